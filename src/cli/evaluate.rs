@@ -4,10 +4,10 @@ use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
 use super::setup::read_store;
 use super::terminal::{say, say_json, table, warn};
-use palpate_lab::study::{Comparison, ComparisonRow, Controls, in_table_order};
+use palpate_lab::study::{Comparison, ComparisonRow, Controls, compare, in_table_order};
 use palpate_learn::evaluation::StageOneScores;
 use palpate_learn::metrics::Interval;
-use palpate_learn::{METHODS, Method, Model, StopRule};
+use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan, StopRule};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -16,6 +16,8 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   palpate evaluate --store set.sqlite --quick
+  palpate evaluate --preset B --split 40/40/20 --repeats 5
+  palpate evaluate --collection mine --models svm,random-forest --split folds:10
   palpate evaluate --models macro-layer,random-forest --controls
   palpate evaluate --models mine.safetensors --test-trials 100 --json
 
@@ -26,9 +28,17 @@ pub(super) struct EvaluateArguments {
     models: Vec<String>,
     #[command(flatten)]
     data: DataArguments,
-    /// Train on the first N trials of each object, test on the others.
-    #[arg(long, value_name = "N", default_value_t = 50)]
-    train_trials: usize,
+    /// Split into training and test trials: 40/40/20 (shares; the second for stage two), folds:5 (cross-validation),
+    /// first:50 or first:50:100 (the oldest of each object for training, those after them for testing), or
+    /// leave-a-pose-out (default: first:50 where there are more, else folds:5).
+    #[arg(long, value_name = "PLAN", conflicts_with_all = ["train_trials", "test_trials"])]
+    split: Option<SplitPlan>,
+    /// Repeat a random split N times, each with new draws.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    repeats: u16,
+    /// Train on the first N trials of each object, test on the others; short for --split first:N.
+    #[arg(long, value_name = "N")]
+    train_trials: Option<usize>,
     /// Test on at most N trials of each object.
     #[arg(long, value_name = "N")]
     test_trials: Option<usize>,
@@ -46,6 +56,9 @@ pub(super) struct EvaluateArguments {
     json: bool,
 }
 
+/// Training trials of each object where no split is asked for.
+const TRAIN_TRIALS: usize = 50;
+
 /// Output of `--json --controls`.
 #[derive(Serialize)]
 struct ReportWithControls {
@@ -58,51 +71,116 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     let models = paths.iter().map(|path| Ok((path.as_str(), Model::load(Path::new(path))?)));
     let models: Vec<(&str, Model)> = models.collect::<Result<_, Failure>>()?;
     let store = read_store(store)?;
-    // A saved model is tested on all trials: only the user knows which of them it was trained on.
-    let train_trials = if methods.is_empty() { 0 } else { arguments.train_trials };
-    let most = arguments.test_trials.map(|test| train_trials + test);
-    let data = arguments.data.read(&store, !arguments.with_empty && models.is_empty(), most)?;
-    let (train, test) = data.first_of_each(train_trials);
+    let data =
+        arguments.data.read(&store, !arguments.with_empty && models.is_empty(), arguments.most_of_each(&methods))?;
     for (_, model) in &models {
         model.check_channels(&data.channels)?;
-        if let Some(seen) = model.card.data.collections.iter().find(|c| data.about.collections.contains(c)) {
-            warn(&format!("{} was trained on collection {seen}, so it may have seen these trials", model.card.method));
-        }
     }
+    let plan = arguments.plan(&data);
+    let splits = match methods.is_empty() {
+        true => Vec::new(),
+        false => plan.splits(&data, arguments.data.seed, usize::from(arguments.repeats))?,
+    };
+    let parts: Vec<[Dataset; 2]> =
+        splits.iter().map(|split| [data.part(&split.all_training()), data.part(&split.test)]).collect();
     let interrupted = AtomicBool::new(false);
-    let seed = arguments.data.seed;
-    let stop = StopRule::default();
-    let comparison =
-        Comparison { train: &train, test: &test, seed, quick: arguments.data.quick, stop, interrupted: &interrupted };
+    let comparisons: Vec<Comparison<'_>> =
+        parts.iter().map(|[train, test]| arguments.comparison(train, test, &interrupted)).collect();
     let threads = match arguments.threads {
         Some(threads) => usize::from(threads),
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
-    let bar = progress_bar("training and testing")?;
-    bar.set_length(methods.len() as u64);
-    bar.tick();
-    let rows = comparison.of_methods(&methods, threads, &|_| bar.inc(1));
-    bar.finish_and_clear();
-    let mut rows = if methods.is_empty() { Vec::new() } else { rows? };
+    let mut rows = Vec::new();
+    if !methods.is_empty() {
+        let bar = progress_bar("training and testing")?;
+        bar.set_length((methods.len() * comparisons.len()) as u64);
+        bar.tick();
+        let compared = compare(&comparisons, &methods, threads, &|_, _| bar.inc(1));
+        bar.finish_and_clear();
+        let compared = compared?;
+        rows = compared.rows;
+        for (method, reason) in &compared.left_out {
+            warn(&format!("{method} is left out: {reason}"));
+        }
+    }
+    // A saved model is tested on all trials that it has not learned from; beside methods, on their test trials.
+    let tested: Vec<usize> = match splits.as_slice() {
+        [split] => split.test.clone(),
+        _ => (0..data.examples.len()).collect(),
+    };
+    let nothing = data.part(&[]);
     for (name, model) in &models {
-        let test = test.relabelled(&model.card.labels).ok_or_else(|| {
-            format!("{name} does not know all objects of these trials; select known ones with --objects")
-        })?;
-        let comparison = Comparison { train: &train, test: &test, ..comparison };
+        let unseen = unseen(name, model, &data, &tested)?;
+        let comparison = arguments.comparison(&nothing, &unseen, &interrupted);
         rows.push(comparison.of_fitted(name, model)?);
     }
-    let controls = match methods.first().filter(|_| arguments.controls) {
-        Some(method) => Some(comparison.controls(method)?),
-        None => None,
+    let controls = match (methods.first().filter(|_| arguments.controls), comparisons.first()) {
+        (Some(method), Some(first)) => Some(first.controls(method)?),
+        _ => None,
     };
     match (arguments.json, controls) {
         (true, Some(controls)) => say_json(&ReportWithControls { rows, controls }),
         (true, None) => say_json(&rows),
         (false, controls) => {
-            print(&rows, arguments, &train.about.described(), train.examples.len(), test.examples.len())?;
+            let plan =
+                if splits.is_empty() { "trials that the models have not learned".to_owned() } else { plan.described() };
+            let plan = if splits.len() > 1 { format!("{plan}, {} fits", splits.len()) } else { plan };
+            print(&rows, arguments, &data, &plan)?;
             controls.map_or(Ok(()), |controls| print_controls(&controls))
         }
     }
+}
+
+impl EvaluateArguments {
+    /// Comparison on one split.
+    fn comparison<'a>(&self, train: &'a Dataset, test: &'a Dataset, interrupted: &'a AtomicBool) -> Comparison<'a> {
+        let (seed, quick) = (self.data.seed, self.data.quick);
+        Comparison { train, test, seed, quick, stop: StopRule::default(), interrupted }
+    }
+
+    /// Largest number of trials of each object that the options use.
+    fn most_of_each(&self, methods: &[&Method]) -> Option<usize> {
+        let train = if methods.is_empty() { 0 } else { self.train_trials.unwrap_or(TRAIN_TRIALS) };
+        self.test_trials.map(|test| train + test)
+    }
+
+    /// The plan that was asked for; else the first trials of each object for training, where others are left for testing,
+    /// and cross-validation where there are too few.
+    fn plan(&self, data: &Dataset) -> SplitPlan {
+        if let Some(plan) = &self.split {
+            return plan.clone();
+        }
+        let train = self.train_trials.unwrap_or(TRAIN_TRIALS);
+        let enough = data.by_class().iter().all(|members| members.is_empty() || members.len() > train);
+        if self.train_trials.is_some() || self.test_trials.is_some() || enough {
+            SplitPlan::FirstOfEach { train, test: self.test_trials }
+        } else {
+            SplitPlan::CROSS_VALIDATION
+        }
+    }
+}
+
+/// Test trials that a saved model has not learned from, by its own classes.
+fn unseen(name: &str, model: &Model, data: &Dataset, tested: &[usize]) -> Result<Dataset, Failure> {
+    let card = &model.card;
+    if card.learned.is_empty()
+        && let Some(seen) = card.data.collections.iter().find(|c| data.about.collections.contains(c))
+    {
+        warn(&format!("{name} was trained on collection {seen}, so it may have seen these trials"));
+    }
+    let fresh: Vec<usize> = tested.iter().copied().filter(|k| !card.learned.contains(&data.examples[*k])).collect();
+    let seen = tested.len() - fresh.len();
+    if fresh.is_empty() {
+        return Err(
+            format!("{name} has learned from all of these {seen} trials; collect others with another --seed").into()
+        );
+    }
+    if seen > 0 {
+        warn(&format!("{name}: {seen} trial(s) skipped because it has learned from them"));
+    }
+    data.part(&fresh).relabelled(&card.labels).ok_or_else(|| {
+        format!("{name} does not know all objects of these trials; select known ones with --objects").into()
+    })
 }
 
 /// Splits names into methods and model files.
@@ -121,15 +199,14 @@ fn chosen(names: &[String]) -> Result<(Vec<&'static Method>, Vec<String>), Failu
     Ok((methods?, rest.into_iter().cloned().collect()))
 }
 
-fn print(
-    rows: &[ComparisonRow],
-    arguments: &EvaluateArguments,
-    about: &str,
-    train: usize,
-    test: usize,
-) -> Result<(), Failure> {
+fn print(rows: &[ComparisonRow], arguments: &EvaluateArguments, data: &Dataset, plan: &str) -> Result<(), Failure> {
     let quick = if arguments.data.quick { "; quick training, do not quote" } else { "" };
-    say(format!("{about}; {train} training trials, {test} test trials; seed {}{quick}\n", arguments.data.seed))?;
+    for line in data.about.lines() {
+        say(line)?;
+    }
+    let (trials, seed) = (data.examples.len(), arguments.data.seed);
+    let tested = rows.first().map_or(0, |row| row.evaluation.trials);
+    say(format!("split: {plan}; {trials} trials, {tested} of them tested; seed {seed}{quick}\n"))?;
     let percent = |x: f64| format!("{:.1}", 100.0 * x);
     let cells: Vec<Vec<String>> = rows
         .iter()

@@ -1,24 +1,29 @@
 //! Arguments and helpers shared by `train` and `evaluate`.
 
 use super::Failure;
+use super::origin::OriginFilters;
 use super::setup::SignalArguments;
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_learn::{Dataset, METHODS, Method, method};
-use palpate_store::Store;
+use palpate_lab::datasets::{DatasetQuery, PhysicsVersion, SensorView};
+use palpate_learn::{Dataset, METHODS, Method, counted, method};
+use palpate_store::{CalibrationId, Store};
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::TrialSource;
 
 /// Selection of trials, and how simulated ones are sensed.
 #[derive(Debug, clap::Args)]
 pub(super) struct DataArguments {
-    /// Only trials of this collection; a prefix of its name is enough.
-    #[arg(long, value_name = "NAME")]
-    pub(super) collection: Option<String>,
-    /// Only trials of this gripper: sim (simulated) or serial (real).
-    #[arg(long, value_name = "NAME")]
-    pub(super) rig: Option<TrialSource>,
+    #[command(flatten)]
+    origin: OriginFilters,
+    /// Only simulated trials of this version of the physics, or of an unknown one.
+    #[arg(long, value_name = "N|unknown")]
+    physics: Option<PhysicsVersion>,
+    /// Only trials of a real gripper with these calibrations, by their numbers, separated by commas.
+    #[arg(long, value_name = "N,..", value_delimiter = ',')]
+    calibration: Vec<CalibrationId>,
+    /// Keep trials with flags.
+    #[arg(long)]
+    include_flagged: bool,
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
@@ -45,6 +50,25 @@ impl DataArguments {
         SensorView { sensors: self.sensors, ..self.signals.view() }
     }
 
+    /// The query for the trials.
+    fn query(&self, without_empty: bool, most_of_each: Option<usize>) -> DatasetQuery {
+        let OriginFilters { source, preset, collection, tag, since, until } = self.origin.clone();
+        DatasetQuery {
+            collection,
+            source,
+            preset,
+            since,
+            until,
+            tag,
+            physics: self.physics,
+            calibrations: self.calibration.clone(),
+            include_flagged: self.include_flagged,
+            objects: self.objects.clone(),
+            without_empty,
+            most_of_each,
+        }
+    }
+
     /// Reads the grasps from the store.
     pub(super) fn read(
         &self,
@@ -52,8 +76,7 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let (collection, objects) = (self.collection.clone(), self.objects.clone());
-        let source = DatasetQuery { collection, source: self.rig, objects, without_empty, most_of_each };
+        let source = self.query(without_empty, most_of_each);
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);
@@ -61,13 +84,11 @@ impl DataArguments {
         });
         bar.finish_and_clear();
         let data = data?;
-        if data.about.collections.len() > 1 {
-            let names = data.about.collections.join(", ");
-            warn(&format!("the trials are from several collections ({names}); select one with --collection"));
+        for mixed in &data.about.mixed {
+            warn(&format!("the trials mix {mixed}"));
         }
-        let left_out = data.about.left_out;
-        if left_out > 0 {
-            warn(&format!("{left_out} trial(s) excluded: they diverged, did not converge or did not come to rest"));
+        if data.about.left_out > 0 {
+            warn(&format!("{} trial(s) left out: {}", data.about.left_out, counted(&data.about.left_out_for)));
         }
         Ok(data)
     }

@@ -14,6 +14,7 @@ mod interrupt;
 mod learning;
 mod link;
 mod movie;
+mod origin;
 mod output;
 mod plan;
 mod plot;

@@ -6,8 +6,9 @@ use super::output::check_folder;
 use super::setup::read_store;
 use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::{make_models_folder, models_folder};
-use palpate_lab::study::{SearchRow, search};
-use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model};
+use palpate_lab::study::{Comparison, SearchRow, compare, search};
+use palpate_learn::evaluation::Evaluation;
+use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan, StopRule};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -18,7 +19,8 @@ use std::sync::atomic::AtomicBool;
   palpate train --list
   palpate train ids-lstm --trials 50 --store set.sqlite --out mine.safetensors
   palpate train macro-layer --collection mine --set epochs=50
-  palpate train macro-layer --rig serial
+  palpate train macro-layer --source serial
+  palpate train random-forest --preset B --since today --split folds:5
 
 See also: palpate help recognition")]
 pub(super) struct TrainArguments {
@@ -39,6 +41,9 @@ pub(super) struct TrainArguments {
     /// Print the hyperparameters of the method, then exit.
     #[arg(long)]
     print_settings: bool,
+    /// Also judge the method on these trials by a split, such as folds:5 or 80/20, and write the result on the card.
+    #[arg(long, value_name = "PLAN", conflicts_with_all = ["settings", "search"])]
+    split: Option<SplitPlan>,
     /// Search the method's grid of hyperparameters by cross-validation first, and train with the best.
     #[arg(long)]
     search: bool,
@@ -60,6 +65,7 @@ struct Report<'a> {
     parameters: usize,
     train_cpu_s: f64,
     data: String,
+    query: &'a str,
     search: Option<Vec<SearchRow>>,
 }
 
@@ -87,6 +93,10 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     if let Some(rows) = &search {
         model.card.metrics = serde_json::json!({ "search": rows });
     }
+    let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan)).transpose()?;
+    if let Some((test, evaluation)) = &judged {
+        model.card.metrics = evaluation.metrics(test);
+    }
     let out = arguments.out.clone().unwrap_or_else(|| models_folder().join(format!("{}.safetensors", method.key)));
     if arguments.out.is_none() {
         make_models_folder(&models_folder())?;
@@ -100,6 +110,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         parameters: model.card.parameters,
         train_cpu_s: model.card.train_cpu_s,
         data: data.about.described(),
+        query: &data.about.query,
         search,
     };
     if arguments.json {
@@ -107,9 +118,15 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     }
     say(format!("method      {} ({})", method.title, method.key))?;
     say(format!("data        {} trials: {}", report.trials, report.data))?;
+    say(format!("query       {}", if report.query.is_empty() { "all trials" } else { report.query }))?;
     say(format!("channels    {}", report.channels.join(", ")))?;
     say(format!("parameters  {}", report.parameters))?;
     say(format!("cost        {:.1} s CPU", report.train_cpu_s))?;
+    if let Some((test, evaluation)) = &judged {
+        let [f1, low, high] =
+            [evaluation.f1_macro, evaluation.ci95[0], evaluation.ci95[1]].map(|x| format!("{:.1}", 100.0 * x));
+        say(format!("F1          {f1} percent ({low} to {high}): {test}"))?;
+    }
     if model.card.rejection.is_none() {
         say("unknown     not supported: every grasp is assigned to one of these objects")?;
     }
@@ -147,6 +164,31 @@ fn fitted(
     let model = method.train(data, &fitting);
     bar.finish_and_clear();
     model
+}
+
+/// Judges the method on splits of the data; also says on what.
+fn judged(
+    method: &'static Method,
+    data: &Dataset,
+    arguments: &TrainArguments,
+    plan: &SplitPlan,
+) -> Result<(String, Evaluation), Failure> {
+    let (seed, quick, stop) = (arguments.data.seed, arguments.data.quick, StopRule::default());
+    let splits = plan.splits(data, seed, 1)?;
+    let parts: Vec<[Dataset; 2]> =
+        splits.iter().map(|split| [data.part(&split.all_training()), data.part(&split.test)]).collect();
+    let interrupted = AtomicBool::new(false);
+    let comparisons: Vec<Comparison<'_>> = parts
+        .iter()
+        .map(|[train, test]| Comparison { train, test, seed, quick, stop, interrupted: &interrupted })
+        .collect();
+    let bar = progress_bar("judging")?;
+    bar.set_length(splits.len() as u64);
+    let compared = compare(&comparisons, &[method], 1, &|_, _| bar.inc(1));
+    bar.finish_and_clear();
+    let row = compared?.rows.into_iter().next().ok_or("no test grasps left")?;
+    let trials = row.evaluation.trials;
+    Ok((format!("{}, {trials} trials tested: {}", plan.described(), data.about.lines().join("; ")), row.evaluation))
 }
 
 fn searched(

@@ -103,16 +103,8 @@ fn shuffled_labels_give_chance_level() {
 }
 
 #[test]
-fn no_grasp_is_on_both_sides_of_a_split() {
+fn folds_are_stratified() {
     let data = made_up(10, 6);
-    let (first, rest) = data.first_of_each(7);
-    let ids = |data: &Dataset| data.examples.iter().map(|e| e.id).collect::<std::collections::BTreeSet<i64>>();
-    assert!(ids(&first).is_disjoint(&ids(&rest)));
-    assert_eq!((first.examples.len(), rest.examples.len()), (28, 12));
-    let shares = data.shares(&[0.4, 0.4, 0.2], 1);
-    assert_eq!(shares.iter().map(|s| s.examples.len()).collect::<Vec<_>>(), [16, 16, 8]);
-    let all: std::collections::BTreeSet<i64> = shares.iter().flat_map(ids).collect();
-    assert_eq!(all.len(), 40, "every grasp once");
     let folds = data.folds(4, 2);
     for class in data.by_class() {
         let mut counts = [0; 4];

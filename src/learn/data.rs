@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Readings of one grasp: rows of channels over time.
@@ -117,9 +118,24 @@ pub struct DataCard {
     /// simulations have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signals: Option<String>,
-    /// Number of grasps left out: diverged, not converged, or not calibrated.
+    /// Number of grasps left out.
     #[serde(default)]
     pub left_out: usize,
+    /// The same by reason: not sound, pulled by hand, flagged, copies of other trials, not calibrated.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub left_out_for: BTreeMap<String, usize>,
+    /// Query that chose the grasps: `preset B, since 2026-11-21`; empty for all.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub query: String,
+    /// What grasps of different kinds were mixed without being asked for, and how to choose one kind.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mixed: Vec<String>,
+    /// Version of the physics; `None` unless all simulated grasps have the same one, and where it is unknown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub physics: Option<u32>,
+    /// Numbers of the calibrations of recorded grasps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub calibrations: Vec<i64>,
 }
 
 impl DataCard {
@@ -135,9 +151,24 @@ impl DataCard {
         parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
         parts.extend(self.layout.clone());
         parts.extend(self.signals.as_ref().filter(|own| *own != "parts").map(|own| format!("{own} pressure")));
-        parts.extend((self.left_out > 0).then(|| format!("{} left out as not sound", self.left_out)));
+        parts.extend((self.left_out > 0).then(|| match self.left_out_for.len() {
+            0 => format!("{} left out as not sound", self.left_out),
+            _ => format!("{} left out ({})", self.left_out, counted(&self.left_out_for)),
+        }));
         parts.join(", ")
     }
+
+    /// Lines for the head of a table: the summary, the query, and a warning for each kind of grasps that were mixed.
+    pub fn lines(&self) -> Vec<String> {
+        let query = if self.query.is_empty() { "all trials" } else { &self.query };
+        let mixed = self.mixed.iter().map(|mixed| format!("warning: mixed {mixed}"));
+        [self.described(), format!("query: {query}")].into_iter().chain(mixed).collect()
+    }
+}
+
+/// Counts in a sentence: `2 flagged, 3 not sound`.
+pub fn counted(counts: &BTreeMap<String, usize>) -> String {
+    counts.iter().map(|(reason, count)| format!("{count} {reason}")).collect::<Vec<_>>().join(", ")
 }
 
 /// Labelled grasps with the same channels.
@@ -196,19 +227,8 @@ impl Dataset {
         by_class
     }
 
-    /// Splits off the first `count` grasps of each class; the order of the rest does not depend on `count`.
-    pub fn first_of_each(&self, count: usize) -> (Self, Self) {
-        let (mut first, mut rest) = (Vec::new(), Vec::new());
-        let mut met = vec![0; self.labels.classes.len()];
-        for (k, example) in self.examples.iter().enumerate() {
-            met[example.class] += 1;
-            if met[example.class] <= count { first.push(k) } else { rest.push(k) }
-        }
-        (self.part(&first), self.part(&rest))
-    }
-
     /// Assigns each grasp a random part, 0 to `parts - 1`, stratified by class.
-    pub fn folds(&self, parts: usize, seed: u64) -> Vec<usize> {
+    pub(crate) fn folds(&self, parts: usize, seed: u64) -> Vec<usize> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut fold = vec![0; self.examples.len()];
         // Classes start at different parts, so that parts have equal size.
@@ -219,28 +239,5 @@ impl Dataset {
             }
         }
         fold
-    }
-
-    /// Splits each class into random shares, such as the paper's 40/40/20; the last share takes the remainder.
-    pub fn shares(&self, shares: &[f64], seed: u64) -> Vec<Self> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut parts = vec![Vec::new(); shares.len()];
-        for mut members in self.by_class() {
-            members.shuffle(&mut random);
-            let (total, mut from, mut sum) = (members.len() as f64, 0, 0.0);
-            for (k, (share, part)) in shares.iter().zip(&mut parts).enumerate() {
-                sum += share;
-                let to = if k + 1 == shares.len() { members.len() } else { (total * sum).round() as usize };
-                part.extend_from_slice(&members[from..to.clamp(from, members.len())]);
-                from = to.clamp(from, members.len());
-            }
-        }
-        parts
-            .into_iter()
-            .map(|mut part| {
-                part.sort_unstable();
-                self.part(&part)
-            })
-            .collect()
     }
 }

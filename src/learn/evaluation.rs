@@ -5,10 +5,12 @@ use crate::data::{Class, Dataset, Example};
 use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, Scores};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
+use crate::split::chains;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Verdicts of a recogniser on the grasps of a data set, one by one.
 #[derive(Clone, Debug)]
@@ -56,6 +58,23 @@ pub struct Evaluation {
     pub confusion: Confusion,
 }
 
+impl Evaluation {
+    /// Results for the card of a model; `test` says on what they were measured.
+    pub fn metrics(&self, test: &str) -> serde_json::Value {
+        serde_json::json!({
+            "test": test,
+            "trials": self.trials,
+            "f1_macro": self.f1_macro,
+            "ci95": self.ci95,
+            "macro_accuracy": self.macro_accuracy,
+            "f1_by_grasps": self.f1_by_grasps,
+            "stage_one": self.stage_one,
+            "ece": self.ece,
+            "stopping": self.stopping,
+        })
+    }
+}
+
 /// Macro F1 of stage one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StageOneScores {
@@ -101,12 +120,21 @@ pub struct Round {
     pub belief: Belief,
 }
 
-/// Draws for each test grasp others of the same object to follow it, as indices; the same for every recogniser.
+/// Finds for each test grasp those of the same object that follow it, as indices; the same for every recogniser. Where
+/// objects stayed as released, these are the grasps that were made next, until the object was placed anew; where it was
+/// placed anew for every grasp, they are drawn at random.
 fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let by_class = data.by_class();
+    let chains: Vec<Vec<Vec<usize>>> = by_class.iter().map(|members| chains(data, members)).collect();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut after = |(first, example): (usize, &Example)| {
-        let mut others: Vec<usize> = by_class[example.class].iter().copied().filter(|k| *k != first).collect();
+        let members = &by_class[example.class];
+        if members.iter().any(|k| data.examples[*k].after.is_some()) {
+            let chain = chains[example.class].iter().find(|chain| chain.contains(&first));
+            let rest = chain.map_or(&[][..], |chain| chain);
+            return rest.iter().copied().skip_while(|k| *k != first).take(MOST_GRASPS).collect();
+        }
+        let mut others: Vec<usize> = members.iter().copied().filter(|k| *k != first).collect();
         others.shuffle(&mut random);
         std::iter::once(first).chain(others).take(MOST_GRASPS).collect()
     };
@@ -137,14 +165,23 @@ fn followed(data: &Dataset, answers: &Answers, seed: u64, next: impl Fn(&Pmf, us
     successions(data, seed).into_iter().map(follow).collect()
 }
 
-/// Computes the macro F1 after each number of grasps, over the classes that occur.
+/// Largest number of successive grasps that at least one round of each class reaches.
+pub fn most_grasps(rounds: &[Round]) -> usize {
+    let mut of_class: BTreeMap<usize, usize> = BTreeMap::new();
+    for round in rounds {
+        let most = of_class.entry(round.truth).or_default();
+        *most = (*most).max(round.belief.grasps());
+    }
+    of_class.into_values().min().unwrap_or(0)
+}
+
+/// Computes the macro F1 after each number of grasps, over the classes that occur and the rounds that are long enough.
 pub fn f1_by_grasps(classes: usize, rounds: &[Round]) -> Vec<f64> {
     let of = |grasps: usize| {
         let pairs = rounds.iter().filter_map(|r| Some((r.truth, Some(r.belief.steps().get(grasps)?.top().0))));
         Confusion::from_pairs(classes, pairs).and_then(|c| f1_over_occurring(&c)).unwrap_or(0.0)
     };
-    let most = rounds.iter().map(|r| r.belief.grasps()).min().unwrap_or(0);
-    (0..most).map(of).collect()
+    (0..most_grasps(rounds)).map(of).collect()
 }
 
 /// Macro F1 over the classes with trials.
@@ -166,6 +203,35 @@ pub fn evaluate(
     stop: StopRule,
     bootstrap: &Bootstrap,
 ) -> Option<Evaluation> {
+    evaluate_stopped(data, answers, rounds, &stops(recogniser, rounds, stop), stop, bootstrap)
+}
+
+/// Indices of the test grasps of each trial, which may have been tested several times, in different splits; and the class
+/// of each trial.
+fn trials(data: &Dataset) -> (Vec<Vec<usize>>, Vec<usize>) {
+    let mut at: BTreeMap<(i64, usize), usize> = BTreeMap::new();
+    let (mut of_trial, mut truth): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (k, example) in data.examples.iter().enumerate() {
+        let trial = *at.entry((example.id, example.class)).or_insert_with(|| {
+            of_trial.push(Vec::new());
+            truth.push(example.class);
+            of_trial.len() - 1
+        });
+        of_trial[trial].push(k);
+    }
+    (of_trial, truth)
+}
+
+/// The same for answers of several recognisers, each tested on its own split: `data` holds the test grasps of all splits,
+/// one after the other. The interval is over trials, however often each was tested.
+pub fn evaluate_stopped(
+    data: &Dataset,
+    answers: &Answers,
+    rounds: &[Round],
+    stops: &[Stop],
+    stop: StopRule,
+    bootstrap: &Bootstrap,
+) -> Option<Evaluation> {
     let classes = data.labels.classes.len();
     let truth = &answers.truth;
     let decided: Vec<Option<usize>> = answers.verdicts.iter().map(|v| Some(v.pmf.top().0)).collect();
@@ -173,11 +239,12 @@ pub fn evaluate(
     let scores = scores_over_occurring(&confusion)?;
     let probabilities: Vec<Vec<f64>> = answers.verdicts.iter().map(|v| v.pmf.probabilities().to_vec()).collect();
     let forecasts = Forecasts::new(truth, &probabilities)?;
+    let (of_trial, truth_of_trial) = trials(data);
     let of_trials = |trials: &[usize]| {
-        let pairs = trials.iter().map(|k| (truth[*k], decided[*k]));
-        f1_over_occurring(&Confusion::from_pairs(classes, pairs)?)
+        let tests = trials.iter().flat_map(|trial| &of_trial[*trial]);
+        f1_over_occurring(&Confusion::from_pairs(classes, tests.map(|k| (truth[*k], decided[*k])))?)
     };
-    let Interval { low, high, .. } = bootstrap.interval(truth, of_trials)?;
+    let Interval { low, high, .. } = bootstrap.interval(&truth_of_trial, of_trials)?;
     let confident = forecasts.confident(stop.threshold);
     Some(Evaluation {
         macro_accuracy: scores.macro_accuracy,
@@ -191,9 +258,9 @@ pub fn evaluate(
         confident: confident.share,
         stage_one: stage_one(data, &answers.verdicts),
         f1_by_grasps: f1_by_grasps(classes, rounds),
-        stopping: stopping(recogniser, rounds, stop),
+        stopping: stopping(stops),
         step_us: answers.step_us,
-        trials: truth.len(),
+        trials: of_trial.len(),
         confusion,
     })
 }
@@ -212,29 +279,35 @@ fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
     })
 }
 
-fn stopping(recogniser: &dyn Recogniser, rounds: &[Round], stop: StopRule) -> Stopping {
-    let (mut grasps, mut sure, mut sure_wrong, mut unknown, mut right) = (0, 0, 0, 0, 0);
-    for round in rounds {
-        let (belief, reason) = stopped(&round.belief, recogniser, stop);
+/// End of a round by the stop rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stop {
+    grasps: usize,
+    reason: StopReason,
+    correct: bool,
+}
+
+/// Stops each round as the rule says.
+pub fn stops(recogniser: &dyn Recogniser, rounds: &[Round], rule: StopRule) -> Vec<Stop> {
+    let stop = |round: &Round| {
+        let (belief, reason) = stopped(&round.belief, recogniser, rule);
         let correct = belief.now().is_some_and(|pmf| pmf.top().0 == round.truth);
-        grasps += belief.grasps();
-        match reason {
-            StopReason::Unknown => unknown += 1,
-            StopReason::Sure => {
-                sure += 1;
-                sure_wrong += usize::from(!correct);
-            }
-            StopReason::GraspLimit => {}
-        }
-        right += usize::from(correct && reason != StopReason::Unknown);
-    }
-    let share = |count: usize| count as f64 / rounds.len().max(1) as f64;
+        Stop { grasps: belief.grasps(), reason, correct }
+    };
+    rounds.iter().map(stop).collect()
+}
+
+fn stopping(stops: &[Stop]) -> Stopping {
+    let count = |is: &dyn Fn(&Stop) -> bool| stops.iter().filter(|stop| is(stop)).count();
+    let share = |count: usize| count as f64 / stops.len().max(1) as f64;
+    let sure = count(&|stop| stop.reason == StopReason::Sure);
+    let sure_wrong = count(&|stop| stop.reason == StopReason::Sure && !stop.correct);
     Stopping {
-        mean_grasps: share(grasps),
+        mean_grasps: share(stops.iter().map(|stop| stop.grasps).sum()),
         sure: share(sure),
         sure_wrong: (sure > 0).then(|| sure_wrong as f64 / sure as f64),
-        unknown: share(unknown),
-        accuracy: share(right),
+        unknown: share(count(&|stop| stop.reason == StopReason::Unknown)),
+        accuracy: share(count(&|stop| stop.correct && stop.reason != StopReason::Unknown)),
     }
 }
 

@@ -15,7 +15,7 @@
 //! | 0 | `temperature` | temperature that calibrates probabilities |
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
-//! | 1 | `split` | splits into training and test trials |
+//! | 1 | `split`, `learned` | splits into training and test trials; the grasps that a model learned |
 //! | 1 | `features` | a grasp as a row of features |
 //! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `recogniser` | the interface of recognisers |
@@ -65,6 +65,7 @@ pub mod evaluation;
 mod features;
 mod fitting;
 mod forest;
+mod learned;
 mod methods;
 pub mod metrics;
 mod mirror;
@@ -79,12 +80,13 @@ mod temperature;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use belief::{Belief, Rejection, StopReason, StopRule};
-pub use data::{Class, DataCard, Dataset, Example, Labels, Sequence};
+pub use data::{Class, DataCard, Dataset, Example, Labels, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
+pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use model::{LoadError, Model, ModelCard, ModelError};
 pub use model_file::shipped_model;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};
-pub use split::{Split, SplitError, SplitPlan};
+pub use split::{Split, SplitError, SplitPlan, check_apart};

@@ -5,6 +5,7 @@ use crate::baselines::{Candle, Convolution, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
 use crate::data::Dataset;
 use crate::fitting::{Fitting, LearnError};
+use crate::learned::LearnedGrasps;
 use crate::model::{LoadError, Model, ModelCard};
 use crate::network::{self, Recipe};
 use crate::recogniser::Recogniser;
@@ -128,6 +129,7 @@ impl Method {
             channels: data.channels.clone(),
             labels: data.labels.clone(),
             data: data.about.clone(),
+            learned: LearnedGrasps::of(data),
             settings: recogniser.settings(),
             fingerprint: Some(self.fingerprint()),
             deviations: recipe.map(|recipe| recipe.deviations()).unwrap_or_default(),

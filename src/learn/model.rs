@@ -4,6 +4,7 @@ use crate::arrays::ArrayError;
 use crate::belief::{Rejection, StopRule};
 use crate::data::{DataCard, Labels};
 use crate::fitting::LearnError;
+use crate::learned::LearnedGrasps;
 use crate::recogniser::Recogniser;
 use crate::signatures::Signatures;
 use serde::de::DeserializeOwned;
@@ -25,6 +26,9 @@ pub struct ModelCard {
     pub labels: Labels,
     /// Training data.
     pub data: DataCard,
+    /// Grasps that it learned from.
+    #[serde(default, skip_serializing_if = "LearnedGrasps::is_empty")]
+    pub learned: LearnedGrasps,
     /// Settings chosen or found while fitting.
     pub settings: serde_json::Value,
     /// Fingerprint of the method that made it, [`crate::Method::fingerprint`]; absent in files of older versions.

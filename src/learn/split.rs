@@ -1,7 +1,8 @@
 //! Splits of a data set into training and test trials.
 //!
 //! A [`SplitPlan`] is stratified: it divides each class by itself. Trials with equal [`Example::content`] are one grasp,
-//! of which only the first trial takes part, so that no recogniser is tested on a grasp that it has learned.
+//! of which only the first trial takes part, so that no recogniser is tested on a grasp that it has learned. Random plans
+//! keep grasps that follow each other on one object ([`Example::after`]) on one side: their poses resemble each other.
 //!
 //! ```
 //! use palpate_learn::{Class, Dataset, Example, Labels, SplitPlan};
@@ -106,19 +107,24 @@ pub enum SplitPlan {
     LeavePoseOut,
 }
 
+/// Refuses a test with grasps of the training.
+pub fn check_apart<'a>(
+    train: impl IntoIterator<Item = &'a Example>,
+    test: impl IntoIterator<Item = &'a Example>,
+) -> Result<(), SplitError> {
+    let learned: BTreeMap<u64, i64> = train.into_iter().map(|example| (example.content, example.id)).collect();
+    let shared = |test: &Example| Some((*learned.get(&test.content)?, test.id));
+    match test.into_iter().find_map(shared) {
+        Some((first, other)) => Err(SplitError::Duplicate { first, other }),
+        None => Ok(()),
+    }
+}
+
 impl Split {
     /// Refuses a split with the same grasp for training and for testing.
     pub fn check(&self, data: &Dataset) -> Result<(), SplitError> {
-        let learned = self.train.iter().chain(&self.second).map(|&k| &data.examples[k]);
-        let learned: BTreeMap<u64, i64> = learned.map(|example| (example.content, example.id)).collect();
-        let shared = |k: &usize| {
-            let test = &data.examples[*k];
-            Some((*learned.get(&test.content)?, test.id))
-        };
-        match self.test.iter().find_map(shared) {
-            Some((first, other)) => Err(SplitError::Duplicate { first, other }),
-            None => Ok(()),
-        }
+        let of = |part: &[usize]| part.iter().map(|&k| &data.examples[k]).collect::<Vec<_>>();
+        check_apart(of(&self.all_training()), of(&self.test))
     }
 
     /// The same test with at most this many training trials of each class (in each of both shares), for learning curves:
@@ -150,10 +156,11 @@ impl SplitPlan {
     /// the seed, once.
     pub fn splits(&self, data: &Dataset, seed: u64, repeats: usize) -> Result<Vec<Split>, SplitError> {
         let grasps = different_grasps(data, self.needed())?;
+        let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| chains(data, members)).collect();
         let mut draws = (0..repeats.max(1) as u64).map(|repeat| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             random.set_stream(repeat);
-            let mut drawn = grasps.clone();
+            let mut drawn = successions.clone();
             drawn.iter_mut().for_each(|members| members.shuffle(&mut random));
             drawn
         });
@@ -267,33 +274,60 @@ fn checked(shares: [f64; 3]) -> Result<(), SplitError> {
     if valid { Ok(()) } else { Err(SplitError::Shares) }
 }
 
-fn by_shares(drawn: &[Vec<usize>], shares: [f64; 3]) -> Result<Split, SplitError> {
+/// Each class as successions of grasps of one object, in a random order.
+type Drawn = [Vec<Vec<usize>>];
+
+/// Grasps of one class as successions: each follows the one before it while the object stays as released. A grasp that
+/// follows none begins its own.
+pub(crate) fn chains(data: &Dataset, members: &[usize]) -> Vec<Vec<usize>> {
+    let mut ends: BTreeMap<i64, usize> = BTreeMap::new();
+    let mut chains: Vec<Vec<usize>> = Vec::new();
+    for &k in members {
+        let example = &data.examples[k];
+        let chain = example.after.and_then(|before| ends.remove(&before)).unwrap_or_else(|| {
+            chains.push(Vec::new());
+            chains.len() - 1
+        });
+        chains[chain].push(k);
+        ends.insert(example.id, chain);
+    }
+    chains
+}
+
+fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
     checked(shares)?;
     let mut split = Split::default();
-    for members in drawn.iter().filter(|members| !members.is_empty()) {
-        // Each share that is not empty gets at least one trial.
+    for class in drawn.iter().filter(|class| !class.is_empty()) {
+        // Each share that is not empty gets at least one grasp.
         let least = shares.map(|share| usize::from(share > 0.0));
-        let count = members.len();
+        let count: usize = class.iter().map(Vec::len).sum();
         let rounded = |sum: f64| (count as f64 * sum).round() as usize;
         let first = rounded(shares[0]).clamp(least[0], count - least[1] - least[2]);
         let second = rounded(shares[0] + shares[1]).clamp(first + least[1], count - least[2]);
-        split.train.extend_from_slice(&members[..first]);
-        split.second.extend_from_slice(&members[first..second]);
-        split.test.extend_from_slice(&members[second..]);
+        let mut taken = 0;
+        for chain in class {
+            let part = match taken {
+                taken if taken < first => &mut split.train,
+                taken if taken < second => &mut split.second,
+                _ => &mut split.test,
+            };
+            part.extend_from_slice(chain);
+            taken += chain.len();
+        }
     }
     split.test.sort_unstable();
     Ok(split)
 }
 
-fn by_folds(drawn: &[Vec<usize>], folds: usize) -> Result<Vec<Split>, SplitError> {
+fn by_folds(drawn: &Drawn, folds: usize) -> Result<Vec<Split>, SplitError> {
     if folds < 2 {
         return Err(SplitError::Folds);
     }
     let mut splits = vec![Split::default(); folds];
     // Each class goes on where the one before ended, so that folds have equal size.
-    for (n, k) in drawn.iter().flatten().enumerate() {
+    for (n, chain) in drawn.iter().flatten().enumerate() {
         for (fold, split) in splits.iter_mut().enumerate() {
-            if n % folds == fold { split.test.push(*k) } else { split.train.push(*k) }
+            if n % folds == fold { &mut split.test } else { &mut split.train }.extend_from_slice(chain);
         }
     }
     splits.retain(|split| !split.test.is_empty());
@@ -469,6 +503,26 @@ mod tests {
         for plan in plans() {
             let refused = plan.splits(&copies, 1, 1).unwrap_err();
             assert!(refused.to_string().contains("1 different grasp(s) in 6 trial(s)"), "{plan}: {refused}");
+        }
+    }
+
+    #[test]
+    fn grasps_that_follow_each_other_stay_on_one_side() {
+        let mut followed = data(40);
+        for k in 2..80 {
+            // Successions of four grasps of the same class.
+            followed.examples[k].after = (k / 2 % 4 != 0).then(|| followed.examples[k - 2].id);
+        }
+        for plan in ["40/40/20", "folds:4"] {
+            for split in plan.parse::<SplitPlan>().unwrap().splits(&followed, 3, 2).unwrap() {
+                for part in [&split.train, &split.second, &split.test] {
+                    let whole =
+                        |k: &usize| (0..80).filter(|o| o % 2 == k % 2 && o / 8 == k / 8).all(|o| part.contains(&o));
+                    assert!(part.iter().all(whole), "{plan}");
+                }
+                assert_eq!(split.train.len() + split.second.len() + split.test.len(), 80);
+                assert!((16..=24).contains(&split.test.len()), "{plan}: {:?}", split.test);
+            }
         }
     }
 

@@ -38,6 +38,11 @@ pub struct TrialRow {
     /// Identity of a simulated grasp.
     #[serde(skip)]
     pub identity: Option<String>,
+    /// Older trial that holds the same grasp.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duplicate_of: Option<TrialId>,
+    /// A recogniser asked for it after earlier grasps of the same object, which stayed in between.
+    pub follows: bool,
     /// The object of a simulated trial was pulled by hand, which its scene does not repeat.
     pub pulled: bool,
     /// Preset of poses that a simulated trial was drawn from.
@@ -89,7 +94,8 @@ const ROWS: &str =
     origin, identity,
     CASE WHEN identity IS NOT NULL AND state = 'complete' THEN (SELECT min(first.id) FROM trials AS first
         WHERE first.identity = trials.identity AND first.state = 'complete' AND first.deleted IS NULL
-        AND first.id < trials.id) END
+        AND first.id < trials.id) END,
+    rig = 'serial' AND earlier IS NOT NULL
     FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id";
 
 /// Reads rows; presets are looked up once per text.
@@ -109,7 +115,8 @@ impl RowReader {
         let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
         let object: String = row.get(4)?;
         let mut flags = flaws(json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default()), Some(&object));
-        flags.extend(row.get::<_, Option<TrialId>>(23)?.map(|first| FlagRemark {
+        let duplicate_of = row.get::<_, Option<TrialId>>(23)?;
+        flags.extend(duplicate_of.map(|first| FlagRemark {
             flag: Flag::Duplicate,
             remark: format!("the same grasp as trial {first}; data sets use that one"),
         }));
@@ -138,6 +145,8 @@ impl RowReader {
             also_in: json_or_default(&row.get::<_, String>(20)?),
             physics: origin.map(|origin| origin.physics),
             identity: row.get(22)?,
+            duplicate_of,
+            follows: row.get(24)?,
             pulled,
             deleted: row.get(9)?,
             object,

@@ -76,16 +76,10 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
         Comparison { train: &train, test: &objects, seed: 1, quick: false, stop, interrupted: &interrupted };
     let row = comparison.of_fitted(METHOD, &model)?;
     let halfway = prefix_calibration(model.recogniser.as_ref(), &objects, 0.5);
-    model.card.metrics = serde_json::json!({
-        "test": format!("{} further grasps of the sixteen: {}", objects.examples.len(), objects.about.described()),
-        "f1_macro": row.evaluation.f1_macro,
-        "ci95": row.evaluation.ci95,
-        "f1_by_grasps": row.evaluation.f1_by_grasps,
-        "stage_one": row.evaluation.stage_one,
-        "ece": row.evaluation.ece,
-        "ece_halfway": halfway,
-        "stopping": row.evaluation.stopping,
-    });
+    let test =
+        format!("{} further grasps of the sixteen: {}", objects.examples.len(), objects.about.lines().join("; "));
+    model.card.metrics = row.evaluation.metrics(&test);
+    model.card.metrics["ece_halfway"] = serde_json::json!(halfway);
     // How long it took depends on the machine, and the file should not.
     model.card.train_cpu_s = 0.0;
     let path = out.join(FILE);

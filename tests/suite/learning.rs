@@ -23,6 +23,8 @@ fn csv(at: &Path, name: &str, trials: usize, labels: &[&str], properties: bool) 
         for k in 0..60 {
             let t = f64::from(k) * 0.02;
             let press = (t - 0.3).max(0.0) * (1.0 + kind as f64 * 2.0) + 0.01 * ((trial * 7 + k as usize) % 5) as f64;
+            // No two grasps are the same.
+            let press = press + 0.001 * trial as f64;
             writeln!(text, "{trial},{},{words}{t:.2},{press:.4},{:.4}", labels[kind], t * 3.0).unwrap();
         }
     }
@@ -64,7 +66,7 @@ fn from_nothing_to_a_table_and_a_model() {
     let sum: f64 = said["together"]["pmf"].as_object().unwrap().values().map(|p| p.as_f64().unwrap()).sum();
     assert!((sum - 1.0).abs() < 1e-9 && said["trials"][1]["stage_one"]["size"].is_string());
     let judged = json(at, &["evaluate", "--models", "models/own.safetensors", "--json"]);
-    assert_eq!(judged[0]["trials"], 56);
+    assert_eq!(judged[0]["trials"], 56 - 32, "trials that it has learned from are skipped");
 
     // A model made for other sensors is refused by their names; one cut short is refused, and the store is unharmed.
     let other = json(at, &["train", "macro-layer", "--quick", "--layout", "C2", "--out", "c2.safetensors", "--json"]);

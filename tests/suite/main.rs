@@ -14,6 +14,7 @@
 //! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `library`: all trials found and changed, in the window and on the command line.
+//! - `datasets`: each grasp once, nothing mixed in silence, few and foreign trials judged.
 //! - `learning`: collect, train, evaluate, recognise, and anybody's data.
 //! - `calibration`: the emulated gripper calibrated and fitted.
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
@@ -41,6 +42,7 @@ mod bench;
 mod calibration;
 mod command_line;
 mod cpu_renderer;
+mod datasets;
 mod desk;
 mod determinism;
 mod emulator;

@@ -17,6 +17,7 @@ pub(crate) fn model() -> Arc<Model> {
         channels: channels.collect(),
         labels: labels_of_catalogue(),
         data: DataCard { layout: Some("C1+F".to_owned()), ..DataCard::default() },
+        learned: Default::default(),
         settings: serde_json::Value::Null,
         fingerprint: None,
         deviations: Vec::new(),

@@ -1,11 +1,11 @@
 //! Which trials a command is about: numbers, and the filters of the library.
 
 use super::super::Failure;
+use super::super::origin::OriginFilters;
 use super::super::terminal::note;
-use palpate_sim::scene::PRESETS;
 use palpate_store::labels::Flag;
-use palpate_store::{Day, Library, Shown, Store, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
@@ -22,40 +22,24 @@ pub(super) struct Filters {
     /// Without a label.
     #[arg(long)]
     unlabelled: bool,
-    /// Origin: sim, serial or import.
-    #[arg(long, value_name = "NAME")]
-    source: Option<TrialSource>,
-    /// With this tag.
-    #[arg(long, value_name = "TAG")]
-    tag: Option<String>,
+    #[command(flatten)]
+    origin: OriginFilters,
     /// With this flag: no-contact, saturated, interrupted, cadence or duplicate.
     #[arg(long, value_name = "FLAG")]
     flag: Option<Flag>,
     /// Quality: sound, warned or unsound.
     #[arg(long, value_name = "NAME")]
     quality: Option<TrialQuality>,
-    /// Preset of poses of simulated trials: A, M, B or C.
-    #[arg(long, value_name = "A|M|B|C", value_parser = PRESETS.map(|preset| preset.name), ignore_case = true)]
-    preset: Option<String>,
     /// Text in the names of the parts or channels.
     #[arg(long, value_name = "TEXT")]
     sensors: Option<String>,
-    /// Data set that they belong to.
-    #[arg(long, value_name = "NAME")]
-    collection: Option<String>,
-    /// From this day on: today, yesterday, days ago as 7d, or a date as 2026-11-21.
-    #[arg(long, value_name = "DAY")]
-    since: Option<Day>,
-    /// Up to and with this day.
-    #[arg(long, value_name = "DAY")]
-    until: Option<Day>,
 }
 
 impl Filters {
     /// The query for the library, oldest first.
     pub(super) fn query(&self, shown: Shown) -> TrialQuery {
-        let Self { search, object, unlabelled, source, tag, flag, quality, preset, sensors, collection, since, until } =
-            self.clone();
+        let Self { search, object, unlabelled, origin, flag, quality, sensors } = self.clone();
+        let OriginFilters { source, preset, collection, tag, since, until } = origin;
         TrialQuery {
             search: search.unwrap_or_default(),
             object,

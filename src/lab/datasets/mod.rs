@@ -1,10 +1,13 @@
 //! Data sets from the store, and the folder of trained models.
 
+mod origin;
 mod query;
+mod reading;
 mod saved_models;
 
 pub(crate) use query::noise_seed;
 pub use query::{
-    DatasetError, DatasetQuery, SensorView, TrialSignals, labels_of_catalogue, sequence_of, trial_signals,
+    DatasetError, DatasetQuery, NoPhysicsVersion, PhysicsVersion, SensorView, TrialSignals, labels_of_catalogue,
+    sequence_of, trial_signals,
 };
 pub use saved_models::{SavedModel, make_models_folder, models_folder, new_model_path, saved_models};

@@ -1,16 +1,15 @@
 //! Data sets from the store: a query for trials, and the sensors through which simulated trials are read.
 
-use palpate_learn::{Class, DataCard, Dataset, Example, Labels, ModelCard, Sequence};
+use super::origin::TrialOrigin;
+use palpate_learn::{Class, Labels, ModelCard, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_sim::scene::{Between, PRESETS, PoseSpread};
-use palpate_store::{Store, StoreError, TrialRow};
+use palpate_store::{CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Sensors, SignalDefinition, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// Sensors through which simulated trials are read. Imported trials have their own channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,12 +55,51 @@ pub struct DatasetQuery {
     pub collection: Option<String>,
     /// Only trials of this source.
     pub source: Option<TrialSource>,
+    /// Only simulated trials of this pose preset.
+    pub preset: Option<String>,
+    /// Only trials begun on this day or later.
+    pub since: Option<Day>,
+    /// Only trials begun on this day or earlier.
+    pub until: Option<Day>,
+    /// Only trials with this tag.
+    pub tag: Option<String>,
+    /// Only simulated trials of this version of the physics.
+    pub physics: Option<PhysicsVersion>,
+    /// Only trials of a real gripper that these calibrations serve; all where the list is empty.
+    pub calibrations: Vec<CalibrationId>,
+    /// True to keep trials with flags.
+    pub include_flagged: bool,
     /// Only these objects; all where the list is empty.
     pub objects: Vec<String>,
     /// True to leave out the empty hand, which is never confused with an object and would raise mean scores.
     pub without_empty: bool,
     /// Largest number of trials of each object, oldest first.
     pub most_of_each: Option<usize>,
+}
+
+/// Version of the physics that made a trial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhysicsVersion {
+    /// A known one.
+    Known(u32),
+    /// That of trials of early versions of the program, which stored none.
+    Unknown,
+}
+
+/// A text that names no [`PhysicsVersion`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("write a number, as `palpate trials show` prints it, or unknown")]
+pub struct NoPhysicsVersion;
+
+impl std::str::FromStr for PhysicsVersion {
+    type Err = NoPhysicsVersion;
+
+    fn from_str(text: &str) -> Result<Self, NoPhysicsVersion> {
+        match text {
+            "unknown" => Ok(Self::Unknown),
+            number => number.parse().map(Self::Known).map_err(|_no_number| NoPhysicsVersion),
+        }
+    }
 }
 
 /// Reason why there is no data set.
@@ -87,14 +125,16 @@ pub enum DatasetError {
     },
     /// Trials match, but none is sound.
     #[error(
-        "no matching trial{about} is usable: {left_out} diverged, did not converge or did not come to rest; \
-         `palpate trials show` says where"
+        "no matching trial{about} is usable: {reasons}; `palpate trials show` says why, --include-flagged keeps flagged \
+         trials"
     )]
     Unsound {
         /// The query.
         about: String,
         /// Matching trials.
         left_out: usize,
+        /// Their numbers by reason.
+        reasons: String,
     },
     /// Trials with different channels.
     #[error(
@@ -159,7 +199,7 @@ pub fn labels_of_catalogue() -> Labels {
 }
 
 /// Labels from class names and, where known, size and shape.
-fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
+pub(super) fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
     // The paper's terms come first, in its order; others follow by name.
     let listed = |known: &[&str], pick: &dyn Fn(&(String, String)) -> String| -> Vec<String> {
         let found: BTreeSet<String> = named.values().flatten().map(pick).collect();
@@ -182,176 +222,69 @@ fn labels(named: &BTreeMap<String, Option<(String, String)>>) -> Labels {
 }
 
 impl DatasetQuery {
-    fn fits(&self, row: &TrialRow) -> bool {
-        let in_collection =
-            |prefix: &String| row.collection.as_ref().is_some_and(|own| own.starts_with(prefix.as_str()));
+    /// The part of it that the library knows.
+    pub(super) fn library_query(&self) -> TrialQuery {
+        TrialQuery {
+            source: self.source,
+            preset: self.preset.clone(),
+            tag: self.tag.clone(),
+            since: self.since.clone(),
+            until: self.until.clone(),
+            order: TrialOrder { column: TrialColumn::Id, descending: false },
+            ..TrialQuery::default()
+        }
+    }
+
+    /// Collection for which a trial is taken: the first that the query names.
+    pub(super) fn collection_of<'a>(&self, row: &'a TrialRow) -> Option<&'a String> {
+        row.collections().find(|own| self.collection.as_ref().is_none_or(|prefix| own.starts_with(prefix.as_str())))
+    }
+
+    /// The part of it that the library does not know.
+    pub(super) fn fits(&self, row: &TrialRow) -> bool {
+        let of_physics = |wanted: PhysicsVersion| {
+            row.source == TrialSource::Simulated
+                && match wanted {
+                    PhysicsVersion::Known(version) => row.physics == Some(version),
+                    PhysicsVersion::Unknown => row.physics.is_none(),
+                }
+        };
         row.state == "complete"
-            && self.collection.as_ref().is_none_or(in_collection)
-            && self.source.is_none_or(|source| source == row.source)
+            && (self.collection.is_none() || self.collection_of(row).is_some())
+            && self.physics.is_none_or(of_physics)
+            && (self.calibrations.is_empty() || row.source == TrialSource::Recorded)
             && (self.objects.is_empty() || self.objects.contains(&row.object))
             && !(self.without_empty && row.object == EMPTY)
     }
 
-    fn described(&self) -> String {
-        let mut about = String::new();
-        if let Some(collection) = &self.collection {
-            about += &format!(" collection {collection}");
-        }
-        if let Some(source) = self.source {
-            about += &format!(" rig {source}");
-        }
-        if !self.objects.is_empty() {
-            about += &format!(" the objects {}", self.objects.join(", "));
-        }
-        about
+    /// The query in words, for tables and cards: `collection 52c1, preset B, since 2026-11-21`. Days are dates.
+    pub fn described(&self, store: &Store) -> String {
+        let date = |day: &Day| day.date(store).unwrap_or_else(|_| day.to_string());
+        let mut parts = Vec::new();
+        parts.extend(self.collection.as_ref().map(|collection| format!("collection {collection}")));
+        parts.extend(self.source.map(|source| format!("source {source}")));
+        parts.extend(self.preset.as_ref().map(|preset| format!("preset {}", preset.to_uppercase())));
+        parts.extend(self.since.as_ref().map(|day| format!("since {}", date(day))));
+        parts.extend(self.until.as_ref().map(|day| format!("until {}", date(day))));
+        parts.extend(self.tag.as_ref().map(|tag| format!("tag {tag}")));
+        parts.extend(self.physics.map(|physics| match physics {
+            PhysicsVersion::Known(version) => format!("physics {version}"),
+            PhysicsVersion::Unknown => "physics unknown".to_owned(),
+        }));
+        let calibrations: Vec<String> = self.calibrations.iter().map(CalibrationId::to_string).collect();
+        parts.extend((!calibrations.is_empty()).then(|| format!("calibrations {}", calibrations.join(" "))));
+        parts.extend((!self.objects.is_empty()).then(|| format!("objects {}", self.objects.join(" "))));
+        parts.extend(self.without_empty.then(|| "without the empty hand".to_owned()));
+        parts.extend(self.most_of_each.map(|most| format!("first {most} of each object")));
+        parts.extend(self.include_flagged.then(|| "with flagged trials".to_owned()));
+        parts.join(", ")
     }
 
-    /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
-    /// rest are left out and counted. `progress` gets the number of trials read and their total.
-    pub fn read(
-        &self,
-        store: &Store,
-        view: &SensorView,
-        progress: &mut dyn FnMut(usize, usize),
-    ) -> Result<Dataset, DatasetError> {
-        view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
-        let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
-        // Unlabelled trials.
-        rows.retain(|row| !row.object.is_empty());
-        self.read_rows(store, &rows, view, progress)
+    /// The query as errors name it: ` (preset B)`; empty for all trials.
+    pub(super) fn about(&self, store: &Store) -> String {
+        let described = self.described(store);
+        if described.is_empty() { described } else { format!(" ({described})") }
     }
-
-    /// Reads one trial, labelled or not, as a data set.
-    pub fn read_trial(&self, store: &Store, id: TrialId, view: &SensorView) -> Result<Dataset, DatasetError> {
-        let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
-        rows.retain(|row| row.id == id);
-        if rows.is_empty() {
-            // Loading returns the reason.
-            store.load(id).map_err(|cause| DatasetError::Store { cause })?;
-        }
-        self.read_rows(store, &rows, view, &mut |_, _| ())
-    }
-
-    fn read_rows(
-        &self,
-        store: &Store,
-        rows: &[TrialRow],
-        view: &SensorView,
-        progress: &mut dyn FnMut(usize, usize),
-    ) -> Result<Dataset, DatasetError> {
-        let mut met: BTreeMap<String, usize> = BTreeMap::new();
-        let mut few_enough = |row: &&TrialRow| {
-            let count = met.entry(row.object.clone()).or_default();
-            *count += 1;
-            self.most_of_each.is_none_or(|most| *count <= most)
-        };
-        let (sound, unsound): (Vec<&TrialRow>, Vec<&TrialRow>) =
-            rows.iter().filter(|row| self.fits(row)).partition(|row| row.sound);
-        let left_out = unsound.len();
-        let rows: Vec<&TrialRow> = sound.into_iter().filter(&mut few_enough).collect();
-        if rows.is_empty() {
-            let about = self.described();
-            return Err(match left_out {
-                0 => DatasetError::Nothing { about },
-                _ => DatasetError::Unsound { about, left_out },
-            });
-        }
-        if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
-            return Err(DatasetError::NoSuchObject { object: object.clone() });
-        }
-        let mut channels: Option<(TrialId, Vec<String>)> = None;
-        let mut named = BTreeMap::new();
-        let mut read = Vec::new();
-        let (mut origins, mut uncalibrated, mut missing) = (BTreeSet::new(), 0, String::new());
-        for (k, row) in rows.iter().enumerate() {
-            progress(k, rows.len());
-            let (TrialSignals { signals, .. }, origin) = match signals_of(store, row.id, row.source, view) {
-                // Skip boards without a calibration, unless it is the only trial.
-                Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
-                    if uncalibrated == 0 {
-                        missing = why;
-                    }
-                    uncalibrated += 1;
-                    continue;
-                }
-                outcome => outcome?,
-            };
-            origins.insert(origin);
-            let (first, known) = channels.get_or_insert_with(|| (row.id, signals.channels.clone()));
-            if *known != signals.channels {
-                return Err(DatasetError::Mixed {
-                    first: *first,
-                    first_channels: known.join(", "),
-                    other: row.id,
-                    other_channels: signals.channels.join(", "),
-                });
-            }
-            named.entry(row.object.clone()).or_insert_with(|| known_properties(row));
-            read.push((row.id, row.object.clone(), sequence_of(&signals)));
-        }
-        let labels = labels(&named);
-        let example = |(id, object, grasp): (TrialId, String, Sequence)| {
-            Some(Example {
-                id,
-                class: labels.class(&object)?,
-                content: grasp.content(),
-                grasp: Arc::new(grasp),
-                ..Example::default()
-            })
-        };
-        if read.is_empty() {
-            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing });
-        }
-        let examples = read.into_iter().filter_map(example).collect();
-        let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
-        let collections: BTreeSet<String> = rows.iter().filter_map(|row| row.collection.clone()).collect();
-        let left_out = left_out + uncalibrated;
-        let about = DataCard { left_out, ..card(&origins, view, collections.into_iter().collect(), rows.len()) };
-        Ok(Dataset { channels, labels, examples, about })
-    }
-}
-
-/// Origin of a trial: simulated with a pose preset and a free or fixed object, or recorded.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Origin {
-    Simulated { preset: Option<&'static str>, fixed: bool },
-    Recorded,
-}
-
-fn card(origins: &BTreeSet<Origin>, view: &SensorView, collections: Vec<String>, grasps: usize) -> DataCard {
-    let simulated: Vec<(Option<&'static str>, bool)> = origins
-        .iter()
-        .filter_map(|origin| match origin {
-            Origin::Simulated { preset, fixed } => Some((*preset, *fixed)),
-            Origin::Recorded => None,
-        })
-        .collect();
-    let preset = simulated.first().and_then(|(preset, _)| *preset).filter(|p| simulated.iter().all(|o| o.0 == Some(p)));
-    let object = match simulated.first() {
-        None => "recorded",
-        Some(first) if simulated.iter().any(|o| o.1 != first.1) => "free and fixed",
-        Some((_, true)) => "fixed",
-        Some((_, false)) => "free",
-    };
-    let seen = !simulated.is_empty();
-    DataCard {
-        collections,
-        preset: preset.map(str::to_owned),
-        object: object.to_owned(),
-        grasps,
-        layout: seen.then(|| view.layout.to_ascii_uppercase()),
-        sensors: seen.then(|| view.sensors.name().to_owned()),
-        signals: seen.then(|| view.signals.name().to_owned()),
-        left_out: 0,
-    }
-}
-
-fn known_properties(row: &TrialRow) -> Option<(String, String)> {
-    let of_catalogue = || {
-        let class = catalogue().iter().find(|b| b.name == row.object)?.class();
-        Some((class.size.name().to_owned(), class.shape.name().to_owned()))
-    };
-    row.properties.clone().or_else(of_catalogue)
 }
 
 /// Signals of one trial, as recognisers read them.
@@ -371,38 +304,48 @@ pub fn trial_signals(
     source: TrialSource,
     view: &SensorView,
 ) -> Result<TrialSignals, DatasetError> {
-    Ok(signals_of(store, id, source, view)?.0)
+    Ok(signals_of(store, id, source, view, &[])?.0)
 }
 
-fn signals_of(
+/// Signals and origin of a trial; a board's by these calibrations, where they fit its parts.
+pub(super) fn signals_of(
     store: &Store,
     id: TrialId,
     source: TrialSource,
     view: &SensorView,
-) -> Result<(TrialSignals, Origin), DatasetError> {
+    calibrations: &[CalibrationId],
+) -> Result<(TrialSignals, TrialOrigin), DatasetError> {
+    let of_board = || {
+        let (signals, used) = board_signals(store, id, view, calibrations)?;
+        Ok((signals, TrialOrigin { calibrations: used, ..TrialOrigin::default() }))
+    };
     if source == TrialSource::Recorded {
-        return Ok((board_signals(store, id, view)?, Origin::Recorded));
+        return of_board();
     }
     let Trial { header, data } = store.load(id).map_err(|cause| DatasetError::Store { cause })?;
     let trial = match data {
         TrialData::Simulated(data) => SimulatedTrial { header, data },
-        TrialData::Imported(signals) => return Ok((TrialSignals { signals, hold_s: None }, Origin::Recorded)),
-        TrialData::Recorded(_) => return Ok((board_signals(store, id, view)?, Origin::Recorded)),
+        TrialData::Imported(signals) => {
+            return Ok((TrialSignals { signals, hold_s: None }, TrialOrigin::default()));
+        }
+        TrialData::Recorded(_) => return of_board(),
     };
-    let scene = &trial.header.scene;
-    let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
-    let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
     let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
     let hold_s = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
-    Ok((TrialSignals { signals, hold_s }, Origin::Simulated { preset, fixed: scene.holds_object() }))
+    Ok((TrialSignals { signals, hold_s }, TrialOrigin::simulated(&trial.header)))
 }
 
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
-fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<TrialSignals, DatasetError> {
+fn board_signals(
+    store: &Store,
+    id: TrialId,
+    view: &SensorView,
+    calibrations: &[CalibrationId],
+) -> Result<(TrialSignals, Vec<CalibrationId>), DatasetError> {
     if view.signals != SignalDefinition::Parts {
         return Err(DatasetError::OnlySimulated { id });
     }
-    let read = store.board_signals(id, &[]).map_err(|cause| DatasetError::Store { cause })?;
+    let read = store.board_signals(id, calibrations).map_err(|cause| DatasetError::Store { cause })?;
     let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
     let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
     let channels =
@@ -414,7 +357,7 @@ fn board_signals(store: &Store, id: TrialId, view: &SensorView) -> Result<TrialS
         why: read.derived.warnings.join("; "),
     })?;
     let hold_s = read.hold_s.map(|hold_s| hold_s - read.closing_s.unwrap_or(0.0));
-    Ok(TrialSignals { signals, hold_s })
+    Ok((TrialSignals { signals, hold_s }, read.serving.ids))
 }
 
 impl SensorView {

@@ -1,9 +1,15 @@
-//! Comparison of methods: all fitted to the same training grasps and evaluated on the same test grasps.
+//! Comparison of methods: all fitted to the same training grasps and evaluated on the same test grasps, in one split of
+//! the data or in several.
 
-use palpate_learn::evaluation::{Answers, Evaluation, Round, answer, evaluate, product_of_experts, rounds};
+use palpate_learn::evaluation::{
+    Answers, Evaluation, Round, Stop, answer, evaluate_stopped, most_grasps, product_of_experts, rounds, stops,
+};
 use palpate_learn::metrics::{Bootstrap, Confusion, Interval, McNemar, holm};
-use palpate_learn::{DataCard, Dataset, Fitting, LearnError, Method, MethodKind, Model, Pmf, StopRule};
+use palpate_learn::{
+    DataCard, Dataset, Fitting, LearnError, Method, MethodKind, Model, Pmf, SplitError, StopRule, check_apart,
+};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -51,6 +57,8 @@ pub struct Difference {
 pub struct Comparison<'a> {
     /// Training set.
     pub train: &'a Dataset,
+    /// Training set of stage two, as in the paper's 40/40/20.
+    pub second: Option<&'a Dataset>,
     /// Test set, disjoint from `train`.
     pub test: &'a Dataset,
     /// Seed of fits and draws.
@@ -63,10 +71,49 @@ pub struct Comparison<'a> {
     pub interrupted: &'a AtomicBool,
 }
 
-/// A method's results before rows are compared.
-struct Judged {
-    row: ComparisonRow,
-    decided: Vec<Option<usize>>,
+/// A method's tests, in one split or several.
+struct Tested {
+    model: String,
+    title: String,
+    /// Test grasps of all splits, one after the other.
+    data: Dataset,
+    answers: Answers,
+    followed: Vec<Round>,
+    independent: Vec<Round>,
+    stops: Vec<Stop>,
+    train_cpu_s: f64,
+    parameters: usize,
+    fingerprint: Option<String>,
+    quick: bool,
+    splits: usize,
+}
+
+impl Tested {
+    /// Adds the tests of another split.
+    fn with(mut self, other: Self) -> Self {
+        let splits = (self.splits + other.splits) as f64;
+        let share = other.splits as f64 / splits;
+        self.data.examples.extend(other.data.examples);
+        self.answers.truth.extend(other.answers.truth);
+        self.answers.verdicts.extend(other.answers.verdicts);
+        self.answers.step_us += share * (other.answers.step_us - self.answers.step_us);
+        self.followed.extend(other.followed);
+        self.independent.extend(other.independent);
+        self.stops.extend(other.stops);
+        self.train_cpu_s += share * (other.train_cpu_s - self.train_cpu_s);
+        self.parameters = self.parameters.max(other.parameters);
+        self.splits += other.splits;
+        self
+    }
+}
+
+/// Rows of a comparison, and the methods that these data cannot train.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Compared {
+    /// Rows, in the order of the methods.
+    pub rows: Vec<ComparisonRow>,
+    /// Key and reason of each method left out.
+    pub left_out: Vec<(&'static str, LearnError)>,
 }
 
 /// Error of a comparison.
@@ -80,47 +127,72 @@ pub enum ComparisonError {
         /// Cause.
         cause: LearnError,
     },
+    /// The same grasp for training and for testing.
+    #[error(transparent)]
+    Split(#[from] SplitError),
     /// No test grasps.
     #[error("no test grasps left: collect more trials, or train on fewer with --train-trials")]
     NoTest,
 }
 
+/// Fits and evaluates methods on several splits in parallel, each fit on one thread; rows are in the order of the methods.
+/// A row holds the tests of all splits. `progress` receives the number of finished fits and of all. Methods that cannot
+/// learn from these data are left out, unless there is no other.
+pub fn compare(
+    splits: &[Comparison<'_>],
+    methods: &[&'static Method],
+    threads: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Compared, ComparisonError> {
+    let Some(first) = splits.first() else { return Err(ComparisonError::NoTest) };
+    for split in splits {
+        split.check()?;
+    }
+    let fits = methods.len() * splits.len();
+    let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let done: Mutex<Vec<Option<Result<Tested, ComparisonError>>>> = Mutex::new((0..fits).map(|_| None).collect());
+    std::thread::scope(|scope| {
+        for _ in 0..threads.clamp(1, fits.max(1)) {
+            scope.spawn(|| {
+                while let Some(n) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|n| *n < fits) {
+                    let tested = splits[n % splits.len()].of_method(methods[n / splits.len()]);
+                    progress(finished.fetch_add(1, Ordering::Relaxed) + 1, fits);
+                    // The lock is poisoned only when another thread has panicked, and then the scope panics too.
+                    if let Ok(mut done) = done.lock() {
+                        done[n] = Some(tested);
+                    }
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_default().into_iter().flatten();
+    let (mut kept, mut left_out, mut refused) = (Vec::new(), Vec::new(), None);
+    for method in methods {
+        let of_splits: Result<Vec<Tested>, _> =
+            done.by_ref().take(splits.len()).collect::<Vec<_>>().into_iter().collect();
+        match of_splits {
+            Ok(tested) => kept.extend(tested.into_iter().reduce(Tested::with)),
+            Err(ComparisonError::Fit { cause, .. }) if cause != LearnError::Stopped => {
+                left_out.push((method.key, cause.clone()));
+                refused.get_or_insert(ComparisonError::Fit { method: method.key, cause });
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    match refused {
+        Some(error) if kept.is_empty() => Err(error),
+        _ => Ok(Compared { rows: first.compared(&kept)?, left_out }),
+    }
+}
+
 impl Comparison<'_> {
-    /// Fits and evaluates methods in parallel, each on one thread; rows are in the order of the methods.
-    /// `progress` receives every finished method.
-    pub fn of_methods(
-        &self,
-        methods: &[&'static Method],
-        threads: usize,
-        progress: &(dyn Fn(&ComparisonRow) + Sync),
-    ) -> Result<Vec<ComparisonRow>, ComparisonError> {
+    /// Refuses a test without grasps, or with grasps of the training.
+    fn check(&self) -> Result<(), ComparisonError> {
         if self.test.examples.is_empty() {
             return Err(ComparisonError::NoTest);
         }
-        let next = AtomicUsize::new(0);
-        let done: Mutex<Vec<Option<Result<Judged, ComparisonError>>>> =
-            Mutex::new((0..methods.len()).map(|_| None).collect());
-        std::thread::scope(|scope| {
-            for _ in 0..threads.clamp(1, methods.len().max(1)) {
-                scope.spawn(|| {
-                    while let Some((n, method)) =
-                        Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|n| Some((n, methods.get(n)?)))
-                    {
-                        let judged = self.of_method(method);
-                        if let Ok(judged) = &judged {
-                            progress(&judged.row);
-                        }
-                        // The lock is poisoned only when another thread has panicked, and then the scope panics too.
-                        if let Ok(mut done) = done.lock() {
-                            done[n] = Some(judged);
-                        }
-                    }
-                });
-            }
-        });
-        let done = done.into_inner().unwrap_or_default();
-        let judged = done.into_iter().flatten().collect::<Result<Vec<Judged>, _>>()?;
-        Ok(self.compared(judged))
+        let second = self.second.map_or(&[][..], |second| &second.examples);
+        Ok(check_apart(self.train.examples.iter().chain(second), &self.test.examples)?)
     }
 
     /// Settings of the method, without progress reports.
@@ -129,7 +201,7 @@ impl Comparison<'_> {
             seed: self.seed,
             quick: self.quick,
             settings: serde_json::Map::new(),
-            second: None,
+            second: self.second,
             progress: &|_| (),
             stop: self.interrupted,
         }
@@ -137,78 +209,99 @@ impl Comparison<'_> {
 
     /// Fits and evaluates one method in this thread.
     pub fn row_of(&self, method: &'static Method) -> Result<ComparisonRow, ComparisonError> {
-        self.of_method(method).map(|judged| judged.row)
+        self.check()?;
+        self.row(&self.of_method(method)?)
     }
 
-    fn of_method(&self, method: &'static Method) -> Result<Judged, ComparisonError> {
+    fn of_method(&self, method: &'static Method) -> Result<Tested, ComparisonError> {
         let fitting = self.fitting();
         let model =
             method.train(self.train, &fitting).map_err(|cause| ComparisonError::Fit { method: method.key, cause })?;
-        self.of_model(method.key, method.title, &model)
+        Ok(self.of_model(method.key, method.title, &model))
     }
 
     /// Evaluates a model that was fitted elsewhere.
     pub fn of_fitted(&self, name: &str, model: &Model) -> Result<ComparisonRow, ComparisonError> {
+        self.check()?;
         let title = palpate_learn::method(&model.card.method).map_or("", |m| m.title);
-        self.of_model(name, title, model).map(|judged| judged.row)
+        self.row(&self.of_model(name, title, model))
     }
 
-    fn of_model(&self, name: &str, title: &str, model: &Model) -> Result<Judged, ComparisonError> {
+    fn of_model(&self, name: &str, title: &str, model: &Model) -> Tested {
         let recogniser = model.recogniser.as_ref();
         let answers = answer(recogniser, self.test);
         let seed = self.seed ^ 0x6ea5;
         let followed = rounds(recogniser, self.test, &answers, seed);
-        let independent = product_of_experts(self.test, &answers, seed);
-        let evaluation = evaluate(
-            recogniser,
-            self.test,
-            &answers,
-            &followed,
-            self.stop,
-            &Bootstrap { seed, ..Bootstrap::default() },
-        )
-        .ok_or(ComparisonError::NoTest)?;
-        let classes = self.test.labels.classes.len();
-        let row = ComparisonRow {
+        Tested {
             model: name.to_owned(),
             title: title.to_owned(),
-            evaluation,
+            data: self.test.clone(),
+            independent: product_of_experts(self.test, &answers, seed),
+            stops: stops(recogniser, &followed, self.stop),
+            answers,
+            followed,
             train_cpu_s: model.card.train_cpu_s,
             parameters: model.card.parameters,
-            f1_by_grasps_independent: palpate_learn::evaluation::f1_by_grasps(classes, &independent),
-            gain_over_independent: fed_back_against_independent(classes, &followed, &independent),
-            data: self.test.about.clone(),
             fingerprint: model.card.fingerprint.clone(),
             quick: model.card.quick,
-            against_first: None,
-        };
-        Ok(Judged { row, decided: decisions(&answers) })
+            splits: 1,
+        }
     }
 
-    fn compared(&self, mut judged: Vec<Judged>) -> Vec<ComparisonRow> {
-        let Some((first, others)) = judged.split_first_mut() else { return Vec::new() };
-        let truth = self.test.truth();
-        let classes = self.test.labels.classes.len();
+    fn row(&self, tested: &Tested) -> Result<ComparisonRow, ComparisonError> {
+        let Tested { data, answers, followed, independent, .. } = tested;
+        let bootstrap = Bootstrap { seed: self.seed ^ 0x6ea5, ..Bootstrap::default() };
+        let evaluation = evaluate_stopped(data, answers, followed, &tested.stops, self.stop, &bootstrap);
+        let classes = data.labels.classes.len();
+        Ok(ComparisonRow {
+            model: tested.model.clone(),
+            title: tested.title.clone(),
+            evaluation: evaluation.ok_or(ComparisonError::NoTest)?,
+            train_cpu_s: tested.train_cpu_s,
+            parameters: tested.parameters,
+            f1_by_grasps_independent: palpate_learn::evaluation::f1_by_grasps(classes, independent),
+            gain_over_independent: fed_back_against_independent(classes, followed, independent),
+            data: data.about.clone(),
+            fingerprint: tested.fingerprint.clone(),
+            quick: tested.quick,
+            against_first: None,
+        })
+    }
+
+    fn compared(&self, tested: &[Tested]) -> Result<Vec<ComparisonRow>, ComparisonError> {
+        let mut rows = tested.iter().map(|tested| self.row(tested)).collect::<Result<Vec<_>, _>>()?;
+        let Some((first, others)) = tested.split_first() else { return Ok(rows) };
+        // A trial that several splits test counts once.
+        let mut met = BTreeSet::new();
+        let examples = first.data.examples.iter().enumerate();
+        let once: Vec<usize> = examples.filter(|(_, e)| met.insert((e.id, e.class))).map(|(k, _)| k).collect();
+        let decided = |tested: &Tested| -> Vec<Option<usize>> {
+            once.iter().map(|k| Some(tested.answers.verdicts[*k].pmf.top().0)).collect()
+        };
+        let truth: Vec<usize> = once.iter().map(|k| first.answers.truth[*k]).collect();
+        let classes = first.data.labels.classes.len();
         let f1 = |decided: &[Option<usize>], trials: &[usize]| {
             Confusion::from_pairs(classes, trials.iter().map(|k| (truth[*k], decided[*k])))?.macro_f1()
         };
-        let p_values: Vec<f64> = others
-            .iter()
-            .map(|o| McNemar::of(&truth, &o.decided, &first.decided).map_or(1.0, |m| m.p_value()))
-            .collect();
+        let of_first = decided(first);
+        let of_others: Vec<Vec<Option<usize>>> = others.iter().map(decided).collect();
+        let p_values: Vec<f64> =
+            of_others.iter().map(|own| McNemar::of(&truth, own, &of_first).map_or(1.0, |m| m.p_value())).collect();
         let adjusted = holm(&p_values);
         let bootstrap = Bootstrap { resamples: 1000, seed: self.seed };
-        for ((other, mcnemar_p), mcnemar_p_holm) in others.iter_mut().zip(p_values).zip(adjusted) {
-            let difference =
-                bootstrap.difference(&truth, |trials| f1(&other.decided, trials), |trials| f1(&first.decided, trials));
-            other.row.against_first = difference.map(|f1| Difference { f1, mcnemar_p, mcnemar_p_holm });
+        for (((row, own), mcnemar_p), mcnemar_p_holm) in
+            rows[1..].iter_mut().zip(&of_others).zip(p_values).zip(adjusted)
+        {
+            let difference = bootstrap.difference(&truth, |trials| f1(own, trials), |trials| f1(&of_first, trials));
+            row.against_first = difference.map(|f1| Difference { f1, mcnemar_p, mcnemar_p_holm });
         }
-        judged.into_iter().map(|j| j.row).collect()
+        Ok(rows)
     }
 
     /// Controls of a fair comparison: a method trained on shuffled labels, which must score at chance, and one that is
     /// given the true size and shape, an upper bound for methods that must estimate them.
     pub fn controls(&self, method: &'static Method) -> Result<Controls, ComparisonError> {
+        self.check()?;
         let fitting = self.fitting();
         let failed = |cause| ComparisonError::Fit { method: method.key, cause };
         let shuffled = method.train(&self.train.with_shuffled_labels(self.seed), &fitting).map_err(failed)?;
@@ -269,9 +362,10 @@ fn decisions(answers: &Answers) -> Vec<Option<usize>> {
 /// after each number of grasps, with paired 95 % intervals.
 fn fed_back_against_independent(classes: usize, fed_back: &[Round], independent: &[Round]) -> Vec<Interval> {
     let truth: Vec<usize> = fed_back.iter().map(|r| r.truth).collect();
-    let most = fed_back.iter().chain(independent).map(|r| r.belief.grasps()).min().unwrap_or(0);
+    let most = most_grasps(fed_back).min(most_grasps(independent));
     let f1 = |rounds: &[Round], grasps: usize, trials: &[usize]| {
-        let pairs = trials.iter().map(|k| (rounds[*k].truth, Some(rounds[*k].belief.steps()[grasps].top().0)));
+        let decided = |k: usize| Some((rounds[k].truth, Some(rounds[k].belief.steps().get(grasps)?.top().0)));
+        let pairs = trials.iter().filter_map(|k| decided(*k));
         Confusion::from_pairs(classes, pairs)?.macro_f1()
     };
     let bootstrap = Bootstrap { resamples: 500, seed: 0 };

@@ -4,7 +4,7 @@
 use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::evaluation::Evaluation;
-use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, ModelError, StopRule};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, ModelError, SplitError, SplitPlan, StopRule};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
@@ -37,7 +37,10 @@ impl LabelledClass {
 pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError> {
     let mut counts = BTreeMap::<String, usize>::new();
     let labelled = |row: &palpate_store::TrialRow| {
-        row.source == TrialSource::Recorded && row.state == "complete" && row.sound && !row.object.is_empty()
+        row.source == TrialSource::Recorded
+            && row.state == "complete"
+            && !row.object.is_empty()
+            && DatasetQuery::default().refused(row).is_none()
     };
     for row in store.list(false)?.into_iter().filter(labelled) {
         *counts.entry(row.object).or_default() += 1;
@@ -116,6 +119,9 @@ pub enum TrainingError {
     /// The trials do not form a data set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// No trials can be held out.
+    #[error(transparent)]
+    Split(#[from] SplitError),
     /// The fit failed.
     #[error(transparent)]
     Fit(#[from] LearnError),
@@ -145,20 +151,16 @@ impl LabelledTraining<'_> {
         })?;
         let all = enough.iter().map(|class| class.trials).sum();
         let data = without_small_classes(&data, all, &mut too_few)?;
-        let shares = data.shares(&[1.0 - HELD_BACK, HELD_BACK], self.seed);
-        let [learned, held_back] = shares.as_slice() else { return Err(LearnError::NoData.into()) };
-        let mut model = self.fitted(learned)?;
-        let evaluation = self.judged(&model, learned, held_back)?;
+        let splits = SplitPlan::Shares([1.0 - HELD_BACK, 0.0, HELD_BACK]).splits(&data, self.seed, 1)?;
+        let split = splits.first().ok_or(LearnError::NoData)?;
+        let (learned, held_back) = (data.part(&split.train), data.part(&split.test));
+        let mut model = self.fitted(&learned)?;
+        let evaluation = self.judged(&model, &learned, &held_back)?;
         let trials = [learned.examples.len(), held_back.examples.len()];
-        model.card.metrics = serde_json::json!({
-            "test": format!("{} trials held back of {}", trials[1], trials[0] + trials[1]),
-            "f1_macro": evaluation.f1_macro,
-            "ci95": evaluation.ci95,
-            "f1_by_grasps": evaluation.f1_by_grasps,
-            "stage_one": evaluation.stage_one,
-            "ece": evaluation.ece,
-            "confusion": evaluation.confusion,
-        });
+        let [tested, all_used] = [trials[1], trials[0] + trials[1]];
+        let test = format!("{tested} trials held back of {all_used}: {}", data.about.lines().join("; "));
+        model.card.metrics = evaluation.metrics(&test);
+        model.card.metrics["confusion"] = serde_json::json!(evaluation.confusion);
         Ok(JudgedModel { model, evaluation, trials, too_few, left_out: all - data.examples.len() })
     }
 

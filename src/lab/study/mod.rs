@@ -20,7 +20,9 @@ mod stored_study;
 mod timed_grasp;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
-pub use comparison::{Comparison, ComparisonError, ComparisonRow, Controls, Difference, in_table_order};
+pub use comparison::{
+    Compared, Comparison, ComparisonError, ComparisonRow, Controls, Difference, compare, in_table_order,
+};
 pub use effect_audit::{
     AuditError, AuditPlan, AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectSize, SEEN, audit_effects,
     audit_figure, audit_table, stored_effects,
@@ -39,5 +41,5 @@ pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cos
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
 pub use recognition_scores::{ControlScores, RecognitionScores, ScoreError, ScoreReport, measure_scores};
 pub use result_file::{ResultFile, ResultFileError, program};
-pub use search::{SearchRow, search};
+pub use search::{SearchError, SearchRow, search};
 pub use stored_study::{GeneratedSection, StoredStudy, markdown_table};

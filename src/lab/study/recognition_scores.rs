@@ -7,7 +7,7 @@ use super::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use crate::grasping::{CollectionError, CollectionPlan, collect};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, Method, StopRule, method};
+use palpate_learn::{Dataset, Method, SplitError, SplitPlan, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::SignalDefinition;
@@ -163,6 +163,9 @@ pub enum ScoreError {
     /// Grasps could not be read.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// Too few different grasps.
+    #[error(transparent)]
+    Split(#[from] SplitError),
     /// A method could not be fitted.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
@@ -193,7 +196,9 @@ pub fn measure_scores(
             units.push(("controls".to_owned(), None));
         }
         let data = data_set(kind, store, how.threads)?;
-        let (train, test) = data.first_of_each(TRAIN);
+        let splits = SplitPlan::FirstOfEach { train: TRAIN, test: None }.splits(&data, SEED, 1)?;
+        let split = splits.first().ok_or(SplitError::Nothing)?;
+        let (train, test) = (data.part(&split.train), data.part(&split.test));
         let stop = StopRule::default();
         let comparison =
             Comparison { train: &train, test: &test, seed: SEED, quick: false, stop, interrupted: how.cancelled };

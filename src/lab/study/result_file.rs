@@ -5,9 +5,7 @@
 //! and computed again. Results that another plan or another physics computed are refused, never mixed.
 
 use super::effects::Measuring;
-use palpate_sim::frame::Frame;
-use palpate_sim::gripper::Side;
-use palpate_sim::scene::{Accuracy, Scene};
+use palpate_sim::PHYSICS_VERSION;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -224,25 +222,9 @@ impl Header {
     }
 }
 
-/// Version of the program with a fingerprint of its physics: grasps of two builds differ where it does.
+/// Version of the program and of its physics: equal scenes give equal frames in builds with the same version of the physics.
 pub fn program() -> String {
-    let mut scene = Scene::default();
-    scene.object.source = "syringe".to_owned();
-    scene.solver.accuracy = Accuracy::Draft;
-    let frames = scene.load_object().map(|object| crate::grasping::grasp(&scene, object.as_ref(), 0).data.frames);
-    let bits = frames.unwrap_or_default().iter().fold(FNV_OFFSET, |hash, frame| {
-        joints(frame).fold(hash, |hash, q| (hash ^ u64::from(q.to_bits())).wrapping_mul(FNV_PRIME))
-    });
-    format!("{}, physics {:08x}", env!("CARGO_PKG_VERSION"), bits as u32 ^ (bits >> 32) as u32)
-}
-
-/// Fowler-Noll-Vo hash, over words.
-const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-const FNV_PRIME: u64 = 0x100_0000_01b3;
-
-/// Joint angles in single precision.
-fn joints(frame: &Frame) -> impl Iterator<Item = f32> {
-    [Side::Left, Side::Right].into_iter().flat_map(|side| frame.joints(side).iter().map(|q| *q as f32))
+    format!("{}, physics {PHYSICS_VERSION}", env!("CARGO_PKG_VERSION"))
 }
 
 #[cfg(test)]

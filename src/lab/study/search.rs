@@ -3,7 +3,7 @@
 
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::Confusion;
-use palpate_learn::{Dataset, Fitting, LearnError, Method};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, SplitError, SplitPlan};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -21,6 +21,17 @@ const GRID: [(&str, &[f64]); 3] = [("units", &[64.0, 128.0]), ("dropout", &[0.3,
 /// Number of folds; each is held out once.
 const FOLDS: usize = 2;
 
+/// Error of a search.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// A fit failed.
+    #[error(transparent)]
+    Fit(#[from] LearnError),
+    /// The grasps cannot be divided into folds.
+    #[error(transparent)]
+    Split(#[from] SplitError),
+}
+
 /// Scores all points of the grid, best first. Settings given by the caller stay fixed.
 pub fn search(
     method: &'static Method,
@@ -29,10 +40,10 @@ pub fn search(
     quick: bool,
     given: &serde_json::Map<String, serde_json::Value>,
     progress: &dyn Fn(usize, usize),
-) -> Result<Vec<SearchRow>, LearnError> {
+) -> Result<Vec<SearchRow>, SearchError> {
     if method.recipe.is_none() {
         let cause = "only networks have settings to search for".to_owned();
-        return Err(LearnError::Setting { name: "search".to_owned(), cause });
+        return Err(LearnError::Setting { name: "search".to_owned(), cause }.into());
     }
     let mut points = vec![given.clone()];
     for (name, values) in GRID.iter().filter(|(name, _)| !given.contains_key(*name)) {
@@ -45,18 +56,15 @@ pub fn search(
         };
         points = points.iter().flat_map(|point| values.iter().map(move |v| with(point, *v))).collect();
     }
-    let fold_of = data.folds(FOLDS, seed ^ 0x5ea7c4);
+    let splits = SplitPlan::Folds { folds: FOLDS }.splits(data, seed ^ 0x5ea7c4, 1)?;
     let classes = data.labels.classes.len();
     let stop = AtomicBool::new(false);
     let mut rows = Vec::new();
     for (n, settings) in points.iter().enumerate() {
         let mut pairs = Vec::new();
-        for fold in 0..FOLDS {
+        for (fold, split) in splits.iter().enumerate() {
             progress(n * FOLDS + fold, points.len() * FOLDS);
-            let of = |inside: bool| -> Vec<usize> {
-                (0..fold_of.len()).filter(|k| (fold_of[*k] == fold) == inside).collect()
-            };
-            let (train, left_out) = (data.part(&of(false)), data.part(&of(true)));
+            let (train, left_out) = (data.part(&split.train), data.part(&split.test));
             let fitting =
                 Fitting { seed, quick, settings: settings.clone(), second: None, progress: &|_| (), stop: &stop };
             let recogniser = (method.fit)(&train, &fitting)?;

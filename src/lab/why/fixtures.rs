@@ -65,6 +65,7 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         channels,
         labels,
         data: DataCard::default(),
+        learned: Default::default(),
         settings: serde_json::Value::Null,
         fingerprint: None,
         deviations: Vec::new(),

@@ -17,8 +17,8 @@ pub enum Day {
 }
 
 impl Day {
-    /// The date.
-    fn date(&self, store: &Store) -> Result<String, StoreError> {
+    /// The date: `2026-11-21`.
+    pub fn date(&self, store: &Store) -> Result<String, StoreError> {
         match self {
             Self::Ago(days) => store.local_day(*days),
             Self::Date(date) => Ok(date.clone()),

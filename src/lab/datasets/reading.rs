@@ -1,0 +1,224 @@
+//! Data sets read from the store: the trials that a query chooses, those that are left out and why, and their card.
+
+use super::origin::{TrialOrigin, card};
+use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
+use palpate_learn::{Dataset, Example, Sequence};
+use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_store::{Library, Store, TrialRow};
+use palpate_tactile::trial::TrialId;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::sync::Arc;
+
+/// Numbers of trials left out, by reason.
+type LeftOut = BTreeMap<String, usize>;
+
+impl DatasetQuery {
+    /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
+    /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial are left out and
+    /// counted. `progress` gets the number of trials read and their total.
+    pub fn read(
+        &self,
+        store: &Store,
+        view: &SensorView,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<Dataset, DatasetError> {
+        view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
+        let failed = |cause| DatasetError::Store { cause };
+        let library = Library::read(store).map_err(failed)?;
+        let mut rows: Vec<TrialRow> =
+            library.find(store, &self.library_query()).map_err(failed)?.iter().map(|trial| trial.row.clone()).collect();
+        rows.retain(|row| !row.object.is_empty() && self.fits(row));
+        let before = Predecessors::of(&store.list(true).map_err(failed)?);
+        let mut left_out = LeftOut::new();
+        let matching = rows.len();
+        rows.retain(|row| match self.refused(row) {
+            Some(reason) => {
+                *left_out.entry(reason.to_owned()).or_default() += 1;
+                false
+            }
+            None => true,
+        });
+        if rows.is_empty() {
+            let about = self.about(store);
+            return Err(match matching {
+                0 => DatasetError::Nothing { about },
+                _ => DatasetError::Unsound { about, left_out: matching, reasons: palpate_learn::counted(&left_out) },
+            });
+        }
+        self.read_rows(store, &rows, view, &before, left_out, progress)
+    }
+
+    /// Reads one trial, labelled or not, flagged or not, as a data set.
+    pub fn read_trial(&self, store: &Store, id: TrialId, view: &SensorView) -> Result<Dataset, DatasetError> {
+        let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
+        rows.retain(|row| row.id == id);
+        match rows.first() {
+            // Loading returns the reason.
+            None => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
+            Some(row) if !row.sound => {
+                let reasons = format!("1 {NOT_SOUND}");
+                return Err(DatasetError::Unsound { about: String::new(), left_out: 1, reasons });
+            }
+            Some(_) => {}
+        }
+        self.read_rows(store, &rows, view, &Predecessors::default(), LeftOut::new(), &mut |_, _| ())
+    }
+
+    /// Reason why a trial that matches is left out.
+    pub(crate) fn refused(&self, row: &TrialRow) -> Option<&'static str> {
+        if !row.sound {
+            Some(NOT_SOUND)
+        } else if row.pulled {
+            Some("pulled by hand")
+        } else if row.duplicate_of.is_some() {
+            Some(COPIES)
+        } else if !row.flags.is_empty() && !self.include_flagged {
+            Some("flagged")
+        } else {
+            None
+        }
+    }
+
+    fn read_rows(
+        &self,
+        store: &Store,
+        rows: &[TrialRow],
+        view: &SensorView,
+        before: &Predecessors,
+        mut left_out: LeftOut,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<Dataset, DatasetError> {
+        let mut met: BTreeMap<String, usize> = BTreeMap::new();
+        let few_enough = |row: &&TrialRow| {
+            let count = met.entry(row.object.clone()).or_default();
+            *count += 1;
+            self.most_of_each.is_none_or(|most| *count <= most)
+        };
+        let rows: Vec<&TrialRow> = rows.iter().filter(few_enough).collect();
+        if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
+            return Err(DatasetError::NoSuchObject { object: object.clone() });
+        }
+        let mut channels: Option<(TrialId, Vec<String>)> = None;
+        let mut named = BTreeMap::new();
+        let (mut read, mut origins) = (Vec::new(), Vec::new());
+        let mut seen: BTreeMap<(u64, u64), TrialId> = BTreeMap::new();
+        let (mut uncalibrated, mut missing) = (0, String::new());
+        for (k, row) in rows.iter().enumerate() {
+            progress(k, rows.len());
+            let (TrialSignals { signals, .. }, origin) =
+                match signals_of(store, row.id, row.source, view, &self.calibrations) {
+                    // Skip boards without a calibration, unless it is the only trial.
+                    Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
+                        if uncalibrated == 0 {
+                            missing = why;
+                        }
+                        uncalibrated += 1;
+                        continue;
+                    }
+                    outcome => outcome?,
+                };
+            if !self.calibrations.is_empty() && !origin.calibrations.iter().all(|id| self.calibrations.contains(id)) {
+                *left_out.entry("with other calibrations".to_owned()).or_default() += 1;
+                continue;
+            }
+            let (first, known) = channels.get_or_insert_with(|| (row.id, signals.channels.clone()));
+            if *known != signals.channels {
+                return Err(DatasetError::Mixed {
+                    first: *first,
+                    first_channels: known.join(", "),
+                    other: row.id,
+                    other_channels: signals.channels.join(", "),
+                });
+            }
+            let grasp = sequence_of(&signals);
+            // All grasps of an empty hand are alike: it touches nothing.
+            let seed = if row.object == EMPTY { row.seed } else { 0 };
+            match seen.entry((grasp.content(), seed)) {
+                Entry::Occupied(_) => *left_out.entry(COPIES.to_owned()).or_default() += 1,
+                Entry::Vacant(free) => {
+                    free.insert(row.id);
+                    named.entry(row.object.clone()).or_insert_with(|| known_properties(row));
+                    read.push((*row, grasp, before.of_trial(row, &origin)));
+                    origins.push(origin);
+                }
+            }
+        }
+        if uncalibrated > 0 {
+            left_out.insert("not calibrated".to_owned(), uncalibrated);
+        }
+        if read.is_empty() {
+            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing });
+        }
+        let labels = labels(&named);
+        let used: Vec<&TrialRow> = read.iter().map(|(row, ..)| *row).collect();
+        let about = card(self, &self.described(store), &used, &origins, view, left_out);
+        let poses: Vec<u32> = origins.iter().map(|origin| origin.pose).collect();
+        let example = |((row, grasp, after), pose): ((&TrialRow, Sequence, Option<TrialId>), u32)| {
+            let content = content_of(row, &grasp);
+            Some(Example {
+                id: row.id,
+                class: labels.class(&row.object)?,
+                grasp: Arc::new(grasp),
+                content,
+                after,
+                pose,
+            })
+        };
+        let examples = read.into_iter().zip(poses).filter_map(example).collect();
+        let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
+        Ok(Dataset { channels, labels, examples, about })
+    }
+}
+
+/// Reason: diverged, did not converge, or did not come to rest.
+const NOT_SOUND: &str = "not sound";
+/// Reason: another trial holds the same grasp.
+const COPIES: &str = "copies of other trials";
+
+/// Hash of a grasp: of its identity where it is known, else of its readings.
+fn content_of(row: &TrialRow, grasp: &Sequence) -> u64 {
+    let of_identity = |identity: &String| palpate_sim::fingerprint([identity.as_bytes()]);
+    row.identity.as_ref().map_or_else(|| grasp.content(), of_identity)
+}
+
+/// The trials made just before others.
+#[derive(Default)]
+struct Predecessors {
+    by_identity: BTreeMap<String, TrialId>,
+    /// The last trial of the same object, source and collection before each.
+    last: BTreeMap<TrialId, TrialId>,
+}
+
+impl Predecessors {
+    fn of(rows: &[TrialRow]) -> Self {
+        let mut found = Self::default();
+        let mut newest = BTreeMap::new();
+        for row in rows {
+            if let Some(identity) = &row.identity {
+                found.by_identity.entry(identity.clone()).or_insert(row.id);
+            }
+            let kind = (&row.object, row.source.name(), &row.collection);
+            if let Some(before) = newest.insert(kind, row.id) {
+                found.last.insert(row.id, before);
+            }
+        }
+        found
+    }
+
+    /// The trial before, if the object has stayed as that one released it.
+    fn of_trial(&self, row: &TrialRow, origin: &TrialOrigin) -> Option<TrialId> {
+        match &origin.after {
+            Some(identity) => self.by_identity.get(identity).copied(),
+            None => self.last.get(&row.id).copied().filter(|_| origin.stayed || row.follows),
+        }
+    }
+}
+
+fn known_properties(row: &TrialRow) -> Option<(String, String)> {
+    let of_catalogue = || {
+        let class = catalogue().iter().find(|b| b.name == row.object)?.class();
+        Some((class.size.name().to_owned(), class.shape.name().to_owned()))
+    };
+    row.properties.clone().or_else(of_catalogue)
+}

@@ -1,0 +1,202 @@
+//! Data sets that can be trusted: each grasp once, nothing mixed in silence, few and foreign trials judged without flags.
+
+use crate::program::{json, refused, run};
+use palpate_lab::grasping::grasp;
+use palpate_sim::scene::Scene;
+use palpate_store::Store;
+use std::fmt::Write as _;
+use std::path::Path;
+
+fn trials(at: &Path) -> Store {
+    Store::open(&at.join("trials.sqlite")).unwrap()
+}
+
+/// A scene with a built-in object.
+fn scene_of(object: &str) -> Scene {
+    let mut scene = Scene::default();
+    object.clone_into(&mut scene.object.source);
+    scene.timing.duration_s = 1.5;
+    scene
+}
+
+#[test]
+fn six_identical_grasps_of_each_of_two_objects_are_not_judged() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // As early versions stored them: without origin, as often as they were made.
+    let mut store = trials(at);
+    for object in ["ball", "box"] {
+        let scene = scene_of(object);
+        let mut trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+        trial.header.origin = None;
+        for _ in 0..6 {
+            assert!(store.insert(&trial).unwrap().is_new());
+        }
+    }
+    drop(store);
+    let once = ["\"ball\" has 1 different grasp(s)", "copies"];
+    refused(at, &["evaluate", "--models", "knn"], &once);
+    for split in ["folds:2", "80/20", "first:1", "leave-a-pose-out"] {
+        refused(at, &["evaluate", "--models", "knn", "--split", split], &once[..1]);
+    }
+    let said = run(at, &["evaluate", "--models", "knn"]);
+    assert!(said.err.contains("10 trial(s) left out: 10 copies of other trials"), "{said:?}");
+}
+
+#[test]
+fn the_same_grasp_is_one_trial_collected_or_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let collect = |trials: &str| {
+        json(
+            at,
+            &[
+                "collect",
+                "--objects",
+                "ball",
+                "--trials",
+                trials,
+                "--preset",
+                "A",
+                "--set",
+                "timing.duration_s=1",
+                "--json",
+            ],
+        )
+    };
+    let pose_of = |seed: &str| {
+        json(at, &["grasp", "ball", "--preset", "A", "--set", "timing.duration_s=1", "--seed", seed, "--json"])
+    };
+    assert_eq!(collect("2")["stored"], 2);
+    let rows = trials(at).list(true).unwrap();
+    let again = pose_of(&rows[1].seed.to_string());
+    assert_eq!((&again["trial_id"], &again["newly_stored"]), (&2.into(), &false.into()));
+    let said = run(
+        at,
+        &["grasp", "ball", "--preset", "A", "--set", "timing.duration_s=1", "--seed", &rows[1].seed.to_string()],
+    );
+    assert!(said.code == Some(0) && said.out.contains("not again: trial 2 is the same grasp"), "{said:?}");
+
+    // A grasp recorded alone first belongs to the collection that asks for it later.
+    let third = tempfile::tempdir().unwrap();
+    let seeds: Vec<u64> = {
+        json(
+            third.path(),
+            &[
+                "collect",
+                "--objects",
+                "ball",
+                "--trials",
+                "3",
+                "--preset",
+                "A",
+                "--set",
+                "timing.duration_s=1",
+                "--json",
+            ],
+        );
+        trials(third.path()).list(true).unwrap().iter().map(|row| row.seed).collect()
+    };
+    assert_eq!(pose_of(&seeds[2].to_string())["newly_stored"], true);
+    let resumed = collect("3");
+    assert_eq!((&resumed["stored"], &resumed["known"]), (&0.into(), &3.into()));
+    let collection = rows[0].collection.clone().unwrap();
+    let rows = trials(at).list(true).unwrap();
+    assert_eq!(rows.iter().map(|row| row.collections().collect::<Vec<_>>()).collect::<Vec<_>>(), [[&collection]; 3]);
+    let listed = json(at, &["trials", "list", "--collection", &collection, "--json"]);
+    assert_eq!(listed.as_array().map(Vec::len), Some(3));
+
+    // Another pose, seed or setting is another grasp.
+    assert_eq!(pose_of("77")["newly_stored"], true);
+    let other = json(at, &["grasp", "ball", "--set", "timing.duration_s=1.2", "--json"]);
+    assert_eq!(other["newly_stored"], true);
+
+    // Merging keeps one of each and both collections.
+    let merged = run(third.path(), &["trials", "merge", at.join("trials.sqlite").to_str().unwrap()]);
+    assert_eq!(merged.code, Some(0), "{merged:?}");
+    let rows = trials(third.path()).list(false).unwrap();
+    assert!(rows.len() == 5 && rows.iter().all(|row| row.duplicate_of.is_none()), "{rows:?}");
+}
+
+#[test]
+fn collections_and_presets_do_not_mix_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for preset in ["A", "M"] {
+        let collect = ["collect", "--objects", "ball,box", "--trials", "6", "--preset", preset, "--json"];
+        assert_eq!(json(at, &collect)["stored"], 12);
+    }
+    let both = run(at, &["evaluate", "--models", "knn"]);
+    assert_eq!(both.code, Some(0), "{both:?}");
+    for told in [
+        "mixed 2 collections (",
+        "--collection selects one",
+        "mixed 2 pose presets (A, M)",
+        "query: without the empty hand",
+    ] {
+        assert!(both.out.contains(told), "{told}: {both:?}");
+    }
+    assert!(both.err.contains("the trials mix 2 pose presets (A, M); --preset selects one"), "{both:?}");
+    let rows = json(at, &["evaluate", "--models", "knn", "--json"]);
+    assert_eq!(rows[0]["data"]["mixed"].as_array().map(Vec::len), Some(2), "{rows}");
+
+    let one = run(at, &["evaluate", "--models", "knn", "--preset", "a"]);
+    assert!(one.code == Some(0) && !one.out.contains("mixed") && !one.err.contains("mix"), "{one:?}");
+    assert!(one.out.contains("preset A") && one.out.contains("12 trials"), "{one:?}");
+
+    // The query is stored with the model and printed.
+    let trained = run(at, &["train", "knn", "--preset", "M", "--since", "today", "--out", "m.safetensors"]);
+    assert!(trained.code == Some(0) && trained.out.contains("query       preset M, since 20"), "{trained:?}");
+    let card: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(at.join("m.json")).unwrap()).unwrap();
+    assert!(card["data"]["query"].as_str().is_some_and(|query| query.starts_with("preset M, since 20")), "{card}");
+    assert_eq!(
+        (&card["data"]["physics"], card["data"]["mixed"].is_null()),
+        (&palpate_sim::PHYSICS_VERSION.into(), true)
+    );
+
+    // The model is judged on what it has not learned.
+    let judged = run(at, &["evaluate", "--models", "m.safetensors"]);
+    assert!(judged.code == Some(0) && judged.err.contains("12 trial(s) skipped because it has learned"), "{judged:?}");
+    refused(at, &["evaluate", "--models", "m.safetensors", "--preset", "M"], &["learned from all of these 12 trials"]);
+    refused(at, &["evaluate", "--physics", "unknown"], &["no trial in the store matches", "physics unknown"]);
+    let nonsense = run(at, &["evaluate", "--split", "40/40/40"]);
+    assert!(nonsense.code == Some(2) && nonsense.err.contains("40/40/20"), "{nonsense:?}");
+}
+
+/// Grasps of somebody else: irregular times and lengths, one channel, no sizes or shapes.
+fn foreign(at: &Path, of_each: usize) {
+    let mut text = String::from("trial,label,t_s,grip\n");
+    for trial in 0..3 * of_each {
+        let kind = trial % 3;
+        let mut t = 0.0;
+        for k in 0..40 + trial % 17 {
+            t += 0.02 + 0.001 * ((trial * 5 + k * 3) % 7) as f64;
+            let press = (t - 0.3_f64).max(0.0) * (1.0 + kind as f64) + 0.003 * trial as f64;
+            writeln!(text, "{trial},{},{t:.4},{press:.4}", ["nut", "bolt", "washer"][kind]).unwrap();
+        }
+    }
+    std::fs::write(at.join("foreign.csv"), text).unwrap();
+}
+
+#[test]
+fn foreign_grasps_without_sizes_get_a_table_without_a_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    foreign(at, 20);
+    assert_eq!(run(at, &["trials", "import", "foreign.csv"]).code, Some(0));
+    let table = run(at, &["evaluate", "--models", "ds-lstm,knn,random-forest,macro-layer", "--quick"]);
+    assert_eq!(table.code, Some(0), "{table:?}");
+    assert!(
+        table.out.contains("cross-validation with 5 folds") && table.out.contains("60 of them tested"),
+        "{table:?}"
+    );
+    for method in ["knn", "random-forest", "macro-layer"] {
+        assert!(table.out.lines().any(|line| line.starts_with(method)), "{method}: {table:?}");
+    }
+    assert!(!table.out.lines().any(|line| line.starts_with("ds-lstm")));
+    assert!(table.err.contains("ds-lstm is left out") && table.err.contains("size"), "{table:?}");
+    let rows = json(at, &["evaluate", "--models", "knn,svm", "--split", "40/40/20", "--repeats", "3", "--json"]);
+    assert!(rows.as_array().unwrap().iter().all(|row| row["macro_accuracy"].as_f64().unwrap() > 0.8), "{rows}");
+    // Only a method that these data cannot train: an error, not an empty table.
+    refused(at, &["evaluate", "--models", "ds-lstm", "--quick"], &["ds-lstm", "size"]);
+}
