@@ -2,10 +2,10 @@
 
 use super::Failure;
 use super::origin::OriginFilters;
-use super::setup::SignalArguments;
+use super::setup::{SignalArguments, within};
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::datasets::{DatasetQuery, PhysicsVersion, SensorView};
+use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
 use palpate_learn::{Dataset, METHODS, Method, counted, method};
 use palpate_store::{CalibrationId, Store};
 use palpate_tactile::model::SensorModel;
@@ -32,6 +32,12 @@ pub(super) struct DataArguments {
     /// Sensor model for simulated trials: virtual (perfect) or physical-like (as on the real gripper).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
+    /// Read the readings at this rate (Hz; default: as they were sampled).
+    #[arg(long, value_name = "HZ", value_parser = within(1.0..=10_000.0))]
+    rate: Option<f64>,
+    /// End of the readings: hold-end, whole (with the release), or seconds from the start of the closing.
+    #[arg(long, value_name = "END", default_value = "hold-end")]
+    cut: Cut,
     /// Random seed of initial weights, order and sampling.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
@@ -47,7 +53,7 @@ pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
 
 impl DataArguments {
     pub(super) fn view(&self) -> SensorView {
-        SensorView { sensors: self.sensors, ..self.signals.view() }
+        SensorView { sensors: self.sensors, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
     }
 
     /// The query for the trials.

@@ -118,6 +118,12 @@ pub struct DataCard {
     /// simulations have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signals: Option<String>,
+    /// Rate at which the readings were read (Hz); as they were sampled if `None`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// End of the readings, other than the end of the hold: `whole`, or a time (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut: Option<String>,
     /// Number of grasps left out.
     #[serde(default)]
     pub left_out: usize,
@@ -151,6 +157,11 @@ impl DataCard {
         parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
         parts.extend(self.layout.clone());
         parts.extend(self.signals.as_ref().filter(|own| *own != "parts").map(|own| format!("{own} pressure")));
+        parts.extend(self.rate_hz.map(|rate_hz| format!("{rate_hz} Hz")));
+        parts.extend(self.cut.as_ref().map(|cut| match cut.as_str() {
+            "whole" => "with the release".to_owned(),
+            seconds => format!("first {seconds} s"),
+        }));
         parts.extend((self.left_out > 0).then(|| match self.left_out_for.len() {
             0 => format!("{} left out as not sound", self.left_out),
             _ => format!("{} left out ({})", self.left_out, counted(&self.left_out_for)),

@@ -3,6 +3,7 @@
 mod origin;
 mod query;
 mod reading;
+mod sampling;
 mod saved_models;
 
 pub(crate) use query::noise_seed;
@@ -10,4 +11,5 @@ pub use query::{
     DatasetError, DatasetQuery, NoPhysicsVersion, PhysicsVersion, SensorView, TrialSignals, labels_of_catalogue,
     sequence_of, trial_signals,
 };
+pub use sampling::{Cut, NoCut};
 pub use saved_models::{SavedModel, make_models_folder, models_folder, new_model_path, saved_models};

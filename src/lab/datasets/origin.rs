@@ -1,6 +1,7 @@
 //! Origin of the trials of a data set, and what was mixed in it.
 
 use super::query::{DatasetQuery, SensorView};
+use super::sampling::Cut;
 use palpate_learn::DataCard;
 use palpate_sim::scene::{Between, Faces, PRESETS, PoseSpread, Scene};
 use palpate_store::{CalibrationId, TrialRow};
@@ -151,6 +152,8 @@ pub(super) fn card(
         layout: seen.then(|| view.layout.to_ascii_uppercase()),
         sensors: seen.then(|| view.sensors.name().to_owned()),
         signals: seen.then(|| view.signals.name().to_owned()),
+        rate_hz: view.rate_hz,
+        cut: (view.cut != Cut::default()).then(|| view.cut.to_string()),
         left_out: left_out_for.values().sum(),
         left_out_for,
         query: asked.to_owned(),

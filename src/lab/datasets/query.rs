@@ -1,6 +1,7 @@
 //! Data sets from the store: a query for trials, and the sensors through which simulated trials are read.
 
 use super::origin::TrialOrigin;
+use super::sampling::{Cut, resampled};
 use palpate_learn::{Class, Labels, ModelCard, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -21,11 +22,16 @@ pub struct SensorView {
     pub sensors: SensorModel,
     /// Definition of the signals.
     pub signals: SignalDefinition,
+    /// Rate at which readings of all sources are read (Hz); as they were sampled if `None`.
+    pub rate_hz: Option<f64>,
+    /// End of the readings of all sources.
+    pub cut: Cut,
 }
 
 impl Default for SensorView {
     fn default() -> Self {
-        Self { layout: "C1".to_owned(), sensors: SensorModel::Virtual, signals: SignalDefinition::Parts }
+        let (sensors, signals) = (SensorModel::Virtual, SignalDefinition::Parts);
+        Self { layout: "C1".to_owned(), sensors, signals, rate_hz: None, cut: Cut::default() }
     }
 }
 
@@ -37,14 +43,17 @@ struct StoredView {
     sensors: SensorModel,
     signals: Option<SignalDefinition>,
     area: Option<String>,
+    rate_hz: Option<f64>,
+    #[serde(default)]
+    cut: Cut,
 }
 
 impl From<StoredView> for SensorView {
     fn from(stored: StoredView) -> Self {
         let by_hull = stored.area.is_some_and(|area| area == "hull");
         let earlier = if by_hull { SignalDefinition::Hull } else { SignalDefinition::Parts };
-        Self { layout: stored.layout, sensors: stored.sensors, signals: earlier }
-            .with_signals(stored.signals.unwrap_or(earlier))
+        let StoredView { layout, sensors, rate_hz, cut, .. } = stored;
+        Self { layout, sensors, signals: earlier, rate_hz, cut }.with_signals(stored.signals.unwrap_or(earlier))
     }
 }
 
@@ -326,6 +335,7 @@ pub(super) fn signals_of(
     let trial = match data {
         TrialData::Simulated(data) => SimulatedTrial { header, data },
         TrialData::Imported(signals) => {
+            let signals = resampled(signals.until(view.cut.end(f64::INFINITY)), view.rate_hz);
             return Ok((TrialSignals { signals, hold_s: None }, TrialOrigin::default()));
         }
         TrialData::Recorded(_) => return of_board(),
@@ -351,13 +361,22 @@ fn board_signals(
     let channels =
         layout.channels(&GripperModel::default(), view.signals).map_err(|cause| DatasetError::Layout { cause })?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
-    let signals = read.grasp(&wanted).ok_or_else(|| DatasetError::Uncalibrated {
+    let cut = match view.cut {
+        Cut::HoldEnd => read.grasp(&wanted),
+        cut @ (Cut::Whole | Cut::Seconds(_)) => read
+            .derived
+            .signals
+            .chosen(&wanted)
+            .map(|signals| read.closing_s.map_or(signals.clone(), |closing_s| signals.since(closing_s)))
+            .map(|signals| signals.until(cut.end(f64::INFINITY))),
+    };
+    let signals = cut.ok_or_else(|| DatasetError::Uncalibrated {
         id,
         layout: layout.full_name(),
         why: read.derived.warnings.join("; "),
     })?;
     let hold_s = read.hold_s.map(|hold_s| hold_s - read.closing_s.unwrap_or(0.0));
-    Ok((TrialSignals { signals, hold_s }, read.serving.ids))
+    Ok((TrialSignals { signals: resampled(signals, view.rate_hz), hold_s }, read.serving.ids))
 }
 
 impl SensorView {
@@ -371,6 +390,8 @@ impl SensorView {
             layout: data.layout.clone().unwrap_or_else(|| if forces { "C1+F" } else { "C1" }.to_owned()),
             sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
             signals: data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default(),
+            rate_hz: data.rate_hz,
+            cut: data.cut.as_deref().and_then(|cut| cut.parse().ok()).unwrap_or_default(),
         }
     }
 
@@ -408,15 +429,15 @@ impl SensorView {
         if none { Err(LayoutError::NoSuchPart) } else { Ok(()) }
     }
 
-    /// Computes the signals of a simulated trial from its start to the end of the hold. The release is left out: it
-    /// differs between classes only by residues of integrators and dampers.
+    /// Computes the signals of a simulated trial from its start to the end that the view has.
     pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
         self.check_parts()?;
         let layout = SensorLayout::named(&self.layout)?;
         let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.signals)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        Ok(self.sensors.apply(&clean, noise_seed(&trial.header)).until(end))
+        let signals = self.sensors.apply(&clean, noise_seed(&trial.header)).until(self.cut.end(end));
+        Ok(resampled(signals, self.rate_hz))
     }
 }
 

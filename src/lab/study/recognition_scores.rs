@@ -235,7 +235,8 @@ fn data_set(kind: &Kind, store: &mut Store, threads: usize) -> Result<Dataset, S
     let plan = CollectionPlan::of_all_objects(scene, (TRAIN + TEST) as u32, POSES);
     let collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
     let query = DatasetQuery { collection: Some(collection), without_empty: true, ..DatasetQuery::default() };
-    let view = SensorView { layout: kind.layout.to_owned(), sensors: kind.sensors, signals: kind.signals };
+    let layout = kind.layout.to_owned();
+    let view = SensorView { layout, sensors: kind.sensors, signals: kind.signals, ..SensorView::default() };
     Ok(query.read(store, &view, &mut |_, _| ())?)
 }
 
