@@ -81,11 +81,13 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         true => Vec::new(),
         false => plan.splits(&data, arguments.data.seed, usize::from(arguments.repeats))?,
     };
-    let parts: Vec<[Dataset; 2]> =
-        splits.iter().map(|split| [data.part(&split.all_training()), data.part(&split.test)]).collect();
+    let parts: Vec<[Dataset; 3]> =
+        splits.iter().map(|split| [&split.train, &split.second, &split.test].map(|part| data.part(part))).collect();
     let interrupted = AtomicBool::new(false);
-    let comparisons: Vec<Comparison<'_>> =
-        parts.iter().map(|[train, test]| arguments.comparison(train, test, &interrupted)).collect();
+    let comparisons: Vec<Comparison<'_>> = parts
+        .iter()
+        .map(|[train, second, test]| arguments.comparison([train, test], Some(second), &interrupted))
+        .collect();
     let threads = match arguments.threads {
         Some(threads) => usize::from(threads),
         None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -111,7 +113,7 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     let nothing = data.part(&[]);
     for (name, model) in &models {
         let unseen = unseen(name, model, &data, &tested)?;
-        let comparison = arguments.comparison(&nothing, &unseen, &interrupted);
+        let comparison = arguments.comparison([&nothing, &unseen], None, &interrupted);
         rows.push(comparison.of_fitted(name, model)?);
     }
     let controls = match (methods.first().filter(|_| arguments.controls), comparisons.first()) {
@@ -133,9 +135,15 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
 
 impl EvaluateArguments {
     /// Comparison on one split.
-    fn comparison<'a>(&self, train: &'a Dataset, test: &'a Dataset, interrupted: &'a AtomicBool) -> Comparison<'a> {
+    fn comparison<'a>(
+        &self,
+        [train, test]: [&'a Dataset; 2],
+        second: Option<&'a Dataset>,
+        interrupted: &'a AtomicBool,
+    ) -> Comparison<'a> {
         let (seed, quick) = (self.data.seed, self.data.quick);
-        Comparison { train, test, seed, quick, stop: StopRule::default(), interrupted }
+        let second = second.filter(|second| !second.examples.is_empty());
+        Comparison { train, second, test, seed, quick, stop: StopRule::default(), interrupted }
     }
 
     /// Largest number of trials of each object that the options use.

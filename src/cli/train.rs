@@ -175,12 +175,15 @@ fn judged(
 ) -> Result<(String, Evaluation), Failure> {
     let (seed, quick, stop) = (arguments.data.seed, arguments.data.quick, StopRule::default());
     let splits = plan.splits(data, seed, 1)?;
-    let parts: Vec<[Dataset; 2]> =
-        splits.iter().map(|split| [data.part(&split.all_training()), data.part(&split.test)]).collect();
+    let parts: Vec<[Dataset; 3]> =
+        splits.iter().map(|split| [&split.train, &split.second, &split.test].map(|part| data.part(part))).collect();
     let interrupted = AtomicBool::new(false);
     let comparisons: Vec<Comparison<'_>> = parts
         .iter()
-        .map(|[train, test]| Comparison { train, test, seed, quick, stop, interrupted: &interrupted })
+        .map(|[train, second, test]| {
+            let second = Some(second).filter(|second| !second.examples.is_empty());
+            Comparison { train, second, test, seed, quick, stop, interrupted: &interrupted }
+        })
         .collect();
     let bar = progress_bar("judging")?;
     bar.set_length(splits.len() as u64);

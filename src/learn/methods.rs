@@ -129,7 +129,7 @@ impl Method {
             channels: data.channels.clone(),
             labels: data.labels.clone(),
             data: data.about.clone(),
-            learned: LearnedGrasps::of(data),
+            learned: LearnedGrasps::of(&data),
             settings: recogniser.settings(),
             fingerprint: Some(self.fingerprint()),
             deviations: recipe.map(|recipe| recipe.deviations()).unwrap_or_default(),

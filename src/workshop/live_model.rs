@@ -72,8 +72,15 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
         (0..test.examples.len()).filter(|k| test.labels.classes[test.examples[*k].class].size.is_some()).collect();
     let objects = test.part(&objects);
     let stop = StopRule::default();
-    let comparison =
-        Comparison { train: &train, test: &objects, seed: 1, quick: false, stop, interrupted: &interrupted };
+    let comparison = Comparison {
+        train: &train,
+        second: None,
+        test: &objects,
+        seed: 1,
+        quick: false,
+        stop,
+        interrupted: &interrupted,
+    };
     let row = comparison.of_fitted(METHOD, &model)?;
     let halfway = prefix_calibration(model.recogniser.as_ref(), &objects, 0.5);
     let test =

@@ -183,7 +183,7 @@ impl LabelledTraining<'_> {
         }
         (self.progress)(TrainingStage::Judging);
         let (seed, quick, stop) = (self.seed, self.quick, StopRule::default());
-        let comparison = Comparison { train, test, seed, quick, stop, interrupted: self.stop };
+        let comparison = Comparison { train, second: None, test, seed, quick, stop, interrupted: self.stop };
         Ok(comparison.of_fitted(self.method.key, model)?.evaluation)
     }
 }

@@ -200,8 +200,15 @@ pub fn measure_scores(
         let split = splits.first().ok_or(SplitError::Nothing)?;
         let (train, test) = (data.part(&split.train), data.part(&split.test));
         let stop = StopRule::default();
-        let comparison =
-            Comparison { train: &train, test: &test, seed: SEED, quick: false, stop, interrupted: how.cancelled };
+        let comparison = Comparison {
+            train: &train,
+            second: None,
+            test: &test,
+            seed: SEED,
+            quick: false,
+            stop,
+            interrupted: how.cancelled,
+        };
         let finished = results.complete(&units, how, |unit| match unit {
             Some(method) => {
                 let row = comparison.row_of(method)?;

@@ -3,7 +3,7 @@
 use super::bench::{StudyBench, StudyError};
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, McNemar};
-use palpate_learn::{Dataset, Method, Model};
+use palpate_learn::{Dataset, Method, Model, SplitError, SplitPlan};
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -83,16 +83,18 @@ impl TestPart {
                 return Err(StudyError::Missing(what));
             }
         }
-        let fold = data.folds(self.of, seed);
-        let (test, others): (Vec<usize>, Vec<usize>) = (0..fold.len()).partition(|k| fold[*k] == self.part);
-        let others = data.part(&others);
+        let missing = |error: SplitError| StudyError::Missing(error.to_string());
+        let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1).map_err(missing)?;
+        let mut split = splits.into_iter().nth(self.part).ok_or_else(|| missing(SplitError::Folds))?;
+        split.train.sort_unstable();
+        let others = data.part(&split.train);
         let train = others.by_class().into_iter().flat_map(|members| {
             let (count, first) = (members.len(), self.part * self.train);
             (0..self.train.min(count)).map(move |k| members[(first + k) % count]).collect::<Vec<_>>()
         });
         let mut train: Vec<usize> = train.collect();
         train.sort_unstable();
-        Ok((others.part(&train), data.part(&test)))
+        Ok((others.part(&train), data.part(&split.test)))
     }
 }
 
