@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-fn quick(seed: u64) -> Fitting<'static> {
+pub(crate) fn quick(seed: u64) -> Fitting<'static> {
     Fitting { seed, quick: true, settings: serde_json::Map::new(), second: None, progress: &|_| (), stop: &NEVER }
 }
 
@@ -180,6 +180,101 @@ fn unsuitable_data_are_refused_with_a_reason() {
 }
 
 #[test]
+fn methods_say_whether_they_need_size_and_shape() {
+    let mut bare = made_up(6, 10);
+    bare.labels.classes.iter_mut().for_each(|class| (class.size, class.shape) = (None, None));
+    for method in &METHODS {
+        assert_eq!(method.needs_properties, method.recipe.is_some_and(|recipe| recipe().two_stages), "{}", method.key);
+        let refused = method.train(&bare, &quick(1)).err();
+        assert_eq!(matches!(refused, Some(LearnError::NoProperties { .. })), method.needs_properties, "{}", method.key);
+    }
+}
+
+#[test]
+fn fingerprints_and_deviations_tell_methods_apart() {
+    let prints: std::collections::BTreeSet<String> = METHODS.iter().map(Method::fingerprint).collect();
+    assert_eq!(prints.len(), METHODS.len());
+    for method in &METHODS {
+        assert_eq!(method.fingerprint().len(), 8, "{}", method.key);
+        let strict = method.recipe.is_some_and(|recipe| recipe().strict);
+        assert_eq!(method.deviations().is_empty(), strict || method.recipe.is_none(), "{}", method.key);
+    }
+    let card = trained(method("paper-macro-layer").expect("in the list"), &made_up(4, 1)).card;
+    assert_eq!((card.fingerprint.as_deref().map(str::len), card.deviations.as_slice()), (Some(8), [].as_slice()));
+    let settings = serde_json::json!({ "noise": 0.1 }).as_object().cloned().expect("an object");
+    let fitting = Fitting { settings, ..quick(1) };
+    let changed = method("paper-macro-layer").expect("in the list").train(&made_up(4, 1), &fitting).expect("fits");
+    assert!(matches!(&changed.card.deviations[..], [one] if one.contains("noise")), "{:?}", changed.card.deviations);
+}
+
+#[test]
+fn each_stage_learns_from_grasps_of_its_own() {
+    let (first, second) = (made_up(6, 20), made_up(6, 21));
+    for key in ["paper-ds-lstm", "paper-ids-lstm", "ds-lstm"] {
+        let stages = |first: &Dataset, second: &Dataset| {
+            let fitting = Fitting { second: Some(second), ..quick(1) };
+            let model = method(key).expect("in the list").train(first, &fitting).expect("fits");
+            assert_eq!(model.card.data.grasps, 48, "the card counts both sets");
+            let (one, two): (Vec<_>, Vec<_>) =
+                model.recogniser.arrays().0.into_iter().partition(|(name, _)| name.starts_with("stage_one"));
+            (one, two)
+        };
+        let usual = stages(&first, &second);
+        let other_second = stages(&first, &second.with_shuffled_labels(1));
+        assert!(usual.0 == other_second.0 && usual.1 != other_second.1, "{key}");
+        let other_first = stages(&first.with_shuffled_labels(1), &second);
+        assert!(usual.0 != other_first.0, "{key}");
+    }
+}
+
+#[test]
+fn methods_of_one_stage_learn_from_both_sets() {
+    let (first, second) = (made_up(6, 20), made_up(6, 21));
+    let both = Dataset { examples: [&first.examples[..], &second.examples[..]].concat(), ..first.clone() };
+    for key in ["random-forest", "paper-macro-layer", "macro-layer", "ds-lstm-cross", "convolution"] {
+        let method = method(key).expect("in the list");
+        let with_second = method.train(&first, &Fitting { second: Some(&second), ..quick(1) }).expect("fits");
+        let joined = method.train(&both, &quick(1)).expect("fits");
+        assert!(with_second.recogniser.arrays() == joined.recogniser.arrays(), "{key}");
+        let other = Dataset { channels: vec!["grip".to_owned(); 4], ..second.clone() };
+        let refused = method.train(&first, &Fitting { second: Some(&other), ..quick(1) }).err();
+        assert_eq!(refused, Some(LearnError::SecondDiffers), "{key}");
+    }
+}
+
+#[test]
+fn the_strict_iterated_network_reads_the_earlier_pmf() {
+    let (train, test) = (made_up(25, 1), made_up(5, 2));
+    let model = trained(method("paper-ids-lstm").expect("in the list"), &train);
+    assert!(model.recogniser.live().is_none(), "stage one decides after the whole grasp");
+    // Mean probability of the true class where the earlier grasp named the class that is some places further.
+    let given = |further: usize| {
+        let of_grasp = |example: &Example| {
+            let named = (example.class + further) % 4;
+            let before = Pmf::from_weights((0..4).map(|k| if k == named { 0.97 } else { 0.01 }));
+            model.recogniser.recognise(&example.grasp, Some(&before)).pmf.probabilities()[example.class]
+        };
+        test.examples.iter().map(of_grasp).sum::<f64>() / test.examples.len() as f64
+    };
+    // The next class is the one most easily taken for it.
+    assert!(given(0) > given(1) + 0.01, "{} against {}", given(0), given(1));
+}
+
+#[test]
+fn votes_of_trees_are_calibrated() {
+    let (train, test) = (made_up(25, 1), made_up(25, 2));
+    for key in ["random-forest", "extra-trees", "rusboost", "rusboost-samme", "decision-tree"] {
+        let model = trained(method(key).expect("in the list"), &train);
+        let answers = answer(model.recogniser.as_ref(), &test);
+        let probabilities: Vec<Vec<f64>> =
+            answers.verdicts.iter().map(|verdict| verdict.pmf.probabilities().to_vec()).collect();
+        let forecasts = crate::metrics::Forecasts::new(&answers.truth, &probabilities).expect("has trials");
+        let error = forecasts.calibration_error(crate::metrics::CALIBRATION_BINS);
+        assert!(error < 0.1, "{key}: calibration error {error}");
+    }
+}
+
+#[test]
 fn truncated_or_altered_models_are_refused() {
     let data = made_up(6, 11);
     for method in &METHODS {
@@ -221,6 +316,9 @@ const SAVED: &[(&str, &[u8])] = &[
     ("ids-lstm-cross", include_bytes!("saved_models/ids-lstm-cross.safetensors")),
     ("macro-layer", include_bytes!("saved_models/macro-layer.safetensors")),
     ("committee", include_bytes!("saved_models/committee.safetensors")),
+    ("paper-macro-layer", include_bytes!("saved_models/paper-macro-layer.safetensors")),
+    ("paper-ds-lstm", include_bytes!("saved_models/paper-ds-lstm.safetensors")),
+    ("paper-ids-lstm", include_bytes!("saved_models/paper-ids-lstm.safetensors")),
     ("zuo", include_bytes!("saved_models/zuo.safetensors")),
     ("decision-tree", include_bytes!("saved_models/decision-tree.safetensors")),
     ("knn", include_bytes!("saved_models/knn.safetensors")),
@@ -233,12 +331,13 @@ const SAVED: &[(&str, &[u8])] = &[
     ("rusboost-samme", include_bytes!("saved_models/rusboost-samme.safetensors")),
     ("measures-svm", include_bytes!("saved_models/measures-svm.safetensors")),
     ("measures-forest", include_bytes!("saved_models/measures-forest.safetensors")),
+    ("extra-trees", include_bytes!("saved_models/extra-trees.safetensors")),
     ("dtw-knn", include_bytes!("saved_models/dtw-knn.safetensors")),
     ("convolution", include_bytes!("saved_models/convolution.safetensors")),
 ];
 
 #[test]
-fn saved_models_of_version_0_1_still_load_with_the_same_results() {
+fn saved_models_still_load_with_the_same_results() {
     let expected: std::collections::BTreeMap<String, Vec<Vec<f64>>> =
         serde_json::from_str(include_str!("saved_models/expected.json")).expect("valid JSON");
     assert!(METHODS.iter().map(|method| method.key).eq(SAVED.iter().map(|(key, _)| *key)), "a model of every method");

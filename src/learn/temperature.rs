@@ -11,6 +11,14 @@ pub(crate) struct Temperatures {
     pub(crate) count: usize,
 }
 
+impl Temperatures {
+    /// True if a temperature from a file may have been found among these.
+    pub(crate) fn allows(&self, temperature: f32) -> bool {
+        // Files hold single precision.
+        (0.99 * self.range.start()..=1.01 * self.range.end()).contains(&f64::from(temperature))
+    }
+}
+
 /// Best temperature of scores (unnormalised logarithms of probabilities), each with its true class, and the mean negative
 /// log-likelihood at it (nat). 1 without scores.
 pub(crate) fn best_temperature(rows: &[(&[f32], usize)], tried: &Temperatures) -> (f64, f64) {

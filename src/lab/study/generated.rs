@@ -4,6 +4,7 @@ use super::accuracy::{accuracy_tables, stored_accuracy};
 use super::effect_audit::{AuditReport, audit_table, stored_effects};
 use super::stored_study::{GeneratedSection, StoredStudy};
 use super::{paper, peer_costs, recognition_scores, stability};
+use palpate_learn::METHODS;
 
 /// All generated sections; a test checks that the documents hold them, and
 /// `cargo run -p palpate-workshop -- tables` writes them.
@@ -20,8 +21,10 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
     };
     let shipped =
         GeneratedSection { document: "assets/help/recognition.md", name: "shipped model", text: shipped_text() };
+    let deviations =
+        GeneratedSection { document: "assets/help/recognition.md", name: "deviations", text: deviations_text() };
     Ok([
-        vec![accuracy, effects, shipped],
+        vec![accuracy, effects, shipped, deviations],
         stability::sections()?,
         recognition_scores::sections()?,
         paper::sections()?,
@@ -46,6 +49,22 @@ fn shipped_text() -> String {
         percent(&metrics["f1_by_grasps"][2]),
         metrics["test"].as_str().unwrap_or("nothing")
     )
+}
+
+/// Differences of the tuned networks from the paper, each with the methods that have it.
+fn deviations_text() -> String {
+    let mut lines: Vec<(String, Vec<String>)> = Vec::new();
+    for method in &METHODS {
+        for deviation in method.deviations() {
+            let key = format!("`{}`", method.key);
+            match lines.iter_mut().find(|(known, _)| *known == deviation) {
+                Some((_, keys)) => keys.push(key),
+                None => lines.push((deviation, vec![key])),
+            }
+        }
+    }
+    let line = |(deviation, keys): &(String, Vec<String>)| format!("- {}: {deviation}.", keys.join(", "));
+    lines.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn effects_text(stored: &StoredStudy<AuditReport>) -> String {

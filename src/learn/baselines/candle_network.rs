@@ -77,7 +77,7 @@ struct Learned {
     mirror: Option<Vec<usize>>,
     revision: u32,
     epochs: usize,
-    temperature: f64,
+    temperature: f32,
 }
 
 /// Sequences per optimiser step.
@@ -159,7 +159,7 @@ impl<N: CandleNetwork> Candle<N> {
         let network = work.train(&of(false).into_iter().chain(of(true)).collect::<Vec<_>>(), 0.5);
         let network = network.map_err(LearnError::failed)?;
         fitting.check()?;
-        learned.temperature = temperature;
+        learned.temperature = temperature as f32;
         Ok(Self { learned, network })
     }
 
@@ -185,7 +185,7 @@ impl<N: CandleNetwork> Candle<N> {
         if !learned.mirror.as_ref().is_none_or(|m| m.len() == width && m.iter().all(is_place)) {
             return Err(LoadError::Card { part: "the mirror image" });
         }
-        if !TEMPERATURES.range.contains(&learned.temperature) {
+        if !TEMPERATURES.allows(learned.temperature) {
             return Err(LoadError::Card { part: "the temperature" });
         }
         let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
@@ -293,7 +293,7 @@ impl<N: CandleNetwork> Recogniser for Candle<N> {
     fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
         // Shapes were checked when the network was made; on failure all classes would be equally likely.
         let logarithms = logarithms(&self.network, &self.learned, &inputs(&self.learned, grasp)).unwrap_or_default();
-        let temperature = self.learned.temperature;
+        let temperature = f64::from(self.learned.temperature);
         let pmf = Pmf::from_scores(logarithms.into_iter().map(|log| f64::from(log) / temperature));
         Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
     }
@@ -314,5 +314,24 @@ impl<N: CandleNetwork> Recogniser for Candle<N> {
 
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(&self.learned).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::guide_network::Perceptron;
+    use super::*;
+    use crate::conformance_tests::{made_up, quick};
+
+    #[test]
+    fn the_network_of_the_guide_is_as_printed_and_learns() {
+        let guide = include_str!("../../../assets/help/contributing.md");
+        let source = include_str!("guide_network.rs");
+        let code = source.split_once("\n\n").map_or(source, |(_, code)| code);
+        assert!(guide.contains(&format!("```rust,ignore\n{code}```")), "{code}");
+        let (train, test) = (made_up(12, 1), made_up(6, 2));
+        let network = Candle::<Perceptron>::fit(&train, &quick(1)).expect("fits");
+        let right = test.examples.iter().filter(|e| network.recognise(&e.grasp, None).pmf.top().0 == e.class).count();
+        assert!(right as f64 > 0.8 * test.examples.len() as f64, "{right} of {}", test.examples.len());
     }
 }

@@ -3,6 +3,8 @@
 
 mod candle_network;
 mod convolution;
+#[cfg(test)]
+mod guide_network;
 mod neighbours;
 mod row_model;
 mod svm;

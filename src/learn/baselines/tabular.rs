@@ -55,7 +55,7 @@ struct Learned {
     model: String,
     /// Temperature of the probabilities; absent in files of versions that did not calibrate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    temperature: Option<f64>,
+    temperature: Option<f32>,
     /// True if the answers on a grasp and on its mirror image are averaged.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     both_views: bool,
@@ -301,7 +301,7 @@ impl Tabular {
         (fitting.progress)(1.0);
         let both_views = mirroring.views && features.has_mirror();
         let learned =
-            Learned { kind, features, scaling, model: description, temperature: Some(temperature), both_views };
+            Learned { kind, features, scaling, model: description, temperature: Some(temperature as f32), both_views };
         Ok(Self { learned, model })
     }
 
@@ -313,7 +313,7 @@ impl Tabular {
         if !learned.features.is_sound(card.channels.len()) || !scaled {
             return Err(LoadError::Card { part: "the feature definition" });
         }
-        if learned.temperature.is_some_and(|own| !TEMPERATURES.range.contains(&own)) {
+        if learned.temperature.is_some_and(|own| !TEMPERATURES.allows(own)) {
             return Err(LoadError::Card { part: "the temperature" });
         }
         let model: Box<dyn RowModel> = match learned.kind.classifier() {
@@ -376,7 +376,7 @@ impl Recogniser for Tabular {
         let own = scaled(self.learned.features.row(grasp));
         let mirrored = if self.learned.both_views { self.learned.features.mirrored(grasp).map(scaled) } else { None };
         let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
-        let pmf = self.learned.temperature.map_or_else(|| pmf.clone(), |temperature| pmf.at_temperature(temperature));
+        let pmf = self.learned.temperature.map_or_else(|| pmf.clone(), |own| pmf.at_temperature(f64::from(own)));
         Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
     }
 

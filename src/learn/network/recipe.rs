@@ -195,7 +195,7 @@ impl Recipe {
 
     /// Applies the settings of a fit, and shortens it if quick. Refuses settings that are unknown or out of range.
     pub fn adjusted(self, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
-        let mut value = serde_json::to_value(&self).map_err(LearnError::failed)?;
+        let mut value = serde_json::to_value(self).map_err(LearnError::failed)?;
         for (name, wanted) in &fitting.settings {
             let known = value.get(name).is_some();
             let place = if known { value.get_mut(name) } else { value["training"].get_mut(name) };
