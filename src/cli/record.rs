@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         return list(arguments.json);
     }
     let scene = match &arguments.scene {
-        Some(path) => Scene::from_file(path)?,
+        Some(path) => Scene::named_or_from_file(path)?,
         None => Scene::default(),
     };
     let object = arguments.object.as_deref().map(|name| class_name(class_of(name))).transpose()?;

@@ -1,4 +1,4 @@
-//! `palpate scene explain`: which effects a scene calls for, why, what each costs and changes.
+//! `palpate scene`: scenes with a name; which effects a scene calls for, why, what each costs and changes.
 
 use super::Failure;
 use super::setup::SceneArguments;
@@ -6,13 +6,15 @@ use super::terminal::{say, say_json, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, explain_effects};
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{SCENES, Scene};
+use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate scene`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
+  palpate scene list
   palpate scene explain lemon
   palpate scene explain scene.toml --json
   palpate scene explain empty --set effects.finger-contact=off
@@ -25,6 +27,12 @@ pub(super) struct SceneCommandArguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum SceneCommand {
+    /// List the scenes that have a name, for --scene.
+    List {
+        /// Print one JSON object per scene instead of text.
+        #[arg(long)]
+        json: bool,
+    },
     /// Print which effects are on and why, the cost of each, and the change if it were switched.
     Explain {
         /// Scene file (.toml), or an object: a built-in name, a URDF, OBJ or STL file, or `empty`.
@@ -38,7 +46,10 @@ enum SceneCommand {
 }
 
 pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
-    let SceneCommand::Explain { scene_or_object, scene, json } = &arguments.command;
+    let (scene_or_object, scene, json) = match &arguments.command {
+        SceneCommand::List { json } => return list(*json),
+        SceneCommand::Explain { scene_or_object, scene, json } => (scene_or_object, scene, json),
+    };
     let scene = scene_of(scene_or_object.as_deref(), scene)?;
     let object = scene.load_object()?;
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} effects")?);
@@ -52,6 +63,30 @@ pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     let explanation = explanation.ok_or("the measurement was cancelled")?;
     if *json { say_json(&explanation) } else { print(&explanation) }
+}
+
+/// A named scene, as `--json` prints it.
+#[derive(Serialize)]
+struct ListedScene {
+    name: &'static str,
+    about: &'static str,
+    /// Settings that differ from the defaults.
+    settings: String,
+}
+
+fn list(json: bool) -> Result<(), Failure> {
+    for named in SCENES {
+        let settings = named.scene().differences();
+        if json {
+            say_json(&ListedScene { name: named.name, about: named.about(), settings })?;
+            continue;
+        }
+        say(format!("{}: {}", named.name, named.about()))?;
+        for setting in settings.lines() {
+            say(format!("  {setting}"))?;
+        }
+    }
+    Ok(())
 }
 
 fn scene_of(name: Option<&str>, arguments: &SceneArguments) -> Result<Scene, Failure> {

@@ -13,8 +13,9 @@ use std::path::{Path, PathBuf};
 /// Scene and changes to it.
 #[derive(Debug, clap::Args)]
 pub(super) struct SceneArguments {
-    /// Scene file (TOML); `palpate grasp --print-scene` prints all keys with their defaults.
-    #[arg(long, value_name = "FILE")]
+    /// Scene by name (default, paper; `palpate scene list`) or scene file (TOML); `palpate grasp --print-scene` prints all
+    /// keys with their defaults.
+    #[arg(long, value_name = "NAME|FILE")]
     pub(super) scene: Option<PathBuf>,
     /// Accuracy: draft, standard, reference, or a tolerance such as 1e-4 (see palpate help accuracy).
     #[arg(long, value_name = "NAME|TOL")]
@@ -105,7 +106,7 @@ impl SceneArguments {
     /// Builds the scene on top of another file.
     pub(super) fn with_file(&self, file: Option<&Path>, object: Option<&str>) -> Result<Scene, Failure> {
         let mut scene = match file {
-            Some(path) => Scene::from_file(path)?,
+            Some(path) => Scene::named_or_from_file(path)?,
             None => Scene::default(),
         };
         if let Some(object) = object {

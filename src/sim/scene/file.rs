@@ -16,6 +16,12 @@ pub enum SceneError {
         /// Message of the operating system.
         cause: String,
     },
+    /// A name that no scene has.
+    #[error("no scene is called \"{name}\"; choose {}, or name a file (.toml)", super::named::SCENES.map(|scene| scene.name).join(" or "))]
+    UnknownName {
+        /// The name.
+        name: String,
+    },
     /// Not TOML, or a value of the wrong kind.
     #[error("the scene is not understood: {0}")]
     Syntax(String),

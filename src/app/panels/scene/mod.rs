@@ -8,7 +8,7 @@ use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
-use palpate_sim::scene::{Auto, EngineKind, Scene, SupportKind};
+use palpate_sim::scene::{Auto, EngineKind, SCENES, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut scene = context.scene.clone();
@@ -21,6 +21,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         section(ui, "Pad", false, |ui| pad_ui(ui, &mut scene));
         section(ui, "Support", false, |ui| support_ui(ui, &mut scene));
         ui.add_space(4.0);
+        named_scenes_ui(ui, &mut scene);
         ui.horizontal_wrapped(|ui| {
             if ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)").clicked() {
                 actions.push(FileAction::SaveScene);
@@ -35,6 +36,20 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     if scene != *context.scene {
         actions.push(SimulationAction::SetScene(Box::new(scene)));
     }
+}
+
+/// Scenes with a name; each keeps the object, its poses and the solver.
+fn named_scenes_ui(ui: &mut Ui, scene: &mut Scene) {
+    ui.horizontal_wrapped(|ui| {
+        ui.label("Gripper of");
+        for named in SCENES {
+            let applied = named.applied_to(scene);
+            let chosen = applied == *scene;
+            if ui.selectable_label(chosen, named.name).on_hover_text(named.about()).clicked() && !chosen {
+                *scene = applied;
+            }
+        }
+    });
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
