@@ -78,7 +78,10 @@ mod tests {
         (other.pose.yaw_deg, other.solver.max_iterations) = (7.0, 33);
         let paper = NamedScene::named("paper").expect("in the list");
         let applied = paper.applied_to(&other);
-        assert_eq!((applied.gripper.clone(), applied.programme.clone()), (paper.scene().gripper, paper.scene().programme));
+        assert_eq!(
+            (applied.gripper.clone(), applied.programme.clone()),
+            (paper.scene().gripper, paper.scene().programme)
+        );
         assert_eq!(SCENES[0].applied_to(&applied), other);
         assert!(SCENES.iter().all(|scene| scene.about().len() > 20));
     }

@@ -7,6 +7,7 @@ use crate::study::result_file::ResultFileError;
 use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
+use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -135,14 +136,24 @@ impl<'a> StudyBench<'a> {
         Ok(Some(data))
     }
 
+    /// A simulated trial of the store; none for others.
+    pub fn simulated(&self, id: TrialId) -> Result<Option<SimulatedTrial>, StudyError> {
+        let store = self.store.lock().unwrap_or_else(PoisonError::into_inner);
+        let Trial { header, data } = store.load(id).map_err(|cause| DatasetError::Store { cause })?;
+        Ok(match data {
+            TrialData::Simulated(data) => Some(SimulatedTrial { header, data }),
+            TrialData::Recorded(_) | TrialData::Imported(_) => None,
+        })
+    }
+
     /// Collects what is missing; returns the query for it, none where it was cancelled.
     fn collected(&self, store: &mut Store, wanted: &DataWanted) -> Result<Option<DatasetQuery>, StudyError> {
         let preset = PosePreset::named(&wanted.preset);
         let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", wanted.preset)))?;
-        let mut scene = Scene { pose: preset.poses(), ..Scene::default() };
+        let mut scene = Scene { pose: preset.poses(), ..wanted.scene.clone() };
         scene.object.fixed = wanted.fixed;
         scene.pose.between = wanted.between;
-        let objects = self.plan.objects();
+        let objects = if wanted.objects.is_empty() { self.plan.objects() } else { wanted.objects.clone() };
         let plan = CollectionPlan {
             objects: objects.clone(),
             ..CollectionPlan::of_all_objects(scene, wanted.grasps as u32, POSES)

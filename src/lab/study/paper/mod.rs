@@ -14,6 +14,7 @@ mod models;
 mod plan;
 mod report;
 mod run;
+mod signatures;
 
 pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
 pub(in crate::study) use claims::sections;
@@ -30,7 +31,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// All studies of the paper, in the order of its figures.
-pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[&models::Models];
+pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[&signatures::TactileSignatures, &models::Models];
 
 /// Finds a study by its key.
 pub fn paper_study(key: &str) -> Option<&'static dyn PaperStudy> {

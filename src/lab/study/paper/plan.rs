@@ -3,7 +3,7 @@
 use crate::datasets::{DatasetQuery, SensorView};
 use palpate_learn::METHODS;
 use palpate_sim::objects::catalogue;
-use palpate_sim::scene::Between;
+use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::model::SensorModel;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,10 @@ pub enum StudySize {
 /// Grasps that a study wants, and the sensors that it reads them through.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataWanted {
+    /// Gripper, programme and all else that is not named below.
+    pub scene: Scene,
+    /// Objects; those of the plan where the list is empty.
+    pub objects: Vec<String>,
     /// Name of the pose preset.
     pub preset: String,
     /// True for objects that are fixed in place.
@@ -102,6 +106,8 @@ impl StudyPlan {
     /// Free objects that are put down anew for each grasp, read through the default layout.
     pub fn wanted(&self, grasps: usize, sensors: SensorModel) -> DataWanted {
         DataWanted {
+            scene: Scene::default(),
+            objects: Vec::new(),
             preset: self.preset.clone(),
             fixed: false,
             between: Between::Reposed,
