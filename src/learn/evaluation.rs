@@ -332,3 +332,46 @@ pub fn prefix_calibration(recogniser: &dyn Recogniser, data: &Dataset, share: f3
     let probabilities: Vec<Vec<f64>> = data.examples.iter().map(cut).collect();
     Some(Forecasts::new(&data.truth(), &probabilities)?.calibration_error(CALIBRATION_BINS))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Labels;
+
+    #[test]
+    fn grasps_follow_as_they_were_made_where_the_object_stayed_and_at_random_where_it_was_placed_anew() {
+        let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+        let labels = Labels { classes: vec![class("left"), class("placed")], ..Labels::default() };
+        // The object of the first class was left three times and then placed anew; a grasp of its second round is missing.
+        let after = [None, Some(1), Some(2), None, Some(9), None, None, None];
+        let example = |(k, after): (usize, Option<i64>)| Example {
+            id: k as i64 + 1,
+            class: usize::from(k > 4),
+            content: k as u64,
+            after,
+            ..Example::default()
+        };
+        let examples: Vec<Example> = after.into_iter().enumerate().map(example).collect();
+        let data = Dataset { labels, examples, ..Dataset::default() };
+        let found = successions(&data, 7);
+        assert_eq!(found[..5], [vec![0, 1, 2], vec![1, 2], vec![2], vec![3], vec![4]]);
+        for (k, grasps) in found.iter().enumerate().skip(5) {
+            let mut sorted = grasps.clone();
+            sorted.sort_unstable();
+            assert_eq!((grasps[0], sorted), (k, vec![5, 6, 7]));
+        }
+        assert_eq!(found, successions(&data, 7));
+    }
+
+    #[test]
+    fn scores_after_several_grasps_need_a_round_of_each_class() {
+        let round = |truth: usize, grasps: usize| {
+            let mut belief = Belief::default();
+            (0..grasps).for_each(|_| belief.add(Pmf::uniform(2), Pmf::uniform(2)));
+            Round { truth, belief }
+        };
+        assert_eq!(most_grasps(&[round(0, 3), round(0, 1), round(1, 2)]), 2);
+        assert_eq!(most_grasps(&[]), 0);
+        assert_eq!(f1_by_grasps(2, &[round(0, 3), round(0, 1), round(1, 2)]).len(), 2);
+    }
+}

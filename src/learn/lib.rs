@@ -76,6 +76,8 @@ mod pmf;
 mod recogniser;
 mod signatures;
 mod split;
+#[cfg(test)]
+mod split_tests;
 mod temperature;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};

@@ -12,7 +12,7 @@ use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
 use palpate_lab::workers::{FinishedTraining, TrainCommand, TrainRequest, TrainerView};
 use palpate_learn::metrics::Confusion;
-use palpate_learn::{Labels, METHODS, method};
+use palpate_learn::{Labels, METHODS, counted, method};
 use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -101,9 +101,13 @@ fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTrain
         let text = format!("\"{}\" left out: {} usable trials, {LEAST_TRIALS} needed", class.name, class.trials);
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
     }
-    if judged.left_out > 0 {
-        let text = format!("{} trials left out: their sensors are not calibrated", judged.left_out);
+    let data = &trained.model.card.data;
+    if data.left_out > 0 {
+        let text = format!("{} trials left out: {}", data.left_out, counted(&data.left_out_for));
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+    }
+    for mixed in &data.mixed {
+        wrapped(ui, RichText::new(format!("Mixed {mixed}")).color(ui.visuals().warn_fg_color));
     }
     if trained.model.card.rejection.is_none() {
         let text = "This model cannot answer \"unknown\": that takes more trials.";

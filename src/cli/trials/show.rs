@@ -18,6 +18,8 @@ struct SimulatedReport {
     rig: TrialSource,
     seed: u64,
     version: String,
+    /// Version of the physics; null for trials of early versions.
+    physics: Option<u32>,
     samples: usize,
     #[serde(flatten)]
     summary: GraspSummary,
@@ -146,6 +148,7 @@ fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), 
         seed: trial.header.seed,
         samples: trial.frames().len(),
         version: trial.header.version,
+        physics: trial.header.origin.as_ref().map(|origin| origin.physics),
         summary,
         plan: trial.data.plan,
         scene: trial.header.scene.to_toml(),
@@ -157,7 +160,8 @@ fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), 
         warn(warning);
     }
     say(format!("trial {id}: {} ({}, seed {})", shown_title(&report.summary.object), report.rig, report.seed))?;
-    say(format!("{} samples, recorded by Palpate {}", report.samples, report.version))?;
+    let physics = report.physics.map_or_else(|| "unknown".to_owned(), |version| version.to_string());
+    say(format!("{} samples, recorded by Palpate {}, physics {physics}", report.samples, report.version))?;
     match report.summary.contact_onset_s {
         Some(onset) => say(format!("first contact at {onset:.3} s"))?,
         None => say("no contact")?,

@@ -427,6 +427,15 @@ mod tests {
         let shift = |k: usize| Scene::from_toml(&whole[k].3).expect("a scene").object.shift;
         assert_eq!((shift(0), shift(5)), ([0.0; 2], [0.0; 2]), "put down anew after five");
         assert!((1..5).any(|k| shift(k) != [0.0; 2]), "left where the fingers pushed it");
+
+        let store = store(&folder, "one");
+        let trials = store.list(true).expect("lists");
+        let headers: Vec<_> = trials.iter().map(|row| store.load(row.id).expect("whole").header).collect();
+        for (k, pair) in headers.windows(2).enumerate() {
+            let stayed = pair[1].scene.object.shift != [0.0; 2];
+            let after = pair[1].origin.as_ref().and_then(|origin| origin.after.clone());
+            assert_eq!(after, pair[0].identity().filter(|_| stayed), "trial {}", k + 1);
+        }
     }
 
     #[test]
