@@ -1,6 +1,6 @@
 //! Recognisers that turn a grasp into a row of features and classify the row.
 //!
-//! Probabilities are calibrated by a temperature, fitted to the answers on grasps that were held out: forests and boosted
+//! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests and boosted
 //! trees order the classes well, but are far too unsure or too sure of them.
 
 use super::neighbours::Neighbours;
@@ -17,7 +17,7 @@ use crate::forest::{
 use crate::model::{LoadError, ModelCard};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
-use crate::temperature::{Temperatures, best_temperature};
+use crate::temperature::{Calibration, Temperatures};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
@@ -53,9 +53,9 @@ struct Learned {
     scaling: Vec<(f32, f32)>,
     /// Settings of the classifier, for people.
     model: String,
-    /// Temperature of the probabilities; absent in files of versions that did not calibrate.
+    /// Absent in files of versions that did not calibrate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    temperature: Option<f32>,
+    calibration: Option<Calibration>,
     /// True if the answers on a grasp and on its mirror image are averaged.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     both_views: bool,
@@ -82,10 +82,8 @@ enum Classifier {
 
 /// Largest number of trees or rounds in a quick fit.
 const QUICK: usize = 20;
-/// Number of parts of the grasps, each of which is held out once for calibration.
-const PARTS: usize = 3;
 /// Temperatures tried; votes of many trees on many classes are nearly equal and need the lowest.
-const TEMPERATURES: Temperatures = Temperatures { range: 0.005..=10.0, count: 160 };
+const TEMPERATURES: Temperatures = Temperatures { range: 0.0005..=10.0, count: 200 };
 /// Version of the fit, part of the fingerprint.
 const REVISION: u32 = 2;
 
@@ -116,6 +114,15 @@ impl TabularKind {
             // The fingers of a real gripper differ, and then a mirrored grasp is no example.
             Self::ExtraTrees => &[Mirroring { rows: true, views: true }, Mirroring { rows: false, views: false }],
             _ => &[ROWS],
+        }
+    }
+
+    /// Number of parts of the grasps, each of which is held out once for calibration: more parts are closer to the final fit
+    /// and cost more.
+    fn parts(self) -> usize {
+        match self {
+            Self::GradientBoosting | Self::RusBoostM2 | Self::RusBoostSamme | Self::Svm | Self::MeasuresSvm => 3,
+            _ => 6,
         }
     }
 
@@ -152,6 +159,7 @@ impl TabularKind {
         serde_json::json!({
             "features": self.features(),
             "revisions": [REVISION, features::REVISION],
+            "parts": self.parts(),
             "mirroring": format!("{:?}", self.mirrorings()),
             "classifier": classifier,
         })
@@ -223,18 +231,19 @@ impl Ground<'_> {
         answer(model, &self.own[k], mirrored)
     }
 
-    /// Fits without each part of the grasps and answers that part; returns the best temperature and the negative
-    /// log-likelihood at it.
+    /// Fits without each part of the grasps and answers that part; returns the calibration and the
+    /// negative log-likelihood with it.
     fn calibrated(
         &self,
-        classifier: &Classifier,
+        (kind, classifier): (TabularKind, &Classifier),
         mirroring: Mirroring,
         fitting: &Fitting<'_>,
         progress: &dyn Fn(f64),
-    ) -> Result<(f64, f64), LearnError> {
-        let part_of = &self.data.folds(PARTS, fitting.seed ^ 0xca11b)[..];
-        let mut answers: Vec<(Vec<f32>, usize)> = Vec::new();
-        for part in 0..PARTS {
+    ) -> Result<(Calibration, f64), LearnError> {
+        let parts = kind.parts();
+        let part_of = &self.data.folds(parts, fitting.seed ^ 0xca11b)[..];
+        let mut answers: Vec<(Pmf, usize)> = Vec::new();
+        for part in 0..parts {
             let of = |inside: bool| (0..part_of.len()).filter(move |k| (part_of[*k] == part) == inside);
             if of(true).next().is_none() {
                 continue;
@@ -244,12 +253,11 @@ impl Ground<'_> {
             let (model, _) = classifier.fit(&self.rows(of(false), mirroring), &within)?;
             for k in of(true) {
                 let pmf = self.answer(model.as_ref(), k, mirroring);
-                answers.push((pmf.logarithms().map(|log| log as f32).collect(), self.data.examples[k].class));
+                answers.push((pmf, self.data.examples[k].class));
             }
-            progress((part + 1) as f64 / PARTS as f64);
+            progress((part + 1) as f64 / parts as f64);
         }
-        let answers: Vec<(&[f32], usize)> = answers.iter().map(|(scores, class)| (&scores[..], *class)).collect();
-        Ok(best_temperature(&answers, &TEMPERATURES))
+        Ok(Calibration::fit(&answers, &TEMPERATURES))
     }
 }
 
@@ -282,15 +290,16 @@ impl Tabular {
         fitting.check()?;
         let classifier = Classifier::of(kind, fitting);
         let tried = if ground.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
-        let mut best: Option<(Mirroring, (f64, f64))> = None;
+        let mut best: Option<(Mirroring, Calibration, f64)> = None;
         for (number, &mirroring) in tried.iter().enumerate() {
             let progress = |share: f64| (fitting.progress)(0.1 + 0.6 * (number as f64 + share) / tried.len() as f64);
-            let found = ground.calibrated(&classifier, mirroring, fitting, &progress)?;
-            if best.is_none_or(|(_, (_, least))| found.1 < least) {
-                best = Some((mirroring, found));
+            let (calibration, loss) = ground.calibrated((kind, &classifier), mirroring, fitting, &progress)?;
+            if best.is_none_or(|(_, _, least)| loss < least) {
+                best = Some((mirroring, calibration, loss));
             }
         }
-        let (mirroring, (temperature, _)) = best.unwrap_or((with_both, (1.0, 0.0)));
+        let (mirroring, calibration) =
+            best.map_or((with_both, None), |(mirroring, calibration, _)| (mirroring, Some(calibration)));
         fitting.check()?;
         let last = Fitting {
             progress: &|share| (fitting.progress)(0.7 + 0.3 * share),
@@ -300,8 +309,7 @@ impl Tabular {
         let (model, description) = classifier.fit(&ground.rows(all(), mirroring), &last)?;
         (fitting.progress)(1.0);
         let both_views = mirroring.views && features.has_mirror();
-        let learned =
-            Learned { kind, features, scaling, model: description, temperature: Some(temperature as f32), both_views };
+        let learned = Learned { kind, features, scaling, model: description, calibration, both_views };
         Ok(Self { learned, model })
     }
 
@@ -313,8 +321,8 @@ impl Tabular {
         if !learned.features.is_sound(card.channels.len()) || !scaled {
             return Err(LoadError::Card { part: "the feature definition" });
         }
-        if learned.temperature.is_some_and(|own| !TEMPERATURES.allows(own)) {
-            return Err(LoadError::Card { part: "the temperature" });
+        if learned.calibration.is_some_and(|own| !own.is_sound(&TEMPERATURES)) {
+            return Err(LoadError::Card { part: "the calibration" });
         }
         let model: Box<dyn RowModel> = match learned.kind.classifier() {
             Classifier::Forest(_) => Box::new(Forest::load(arrays, columns, classes)?),
@@ -376,7 +384,7 @@ impl Recogniser for Tabular {
         let own = scaled(self.learned.features.row(grasp));
         let mirrored = if self.learned.both_views { self.learned.features.mirrored(grasp).map(scaled) } else { None };
         let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
-        let pmf = self.learned.temperature.map_or_else(|| pmf.clone(), |own| pmf.at_temperature(f64::from(own)));
+        let pmf = self.learned.calibration.map_or_else(|| pmf.clone(), |own| own.apply(&pmf));
         Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
     }
 
