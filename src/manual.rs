@@ -45,6 +45,7 @@ topics! {
     datasets
     recognition
     paper
+    studies
     sensors
     gripper
     labelling

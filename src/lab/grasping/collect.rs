@@ -109,8 +109,9 @@ struct Task {
     seed: u64,
 }
 
-/// Grasps in a row before the object is placed again, if objects stay as released.
-const SUCCESSION: u64 = 5;
+/// Grasps in a row before the object is placed again, if objects stay as released: as many as the study of successive
+/// grasps looks at.
+pub(crate) const SUCCESSION: u64 = 8;
 
 /// The sixteen and the empty hand.
 pub fn all_objects() -> Vec<String> {
@@ -132,7 +133,11 @@ impl CollectionPlan {
             Recompute::Unsettled => 0,
             Recompute::UntilAgreement => mixed(1),
         };
-        format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed) ^ agreement))
+        let succession = match scene.pose.between {
+            Between::Reposed => 0,
+            Between::AsReleased => mixed(SUCCESSION),
+        };
+        format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed) ^ agreement ^ succession))
     }
 
     fn tasks(&self) -> Vec<Task> {
@@ -408,7 +413,7 @@ mod tests {
     #[test]
     fn successions_of_released_objects_do_not_depend_on_threads_either() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut plan = CollectionPlan { trials: 7, objects: vec!["smallcube".to_owned()], ..plan() };
+        let mut plan = CollectionPlan { trials: 10, objects: vec!["smallcube".to_owned()], ..plan() };
         plan.scene.timing.duration_s = 4.0;
         plan.scene.pose.between = Between::AsReleased;
         let run =
@@ -420,13 +425,13 @@ mod tests {
                 .expect("collects");
                 store
             };
-        let whole = contents(&run("one", 7, 1));
-        assert!(contents(&run("two", 7, 2)) == whole);
+        let whole = contents(&run("one", 10, 1));
+        assert!(contents(&run("two", 10, 2)) == whole);
         run("resumed", 3, 2);
-        assert!(contents(&run("resumed", 7, 2)) == whole);
+        assert!(contents(&run("resumed", 10, 2)) == whole);
         let shift = |k: usize| Scene::from_toml(&whole[k].3).expect("a scene").object.shift;
-        assert_eq!((shift(0), shift(5)), ([0.0; 2], [0.0; 2]), "put down anew after five");
-        assert!((1..5).any(|k| shift(k) != [0.0; 2]), "left where the fingers pushed it");
+        assert_eq!((shift(0), shift(8)), ([0.0; 2], [0.0; 2]), "put down anew after eight");
+        assert!((1..8).any(|k| shift(k) != [0.0; 2]), "left where the fingers pushed it");
 
         let store = store(&folder, "one");
         let trials = store.list(true).expect("lists");

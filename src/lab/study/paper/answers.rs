@@ -69,32 +69,16 @@ pub(super) struct TestPart {
     pub(super) of: usize,
     /// The part to test on, from 0.
     pub(super) part: usize,
-    /// Largest number of training grasps of each class. Parts take different ones.
+    /// Largest number of training grasps of each class; fewer are contained in more.
     pub(super) train: usize,
 }
 
 impl TestPart {
     /// Training and test set.
     pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<(Dataset, Dataset), StudyError> {
-        for (class, members) in data.labels.classes.iter().zip(data.by_class()) {
-            if members.len() < self.of.max(2) {
-                let (least, name, found) = (self.of.max(2), &class.name, members.len());
-                let what = format!("at least {least} grasps of each object, but there are {found} of \"{name}\"");
-                return Err(StudyError::Missing(what));
-            }
-        }
-        let missing = |error: SplitError| StudyError::Missing(error.to_string());
-        let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1).map_err(missing)?;
-        let mut split = splits.into_iter().nth(self.part).ok_or_else(|| missing(SplitError::Folds))?;
-        split.train.sort_unstable();
-        let others = data.part(&split.train);
-        let train = others.by_class().into_iter().flat_map(|members| {
-            let (count, first) = (members.len(), self.part * self.train);
-            (0..self.train.min(count)).map(move |k| members[(first + k) % count]).collect::<Vec<_>>()
-        });
-        let mut train: Vec<usize> = train.collect();
-        train.sort_unstable();
-        Ok((others.part(&train), data.part(&split.test)))
+        let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1)?;
+        let split = splits.get(self.part).ok_or(StudyError::Split(SplitError::Folds))?.limited(data, self.train);
+        Ok((data.part(&split.train), data.part(&split.test)))
     }
 }
 
@@ -175,6 +159,15 @@ pub(super) struct PairedDifference {
 }
 
 impl Pool {
+    /// Decisions on trials: number, class and decision of each.
+    pub(super) fn of_decisions(classes: &[String], all: impl IntoIterator<Item = (TrialId, usize, usize)>) -> Self {
+        let mut pool = Self { classes: classes.to_vec(), trials: BTreeMap::new() };
+        for (trial, truth, decided) in all {
+            pool.trials.entry(trial).or_insert((truth, Vec::new())).1.push(decided);
+        }
+        pool
+    }
+
     /// Pools the answers of several parts; those with other classes than the first are left out.
     pub(super) fn of<'a>(parts: impl IntoIterator<Item = &'a ModelAnswers>) -> Self {
         let mut pool = Self::default();
@@ -252,6 +245,21 @@ impl Pool {
         found.truncate(SHOWN);
         found
     }
+
+    /// Counts of decisions with some of their trials, by true and decided class.
+    pub(super) fn confusions(&self) -> BTreeMap<(usize, usize), (usize, Vec<TrialId>)> {
+        let mut cells: BTreeMap<(usize, usize), (usize, Vec<TrialId>)> = BTreeMap::new();
+        for (id, (truth, decided)) in &self.trials {
+            for decided in decided {
+                let (count, trials) = cells.entry((*truth, *decided)).or_default();
+                *count += 1;
+                if trials.len() < SHOWN && !trials.contains(id) {
+                    trials.push(*id);
+                }
+            }
+        }
+        cells
+    }
 }
 
 /// Most trials behind a row of a table.
@@ -289,6 +297,8 @@ mod tests {
         assert!((accuracy.estimate - 0.9).abs() < 1e-12, "{accuracy:?}");
         // A trial that counts twice makes the interval no narrower.
         assert_eq!(accuracy, Pool::of([&good]).accuracy().expect("trials"));
+        let cells = pool.confusions();
+        assert_eq!((cells[&(0, 1)].clone(), cells[&(1, 1)].0), ((4, vec![0, 10]), 20));
         let difference = Pool::of([&good]).against(&Pool::of([&bad])).expect("the same trials");
         assert!(difference.f1.estimate > 0.1 && difference.p > 0.05, "{difference:?}");
         let same = pool.against(&pool).expect("the same trials");

@@ -4,7 +4,7 @@ use super::plan::{DataWanted, StudyPlan};
 use crate::datasets::{DatasetError, DatasetQuery};
 use crate::grasping::{CollectionError, CollectionPlan, collect};
 use crate::study::result_file::ResultFileError;
-use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, SplitError};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
@@ -32,6 +32,9 @@ pub enum StudyError {
         /// Cause.
         cause: LearnError,
     },
+    /// The trials cannot be divided into training and test grasps.
+    #[error(transparent)]
+    Split(#[from] SplitError),
     /// A preset or method that is not there.
     #[error("there is no {0}")]
     Unknown(String),

@@ -10,11 +10,17 @@ mod answers;
 mod bench;
 mod claims;
 mod drawing;
+mod grasps;
+mod layouts;
+mod modality;
 mod models;
 mod plan;
+mod pools;
 mod report;
 mod run;
 mod signatures;
+mod stages;
+mod training_size;
 
 pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
 pub(in crate::study) use claims::sections;
@@ -31,7 +37,15 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// All studies of the paper, in the order of its figures.
-pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[&signatures::TactileSignatures, &models::Models];
+pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
+    &signatures::TactileSignatures,
+    &layouts::Layouts,
+    &modality::Modality,
+    &stages::Stages,
+    &training_size::TrainingSize,
+    &models::Models,
+    &grasps::Grasps,
+];
 
 /// Finds a study by its key.
 pub fn paper_study(key: &str) -> Option<&'static dyn PaperStudy> {

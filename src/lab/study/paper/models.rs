@@ -4,12 +4,14 @@ use super::answers::{Judged, ModelAnswers, ModelCost, PairedDifference, Pool, Te
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, named_rows, percent_point, percent_row};
 use super::plan::StudyPlan;
+use super::pools::{
+    Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, negated, no_worse_than_any,
+};
 use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::study::comparison::in_table_order;
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, Marker, Plot, PlotAxis};
-use palpate_learn::metrics::{Interval, holm};
-use palpate_learn::{Dataset, Method, MethodKind, method};
+use palpate_learn::{Method, MethodKind, method};
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
 
@@ -79,17 +81,6 @@ fn is_of_papers_table(method: &Method) -> bool {
     matches!(method.kind, MethodKind::Single | MethodKind::Ensemble) || PAPERS_MODEL.contains(&method.key)
 }
 
-/// Classes with 40 to 55 grasps for each 50, as in the paper, by their order.
-fn imbalanced(train: &Dataset) -> Dataset {
-    let keep = train.by_class().into_iter().enumerate().flat_map(|(class, members)| {
-        let count = members.len() * (40 + 7 * class % 16) / 55;
-        members.into_iter().take(count.max(2)).collect::<Vec<_>>()
-    });
-    let mut keep: Vec<usize> = keep.collect();
-    keep.sort_unstable();
-    train.part(&keep)
-}
-
 impl PaperStudy for Models {
     fn card(&self) -> StudyCard {
         CARD
@@ -107,31 +98,17 @@ impl PaperStudy for Models {
         let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
         let of = plan.pick(PARTS, 2, 2);
         let most = if case.imbalanced { TRAIN * 55 / 50 } else { TRAIN };
-        let (train, test) =
-            TestPart { of, part: case.part, train: plan.pick(most, grasps, grasps) }.split(&data, plan.seed)?;
-        let train = if case.imbalanced { imbalanced(&train) } else { train };
+        let (train, test) = TestPart { of, part: case.part, train: most }.split(&data, plan.seed)?;
+        // 40 to 55 grasps of each object, as in the paper, or the same share of fewer.
+        let most = train.by_class().iter().map(Vec::len).max().unwrap_or(0);
+        let train = if case.imbalanced { train.imbalanced((40 * most).div_ceil(55)..=most, plan.seed) } else { train };
         fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
     }
 
     fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut rows: Vec<ModelRow> = Vec::new();
-        let mut report = StudyReport::default();
+        let mut pools = Pools::default();
         for case in Case::all(plan) {
-            let Some(unit) = units.get(&case.name()) else { continue };
-            let judged: Judged = unit.read()?;
-            let of = kind(case.sensors, case.imbalanced);
-            let same = |row: &ModelRow| row.kind == of && row.method.key == case.method.key;
-            if let Some(answers) = judged.answers() {
-                let about = if case.imbalanced { ", 40 to 55 training grasps for each 50" } else { "" };
-                let line = format!("{}{about}", answers.data);
-                if !report.data.contains(&line) {
-                    report.data.push(line);
-                }
-            }
-            match rows.iter_mut().find(|row| same(row)) {
-                Some(row) => row.parts.push(judged),
-                None => rows.push(ModelRow { kind: of, method: case.method, parts: vec![judged] }),
-            }
+            pools.add((kind(case.sensors, case.imbalanced), case.method.key), units, &case.name())?;
         }
         let reference = papers_model();
         let mut table = StudyTable::new(
@@ -159,62 +136,35 @@ impl PaperStudy for Models {
                 ("remark", ""),
             ],
         );
+        let rows: Vec<ModelRow<'_>> =
+            pools.parts().filter_map(|((kind, key), parts)| ModelRow::new(kind, key, parts)).collect();
+        let mut kinds: Vec<String> = Vec::new();
+        rows.iter().for_each(|row| add_new(&mut kinds, row.kind));
         let mut measured = Vec::new();
-        for kind in rows.iter().map(|row| row.kind.clone()).fold(Vec::new(), with_new) {
-            let of_kind: Vec<(&ModelRow, Pool)> =
-                rows.iter().filter(|row| row.kind == kind).map(|row| (row, row.pool())).collect();
-            let papers = of_kind.iter().find(|(row, _)| reference.is_some_and(|m| m.key == row.method.key));
-            let compared: Vec<Option<PairedDifference>> = of_kind
-                .iter()
-                .map(|(row, pool)| {
-                    let (own, papers) = papers.filter(|(own, _)| own.method.key != row.method.key)?;
-                    pool.against(papers).filter(|_| own.kind == row.kind)
-                })
-                .collect();
-            let adjusted = holm(&compared.iter().flatten().map(|difference| difference.p).collect::<Vec<_>>());
-            let mut adjusted = adjusted.into_iter();
-            for ((row, pool), difference) in of_kind.iter().zip(&compared) {
-                let cost = row.cost();
-                let number = |pick: fn(&ModelCost) -> f64| Cell::number(cost.as_ref().map(pick));
-                table.push(
-                    vec![
-                        Cell::text(&row.kind),
-                        Cell::text(row.method.key),
-                        Cell::text(kind_name(row.method.kind)),
-                        Cell::interval(pool.f1()),
-                        Cell::interval(pool.accuracy()),
-                        Cell::interval(difference.map(|difference| difference.f1)),
-                        Cell::number(difference.and_then(|_| adjusted.next())),
-                        Cell::number(row.mean(|answers| answers.ece)),
-                        number(|cost| cost.train_cpu_s),
-                        Cell::number(cost.and_then(|cost| cost.step_us)),
-                        number(|cost| cost.answer_ms),
-                        number(|cost| cost.bytes as f64 / 1e3),
-                        number(|cost| cost.parameters as f64),
-                        Cell::Number(pool.len() as f64),
-                        Cell::text(row.remark()),
-                    ],
-                    pool.misjudged(),
-                );
-                measured.push(Measured { kind: row.kind.clone(), method: row.method, difference: *difference, cost });
+        for kind in &kinds {
+            let rows: Vec<&ModelRow<'_>> = rows.iter().filter(|row| row.kind == kind).collect();
+            let papers = rows.iter().find(|row| reference.is_some_and(|papers| papers.key == row.method.key));
+            let against = |row: &&ModelRow<'_>| {
+                let papers = papers.filter(|papers| papers.method.key != row.method.key)?;
+                row.pool.against(&papers.pool)
+            };
+            let differences: Vec<Option<PairedDifference>> = rows.iter().map(against).collect();
+            for ((row, difference), p) in rows.iter().zip(&differences).zip(adjusted(&differences)) {
+                table.push(row.cells(*difference, p), row.pool.misjudged());
+                measured.push(Measured {
+                    kind: kind.clone(),
+                    method: row.method,
+                    difference: *difference,
+                    cost: row.cost(),
+                });
             }
         }
-        report.tables.push(table);
-        report.findings = findings(&measured);
-        Ok(report)
+        Ok(StudyReport { data: pools.data.clone(), tables: vec![table], findings: findings(&measured) })
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
         report.table(CARD.key).map(|(at, table)| figure(at, table)).into_iter().collect()
     }
-}
-
-/// Adds a text that is not there yet.
-fn with_new(mut known: Vec<String>, text: String) -> Vec<String> {
-    if !known.contains(&text) {
-        known.push(text);
-    }
-    known
 }
 
 fn kind_name(kind: MethodKind) -> &'static str {
@@ -227,15 +177,39 @@ fn kind_name(kind: MethodKind) -> &'static str {
 }
 
 /// A method on a kind of data.
-struct ModelRow {
-    kind: String,
+struct ModelRow<'a> {
+    kind: &'a str,
     method: &'static Method,
-    parts: Vec<Judged>,
+    parts: &'a [Judged],
+    pool: Pool,
 }
 
-impl ModelRow {
-    fn pool(&self) -> Pool {
-        Pool::of(self.parts.iter().filter_map(Judged::answers))
+impl<'a> ModelRow<'a> {
+    fn new(kind: &'a str, key: &str, parts: &'a [Judged]) -> Option<Self> {
+        let pool = Pool::of(parts.iter().filter_map(Judged::answers));
+        Some(Self { kind, method: method(key)?, parts, pool })
+    }
+
+    fn cells(&self, difference: Option<PairedDifference>, p: Option<f64>) -> Vec<Cell> {
+        let cost = self.cost();
+        let number = |pick: fn(&ModelCost) -> f64| Cell::number(cost.as_ref().map(pick));
+        vec![
+            Cell::text(self.kind),
+            Cell::text(self.method.key),
+            Cell::text(kind_name(self.method.kind)),
+            Cell::interval(self.pool.f1()),
+            Cell::interval(self.pool.accuracy()),
+            Cell::interval(difference.map(|difference| difference.f1)),
+            Cell::number(p),
+            Cell::number(self.mean(|answers| answers.ece)),
+            number(|cost| cost.train_cpu_s),
+            Cell::number(cost.and_then(|cost| cost.step_us)),
+            number(|cost| cost.answer_ms),
+            number(|cost| cost.bytes as f64 / 1e3),
+            number(|cost| cost.parameters as f64),
+            Cell::Number(self.pool.len() as f64),
+            Cell::text(self.remark()),
+        ]
     }
 
     fn mean(&self, pick: impl Fn(&ModelAnswers) -> f64) -> Option<f64> {
@@ -273,97 +247,60 @@ struct Measured {
     cost: Option<ModelCost>,
 }
 
-/// Points with sign, rounded.
-fn points(share: f64) -> String {
-    format!("{:+.1}", 100.0 * share)
-}
-
 fn findings(all: &[Measured]) -> Vec<Finding> {
     let Some(papers) = papers_model() else { return Vec::new() };
-    let kinds: Vec<String> = all.iter().map(|row| row.kind.clone()).fold(Vec::new(), with_new);
-    let (imbalanced, balanced): (Vec<&String>, Vec<&String>) =
-        kinds.iter().partition(|kind| kind.ends_with("imbalanced"));
+    let mut kinds: Vec<String> = Vec::new();
+    all.iter().for_each(|row| add_new(&mut kinds, &row.kind));
+    let (imbalanced, balanced): (Vec<String>, Vec<String>) =
+        kinds.into_iter().partition(|kind| kind.ends_with("imbalanced"));
     // Gain of the paper's model over others of a kind of data, worst first.
-    let gains = |kind: &str, group: MethodKind| -> Vec<(&'static str, Interval)> {
+    let gains = |kind: &String, group: MethodKind| {
         let rows =
-            all.iter().filter(|row| row.kind == kind && row.method.kind == group && row.method.key != papers.key);
-        let mut gains: Vec<_> = rows.filter_map(|row| Some((row.method.key, negated(row.difference?.f1)))).collect();
+            all.iter().filter(|row| row.kind == *kind && row.method.kind == group && row.method.key != papers.key);
+        let gains = rows.filter_map(|row| Some((format!("over {}", row.method.key), negated(row.difference?.f1))));
+        let mut gains: Gains = gains.collect();
         gains.sort_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate));
-        gains
+        (kind.clone(), gains)
     };
-    let described = |kind: &str, gains: &[(&str, Interval)]| {
-        let listed = gains.iter().map(|(key, gain)| {
-            format!("{key} {} ({} to {})", points(gain.estimate), points(gain.low), points(gain.high))
-        });
-        format!("{kind}: points of macro F1 over {}", listed.collect::<Vec<_>>().join(", "))
+    let over = |kinds: &[String], group: MethodKind| -> Vec<(String, Gains)> {
+        kinds.iter().map(|kind| gains(kind, group)).collect()
     };
-    let over = |kinds: &[&String], group: MethodKind, verdict: fn(&[Interval]) -> Verdict| {
-        let (mut found, mut verdicts) = (Vec::new(), Vec::new());
-        for kind in kinds {
-            let gains = gains(kind, group);
-            if !gains.is_empty() {
-                found.push(described(kind, &gains));
-                verdicts.push(verdict(&gains.iter().map(|(_, gain)| *gain).collect::<Vec<_>>()));
-            }
-        }
-        (found.join("; "), Verdict::of_all(verdicts))
-    };
-    let mut findings = Vec::new();
-    let mut add = |section: &str, claim: &str, (found, verdict): (String, Verdict), why: &str| {
-        let (section, claim, why) = (section.to_owned(), claim.to_owned(), why.to_owned());
-        findings.push(Finding { section, claim, found, verdict, why });
-    };
-    add(
-        "V-D",
-        "The dual-stage LSTM is better than every single model",
-        over(&balanced, MethodKind::Single, better_than_each),
-        "Agrees where every paired 95 % interval is above zero, disagrees where one is below",
-    );
-    add(
-        "V-D",
-        "The dual-stage LSTM is at least as good as every ensemble, and comparable to RUSBoost",
-        over(&balanced, MethodKind::Ensemble, no_worse_than_any),
-        "Disagrees where an ensemble's paired 95 % interval is above that of the dual-stage LSTM",
-    );
-    add(
-        "V-D",
-        "The dual-stage LSTM is particularly effective on imbalanced data",
-        over(&imbalanced, MethodKind::Single, better_than_each),
-        "The same rule for training sets of 40 to 55 grasps for each 50",
-    );
-    add(
-        "VI",
-        "The dual-stage LSTM costs less than ensembles",
-        cost_finding(all, papers.key, &balanced),
-        "Agrees where both its training and its answer to a grasp take less CPU time than those of every ensemble, disagrees where they \
-         take more",
-    );
-    findings
+    let rule = "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
+    let (cost, cost_verdict) = cost_finding(all, papers.key, balanced.first().map_or("", String::as_str));
+    vec![
+        finding_on_gains(
+            ("V-D", "The dual-stage LSTM is better than every single model", rule),
+            &over(&balanced, MethodKind::Single),
+            better_than_each,
+        ),
+        finding_on_gains(
+            (
+                "V-D",
+                "The dual-stage LSTM is at least as good as every ensemble, and comparable to RUSBoost",
+                "Disagrees where the paired 95 % interval of an ensemble excludes zero in its favour",
+            ),
+            &over(&balanced, MethodKind::Ensemble),
+            no_worse_than_any,
+        ),
+        finding_on_gains(
+            ("V-D", "The dual-stage LSTM is particularly effective on imbalanced data", rule),
+            &over(&imbalanced, MethodKind::Single),
+            better_than_each,
+        ),
+        finding(
+            (
+                "VI",
+                "The dual-stage LSTM is as precise as ensembles and costs less",
+                "Agrees where both its training and its answer to a grasp take less CPU time than those of every ensemble, \
+                 disagrees where both take more",
+            ),
+            cost,
+            cost_verdict,
+        ),
+    ]
 }
 
-fn negated(interval: Interval) -> Interval {
-    let Interval { estimate, low, high } = interval;
-    Interval { estimate: -estimate, low: -high, high: -low }
-}
-
-/// Verdict on a claim to be better than all others.
-fn better_than_each(gains: &[Interval]) -> Verdict {
-    if gains.iter().any(|gain| gain.high < 0.0) {
-        Verdict::Disagrees
-    } else if gains.iter().all(|gain| gain.low > 0.0) {
-        Verdict::Agrees
-    } else {
-        Verdict::Partly
-    }
-}
-
-/// Verdict on a claim to be as good as all others.
-fn no_worse_than_any(gains: &[Interval]) -> Verdict {
-    if gains.iter().any(|gain| gain.high < 0.0) { Verdict::Disagrees } else { Verdict::Agrees }
-}
-
-fn cost_finding(all: &[Measured], papers: &str, kinds: &[&String]) -> (String, Verdict) {
-    let first = kinds.first().map_or("", |kind| kind.as_str());
+fn cost_finding(all: &[Measured], papers: &str, first: &str) -> (String, Verdict) {
     let costs = |wanted: &dyn Fn(&Measured) -> bool| -> Vec<(&'static str, ModelCost)> {
         let rows = all.iter().filter(|row| row.kind == first && wanted(row));
         rows.filter_map(|row| Some((row.method.key, row.cost?))).collect()
