@@ -4,7 +4,7 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::paper::{
     Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
-    StudySize, StudyStep, StudyWork, run_study, stored_report,
+    StudyRow, StudySize, StudyStep, StudyWork, run_study, stored_report,
 };
 use palpate_lab::study::{StoredStudy, generated_sections, program};
 use palpate_render::figure_svg;
@@ -65,11 +65,12 @@ fn sample(
 }
 
 /// The tables without columns of CPU times, which differ from run to run.
-fn without_times(report: &StudyReport) -> Vec<(String, Vec<(Vec<Cell>, Vec<i64>)>)> {
+fn without_times(report: &StudyReport) -> Vec<(String, Vec<StudyRow>)> {
     let tables = report.tables.iter().map(|table| {
         let is_time = |at: usize| ["CPU s", "µs", "ms"].contains(&table.columns[at].unit.as_str());
         let cells = |cells: &[Cell]| (0..cells.len()).filter(|at| !is_time(*at)).map(|at| cells[at].clone()).collect();
-        (table.name.clone(), table.rows.iter().map(|row| (cells(&row.cells), row.trials.clone())).collect())
+        let row = |row: &StudyRow| StudyRow { cells: cells(&row.cells), trials: row.trials.clone() };
+        (table.name.clone(), table.rows.iter().map(row).collect())
     });
     tables.collect()
 }

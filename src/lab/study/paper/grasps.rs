@@ -31,9 +31,8 @@ const CARD: StudyCard = StudyCard {
     budget: "about 30 CPU minutes",
 };
 
-/// The paper's iterated network, one grasp at a time, and a method of seconds.
-const MODELS: [&str; 3] = [ITERATED, "macro-layer", "extra-trees"];
-const ITERATED: &str = "ids-lstm";
+/// The paper's iterated network, strict and tuned, one of a single grasp, and a method of seconds.
+const MODELS: [&str; 4] = ["paper-ids-lstm", "ids-lstm", "macro-layer", "extra-trees"];
 /// Grasps in a row.
 const MOST: usize = SUCCESSION as usize;
 /// Parts and training grasps of each object, as in the comparison of methods.
@@ -274,7 +273,7 @@ impl PaperStudy for Grasps {
             stops.push([named, cells].concat(), wrong);
         }
         let findings = findings(&classes, &courses);
-        Ok(StudyReport { data, tables: vec![table, stops], findings })
+        Ok(StudyReport::new(data, vec![table, stops], findings))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
@@ -323,9 +322,8 @@ impl Merged {
 fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
     let rule = "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
     // The paper's figure: the iterated network with feedback; the object is put down anew.
-    let papers: Vec<&Merged> =
-        courses.iter().filter(|merged| merged.kind[1] == ITERATED && merged.kind[3] == FEEDBACK).collect();
-    let named = |merged: &Merged| format!("{}, {}", merged.kind[0], merged.kind[2]);
+    let papers: Vec<&Merged> = courses.iter().filter(|merged| merged.kind[3] == FEEDBACK).collect();
+    let named = |merged: &Merged| merged.kind[..3].join(", ");
     let gain = |merged: &Merged, from: usize, to: usize| -> Option<Interval> {
         let to = to.min(merged.most());
         (from < to).then(|| merged.after(classes, to).against(&merged.after(classes, from)))?.map(|gain| gain.f1)
@@ -373,7 +371,7 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
     let wrong = papers.iter().filter(|merged| merged.kind[2] == ANEW).map(|merged| {
         let sure = merged.rounds.iter().filter(|round| round.sure);
         let (count, wrong) = sure.fold((0, 0), |(n, wrong), round| (n + 1, wrong + usize::from(!round.is_right())));
-        (merged.kind[0].clone(), count, Interval::of_share(wrong, count))
+        (merged.kind[..2].join(", "), count, Interval::of_share(wrong, count))
     });
     let wrong: Vec<(String, usize, Interval)> = wrong.filter(|(_, count, _)| *count > 0).collect();
     let promised = 1.0 - StopRule::default().threshold;
@@ -382,9 +380,9 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
         (_, true) => Verdict::Disagrees,
         (false, false) => Verdict::Partly,
     };
-    let listed = wrong.iter().map(|(sensors, count, share)| {
+    let listed = wrong.iter().map(|(kind, count, share)| {
         let [estimate, low, high] = [share.estimate, share.low, share.high].map(|x| 100.0 * x);
-        format!("{sensors}: {estimate:.1} % ({low:.1} to {high:.1}) of {count} confident stops are wrong")
+        format!("{kind}: {estimate:.1} % ({low:.1} to {high:.1}) of {count} confident stops are wrong")
     });
     vec![
         finding_on_gains(("V-E", "Accuracy and F1 rise over successive grasps", rule), &rising, better_than_each),

@@ -12,7 +12,7 @@ use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, Plo
 use palpate_learn::{Method, method};
 use palpate_sim::gripper::GripperModel;
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::{CATALOGUE, SensorLayout};
+use palpate_tactile::{CATALOGUE, SensorLayout, SignalDefinition};
 use std::collections::BTreeMap;
 
 pub(super) struct Layouts;
@@ -20,13 +20,13 @@ pub(super) struct Layouts;
 const CARD: StudyCard = StudyCard {
     key: "layouts",
     title: "Sensor layouts",
-    about: "C1 to C8, with and without force, and the layout with the fewest channels that is as good as the best",
+    about: "C1 to C8 of parts and of contact pressure, with and without force, and the layout with the fewest channels that is as good as the best",
     paper: "Fig. 5a",
     budget: "about 50 CPU minutes",
 };
 
-/// The paper's network, the one that it is compared with, and a method of seconds.
-const MODELS: [&str; 3] = ["macro-layer", "zuo", "extra-trees"];
+/// The paper's network, the one that it is compared with, both strict, and a method of seconds.
+const MODELS: [&str; 3] = ["paper-macro-layer", "zuo", "extra-trees"];
 /// The simplest layout, which the paper chooses.
 const SIMPLEST: &str = "C1";
 /// Parts and training grasps of each object, as in the comparison of methods.
@@ -36,9 +36,41 @@ const QUICK: usize = 40;
 /// Gain below which two layouts are as good as each other.
 const MINIMAL: f64 = 0.02;
 
+/// Signals of a layout: its name, and what they are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Signals {
+    layout: String,
+    definition: SignalDefinition,
+}
+
+impl Signals {
+    /// What parts measure; what only a simulation knows, with and without force; and the paper's C1.
+    fn all() -> Vec<Self> {
+        let of = |definition: SignalDefinition, force: &str| {
+            let named = move |layout: &SensorLayout| Self { layout: format!("{}{force}", layout.name), definition };
+            CATALOGUE.iter().map(named).collect::<Vec<_>>()
+        };
+        let papers = vec![Self { layout: SIMPLEST.to_owned(), definition: SignalDefinition::Hull }];
+        [
+            of(SignalDefinition::Parts, ""),
+            of(SignalDefinition::Contact, ""),
+            of(SignalDefinition::Contact, "+F"),
+            papers,
+        ]
+        .concat()
+    }
+
+    fn name(&self) -> String {
+        match self.definition {
+            SignalDefinition::Parts => self.layout.clone(),
+            SignalDefinition::Contact | SignalDefinition::Hull => format!("{} {}", self.layout, self.definition.name()),
+        }
+    }
+}
+
 struct Case {
     sensors: SensorModel,
-    layout: String,
+    signals: Signals,
     method: &'static Method,
     part: usize,
 }
@@ -47,19 +79,23 @@ impl Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for &sensors in &plan.sensors {
-            let names = CATALOGUE.iter().flat_map(|layout| [layout.name.to_owned(), format!("{}+F", layout.name)]);
-            for layout in names {
+            for signals in Signals::all() {
+                let of_parts = signals.definition == SignalDefinition::Parts;
+                if sensors == SensorModel::PhysicalLike && !of_parts {
+                    continue;
+                }
                 for method in MODELS.into_iter().filter_map(method) {
-                    // A network of minutes: one part on clean sensors without force, where the paper has it.
                     let is_network = method.recipe.is_some();
-                    let skipped = is_network && (layout.ends_with("+F") || sensors != SensorModel::Virtual);
-                    let too_long =
-                        is_network && plan.pick(false, !["C1", "C8"].contains(&layout.as_str()), layout != "C1");
+                    // A network of minutes: on clean sensors, for parts, and for the simplest of other signals.
+                    let simple = [SIMPLEST, "C1+F"].contains(&signals.layout.as_str());
+                    let wanted = of_parts || (simple && method.key == MODELS[0]);
+                    let skipped = is_network && (sensors != SensorModel::Virtual || !wanted);
+                    let too_long = is_network && plan.pick(false, !simple || !of_parts, !simple || !of_parts);
                     if skipped || too_long {
                         continue;
                     }
                     let parts = plan.pick(if is_network { 1 } else { PARTS }, 1, 1);
-                    cases.extend((0..parts).map(|part| Self { sensors, layout: layout.clone(), method, part }));
+                    cases.extend((0..parts).map(|part| Self { sensors, signals: signals.clone(), method, part }));
                 }
             }
         }
@@ -67,13 +103,15 @@ impl Case {
     }
 
     fn name(&self) -> String {
-        format!("{}, {}, {}, part {}", self.sensors.name(), self.layout, self.method.key, self.part + 1)
+        format!("{}, {}, {}, part {}", self.sensors.name(), self.signals.name(), self.method.key, self.part + 1)
     }
 }
 
-/// Number of channels of a layout on both fingers.
-fn channels(layout: &str) -> Option<usize> {
-    Some(SensorLayout::named(layout).ok()?.channels(&GripperModel::default()).ok()?.len())
+/// Number of channels on both fingers.
+fn channels(name: &str) -> Option<usize> {
+    let signals = Signals::all().into_iter().find(|signals| signals.name() == name)?;
+    let layout = SensorLayout::named(&signals.layout).ok()?;
+    Some(layout.channels(&GripperModel::default(), signals.definition).ok()?.len())
 }
 
 impl PaperStudy for Layouts {
@@ -90,7 +128,8 @@ impl PaperStudy for Layouts {
         let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let usual = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
-        let view = SensorView { layout: case.layout.clone(), ..usual.view.clone() };
+        let view =
+            SensorView { layout: case.signals.layout.clone(), signals: case.signals.definition, ..usual.view.clone() };
         let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
         if data.about.object == "recorded" {
             let what = "simulated trials: recorded and imported ones have the channels that they have";
@@ -104,7 +143,7 @@ impl PaperStudy for Layouts {
     fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
         let mut pools = Pools::default();
         for case in Case::all(plan) {
-            pools.add((case.sensors.name(), case.method.key, case.layout.clone()), units, &case.name())?;
+            pools.add((case.sensors.name(), case.method.key, case.signals.name()), units, &case.name())?;
         }
         let pooled = pools.pooled();
         let mut table = StudyTable::new(
@@ -145,7 +184,7 @@ impl PaperStudy for Layouts {
         }
         let recommended = recommended_table(&table);
         let findings = findings(&pooled, &recommended);
-        Ok(StudyReport { data: pools.data.clone(), tables: vec![table, recommended], findings })
+        Ok(StudyReport::new(pools.data.clone(), vec![table, recommended], findings))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
@@ -178,6 +217,8 @@ fn recommended_table(table: &StudyTable) -> StudyTable {
     for sensors in table.texts("sensors") {
         for model in table.texts("model") {
             let rows = table.rows_with(&[("sensors", sensors), ("model", model)]);
+            // Only layouts of parts can be built.
+            let rows: Vec<usize> = rows.into_iter().filter(|row| !table.text(*row, "layout").contains(' ')).collect();
             let f1 = |row: usize| table.cell(row, "F1").value().unwrap_or(f64::NEG_INFINITY);
             let Some(best) = rows.iter().copied().max_by(|a, b| f1(*a).total_cmp(&f1(*b))) else { continue };
             let Some([low, _]) = table.cell(best, "F1").spread() else { continue };
@@ -213,7 +254,9 @@ fn findings(pooled: &[Pooled<'_>], recommended: &StudyTable) -> Vec<Finding> {
     let (mut found, mut verdicts) = (Vec::new(), Vec::new());
     for (sensors, model) in &kinds {
         let Some(simplest) = of(pooled, sensors, model, SIMPLEST) else { continue };
-        let others = pooled.iter().filter(|(kind, _)| (kind.0, kind.1) == (*sensors, *model) && kind.2 != SIMPLEST);
+        let others = pooled
+            .iter()
+            .filter(|(kind, _)| (kind.0, kind.1) == (*sensors, *model) && kind.2 != SIMPLEST && !kind.2.contains(' '));
         let gains = others.filter_map(|(kind, pool)| Some((kind.2.clone(), pool.against(simplest)?.f1)));
         let Some((layout, gain)) = gains.max_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate)) else { continue };
         found.push(format!(

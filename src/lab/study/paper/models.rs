@@ -159,7 +159,7 @@ impl PaperStudy for Models {
                 });
             }
         }
-        Ok(StudyReport { data: pools.data.clone(), tables: vec![table], findings: findings(&measured) })
+        Ok(StudyReport::new(pools.data.clone(), vec![table], findings(&measured)))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {

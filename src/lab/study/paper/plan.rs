@@ -143,7 +143,7 @@ impl StudyPlan {
             StudySize::Full => {}
             StudySize::Quick => options += " --quick",
             StudySize::Sample { objects, trials } => {
-                options += &format!(" (a sample of {objects} objects, {trials} trials)")
+                options += &format!(" (a sample of {objects} objects, {trials} trials)");
             }
         }
         if self.preset != usual.preset {

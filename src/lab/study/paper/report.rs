@@ -310,6 +310,11 @@ fn quoted(text: &str) -> String {
 }
 
 impl StudyReport {
+    /// A report of units; the runner adds the fingerprint.
+    pub(super) fn new(data: Vec<String>, tables: Vec<StudyTable>, findings: Vec<Finding>) -> Self {
+        Self { fingerprint: String::new(), data, tables, findings }
+    }
+
     /// A table by its name.
     pub fn table(&self, name: &str) -> Option<(usize, &StudyTable)> {
         self.tables.iter().enumerate().find(|(_, table)| table.name == name)

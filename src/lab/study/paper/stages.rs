@@ -4,7 +4,7 @@
 //! trained on the other half, for which stage one's probabilities are further channels, constant over a grasp. In place of
 //! them it gets nothing (uniform probabilities), one of both, or the true size and shape.
 
-use super::answers::{Judged, Pool, TestPart, judge};
+use super::answers::{Judged, Pool, TestPart, fit_and_judge, judge};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, confusion_plot, confusion_table, named_rows, percent_row};
 use super::plan::StudyPlan;
@@ -178,18 +178,18 @@ impl PaperStudy for Stages {
         let of = plan.pick(PARTS, 2, 2);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         let [first, second] = halves(&train, plan.seed)?;
-        let mut models: Vec<Model> = Vec::new();
-        let mut stage_one = Vec::new();
-        for property in 0..PROPERTIES.len() {
+        let first_stage = |property: usize| -> Result<Option<(Model, Judged)>, StudyError> {
             let pair = of_property(&first, property).zip(of_property(&test, property));
             let no_properties = || StudyError::Missing("a size and a shape of every object".to_owned());
             let (first, test) = pair.ok_or_else(no_properties)?;
-            let Some(model) = bench.fit(case.method, &first)? else { return Ok(None) };
-            stage_one.push(Judged::Answers(judge(&model, &test)));
-            models.push(model);
-        }
-        let [sizes, shapes] =
-            <[Model; 2]>::try_from(models).map_err(|_| StudyError::Missing("both properties".to_owned()))?;
+            let fitted = bench.fit(case.method, &first)?;
+            Ok(fitted.map(|model| {
+                let judged = Judged::Answers(judge(&model, &test));
+                (model, judged)
+            }))
+        };
+        let Some((sizes, of_size)) = first_stage(0)? else { return Ok(None) };
+        let Some((shapes, of_shape)) = first_stage(1)? else { return Ok(None) };
         let estimates = |data: &Dataset| -> Vec<Estimates> {
             let of = |model: &Model, example: &Example| model.recogniser.recognise(&example.grasp, None).pmf;
             data.examples.iter().map(|example| [of(&sizes, example), of(&shapes, example)]).collect()
@@ -197,15 +197,10 @@ impl PaperStudy for Stages {
         let (of_second, of_test) = (estimates(&second), estimates(&test));
         let mut stage_two = Vec::new();
         let mut add = |name: &str, train: &Dataset, test: &Dataset| -> Result<bool, StudyError> {
-            match bench.fit(case.method, train) {
-                Ok(None) => return Ok(false),
-                Ok(Some(model)) => stage_two.push((name.to_owned(), Judged::Answers(judge(&model, test)))),
-                Err(StudyError::Fit { cause, .. }) => {
-                    stage_two.push((name.to_owned(), Judged::NotFitted(cause.to_string())))
-                }
-                Err(other) => return Err(other),
-            }
-            Ok(true)
+            let judged = fit_and_judge(bench, case.method, train, test)?;
+            let is_finished = judged.is_some();
+            stage_two.extend(judged.map(|judged| (name.to_owned(), judged)));
+            Ok(is_finished)
         };
         for known in KNOWN {
             if !add(known.name, &with_known(&second, &of_second, known), &with_known(&test, &of_test, known))? {
@@ -215,8 +210,7 @@ impl PaperStudy for Stages {
         if !add(ONE_STAGE, &train, &test)? {
             return Ok(None);
         }
-        let stage_one =
-            <[Judged; 2]>::try_from(stage_one).map_err(|_| StudyError::Missing("both properties".to_owned()))?;
+        let stage_one = [of_size, of_shape];
         UnitResult::new(&StagesResult { stage_one, stage_two }).map(Some)
     }
 
@@ -267,7 +261,7 @@ impl PaperStudy for Stages {
         let second = twos.pooled();
         let table = second_table(plan, &second);
         let findings = findings(&first, &second);
-        Ok(StudyReport { data: twos.data.clone(), tables: vec![properties, confusions, table], findings })
+        Ok(StudyReport::new(twos.data.clone(), vec![properties, confusions, table], findings))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
