@@ -10,6 +10,7 @@ mod answers;
 mod bench;
 mod claims;
 mod drawing;
+mod drift;
 mod grasps;
 mod layouts;
 mod modality;
@@ -18,6 +19,7 @@ mod plan;
 mod pools;
 mod report;
 mod run;
+mod shaking;
 mod signatures;
 mod stages;
 mod training_size;
@@ -45,6 +47,8 @@ pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
     &training_size::TrainingSize,
     &models::Models,
     &grasps::Grasps,
+    &drift::Drift,
+    &shaking::Shaken,
 ];
 
 /// Finds a study by its key.
