@@ -77,6 +77,7 @@
 //! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
 //! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
+//! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!

@@ -6,6 +6,7 @@ use crate::app::features::inspect::InspectAction;
 use crate::app::features::library::LibraryAction;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::simulation::SimulationAction;
+use crate::app::features::studies::StudyAction;
 use crate::app::features::tools::ToolAction;
 use crate::app::features::view::ViewAction;
 use crate::app::notices::UserMessage;
@@ -26,6 +27,8 @@ pub enum Action {
     Recognition(RecognitionAction),
     /// Diagnostics, fit and training.
     Tool(ToolAction),
+    /// Studies of the paper.
+    Study(StudyAction),
     /// Stored trials that are looked at.
     Inspect(InspectAction),
     /// View state.
@@ -76,6 +79,7 @@ actions_from! {
     LibraryAction => |action| Self::Library(action);
     RecognitionAction => |action| Self::Recognition(action);
     ToolAction => |action| Self::Tool(action);
+    StudyAction => |action| Self::Study(action);
     InspectAction => |action| Self::Inspect(action);
     ViewAction => |action| Self::View(action);
     FileAction => |action| Self::File(action);

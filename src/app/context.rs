@@ -2,6 +2,7 @@
 
 use crate::app::features::inspect::{ComparedTrace, Inspected, Pinned};
 use crate::app::features::library::LibrarySelection;
+use crate::app::features::studies::Studies;
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
 use crate::app::playback::Playback;
@@ -43,6 +44,8 @@ pub struct PanelContext<'a> {
     pub gripper: Option<&'a GripperView>,
     /// Diagnostics, fit and training.
     pub tools: &'a GripperTools,
+    /// Studies of the paper.
+    pub studies: &'a Studies,
     /// Newest explanation of an answer.
     pub explained: Option<&'a ExplainedGrasp>,
     /// Labels, plan and journal; absent until the store has been read.

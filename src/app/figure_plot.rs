@@ -1,13 +1,13 @@
 //! A plot of a figure in the window: the same data as in the files that studies write.
 
 use crate::app::theme::{colour, veil};
-use egui::{Align2, Color32, Response, RichText, Ui};
+use egui::{Align2, Color32, FontId, Rect, Response, RichText, Ui};
 use egui_plot::{
-    GridInput, GridMark, HLine, Legend, Line, LineStyle as Dashes, MarkerShape, Plot as PlotWidget, PlotPoint,
-    PlotTransform, Points, Text, VLine,
+    FilledArea, GridInput, GridMark, HLine, Legend, Line, LineStyle as Dashes, MarkerShape, Plot as PlotWidget,
+    PlotPoint, PlotTransform, Points, Text, VLine,
 };
-use palpate_geometry::drawing::{DataSeries, LineStyle, Marker, Plot, PlotAxis};
-use palpate_geometry::palette::{Theme, series_colour};
+use palpate_geometry::drawing::{CellAxis, DataSeries, HeatMap, LineStyle, Marker, Plot};
+use palpate_geometry::palette::{Rgb, Theme, series_colour};
 use std::ops::RangeInclusive;
 
 /// A plot on the screen.
@@ -23,28 +23,42 @@ impl ShownPlot {
         let [x, y] = plot.place(at)?;
         Some(self.transform.position_from_point(&PlotPoint::new(x, y)))
     }
+
+    /// Place of a cell of colour on the screen.
+    pub(super) fn cell(&self, plot: &Plot, row: usize, column: usize) -> Option<Rect> {
+        let heat = plot.heat.as_ref()?;
+        let corner = |row: usize, column: usize| self.position(plot, [edge(&heat.x, column), edge(&heat.y, row)]);
+        Some(Rect::from_two_pos(corner(row, column)?, corner(row + 1, column + 1)?))
+    }
 }
 
-/// Draws a plot, `height` points high. `labelled` chooses points whose labels are shown.
+/// Value at the beginning of a cell.
+fn edge(axis: &CellAxis, cell: usize) -> f64 {
+    let [from, to] = axis.range;
+    from + (to - from) * cell as f64 / axis.count.max(1) as f64
+}
+
+/// Draws a plot, `height` points high. `legend`: names of the series stand in it where there
+/// is room. `labelled` chooses points whose labels are shown.
 pub(super) fn show(
     ui: &mut Ui,
     theme: Theme,
     (id, plot): (&str, &Plot),
     height: f32,
+    legend: bool,
     labelled: impl Fn(&str) -> bool,
 ) -> ShownPlot {
     let [x_bounds, y_bounds] = plot.bounds();
     let quiet = theme.colours().quiet_text;
-    let marks = |axis: &PlotAxis, bounds: &RangeInclusive<f64>| {
-        let (axis, bounds) = (axis.clone(), bounds.clone());
+    let known = [plot.x.marks(&x_bounds), plot.y_marks(&y_bounds)];
+    let marks = |known: &[(f64, String)], bounds: &RangeInclusive<f64>| {
         let step_size = bounds.end() - bounds.start();
-        move |_: GridInput| {
-            let numbered = axis.marks(&bounds).into_iter().filter(|(_, text)| !text.is_empty());
-            numbered.map(|(value, _)| GridMark { value, step_size }).collect()
-        }
+        let numbered = known.iter().filter(|(_, text)| !text.is_empty());
+        let marks: Vec<GridMark> = numbered.map(|(value, _)| GridMark { value: *value, step_size }).collect();
+        move |_: GridInput| marks.clone()
     };
-    let texts = |axis: &PlotAxis, bounds: &RangeInclusive<f64>| {
-        let known = axis.marks(bounds);
+    let texts = |known: &[(f64, String)]| {
+        let known = known.to_vec();
         move |mark: GridMark, _: &RangeInclusive<f64>| {
             known.iter().find(|(at, _)| (at - mark.value).abs() < 1e-9).map_or(String::new(), |(_, text)| text.clone())
         }
@@ -61,10 +75,10 @@ pub(super) fn show(
         .show_y(false)
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
-        .x_grid_spacer(marks(&plot.x, &x_bounds))
-        .y_grid_spacer(marks(&plot.y, &y_bounds))
-        .x_axis_formatter(texts(&plot.x, &x_bounds))
-        .y_axis_formatter(texts(&plot.y, &y_bounds))
+        .x_grid_spacer(marks(&known[0], &x_bounds))
+        .y_grid_spacer(marks(&known[1], &y_bounds))
+        .x_axis_formatter(texts(&known[0]))
+        .y_axis_formatter(texts(&known[1]))
         .set_margin_fraction(egui::Vec2::ZERO);
     if height > ROOM_FOR_TITLES {
         widget = widget.x_axis_label(plot.x.title.clone()).y_axis_label(plot.y.title.clone());
@@ -72,7 +86,7 @@ pub(super) fn show(
         let axes = format!("{} against {}", plot.y.title, plot.x.title);
         ui.add(egui::Label::new(RichText::new(axes).small().weak()).truncate());
     }
-    if ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
+    if legend && ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
         let legend = Legend::default().background_alpha(0.6).follow_insertion_order(true);
         let legend = legend.text_style(egui::TextStyle::Small).position(egui_plot::Corner::RightBottom);
         widget = widget.legend(legend);
@@ -80,6 +94,9 @@ pub(super) fn show(
     let shown = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(x_bounds.clone());
         plot_ui.set_plot_bounds_y(y_bounds.clone());
+        for band in &plot.bands {
+            add_band(plot_ui, plot, &band.points, veil(series_colour(band.colour, theme), BAND));
+        }
         for line in &plot.references {
             let axis = if line.horizontal { &plot.y } else { &plot.x };
             let Some(at) = axis.coordinate(line.at) else { continue };
@@ -105,7 +122,45 @@ pub(super) fn show(
             }
         }
     });
-    ShownPlot { response: shown.response, transform: shown.transform }
+    let shown = ShownPlot { response: shown.response, transform: shown.transform };
+    if let Some(heat) = &plot.heat {
+        cells(ui, &shown, plot, heat);
+    }
+    shown
+}
+
+/// Opacity of a band.
+const BAND: f32 = 0.22;
+/// Least size of a cell with its value in it (points).
+const ROOM_FOR_VALUE: egui::Vec2 = egui::vec2(19.0, 12.0);
+
+/// Cells of colour; their values where there is room, but for zeros.
+fn cells(ui: &Ui, shown: &ShownPlot, plot: &Plot, heat: &HeatMap) {
+    let painter = ui.painter().with_clip_rect(shown.response.rect.intersect(ui.clip_rect()));
+    for (row, column) in (0..heat.y.count).flat_map(|row| (0..heat.x.count).map(move |column| (row, column))) {
+        let value = heat.value(row, column);
+        let (Some(fill), Some(cell)) = (heat.scale.colour(value), shown.cell(plot, row, column)) else { continue };
+        painter.rect_filled(cell, 0.0, colour(fill));
+        let text = format!("{value:.0}");
+        if text.trim_start_matches('-') != "0" && cell.width() > ROOM_FOR_VALUE.x && cell.height() > ROOM_FOR_VALUE.y {
+            let [dark, bright] = [Rgb(0, 0, 0), Rgb(255, 255, 255)];
+            let ink = if fill.contrast(dark) > fill.contrast(bright) { dark } else { bright };
+            painter.text(cell.center(), Align2::CENTER_CENTER, text, FontId::proportional(10.0), colour(ink));
+        }
+    }
+}
+
+/// A band, cut where an edge has no number.
+fn add_band(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, points: &[[f64; 3]], fill: Color32) {
+    for run in points.split(|point| point.iter().any(|c| !c.is_finite())) {
+        let places = run.iter().filter_map(|[x, low, high]| Some([plot.place([*x, *low])?, plot.place([*x, *high])?]));
+        let places: Vec<[[f64; 2]; 2]> = places.collect();
+        let [xs, low, high] =
+            [[0, 0], [0, 1], [1, 1]].map(|[end, axis]| places.iter().map(|place| place[end][axis]).collect::<Vec<_>>());
+        if xs.len() > 1 {
+            plot_ui.add(FilledArea::new("", &xs, &low, &high).fill_color(fill).allow_hover(false));
+        }
+    }
 }
 
 /// Height from which on titles stand at the axes (points).

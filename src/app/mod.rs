@@ -19,7 +19,7 @@
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
 //! | simulation | `features/simulation.rs` | simulated gripper and its scene |
 //! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
-//! | workflow | `features/labelling.rs` `features/library.rs` `features/recognition.rs` | labelling session; trial library; recognition by both grippers |
+//! | workflow | `features/labelling.rs` `features/library.rs` `features/recognition.rs` `features/studies.rs` | labelling session; trial library; recognition by both grippers; studies of the paper |
 //! | actions | `actions.rs` `features/` | actions of all features |
 //! | context | `context.rs` | read-only context of panels |
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
@@ -81,6 +81,7 @@ pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};
 pub use features::library::{LibraryAction, LibrarySelection, Reach};
 pub use features::recognition::RecognitionAction;
 pub use features::simulation::SimulationAction;
+pub use features::studies::{Studies, StudyAction};
 pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
 pub use features::view::{PathLayer, ViewAction, ViewState};
 pub use modes::mode::Mode;

@@ -11,6 +11,7 @@ use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::LibraryFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
+use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::keys;
@@ -109,6 +110,7 @@ pub struct Workbench {
     recognition: RecognitionFeature,
     inspect: InspectFeature,
     tools: GripperTools,
+    studies: Studies,
     files: FileFeature,
     path_dialog: Option<PathDialog>,
     thumbnails: Thumbnails,
@@ -175,6 +177,7 @@ impl Workbench {
         let inspect = InspectFeature::new(inspector, model.cloned(), GRASPS);
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
+        let studies = Studies::start(&store, &wake)?;
         let driver = setup.render_state.map(|state| {
             Viewport::install(state);
             describe_adapter(&state.adapter.get_info())
@@ -200,6 +203,7 @@ impl Workbench {
             recognition,
             inspect,
             tools,
+            studies,
             files: FileFeature::new(wake, setup.system_dialogs),
             path_dialog: None,
             thumbnails,
@@ -325,6 +329,7 @@ impl Workbench {
             ghost: ghost_frame(snapshot, ghost.as_deref()),
             gripper,
             tools: &self.tools,
+            studies: &self.studies,
             explained: explained.as_deref(),
             labels,
             draft: self.labelling.session().draft(),
@@ -405,6 +410,12 @@ impl Workbench {
                 let request = figure.map(|figure| ExportRequest::Figure(figure, Theme::Light, FIGURE_SIZE));
                 Some(request.map_err(|cause| cause.to_string()))
             }
+            FileAction::ExportStudyFigure => {
+                let Some(linked) = self.studies.exported() else {
+                    return Some(Err("There is no figure: run the study first.".to_owned()));
+                };
+                Some(Ok(ExportRequest::Figure(linked.figure, Theme::Light, linked.size)))
+            }
             FileAction::ExportTrials => {
                 let ids: Vec<TrialId> = self.library.selection().selected.iter().copied().collect();
                 if ids.is_empty() {
@@ -418,7 +429,7 @@ impl Workbench {
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, library, .. } = self;
-        let Self { recognition, inspect, tools, files, thumbnails, .. } = self;
+        let Self { recognition, inspect, tools, studies, files, thumbnails, .. } = self;
         simulation.gather(view, notices);
         gripper.gather(simulation, view, notices);
         if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
@@ -426,6 +437,7 @@ impl Workbench {
             let _no_edit = inspect.apply(action, &[], view, notices);
         }
         library.gather(notices);
+        studies.gather(notices);
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, notices);
         thumbnails.gather(ctx, &view.recent);
@@ -466,8 +478,8 @@ impl Workbench {
             Action::Inspect(_) => self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default(),
             _ => Vec::new(),
         };
-        let Self { view, notices, simulation, gripper, labelling, library, recognition, inspect, tools, files, .. } =
-            self;
+        let Self { view, notices, simulation, gripper, labelling, library, .. } = self;
+        let Self { recognition, inspect, tools, studies, files, .. } = self;
         match action {
             Action::Simulation(action) => simulation.apply(action, view, notices),
             Action::Gripper(action) => gripper.apply(action, view, notices),
@@ -481,6 +493,11 @@ impl Workbench {
                 recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
             }
             Action::Tool(action) => tools.apply(action, notices),
+            Action::Study(action) => {
+                for action in studies.apply(action, notices) {
+                    inspect.apply(action, &times, view, notices);
+                }
+            }
             Action::Inspect(action) => {
                 // Looking back pauses the simulation.
                 if matches!(action, InspectAction::Seek(_)) && view.source == ViewSource::Simulation {

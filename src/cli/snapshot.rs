@@ -41,7 +41,7 @@ pub(super) struct SnapshotArguments {
     /// Draw the whole window, with its panels.
     #[arg(long, conflicts_with_all = ["view", "ghost", "no_forces", "bare"])]
     panels: bool,
-    /// Mode of the window: demo, inspect or label (default: inspect with --trial, else demo).
+    /// Mode of the window: demo, inspect, label or study (default: inspect with --trial, else demo).
     #[arg(long, value_name = "NAME", requires = "panels", value_parser = parse_mode)]
     mode: Option<Mode>,
     /// View: home, front, back, left, right, top or bottom.
@@ -86,7 +86,8 @@ fn parse_mode(text: &str) -> Result<Mode, String> {
         "demo" => Ok(Mode::Demo),
         "inspect" => Ok(Mode::Inspect),
         "label" => Ok(Mode::Label),
-        _ => Err("choose demo, inspect or label".to_owned()),
+        "study" => Ok(Mode::Study),
+        _ => Err("choose demo, inspect, label or study".to_owned()),
     }
 }
 

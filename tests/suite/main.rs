@@ -24,6 +24,7 @@
 //! - `one_path`: the same fault recorded from the command line and from the window.
 //! - `one_signal`: pads and strips measure the same in simulated, physical-like, emulated and recorded grasps.
 //! - `studies`: stored results of studies, and what is made from them.
+//! - `study_mode`: studies of the paper run, stopped, resumed and looked at in the window.
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
 //! - `window`: command palette, undo, keys without effect, files without a system dialog, sizes.
@@ -71,6 +72,7 @@ mod signatures;
 mod store;
 mod streams;
 mod studies;
+mod study_mode;
 mod training;
 mod trust;
 mod why;

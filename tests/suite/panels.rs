@@ -4,18 +4,19 @@
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::{compare, sheet};
+use crate::study_mode::scripted_result;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, LibraryAction, Mode, PanelKind, SimulationAction, ViewAction};
+use palpate::app::{ALL_PANELS, LibraryAction, Mode, PanelKind, SimulationAction, StudyAction, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Accuracy, Effect, PosePreset, Scene, Setting};
-use palpate_store::TrialQuery;
+use palpate_store::{Store, TrialQuery};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -35,9 +36,22 @@ fn every_panel_in_both_themes() {
     let picture = |panel: &'static PanelKind| {
         let [dark, light] = Theme::ALL.map(|theme| {
             let size = [300.0, 240.0];
-            let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), ..BenchSetup::default() });
+            let fill: fn(&mut Store) =
+                if panel.name.starts_with("study-") { scripted_result } else { |_: &mut Store| () };
+            let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), fill, ..BenchSetup::default() });
             bench.advance_to(2.6);
             match panel.name {
+                "studies" => bench.until_shown(true, "not run"),
+                "study-figure" | "study-tables" | "study-findings" => {
+                    bench.tell(StudyAction::Choose("models".to_owned()));
+                    let text = match panel.name {
+                        "study-figure" => "than today's",
+                        "study-tables" => "Row virtual, svm",
+                        _ => "Claims of the paper",
+                    };
+                    bench.until_shown(true, text);
+                    bench.harness.run_steps(8);
+                }
                 "effects" => bench.until_effects_are_measured(),
                 "plan" => bench.until_shown(true, "0 of 800 trials"),
                 "trials" => bench.until_shown(true, "No trials of the real gripper yet"),
@@ -503,7 +517,7 @@ fn theme_keys_and_layout_answer() {
         ALL_PANELS.iter().map(|panel| panel.title).filter(has_tab).collect()
     };
     let mut seen = tabs(&bench);
-    for (key, mode) in [(Key::Num2, Mode::Inspect), (Key::Num3, Mode::Label)] {
+    for (key, mode) in [(Key::Num2, Mode::Inspect), (Key::Num3, Mode::Label), (Key::Num4, Mode::Study)] {
         bench.harness.key_press_modifiers(Modifiers::COMMAND, key);
         bench.harness.run_steps(2);
         assert_eq!(bench.workbench().view().mode, mode);

@@ -24,6 +24,8 @@ pub enum FileAction {
     SavePicture,
     /// Export a figure of the trial that is open and of those compared with it.
     ExportFigure(FigureOptions),
+    /// Export the figure of a study that is shown.
+    ExportStudyFigure,
     /// Export the trials selected in the library into one file.
     ExportTrials,
 }
@@ -70,7 +72,10 @@ impl FileFeature {
             FileAction::SaveScene => Question::SaveScene(Box::new(simulation.scene().clone())),
             FileAction::SaveSceneAs(scene) => Question::SaveScene(scene),
             // Needs what the window shows: see `export`.
-            FileAction::SavePicture | FileAction::ExportFigure(_) | FileAction::ExportTrials => return,
+            FileAction::SavePicture
+            | FileAction::ExportFigure(_)
+            | FileAction::ExportStudyFigure
+            | FileAction::ExportTrials => return,
         };
         self.ask(question);
     }

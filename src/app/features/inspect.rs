@@ -362,7 +362,7 @@ impl InspectFeature {
     pub(in crate::app) fn enter_mode(&mut self, mode: Mode, view: &mut ViewState) {
         match (mode, self.wanted) {
             (Mode::Inspect, Some(id)) => self.show(id, view),
-            (Mode::Inspect, None) | (Mode::Demo | Mode::Label, _) => self.show_live(view),
+            (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => self.show_live(view),
         }
     }
 

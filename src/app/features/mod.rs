@@ -8,5 +8,6 @@ pub(super) mod labelling;
 pub(super) mod library;
 pub(super) mod recognition;
 pub(super) mod simulation;
+pub(super) mod studies;
 pub(super) mod tools;
 pub(super) mod view;

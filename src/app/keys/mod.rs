@@ -190,7 +190,7 @@ mod tests {
         }
         let mouse: String = MOUSE.iter().map(|(how, does)| row(how, does)).collect();
         holds("keys", &format!("| mouse | action |\n|---|---|\n{mouse}"));
-        for (topic, mode) in [("labelling", Mode::Label), ("inspect", Mode::Inspect)] {
+        for (topic, mode) in [("labelling", Mode::Label), ("inspect", Mode::Inspect), ("paper", Mode::Study)] {
             holds(topic, &table(&modes::kind(mode).keys.iter().collect::<Vec<_>>()));
         }
     }

@@ -5,6 +5,7 @@ mod demo;
 mod inspect;
 mod label;
 pub(super) mod mode;
+mod study;
 
 use crate::app::actions::Action;
 use crate::app::context::PanelContext;
@@ -30,7 +31,7 @@ pub(super) struct ModeKind {
 }
 
 /// All modes, in the order of their tabs.
-pub(super) static ALL: [ModeKind; 3] = [demo::KIND, inspect::KIND, label::KIND];
+pub(super) static ALL: [ModeKind; 4] = [demo::KIND, inspect::KIND, label::KIND, study::KIND];
 
 /// Kind of a mode.
 pub(super) fn kind(mode: Mode) -> &'static ModeKind {

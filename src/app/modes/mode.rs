@@ -13,4 +13,6 @@ pub enum Mode {
     Inspect,
     /// Record and label trials of the real gripper.
     Label,
+    /// Run the studies of the paper and look at their figures.
+    Study,
 }

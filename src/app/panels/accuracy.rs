@@ -32,7 +32,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
         let roomy = height > ROOM_FOR_LABELS;
         let labelled = |label: &str| roomy && (label.contains("(default)") || ["draft", "reference"].contains(&label));
-        let shown = figure_plot::show(ui, context.view.theme, ("error against CPU time", &plot), height, labelled);
+        let shown =
+            figure_plot::show(ui, context.view.theme, ("error against CPU time", &plot), height, true, labelled);
         shown.response.widget_info(|| {
             let text = format!("Error against CPU time, {} settings", study.rows.len());
             egui::WidgetInfo::labeled(egui::Role::Figure, true, text)

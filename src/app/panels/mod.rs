@@ -26,6 +26,7 @@ mod recognition;
 mod scene;
 mod sensors;
 mod signature;
+mod study;
 mod training;
 mod trial;
 mod trials;
@@ -47,7 +48,7 @@ pub struct PanelKind {
 }
 
 /// All panels.
-pub const ALL: [PanelKind; 30] = [
+pub const ALL: [PanelKind; 34] = [
     PanelKind { name: "objects", title: "Objects", ui: objects::ui },
     PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
     PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
@@ -78,6 +79,10 @@ pub const ALL: [PanelKind; 30] = [
     PanelKind { name: "sensors", title: "Sensors", ui: sensors::ui },
     PanelKind { name: "hysteresis", title: "Hysteresis", ui: hysteresis::ui },
     PanelKind { name: "training", title: "Training", ui: training::ui },
+    PanelKind { name: "studies", title: "Studies", ui: study::list::ui },
+    PanelKind { name: "study-figure", title: "Figure", ui: study::figure::ui },
+    PanelKind { name: "study-tables", title: "Tables", ui: study::tables::ui },
+    PanelKind { name: "study-findings", title: "Findings", ui: study::findings::ui },
 ];
 
 /// Panel of a name.

@@ -12,8 +12,8 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::DatasetQuery;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyPlan, StudyProgress, StudyReport,
-    StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
+    PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyFolder, StudyPlan, StudyProgress,
+    StudyReport, StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
 };
 use palpate_render::figure_svg;
 use palpate_sim::scene::PosePreset;
@@ -145,9 +145,9 @@ impl PaperArguments {
         StudyPlan { preset: self.preset.clone(), sensors, query, seed: self.seed, ..usual }
     }
 
-    fn folder(&self) -> PathBuf {
+    fn folder(&self) -> StudyFolder {
         let named = || PathBuf::from(format!("palpate-studies{}", if self.quick { "-quick" } else { "" }));
-        self.out.clone().unwrap_or_else(named)
+        StudyFolder::new(self.out.clone().unwrap_or_else(named))
     }
 }
 
@@ -174,7 +174,7 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
     for study in studies {
         let key = study.card().key;
         bar.reset();
-        let outcome = run_study(*study, &bench, Some(&folder.join(format!("{key}.jsonl"))));
+        let outcome = run_study(*study, &bench, Some(&folder.units(key)));
         bar.finish_and_clear();
         let Some(stored) = outcome? else {
             note_stopped(&format!("a part of {key}"));
@@ -196,22 +196,11 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
 }
 
 /// Writes a study's result, its tables and figures; returns a sentence that names the files.
-fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &Path) -> Result<String, Failure> {
-    let key = study.card().key;
-    let mut names = vec![format!("{key}.json")];
-    stored.write(&folder.join(&names[0]))?;
-    for table in &stored.result.tables {
-        let name = format!("{}.csv", table.name);
-        std::fs::write(folder.join(&name), table.csv())?;
-        names.push(name);
-    }
-    for mut linked in study.figures(&stored.result) {
-        let name = format!("{}.svg", linked.name);
-        linked.figure.note += &format!("\n{}", stored.origin().replace('`', ""));
-        std::fs::write(folder.join(&name), figure_svg(&linked.figure, Theme::Light, linked.size)?)?;
-        names.push(name);
-    }
-    Ok(format!("Written to {}: {}", folder.display(), names.join(", ")))
+fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &StudyFolder) -> Result<String, Failure> {
+    let names = folder.write(study, stored, &|linked| {
+        figure_svg(&linked.figure, Theme::Light, linked.size).map_err(std::io::Error::other)
+    })?;
+    Ok(format!("Written to {}: {}", folder.path().display(), names.join(", ")))
 }
 
 fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>) -> Result<(), Failure> {

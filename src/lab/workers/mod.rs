@@ -20,7 +20,8 @@
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
 //! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it.
-//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials.
+//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials,
+//! "study" runs the studies of the paper.
 //!
 //! "portraits" draws small pictures of objects from files.
 //!
@@ -56,6 +57,7 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 mod simulation_session;
+mod student;
 mod trainer;
 
 pub use background_job::BackgroundJob;
@@ -86,4 +88,8 @@ pub use object_search::NUMBERED_OBJECTS;
 pub use portraits::{PORTRAIT_SIDE, Portrait, PortraitJob};
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
+pub use student::{
+    DrawFigure, Student, StudentCommand, StudentError, StudentView, StudyFiles, StudyOrigin, StudyOutcome,
+    StudyRequest, StudyResult,
+};
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -11,6 +11,7 @@ mod bench;
 mod claims;
 mod drawing;
 mod drift;
+mod folder;
 mod grasps;
 mod layouts;
 mod modality;
@@ -27,6 +28,7 @@ mod training_size;
 pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
 pub(in crate::study) use claims::sections;
 pub use claims::stored_report;
+pub use folder::StudyFolder;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub use report::{
     Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow, StudyTable,

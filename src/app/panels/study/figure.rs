@@ -1,0 +1,155 @@
+//! Figures of the chosen study: its plots, from which the pointer leads to rows and trials.
+
+use super::plot::plot_ui;
+use super::result_ui;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::files::FileAction;
+use crate::app::features::studies::StudyAction;
+use crate::app::theme::colour;
+use crate::app::widgets::wrapped;
+use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
+use palpate_geometry::drawing::{Figure, LineStyle, Marker};
+use palpate_geometry::palette::{Theme, series_colour};
+use palpate_lab::study::paper::{LinkedFigure, StudySize};
+use palpate_lab::workers::{StudyOrigin, StudyResult};
+
+/// Least width of a plot (points).
+const LEAST_WIDTH: f32 = 300.0;
+/// Room below a single row of plots (points).
+const BELOW: f32 = 46.0;
+
+pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, context, "study-figure", "figures", actions) else { return };
+    let number = context.studies.figure().min(result.figures.len().saturating_sub(1));
+    header_ui(ui, context, &result, number, actions);
+    let Some(linked) = result.figures.get(number) else {
+        ui.weak("This result has no figure.");
+        return;
+    };
+    legend_ui(ui, context.view.theme, &linked.figure);
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        plots_ui(ui, context, &result, linked, actions);
+        for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
+            wrapped(ui, RichText::new(line).small().weak());
+        }
+        wrapped(ui, RichText::new(result.stored.origin().replace('`', "")).small().weak());
+    });
+}
+
+/// Title; origins and figures to choose from; the button that exports.
+fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, result: &StudyResult, number: usize, actions: &mut Actions) {
+    let (view, card) = (context.studies.view(), context.studies.chosen().card());
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.strong(card.title);
+        for other in view.studies.get(card.key).into_iter().flat_map(|files| &files.results) {
+            let chosen = other.origin.is_like(result.origin);
+            let button = ui.selectable_label(chosen, RichText::new(other.origin.title()).small());
+            if button.on_hover_text(about_origin(other.origin)).clicked() {
+                actions.push(StudyAction::ShowResult(other.origin));
+            }
+        }
+        if result.figures.len() > 1 {
+            ui.separator();
+            for (k, figure) in result.figures.iter().enumerate() {
+                let button = ui.selectable_label(k == number, RichText::new(&figure.name).small());
+                if button.on_hover_text(&figure.figure.title).clicked() {
+                    actions.push(StudyAction::ShowFigure(k));
+                }
+            }
+        }
+        if ui.small_button("Export").on_hover_text("Save this figure as SVG or PNG (Ctrl+E)").clicked() {
+            actions.push(FileAction::ExportStudyFigure);
+        }
+    });
+    let warning = match result.origin {
+        _ if !result.current => "From other settings, methods or physics than today's: run the study again.",
+        StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "A short form: do not quote its numbers.",
+        StudyOrigin::Shipped => {
+            "Not run here: the result that comes with the program. Run the study to open its trials."
+        }
+        StudyOrigin::Run(StudySize::Full) => return,
+    };
+    wrapped(ui, RichText::new(warning).small().color(ui.visuals().warn_fg_color));
+}
+
+fn about_origin(origin: StudyOrigin) -> &'static str {
+    match origin {
+        StudyOrigin::Run(StudySize::Full) => "The full form, run here",
+        StudyOrigin::Run(StudySize::Quick) => "The quick form, run here",
+        StudyOrigin::Run(StudySize::Sample { .. }) => "A sample of a few objects and grasps, run here",
+        StudyOrigin::Shipped => "The full form, as it comes with the program",
+    }
+}
+
+/// Names of all series with their colours and signs.
+fn legend_ui(ui: &mut Ui, theme: Theme, figure: &Figure) {
+    let mut seen = Vec::new();
+    for series in figure.plots.iter().flat_map(|plot| &plot.series).filter(|series| !series.name.is_empty()) {
+        let key = (series.name.as_str(), series.colour, series.marker, series.line);
+        if !seen.contains(&key) {
+            seen.push(key);
+        }
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
+        for (name, number, marker, line) in seen {
+            let ink = colour(series_colour(number, theme));
+            let (rect, _) = ui.allocate_exact_size(vec2(16.0, 14.0), Sense::hover());
+            let (painter, at) = (ui.painter(), rect.center());
+            if line != LineStyle::None {
+                let width = if line == LineStyle::Bold { 3.0 } else { 1.3 };
+                let ends = [rect.left_center(), rect.right_center()];
+                if line == LineStyle::Dashed {
+                    painter.extend(egui::Shape::dashed_line(&ends, Stroke::new(width, ink), 4.0, 3.0));
+                } else {
+                    painter.line_segment(ends, Stroke::new(width, ink));
+                }
+            }
+            match marker {
+                Marker::None => {}
+                Marker::Dot => {
+                    painter.circle_filled(at, 3.5, ink);
+                }
+                Marker::Ring => {
+                    painter.circle_stroke(at, 3.5, Stroke::new(1.3, ink));
+                }
+                Marker::Square => {
+                    painter.rect_filled(egui::Rect::from_center_size(at, vec2(7.0, 7.0)), 0.0, ink);
+                }
+                Marker::Cross => {
+                    for side in [1.0, -1.0] {
+                        let reach = vec2(3.5, 3.5 * side);
+                        painter.line_segment([at - reach, at + reach], Stroke::new(1.3, ink));
+                    }
+                }
+            }
+            ui.label(RichText::new(name).small());
+            ui.add_space(6.0);
+        }
+    });
+}
+
+/// All plots in rows, as many beside each other as there is room for.
+fn plots_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    result: &StudyResult,
+    linked: &LinkedFigure,
+    actions: &mut Actions,
+) {
+    let plots = &linked.figure.plots;
+    let most = if linked.figure.columns == 0 { plots.len() } else { linked.figure.columns };
+    let fitting = (ui.available_width() / LEAST_WIDTH) as usize;
+    let columns = most.min(plots.len()).min(fitting).max(1);
+    // A single row fills the panel.
+    let room = if plots.len() <= columns { ui.available_height() - BELOW } else { 0.0 };
+    for (row, chunk) in plots.chunks(columns).enumerate() {
+        ui.columns(columns, |uis| {
+            for (k, (ui, _)) in uis.iter_mut().zip(chunk).enumerate() {
+                plot_ui(ui, context, result, (linked, row * columns + k), room, actions);
+            }
+        });
+    }
+}

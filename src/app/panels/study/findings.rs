@@ -1,0 +1,60 @@
+//! Findings of the chosen study: each claim of the paper, our number beside it, and the verdict as a word and a sign.
+
+use super::result_ui;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::theme::{colour, veil};
+use crate::app::widgets::wrapped;
+use egui::{Frame, Margin, RichText, ScrollArea, Ui};
+use palpate_geometry::palette::{Rgb, Theme};
+use palpate_lab::study::paper::{Finding, Verdict};
+
+pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, context, "study-findings", "findings", actions) else { return };
+    let findings = &result.stored.result.findings;
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let count = |verdict: Verdict| findings.iter().filter(|finding| finding.verdict == verdict).count();
+        let counts = [Verdict::Agrees, Verdict::Partly, Verdict::Disagrees, Verdict::NotMeasured]
+            .map(|verdict| (count(verdict), verdict.name()));
+        let shown = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
+        let text = format!("Claims of the paper: {}", shown.collect::<Vec<_>>().join(", "));
+        wrapped(
+            ui,
+            RichText::new(if findings.is_empty() { "The paper claims nothing here.".to_owned() } else { text }).weak(),
+        );
+        for finding in findings {
+            finding_ui(ui, context.view.theme, finding);
+        }
+    });
+}
+
+/// Sign and colour of a verdict.
+fn sign(verdict: Verdict, theme: Theme) -> (&'static str, Rgb) {
+    let colours = theme.colours();
+    match verdict {
+        Verdict::Agrees => ("✔", colours.good),
+        Verdict::Partly => ("±", colours.warning),
+        Verdict::Disagrees => ("✖", colours.error),
+        Verdict::NotMeasured => ("–", colours.quiet_text),
+    }
+}
+
+fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
+    let (sign, ink) = sign(finding.verdict, theme);
+    Frame::new().fill(colour(theme.colours().raised)).corner_radius(4).inner_margin(Margin::same(7)).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.spacing_mut().item_spacing.y = 3.0;
+        ui.horizontal_wrapped(|ui| {
+            let tag = Frame::new().fill(veil(ink, 0.16)).corner_radius(4).inner_margin(Margin::symmetric(6, 1));
+            tag.show(ui, |ui| {
+                ui.label(RichText::new(format!("{sign} {}", finding.verdict.name())).color(colour(ink)).strong());
+            });
+            ui.weak(&finding.section);
+        });
+        wrapped(ui, RichText::new(&finding.claim));
+        if !finding.found.is_empty() {
+            wrapped(ui, RichText::new(format!("Here: {}", finding.found)));
+        }
+        wrapped(ui, RichText::new(&finding.why).small().weak());
+    });
+}

@@ -1,0 +1,179 @@
+//! List of the studies: state of each; the chosen one with its purpose, its cost, and the buttons that run and stop it.
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::studies::StudyAction;
+use crate::app::theme::{accented, colour};
+use crate::app::widgets::{command_ui, just_opened, wrapped};
+use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_geometry::palette::Rgb;
+use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudyFolder, StudyProgress, StudySize, StudyStep};
+use palpate_lab::workers::{StudentView, StudyFiles, StudyOrigin, StudyOutcome, StudyRequest};
+use palpate_store::Store;
+
+/// Height of a row (points).
+const ROW: f32 = 40.0;
+
+pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    if just_opened(ui, "studies") {
+        actions.push(StudyAction::Look);
+    }
+    let view = context.studies.view();
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for study in PAPER_STUDIES {
+            let card = study.card();
+            let chosen = card.key == context.studies.chosen().card().key;
+            row_ui(ui, context, &view, &card, chosen, actions);
+            if chosen {
+                ui.indent(card.key, |ui| chosen_ui(ui, context, &view, &card, actions));
+            }
+        }
+        ui.add_space(6.0);
+        let all = ui.button("Run all, quick").on_hover_text("Run the quick form of all studies, one after the other");
+        if all.clicked() {
+            for study in PAPER_STUDIES {
+                run(study.card().key, StudySize::Quick, false, actions);
+            }
+        }
+    });
+}
+
+fn run(key: &str, size: StudySize, anew: bool, actions: &mut Actions) {
+    actions.push(StudyAction::Run(StudyRequest { key: key.to_owned(), size, anew }));
+}
+
+fn row_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    view: &StudentView,
+    card: &StudyCard,
+    chosen: bool,
+    actions: &mut Actions,
+) {
+    let colours = context.view.theme.colours();
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    let (state, ink) = state(context, view, card.key);
+    let label = format!("{}, {}: {state}", card.title, card.paper);
+    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
+    if chosen || response.hovered() || response.has_focus() {
+        let share = if chosen { 0.30 } else { 0.10 };
+        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
+    }
+    let inner = rect.shrink2(vec2(6.0, 4.0));
+    let painter = ui.painter_at(inner);
+    let small = FontId::proportional(11.5);
+    let quiet = if chosen { colours.text } else { colours.quiet_text };
+    let paper = painter.text(inner.right_top(), Align2::RIGHT_TOP, card.paper, small.clone(), colour(quiet));
+    let room = egui::Rect::from_min_max(inner.min, egui::pos2(paper.left() - 6.0, inner.bottom()));
+    let title = painter.with_clip_rect(room.intersect(ui.clip_rect()));
+    title.text(inner.left_top(), Align2::LEFT_TOP, card.title, FontId::proportional(13.5), colour(colours.text));
+    painter.text(
+        inner.left_bottom(),
+        Align2::LEFT_BOTTOM,
+        &state,
+        small,
+        colour(if chosen { colours.text } else { ink }),
+    );
+    if response.on_hover_text(card.about).clicked() {
+        actions.push(StudyAction::Choose(card.key.to_owned()));
+    }
+}
+
+/// State of a study in a few words.
+fn state(context: &PanelContext<'_>, view: &StudentView, key: &str) -> (String, Rgb) {
+    let colours = context.view.theme.colours();
+    if let Some((_, progress)) = view.running.as_ref().filter(|(request, _)| request.key == key) {
+        return (progress.map_or("begins ..".to_owned(), progress_text), colours.accent);
+    }
+    if context.studies.waits(key) {
+        return ("waits for those before".to_owned(), colours.accent);
+    }
+    if let Some((_, StudyOutcome::Failed(_))) = view.last(key) {
+        return ("failed".to_owned(), colours.error);
+    }
+    let Some(StudyFiles { results, begun, .. }) = view.studies.get(key) else {
+        return ("..".to_owned(), colours.quiet_text);
+    };
+    let stopped = if begun.is_empty() { "" } else { ", another stopped" };
+    let text = match results.first() {
+        None if !begun.is_empty() => return ("stopped: a run goes on there".to_owned(), colours.warning),
+        None => return ("not run".to_owned(), colours.quiet_text),
+        Some(result) => match result.origin {
+            StudyOrigin::Run(StudySize::Full) => "run in full",
+            StudyOrigin::Run(StudySize::Quick) => "quick form run",
+            StudyOrigin::Run(StudySize::Sample { .. }) => "sample run",
+            StudyOrigin::Shipped => "not run here; result of the program",
+        },
+    };
+    (format!("{text}{stopped}"), colours.quiet_text)
+}
+
+fn progress_text(progress: StudyProgress) -> String {
+    let StudyProgress { step, done, of } = progress;
+    match step {
+        StudyStep::Collecting => format!("simulating grasps, {done} of {of}"),
+        StudyStep::Measuring => format!("measuring, {done} of {of} parts"),
+    }
+}
+
+/// Purpose and cost of the chosen study, and its buttons.
+fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &StudentView, card: &StudyCard, actions: &mut Actions) {
+    let key = card.key;
+    wrapped(ui, RichText::new(format!("{}.", card.about)));
+    let cost = format!(
+        "In full: {}. Quick: less than a minute, not to be quoted. Grasps that the store lacks are simulated and kept there.",
+        card.budget
+    );
+    wrapped(ui, RichText::new(cost).small().weak());
+    let running = view.running.as_ref().filter(|(request, _)| request.key == key);
+    if let Some((_, progress)) = running {
+        let share = progress.map_or(0.0, |progress| progress.done as f32 / progress.of.max(1) as f32);
+        let text = progress.map_or("begins ..".to_owned(), progress_text);
+        ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
+    }
+    ui.horizontal_wrapped(|ui| {
+        if running.is_some() || context.studies.waits(key) {
+            let stop = ui
+                .button("Stop study")
+                .on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
+            if stop.clicked() {
+                actions.push(StudyAction::Stop);
+            }
+            return;
+        }
+        let begun = |size: StudySize| view.studies.get(key).is_some_and(|files| files.begun.contains(&size));
+        for (size, title, shortcut) in
+            [(StudySize::Quick, "Run quick", "Enter"), (StudySize::Full, "Run in full", "Shift+Enter")]
+        {
+            let text = if begun(size) { title.replace("Run", "Resume") } else { title.to_owned() };
+            let mut button = Button::new(text);
+            if size == StudySize::Quick {
+                button = button.fill(accented(context.view.theme));
+            }
+            if ui.add(button).on_hover_text(shortcut).clicked() {
+                run(key, size, false, actions);
+            }
+        }
+    });
+    if let Some((request, StudyOutcome::Failed(cause))) = view.last(key).filter(|_| running.is_none()) {
+        wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color));
+        if cause.is_of_something_else()
+            && ui.button("Begin anew").on_hover_text("Forget the finished parts and run the study again").clicked()
+        {
+            run(key, request.size, true, actions);
+        }
+    }
+    for cause in view.studies.get(key).into_iter().flat_map(|files| &files.unreadable) {
+        wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color));
+    }
+    ui.collapsing("In the terminal", |ui| command_ui(ui, "this study", &command(context, card)));
+    ui.add_space(4.0);
+}
+
+/// Command that runs the study in the same files.
+fn command(context: &PanelContext<'_>, card: &StudyCard) -> String {
+    let store = context.studies.store();
+    let folder = StudyFolder::beside(store, StudySize::Quick);
+    let own = if store == Store::default_path() { String::new() } else { format!(" --store \"{}\"", store.display()) };
+    format!("palpate study {} --quick{own} --out \"{}\"", card.key, folder.path().display())
+}

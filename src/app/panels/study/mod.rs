@@ -1,0 +1,76 @@
+//! Study mode: the studies of the paper, the figures, tables and findings of the one that is chosen. A click on a point, cell
+//! or row opens the trials behind it.
+
+pub(super) mod figure;
+pub(super) mod findings;
+pub(super) mod list;
+mod plot;
+pub(super) mod tables;
+
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::studies::StudyAction;
+use crate::app::widgets::{just_opened, wrapped};
+use egui::{RichText, Ui};
+use palpate_lab::study::paper::{Cell, StudyRow, StudyTable};
+use palpate_lab::workers::{StudyOrigin, StudyResult};
+use std::sync::Arc;
+
+/// Result of the chosen study. Without one the panel says what to do.
+fn result_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    panel: &str,
+    what: &str,
+    actions: &mut Actions,
+) -> Option<Arc<StudyResult>> {
+    if just_opened(ui, panel) {
+        actions.push(StudyAction::Look);
+    }
+    let result = context.studies.result();
+    if result.is_none() {
+        let view = context.studies.view();
+        let card = context.studies.chosen().card();
+        let text = match &view.running {
+            _ if view.studies.is_empty() => "Reading the results ..".to_owned(),
+            Some((request, _)) if request.key == card.key => {
+                format!("{}: its {what} appear here when the run is over.", card.title)
+            }
+            _ => {
+                format!("{}: no {what} yet. Run the study: Enter for the quick form, Shift+Enter in full.", card.title)
+            }
+        };
+        wrapped(ui, RichText::new(text).weak());
+    }
+    result
+}
+
+/// Opens the trials behind a row; none where they are not in the store of the window.
+fn opening(result: &StudyResult, row: &StudyRow) -> Option<StudyAction> {
+    let own = !row.trials.is_empty() && result.origin != StudyOrigin::Shipped;
+    own.then(|| StudyAction::OpenTrials(row.trials.clone()))
+}
+
+/// What a click on a row does, or why it does nothing.
+fn hint(result: &StudyResult, row: &StudyRow) -> String {
+    match (row.trials.as_slice(), result.origin) {
+        ([], _) => "No trials are kept for this row".to_owned(),
+        (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
+        ([only], _) => format!("Click to open trial {only} in Inspect"),
+        ([first, others @ ..], _) => {
+            format!("Click to open trial {first} in Inspect, with {} others beside it", others.len())
+        }
+    }
+}
+
+/// Row of a table under the pointer: a line for each column, and what a click does.
+fn about_row_ui(ui: &mut Ui, result: &StudyResult, table: &StudyTable, row: &StudyRow) {
+    ui.spacing_mut().item_spacing.y = 2.0;
+    for (cell, column) in row.cells.iter().zip(&table.columns) {
+        if *cell != Cell::Missing {
+            let unit = if column.unit.is_empty() { String::new() } else { format!(" {}", column.unit) };
+            ui.label(RichText::new(format!("{}: {}{unit}", column.name, cell.shown(&column.unit))).small());
+        }
+    }
+    ui.label(RichText::new(hint(result, row)).small().weak());
+}

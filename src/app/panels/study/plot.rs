@@ -1,0 +1,98 @@
+//! A plot of a study's figure: the row behind the point or cell under the pointer; a click opens its trials.
+
+use super::{about_row_ui, opening};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::figure_plot::{self, ShownPlot};
+use crate::app::theme::colour;
+use egui::{Rect, RichText, Stroke, StrokeKind, Tooltip, Ui, Vec2};
+use palpate_geometry::drawing::Plot;
+use palpate_lab::study::paper::{FigureLink, FigureMark, LinkedFigure};
+use palpate_lab::workers::StudyResult;
+
+/// Distance within which the pointer means a point (points).
+const NEAR: f32 = 12.0;
+/// Heights of a named row and of what stands around the rows (points).
+const ROW: f32 = 15.0;
+const AROUND: f32 = 64.0;
+/// Least and largest height of other plots (points).
+const HEIGHTS: [f32; 2] = [190.0, 380.0];
+
+pub(super) fn plot_ui(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    result: &StudyResult,
+    (linked, number): (&LinkedFigure, usize),
+    room: f32,
+    actions: &mut Actions,
+) {
+    let plot = &linked.figure.plots[number];
+    if !plot.title.is_empty() {
+        ui.add(egui::Label::new(RichText::new(&plot.title).small().strong()).truncate());
+    }
+    let [least, most] = HEIGHTS;
+    let rows = plot.heat.as_ref().map_or(plot.y.ticks.len(), |heat| heat.y.count);
+    let height = if rows > 0 {
+        (ROW * rows as f32 + AROUND).max(least).max(room.min(1.6 * most))
+    } else {
+        (0.7 * ui.available_width()).clamp(least, most).max(room.min(1.2 * most))
+    };
+    let id = format!("{} {number}", linked.name);
+    let shown = figure_plot::show(ui, context.view.theme, (&id, plot), height, false, |_| false);
+    let points: usize = plot.series.iter().map(|series| series.points.len()).sum();
+    let text = match &plot.heat {
+        Some(heat) => {
+            format!("{}: {} by {} cells, {} in {}", plot.title, heat.y.count, heat.x.count, heat.quantity, heat.unit)
+        }
+        None => format!("{}: {points} points", plot.title),
+    };
+    shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, &text));
+    let links = linked.links.iter().filter(|link| link.plot == number);
+    pointed_ui(ui, context, result, (plot, &shown), links, actions);
+}
+
+/// Place of a mark on the screen, and its distance from the pointer.
+fn place(plot: &Plot, shown: &ShownPlot, mark: FigureMark, pointer: egui::Pos2) -> Option<(Rect, f32)> {
+    match mark {
+        FigureMark::Point(series, point) => {
+            let at = plot.series.get(series)?.points.get(point)?.at;
+            let at = shown.position(plot, at)?;
+            Some((Rect::from_center_size(at, Vec2::splat(2.0 * NEAR)), at.distance(pointer)))
+        }
+        FigureMark::Cell(row, column) => {
+            let cell = shown.cell(plot, row, column)?;
+            cell.contains(pointer).then_some((cell, 0.0))
+        }
+    }
+}
+
+/// Marks what the pointer means and tells its row; a click opens its trials.
+fn pointed_ui<'a>(
+    ui: &mut Ui,
+    context: &PanelContext<'_>,
+    result: &StudyResult,
+    (plot, shown): (&Plot, &ShownPlot),
+    links: impl Iterator<Item = &'a FigureLink>,
+    actions: &mut Actions,
+) {
+    let Some(pointer) = shown.response.hover_pos() else { return };
+    let places = links.filter_map(|link| Some((link, place(plot, shown, link.mark, pointer)?)));
+    let nearest = places.min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).filter(|(_, (_, distance))| *distance < NEAR);
+    let Some((link, (rect, _))) = nearest else { return };
+    let Some(table) = result.stored.result.tables.get(link.table) else { return };
+    let Some(row) = table.rows.get(link.row) else { return };
+    let stroke = Stroke::new(2.0, colour(context.view.theme.colours().text));
+    let painter = ui.painter().with_clip_rect(shown.response.rect.intersect(ui.clip_rect()));
+    match link.mark {
+        FigureMark::Point(..) => painter.circle_stroke(rect.center(), 7.0, stroke),
+        FigureMark::Cell(..) => painter.rect_stroke(rect, 0.0, stroke, StrokeKind::Inside),
+    };
+    // Beside the mark at once, without the delay of hints.
+    let (ctx, response) = (ui.ctx().clone(), &shown.response);
+    Tooltip::always_open(ctx, response.layer_id, response.id, rect).show(|ui| about_row_ui(ui, result, table, row));
+    let Some(action) = opening(result, row) else { return };
+    ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
+    if response.clicked() {
+        actions.push(action);
+    }
+}

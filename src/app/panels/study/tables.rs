@@ -1,0 +1,120 @@
+//! Tables of the chosen study; a click on a row opens its trials.
+
+use super::{about_row_ui, opening, result_ui};
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::theme::colour;
+use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use palpate_geometry::palette::Theme;
+use palpate_lab::study::paper::{Cell, StudyColumn, StudyRow, StudyTable};
+use palpate_lab::workers::StudyResult;
+
+/// Height of a row, room between columns, widest column (points).
+const ROW: f32 = 21.0;
+const GAP: f32 = 14.0;
+const WIDEST: f32 = 300.0;
+/// Size of the texts (points).
+const SIZE: f32 = 12.5;
+/// Rows whose texts decide the widths of columns.
+const MEASURED: usize = 300;
+
+pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, context, "study-tables", "tables", actions) else { return };
+    let tables = &result.stored.result.tables;
+    let id = egui::Id::unique(("study table", context.studies.chosen().card().key));
+    let mut chosen = ui.data_mut(|data| data.get_temp::<usize>(id)).unwrap_or(0).min(tables.len().saturating_sub(1));
+    let Some(first) = tables.get(chosen) else {
+        ui.weak("This result has no table.");
+        return;
+    };
+    if tables.len() > 1 {
+        ui.horizontal_wrapped(|ui| {
+            for (k, table) in tables.iter().enumerate() {
+                let button = ui.selectable_label(k == chosen, RichText::new(&table.name).small());
+                if button.on_hover_text(&table.title).clicked() {
+                    chosen = k;
+                    ui.data_mut(|data| data.insert_temp(id, k));
+                }
+            }
+        });
+    }
+    let table = tables.get(chosen).unwrap_or(first);
+    ui.add(egui::Label::new(RichText::new(&table.title).strong()).truncate());
+    table_ui(ui, context.view.theme, &result, table, actions);
+}
+
+/// Columns, from their left ends to their right ones, and whether they hold numbers.
+fn columns(ui: &Ui, table: &StudyTable) -> Vec<(f32, f32, bool)> {
+    let font = FontId::proportional(SIZE);
+    let width = |text: String| ui.painter().layout_no_wrap(text, font.clone(), Color32::WHITE).size().x;
+    let mut left = 6.0;
+    let mut places = Vec::new();
+    for (k, column) in table.columns.iter().enumerate() {
+        let cells = || table.rows.iter().take(MEASURED).filter_map(move |row| row.cells.get(k));
+        let widest = cells().map(|cell| width(cell.shown(&column.unit))).fold(width(column.titled()), f32::max);
+        let right = left + widest.min(WIDEST);
+        places.push((left, right, cells().all(|cell| !matches!(cell, Cell::Text(_)))));
+        left = right + GAP;
+    }
+    places
+}
+
+fn table_ui(ui: &mut Ui, theme: Theme, result: &StudyResult, table: &StudyTable, actions: &mut Actions) {
+    let places = columns(ui, table);
+    let colours = theme.colours();
+    ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let whole = places.last().map_or(0.0, |(_, right, _)| right + GAP).max(ui.available_width());
+        let (header, _) = ui.allocate_exact_size(vec2(whole, ROW), Sense::hover());
+        let titles = table.columns.iter().map(StudyColumn::titled);
+        texts(ui, header, &places, titles, colour(colours.quiet_text));
+        ScrollArea::vertical().auto_shrink(false).show_rows(ui, ROW, table.rows.len(), |ui, rows| {
+            for at in rows {
+                if let Some(row) = table.rows.get(at) {
+                    row_ui(ui, theme, result, (table, row), (whole, &places), actions);
+                }
+            }
+        });
+    });
+}
+
+fn row_ui(
+    ui: &mut Ui,
+    theme: Theme,
+    result: &StudyResult,
+    (table, row): (&StudyTable, &StudyRow),
+    (whole, places): (f32, &[(f32, f32, bool)]),
+    actions: &mut Actions,
+) {
+    let colours = theme.colours();
+    let action = opening(result, row);
+    let (rect, response) = ui.allocate_exact_size(vec2(whole, ROW), Sense::click());
+    let cells: Vec<String> =
+        row.cells.iter().zip(&table.columns).map(|(cell, column)| cell.shown(&column.unit)).collect();
+    let label = format!("Row {}", cells.join(", "));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, action.is_some(), &label));
+    if response.hovered() || response.has_focus() {
+        ui.painter().rect_filled(rect, 3.0, colour(colours.background.mix(colours.accent, 0.14)));
+    }
+    texts(ui, rect, places, cells.into_iter(), colour(colours.text));
+    let clicked = response.clicked();
+    response.on_hover_ui(|ui| about_row_ui(ui, result, table, row));
+    if let Some(action) = action.filter(|_| clicked) {
+        actions.push(action);
+    }
+}
+
+/// Texts in their columns: numbers to the right.
+fn texts(ui: &Ui, row: Rect, places: &[(f32, f32, bool)], texts: impl Iterator<Item = String>, ink: Color32) {
+    let font = FontId::proportional(SIZE);
+    for ((left, right, number), text) in places.iter().zip(texts) {
+        let [left, right] = [left, right].map(|x| row.left() + x);
+        let room = Rect::from_min_max(pos2(left, row.top()), pos2(right + 1.0, row.bottom()));
+        let painter = ui.painter().with_clip_rect(room.intersect(ui.clip_rect()));
+        if *number {
+            painter.text(room.right_center(), Align2::RIGHT_CENTER, text, font.clone(), ink);
+        } else {
+            painter.text(room.left_center(), Align2::LEFT_CENTER, text, font.clone(), ink);
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Files of studies in a folder: finished units, results, tables and figures.
+
+use super::report::{LinkedFigure, StudyReport};
+use super::{PaperStudy, StudySize};
+use crate::study::result_file::ResultFileError;
+use crate::study::stored_study::StoredStudy;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Folder of results: that of the command line, or one of those beside the store, which the window uses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StudyFolder(PathBuf);
+
+impl StudyFolder {
+    /// A folder; it is made when something is written.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self(path.into())
+    }
+
+    /// Folder beside a store for studies of a size.
+    pub fn beside(store: &Path, size: StudySize) -> Self {
+        Self(store.with_file_name(match size {
+            StudySize::Full => "studies",
+            StudySize::Quick => "studies-quick",
+            StudySize::Sample { .. } => "studies-sample",
+        }))
+    }
+
+    /// Its path.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// File of finished units of a study.
+    pub fn units(&self, key: &str) -> PathBuf {
+        self.0.join(format!("{key}.jsonl"))
+    }
+
+    fn result(&self, key: &str) -> PathBuf {
+        self.0.join(format!("{key}.json"))
+    }
+
+    /// True where a study has finished units.
+    pub fn has_begun(&self, key: &str) -> bool {
+        self.units(key).is_file()
+    }
+
+    /// Removes the finished units of a study; its result stays until there is a new one.
+    pub fn forget_units(&self, key: &str) -> Result<(), ResultFileError> {
+        let path = self.units(key);
+        match std::fs::remove_file(&path) {
+            Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
+                Err(ResultFileError::File { attempt: "remove", path, cause })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Result of a study; none where it is not finished.
+    pub fn read(&self, key: &str) -> Result<Option<StoredStudy<StudyReport>>, ResultFileError> {
+        let path = self.result(key);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(cause) => return Err(ResultFileError::File { attempt: "read", path, cause }),
+        };
+        let parsed = StoredStudy::parse(&text).map_err(io::Error::from);
+        parsed.map(Some).map_err(|cause| ResultFileError::File { attempt: "read", path, cause })
+    }
+
+    /// Writes a result, each of its tables (CSV) and each of its figures, which `draw` draws as SVG. Returns the names of
+    /// the files.
+    pub fn write(
+        &self,
+        study: &dyn PaperStudy,
+        stored: &StoredStudy<StudyReport>,
+        draw: &dyn Fn(&LinkedFigure) -> io::Result<String>,
+    ) -> Result<Vec<String>, ResultFileError> {
+        let key = study.card().key;
+        let mut names = vec![format!("{key}.json")];
+        stored.write(&self.result(key))?;
+        let mut put = |name: String, text: io::Result<String>| {
+            let path = self.0.join(&name);
+            let written = text.and_then(|text| std::fs::write(&path, text));
+            names.push(name);
+            written.map_err(|cause| ResultFileError::File { attempt: "write", path, cause })
+        };
+        for table in &stored.result.tables {
+            put(format!("{}.csv", table.name), Ok(table.csv()))?;
+        }
+        for mut linked in study.figures(&stored.result) {
+            linked.figure.note += &format!("\n{}", stored.origin().replace('`', ""));
+            put(format!("{}.svg", linked.name), draw(&linked))?;
+        }
+        Ok(names)
+    }
+}

@@ -1,0 +1,189 @@
+//! Study mode: a study is run, stopped and resumed in the window, and a point of its figure opens its trials.
+
+use crate::bench::{Bench, BenchSetup};
+use crate::cpu_renderer::CpuRenderer;
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
+use image::RgbaImage;
+use palpate::app::{Mode, StudyAction, ViewAction};
+use palpate_geometry::palette::Theme;
+use palpate_lab::study::StoredStudy;
+use palpate_lab::study::paper::{
+    Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable, Verdict,
+};
+use palpate_lab::workers::StudyRequest;
+use palpate_learn::metrics::Interval;
+use palpate_store::Store;
+
+const SAMPLE: StudySize = StudySize::Sample { objects: 4, trials: 6 };
+
+fn request(anew: bool) -> StudyAction {
+    StudyAction::Run(StudyRequest { key: "models".to_owned(), size: SAMPLE, anew })
+}
+
+/// A made-up result of the study `models`, whose numbers repeat.
+pub(crate) fn scripted_result(store: &mut Store) {
+    let columns = [("grasps", ""), ("model", ""), ("kind", ""), ("F1", PERCENT), ("training", "CPU s")];
+    let mut table = StudyTable::new("models", "Methods on grasps that none has seen, preset B", &columns);
+    for kind in ["virtual", "physical-like"] {
+        let models =
+            [("extra-trees", "ensemble", 0.83), ("macro-layer", "network", 0.79), ("svm", "single model", 0.64)];
+        for (k, (model, group, f1)) in models.into_iter().enumerate() {
+            let f1 = if kind == "virtual" { f1 } else { f1 - 0.3 };
+            let interval = Interval { estimate: f1, low: f1 - 0.04, high: f1 + 0.03 };
+            let cells = [kind, model, group].map(Cell::text).to_vec();
+            let cells = [cells, vec![Cell::Interval(interval), Cell::Number(3.0 / (k + 1) as f64)]].concat();
+            table.push(cells, vec![k as i64 + 1, 1]);
+        }
+    }
+    let finding = |section: &str, claim: &str, found: &str, verdict: Verdict| Finding {
+        section: section.to_owned(),
+        claim: claim.to_owned(),
+        found: found.to_owned(),
+        verdict,
+        why: "Agrees where every interval of the difference lies above zero".to_owned(),
+    };
+    let findings = vec![
+        finding("V-D", "Ensembles are best", "extra-trees .83 (.79 to .86), macro-layer .79", Verdict::Agrees),
+        finding("V-D", "The SVM is as good as networks", "SVM .64, macro-layer .79", Verdict::Disagrees),
+        finding("VI", "It costs less", "training 3.0 s and 1.5 s", Verdict::Partly),
+        finding("VI", "It is small", "", Verdict::NotMeasured),
+    ];
+    let data = vec!["virtual sensors: 320 grasps of 16 objects, preset B, layout C1".to_owned()];
+    let fingerprint = StudyPlan::of_size(StudySize::Quick).fingerprint();
+    let report = StudyReport { fingerprint, data, tables: vec![table], findings };
+    let mut stored = StoredStudy::new("palpate study models --quick", 0.25, report);
+    // Programs of other versions have the same picture.
+    stored.program = "0.0.0, physics 0".to_owned();
+    let folder = StudyFolder::beside(store.path(), StudySize::Quick);
+    std::fs::create_dir_all(folder.path()).expect("makes the folder");
+    stored.write(&folder.path().join("models.json")).expect("writes");
+}
+
+fn bench(theme: Theme, size: [f32; 2], fill: fn(&mut Store)) -> Bench {
+    let mut bench = Bench::new(BenchSetup { theme, size, fill, ..BenchSetup::default() }, CpuRenderer::default());
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    bench.harness.run_steps(2);
+    assert_eq!(bench.workbench().view().mode, Mode::Study);
+    bench.tell(StudyAction::Choose("models".to_owned()));
+    bench
+}
+
+/// Moves the pointer over a plot until a text is there.
+fn point_at(bench: &mut Bench, plot: &str, text: &str) -> egui::Pos2 {
+    let rect = bench.harness.get_by_label_contains(plot).rect();
+    for row in 0..40 {
+        for column in 0..40 {
+            let at = rect.min + rect.size() * egui::vec2((column as f32 + 0.5) / 40.0, (row as f32 + 0.5) / 40.0);
+            bench.harness.hover_at(at);
+            bench.harness.run_steps(2);
+            if bench.harness.query_all_by_label_contains(text).next().is_some() {
+                return at;
+            }
+        }
+    }
+    panic!("{text} is nowhere in {plot}");
+}
+
+fn until_open(bench: &mut Bench) -> i64 {
+    for _ in 0..3000 {
+        if let Some(open) = bench.workbench().inspected() {
+            return open.trial.id;
+        }
+        bench.wait();
+    }
+    panic!("no trial is open: {:?}", bench.workbench().messages());
+}
+
+#[test]
+fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
+    let mut bench = bench(Theme::Dark, [1600.0, 1800.0], |_| ());
+    bench.until_shown(true, "no figures yet");
+    bench.until_shown(true, "not run");
+    bench.tell(request(false));
+    bench.until_shown(true, "measuring, ");
+    bench.harness.get_by_label("Stop study").click();
+    bench.until_told("Study stopped: ");
+    bench.until_shown(true, "stopped: a run goes on there");
+    bench.tell(request(false));
+    bench.until_told("Study finished: ");
+    bench.until_shown(true, "A short form: do not quote its numbers.");
+    // The same files as those of the command line.
+    let folder = StudyFolder::beside(bench.store().path(), SAMPLE);
+    let stored = folder.read("models").unwrap().expect("a result");
+    assert!(stored.result.tables.iter().any(|table| table.rows.iter().any(|row| !row.trials.is_empty())));
+    assert!(folder.has_begun("models") && folder.path().join("models.svg").is_file());
+    let at = point_at(&mut bench, "Cost: ", "Click to open trial");
+    bench.harness.drag_at(at);
+    bench.harness.drop_at(at);
+    bench.harness.run_steps(2);
+    let opened = until_open(&mut bench);
+    assert_eq!(bench.workbench().view().mode, Mode::Inspect);
+    let of_a_row =
+        stored.result.tables.iter().flat_map(|table| &table.rows).any(|row| row.trials.first() == Some(&opened));
+    assert!(of_a_row, "trial {opened} is the first of a row");
+}
+
+#[test]
+fn findings_are_told_by_words_and_rows_open_trials() {
+    let fill = |store: &mut Store| {
+        crate::inspect::three_trials(store);
+        scripted_result(store);
+    };
+    let mut bench = bench(Theme::Light, [1400.0, 1000.0], fill);
+    bench.until_shown(true, "Claims of the paper: 1 agrees, 1 partly, 1 disagrees, 1 not measured");
+    for word in ["✔ agrees", "✖ disagrees", "± partly", "– not measured"] {
+        assert!(bench.harness.query_by_label(word).is_some(), "{word}");
+    }
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label_contains("than today's: run the study again").is_some());
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label("Cancel").is_some(), "the file is asked for");
+    bench.harness.get_by_label("Cancel").click();
+    bench.harness.run_steps(3);
+    let label = "Row virtual, macro-layer, network, 79.0 (75.0 to 82.0), 1.50";
+    bench.harness.get_by_label(label).click();
+    bench.harness.run_steps(2);
+    assert_eq!(until_open(&mut bench), 2);
+    bench.until_shown(true, "Lemon, trial 1, simulated");
+}
+
+#[test]
+fn units_of_another_plan_are_forgotten_on_request() {
+    let fill = |store: &mut Store| {
+        let folder = StudyFolder::beside(store.path(), SAMPLE);
+        std::fs::create_dir_all(folder.path()).unwrap();
+        std::fs::write(folder.units("models"), "{\"study\":\"models\",\"program\":\"0\",\"plan\":null}\n").unwrap();
+    };
+    let mut bench = bench(Theme::Dark, [1400.0, 1000.0], fill);
+    bench.tell(request(false));
+    bench.until_told("another version");
+    bench.until_shown(true, "Begin anew");
+    bench.harness.get_by_label("Begin anew").click();
+    bench.until_shown(true, "simulating grasps");
+    bench.harness.key_press(Key::Delete);
+    bench.until_told("Study stopped: ");
+}
+
+/// Whole pictures of the mode, to be looked at: `UPDATE_SCREENSHOTS=1` writes them to `screenshots/failed`.
+#[test]
+fn the_mode_is_drawn_in_both_themes_and_small() {
+    for (name, theme, size) in [
+        ("study_dark", Theme::Dark, [1280.0, 820.0]),
+        ("study_light", Theme::Light, [1280.0, 820.0]),
+        ("study_small", Theme::Light, [760.0, 500.0]),
+    ] {
+        let mut bench = bench(theme, size, scripted_result);
+        bench.tell(ViewAction::ShowPanel("study-figure"));
+        bench.until_shown(true, "Claims of the paper: ");
+        bench.harness.run_steps(8);
+        let picture: RgbaImage = bench.harness.render().unwrap();
+        assert_eq!([picture.width() as f32, picture.height() as f32], size);
+        if std::env::var_os("UPDATE_SCREENSHOTS").is_some() {
+            let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("screenshots/failed");
+            std::fs::create_dir_all(&folder).unwrap();
+            picture.save(folder.join(format!("{name}.png"))).unwrap();
+        }
+    }
+}
