@@ -10,11 +10,11 @@ use palpate_learn::{Dataset, METHODS, Method, counted, method};
 use palpate_store::{CalibrationId, Store};
 use palpate_tactile::model::SensorModel;
 
-/// Selection of trials, and how simulated ones are sensed.
-#[derive(Debug, clap::Args)]
-pub(super) struct DataArguments {
+/// Selection of trials.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct QueryArguments {
     #[command(flatten)]
-    origin: OriginFilters,
+    pub(super) origin: OriginFilters,
     /// Only simulated trials of this version of the physics, or of an unknown one.
     #[arg(long, value_name = "N|unknown")]
     physics: Option<PhysicsVersion>,
@@ -27,6 +27,13 @@ pub(super) struct DataArguments {
     /// Only these objects, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     pub(super) objects: Vec<String>,
+}
+
+/// Selection of trials, and how simulated ones are sensed.
+#[derive(Debug, clap::Args)]
+pub(super) struct DataArguments {
+    #[command(flatten)]
+    pub(super) trials: QueryArguments,
     #[command(flatten)]
     pub(super) signals: SignalArguments,
     /// Sensor model for simulated trials: virtual (perfect) or physical-like (as on the real gripper).
@@ -51,13 +58,9 @@ pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
     SensorModel::named(text).ok_or_else(|| "choose virtual or physical-like".to_owned())
 }
 
-impl DataArguments {
-    pub(super) fn view(&self) -> SensorView {
-        SensorView { sensors: self.sensors, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
-    }
-
+impl QueryArguments {
     /// The query for the trials.
-    fn query(&self, without_empty: bool, most_of_each: Option<usize>) -> DatasetQuery {
+    pub(super) fn query(&self, without_empty: bool, most_of_each: Option<usize>) -> DatasetQuery {
         let OriginFilters { source, preset, collection, tag, since, until } = self.origin.clone();
         DatasetQuery {
             collection,
@@ -74,6 +77,12 @@ impl DataArguments {
             most_of_each,
         }
     }
+}
+
+impl DataArguments {
+    pub(super) fn view(&self) -> SensorView {
+        SensorView { sensors: self.sensors, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
+    }
 
     /// Reads the grasps from the store.
     pub(super) fn read(
@@ -82,7 +91,7 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let source = self.query(without_empty, most_of_each);
+        let source = self.trials.query(without_empty, most_of_each);
         let bar = progress_bar("reading trials")?;
         let data = source.read(store, &self.view(), &mut |done, of| {
             bar.set_length(of as u64);

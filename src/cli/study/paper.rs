@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
-use super::super::learning::parse_sensors;
+use super::super::learning::{QueryArguments, parse_sensors};
 use super::super::setup::open_store;
 use super::super::terminal::{note, say, say_json, table};
 use super::files::note_stopped;
@@ -16,9 +16,7 @@ use palpate_lab::study::paper::{
     StudyReport, StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
 };
 use palpate_render::figure_svg;
-use palpate_sim::scene::PosePreset;
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -28,21 +26,11 @@ pub(super) struct PaperArguments {
     /// Take less than a minute: fewer grasps, small networks, few epochs.
     #[arg(long)]
     quick: bool,
-    /// Poses of simulated grasps: A, M, B or C.
-    #[arg(long, value_name = "A|M|B|C", default_value = STUDY_PRESET, value_parser = parse_preset)]
-    preset: String,
     /// Sensor model of simulated grasps: virtual or physical-like (default: both).
     #[arg(long, value_name = "MODEL", value_parser = parse_sensors)]
     sensors: Option<SensorModel>,
-    /// Use trials of this collection in the store; a prefix of its name is enough (default: simulate grasps).
-    #[arg(long, value_name = "NAME")]
-    collection: Option<String>,
-    /// Use trials of this gripper in the store: sim (simulated) or serial (real).
-    #[arg(long, value_name = "NAME")]
-    rig: Option<TrialSource>,
-    /// Use trials of these objects in the store, separated by commas.
-    #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
-    objects: Vec<String>,
+    #[command(flatten)]
+    trials: QueryArguments,
     /// Random seed of fits and splits.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -56,11 +44,6 @@ pub(super) struct PaperArguments {
     /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
-}
-
-fn parse_preset(text: &str) -> Result<String, String> {
-    let preset = PosePreset::named(text).ok_or_else(|| "choose A, M, B or C".to_owned())?;
-    Ok(preset.name.to_owned())
 }
 
 /// A study by its key, or all of them.
@@ -83,7 +66,7 @@ fn subcommands() -> Vec<Command> {
         let examples = format!(
             "Cost: {budget}, with --quick less than a minute. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study \
              {key} --quick\n  palpate study {key} --out studies/\n  palpate study {key} --preset A --sensors physical-like\n  \
-             palpate study {key} --rig serial --json\n\nSee also: palpate help studies"
+             palpate study {key} --source serial --json\n\nSee also: palpate help studies"
         );
         of(key, format!("{} ({paper} of the paper): {about}.", study.card().title), examples)
     });
@@ -128,13 +111,11 @@ impl Subcommand for PaperCommand {
 impl PaperArguments {
     fn plan(&self) -> StudyPlan {
         let size = if self.quick { StudySize::Quick } else { StudySize::Full };
-        let stored = self.collection.is_some() || self.rig.is_some() || !self.objects.is_empty();
-        let query = stored.then(|| DatasetQuery {
-            collection: self.collection.clone(),
-            source: self.rig,
-            objects: self.objects.clone(),
-            ..DatasetQuery::default()
-        });
+        // A preset alone names poses to simulate; anything more asks for stored trials.
+        let query = self.trials.query(false, None);
+        let simulated = DatasetQuery { preset: query.preset.clone(), ..DatasetQuery::default() };
+        let preset = query.preset.clone().map_or_else(|| STUDY_PRESET.to_owned(), |name| name.to_uppercase());
+        let query = (query != simulated).then_some(query);
         let usual = StudyPlan::of_size(size);
         // Recorded trials have the sensors that they have.
         let sensors = match (self.sensors, &query) {
@@ -142,7 +123,7 @@ impl PaperArguments {
             (None, Some(_)) => vec![SensorModel::Virtual],
             (None, None) => usual.sensors.clone(),
         };
-        StudyPlan { preset: self.preset.clone(), sensors, query, seed: self.seed, ..usual }
+        StudyPlan { preset, sensors, query, seed: self.seed, ..usual }
     }
 
     fn folder(&self) -> StudyFolder {

@@ -227,7 +227,7 @@ impl PaperStudy for Grasps {
         courses.retain(|merged| !merged.rounds.is_empty());
         let mut table = StudyTable::new(
             CARD.key,
-            format!("Successive grasps, preset {}", plan.preset),
+            format!("Successive grasps, {}", plan.described()),
             &[
                 ("sensors", ""),
                 ("model", ""),

@@ -148,7 +148,7 @@ impl PaperStudy for Layouts {
         let pooled = pools.pooled();
         let mut table = StudyTable::new(
             CARD.key,
-            format!("Sensor layouts, preset {}; differences to {SIMPLEST}", plan.preset),
+            format!("Sensor layouts, {}; differences to {SIMPLEST}", plan.described()),
             &[
                 ("sensors", ""),
                 ("model", ""),

@@ -163,7 +163,7 @@ impl PaperStudy for Modality {
         let of = |kind: Kind| pooled.iter().find(|(own, _)| **own == kind).map(|(_, pool)| pool);
         let mut table = StudyTable::new(
             CARD.key,
-            format!("Modalities, preset {}; differences to both modalities of whole fingers", plan.preset),
+            format!("Modalities, {}; differences to both modalities of whole fingers", plan.described()),
             &[
                 ("sensors", ""),
                 ("model", ""),
@@ -203,7 +203,7 @@ impl PaperStudy for Modality {
         let whole: Vec<(&str, &Pool)> = whole.collect();
         let confusions = confusion_table(
             "modality-confusion",
-            &format!("Confusions of {NETWORK} with C1, preset {}", plan.preset),
+            &format!("Confusions of {NETWORK} with C1, {}", plan.described()),
             &whole,
         );
         let findings = findings(plan, &of, &whole);

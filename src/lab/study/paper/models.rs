@@ -114,8 +114,8 @@ impl PaperStudy for Models {
         let mut table = StudyTable::new(
             CARD.key,
             format!(
-                "Methods on grasps that none has seen, preset {}; differences to {}",
-                plan.preset,
+                "Methods on grasps that none has seen, {}; differences to {}",
+                plan.described(),
                 reference.map_or("", |m| m.key)
             ),
             &[
@@ -355,9 +355,9 @@ fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
         y: PlotAxis::linear(F1_PERCENT),
         ..Plot::default()
     };
-    let kinds = table.texts("grasps");
+    let first = table.texts("grasps").first().copied().unwrap_or_default();
     for (colour, group) in table.texts("kind").into_iter().enumerate() {
-        let rows = table.rows_with(&[("grasps", kinds[0]), ("kind", group)]);
+        let rows = table.rows_with(&[("grasps", first), ("kind", group)]);
         for (point, row) in rows.iter().enumerate() {
             let mark = FigureMark::Point(cost.series.len(), point);
             links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });

@@ -1,6 +1,6 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
-use crate::datasets::{DatasetQuery, SensorView};
+use crate::datasets::{DatasetQuery, PhysicsVersion, SensorView};
 use palpate_learn::METHODS;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
@@ -135,6 +135,14 @@ impl StudyPlan {
         })
     }
 
+    /// Origin of the grasps, for titles.
+    pub(super) fn described(&self) -> String {
+        match self.query {
+            None => format!("preset {}", self.preset),
+            Some(_) => "stored trials".to_owned(),
+        }
+    }
+
     /// Options of the command line that give this plan.
     pub(super) fn options(&self) -> String {
         let mut options = String::new();
@@ -146,18 +154,32 @@ impl StudyPlan {
                 options += &format!(" (a sample of {objects} objects, {trials} trials)");
             }
         }
-        if self.preset != usual.preset {
+        if self.preset != usual.preset || self.query.as_ref().is_some_and(|query| query.preset.is_some()) {
             options += &format!(" --preset {}", self.preset);
         }
         if let ([only], None) = (self.sensors.as_slice(), &self.query) {
             options += &format!(" --sensors {}", only.name());
         }
         if let Some(query) = &self.query {
-            options += &query.collection.as_ref().map_or(String::new(), |name| format!(" --collection {name}"));
-            options += &query.source.map_or(String::new(), |source| format!(" --rig {source}"));
-            if !query.objects.is_empty() {
-                options += &format!(" --objects {}", query.objects.join(","));
-            }
+            let mut add = |name: &str, value: Option<String>| {
+                options += &value.map_or_else(String::new, |value| format!(" --{name} {value}"));
+            };
+            let listed = |values: Vec<String>| (!values.is_empty()).then(|| values.join(","));
+            add("collection", query.collection.clone());
+            add("source", query.source.map(|source| source.to_string()));
+            add("tag", query.tag.clone());
+            add("since", query.since.as_ref().map(ToString::to_string));
+            add("until", query.until.as_ref().map(ToString::to_string));
+            add(
+                "physics",
+                query.physics.map(|physics| match physics {
+                    PhysicsVersion::Known(version) => version.to_string(),
+                    PhysicsVersion::Unknown => "unknown".to_owned(),
+                }),
+            );
+            add("calibration", listed(query.calibrations.iter().map(ToString::to_string).collect()));
+            add("objects", listed(query.objects.clone()));
+            add("include-flagged", query.include_flagged.then(String::new));
         }
         if self.seed != usual.seed {
             options += &format!(" --seed {}", self.seed);

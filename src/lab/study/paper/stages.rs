@@ -230,7 +230,7 @@ impl PaperStudy for Stages {
         let first = ones.pooled();
         let mut properties = StudyTable::new(
             "stages-first",
-            format!("Stage one, preset {}", plan.preset),
+            format!("Stage one, {}", plan.described()),
             &[
                 ("sensors", ""),
                 ("model", ""),
@@ -257,7 +257,7 @@ impl PaperStudy for Stages {
             .collect();
         let named: Vec<(&str, &Pool)> = named.iter().map(|(name, pool)| (name.as_str(), *pool)).collect();
         let confusions =
-            confusion_table("stages-confusion", &format!("Confusions of stage one, preset {}", plan.preset), &named);
+            confusion_table("stages-confusion", &format!("Confusions of stage one, {}", plan.described()), &named);
         let second = twos.pooled();
         let table = second_table(plan, &second);
         let findings = findings(&first, &second);
@@ -292,7 +292,7 @@ fn of<'a>(pooled: &'a [Pooled<'a>], kind: (&'static str, &'static str), name: &s
 fn second_table(plan: &StudyPlan, second: &[Pooled<'_>]) -> StudyTable {
     let mut table = StudyTable::new(
         CARD.key,
-        format!("Stage two by what it is told, preset {}; differences to nothing", plan.preset),
+        format!("Stage two by what it is told, {}; differences to nothing", plan.described()),
         &[
             ("sensors", ""),
             ("model", ""),

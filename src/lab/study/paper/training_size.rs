@@ -111,7 +111,7 @@ impl PaperStudy for TrainingSize {
         let curves: Vec<Point<'_>> = pools.pooled().into_iter().map(|(kind, pool)| Point { kind, pool }).collect();
         let mut table = StudyTable::new(
             CARD.key,
-            format!("Models by the number of training grasps of each object, preset {}", plan.preset),
+            format!("Models by the number of training grasps of each object, {}", plan.described()),
             &[
                 ("sensors", ""),
                 ("model", ""),
