@@ -2,6 +2,7 @@
 //! events and by sums and differences of both fingers, or a few hand-crafted measures of each channel.
 
 use crate::data::{Dataset, Sequence};
+use crate::gaps;
 use crate::mirror::mirror;
 use serde::{Deserialize, Serialize};
 
@@ -82,7 +83,9 @@ impl Features {
         let mut range = vec![(f32::INFINITY, f32::NEG_INFINITY); channels];
         for (_, row) in data.examples.iter().flat_map(|e| e.grasp.rows()) {
             for ((low, high), x) in range.iter_mut().zip(row) {
-                (*low, *high) = (low.min(*x), high.max(*x));
+                if x.is_finite() {
+                    (*low, *high) = (low.min(*x), high.max(*x));
+                }
             }
         }
         let risen: Vec<f32> =
@@ -137,6 +140,7 @@ impl Features {
 
     /// Features of a grasp.
     pub(crate) fn row(&self, grasp: &Sequence) -> Vec<f32> {
+        let grasp = &*gaps::filled(grasp);
         match self.kind {
             FeatureKind::Course => self.course(grasp),
             FeatureKind::ExtendedCourse => self.extended_course(grasp),

@@ -16,7 +16,8 @@
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
 //! | 1 | `split`, `learned` | splits into training and test trials; the grasps that a model learned |
-//! | 1 | `features` | a grasp as a row of features |
+//! | 1 | `gaps` | readings that are not finite numbers |
+//! | 2 | `features` | a grasp as a row of features |
 //! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
@@ -65,6 +66,7 @@ pub mod evaluation;
 mod features;
 mod fitting;
 mod forest;
+mod gaps;
 mod learned;
 mod methods;
 pub mod metrics;

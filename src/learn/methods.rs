@@ -5,6 +5,7 @@ use crate::baselines::{Candle, Convolution, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
 use crate::data::Dataset;
 use crate::fitting::{Fitting, LearnError};
+use crate::gaps;
 use crate::learned::LearnedGrasps;
 use crate::model::{LoadError, Model, ModelCard};
 use crate::network::{self, Recipe};
@@ -144,7 +145,7 @@ impl Method {
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };
-        Ok(model.with_signatures(Signatures::of(&data)))
+        Ok(model.with_signatures(Signatures::of(&gaps::filled_data(&data))))
     }
 
     /// Fingerprint of everything that decides a fit besides the data, the seed and the options of the fit: settings, features,

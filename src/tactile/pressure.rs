@@ -18,6 +18,9 @@ use palpate_geometry::convex_hull_area;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, TaxelGrid};
 
+/// Areas up to this are rounding errors of a hull around a row (m²); taxels are a thousand times larger.
+const LEAST_AREA: f64 = 1e-9;
+
 /// The loaded part of a stretch of one pad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactPatch {
@@ -68,7 +71,7 @@ impl ContactPatch {
             SignalDefinition::Contact => self.participation_area(),
             SignalDefinition::Hull => self.hull_area(),
         };
-        (area > 0.0).then(|| self.force / area)
+        (area > LEAST_AREA).then(|| self.force / area)
     }
 }
 
@@ -118,6 +121,10 @@ mod tests {
         let (patch, _) = patch(&[(80, 0.1), (81, 0.2), (82, 0.2), (83, 0.1)]);
         assert_eq!(patch.pressure(SignalDefinition::Hull), None);
         assert!(patch.pressure(SignalDefinition::Contact).is_some_and(|p| p > 0.0));
+        // Points in a row but for rounding.
+        let points = [(0.0, 0.1), (0.3, 0.4), (0.6, 0.7 + 1e-16)].map(|(x, y)| 0.01 * DVec2::new(x, y));
+        let row = ContactPatch { points: points.to_vec(), ..patch };
+        assert!(row.hull_area() < LEAST_AREA && row.pressure(SignalDefinition::Hull).is_none());
     }
 
     #[test]

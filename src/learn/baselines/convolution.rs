@@ -24,7 +24,7 @@ const KERNELS: [(usize, usize); 3] = [(5, 1), (5, 2), (3, 2)];
 /// Width of the dense layer.
 const DENSE: usize = 128;
 /// Share of values dropped before and after the dense layer.
-const DROPOUT: f32 = 0.4;
+const DROPOUT: f32 = 0.3;
 
 impl Layer {
     fn new(from: usize, to: usize, variables: &VarBuilder<'_>) -> Result<Self> {
@@ -53,6 +53,7 @@ fn windows(x: &Tensor, kernel: usize, stride: usize) -> Result<Tensor> {
 
 impl CandleNetwork for Convolution {
     const REVISION: u32 = 2;
+    const RATE: f64 = 4e-3;
 
     fn new(inputs: usize, classes: usize, variables: &VarBuilder<'_>) -> Result<Self> {
         let convolution = |number: usize| {

@@ -6,6 +6,7 @@
 //! differences between objects. Strict networks read the standardised channels only.
 
 use crate::data::{Dataset, Sequence};
+use crate::gaps;
 use serde::{Deserialize, Serialize};
 
 /// Mapping from readings to inputs.
@@ -176,6 +177,9 @@ pub(crate) struct Binner {
     completed: usize,
     step: u32,
     sums: Vec<f32>,
+    /// The reading, and the last readings, for gaps.
+    row: Vec<f32>,
+    last: Vec<f32>,
     count: u32,
     out: Vec<f32>,
 }
@@ -193,6 +197,7 @@ impl Binner {
     pub(crate) fn reset(&mut self) {
         (self.step, self.count, self.completed) = (0, 0, 0);
         self.sums.fill(0.0);
+        self.last.fill(0.0);
     }
 
     fn plain(rate_hz: f32, channels: usize) -> Self {
@@ -203,6 +208,8 @@ impl Binner {
             completed: 0,
             step: 0,
             sums: vec![0.0; channels],
+            row: Vec::with_capacity(channels),
+            last: vec![0.0; channels],
             count: 0,
             out: vec![0.0; channels],
         }
@@ -230,7 +237,10 @@ impl Binner {
             self.close();
         }
         self.step = step;
-        self.sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        self.row.clear();
+        self.row.extend_from_slice(row);
+        gaps::fill(&mut self.row, &mut self.last);
+        self.sums.iter_mut().zip(&self.row).for_each(|(sum, x)| *sum += x);
         self.count += 1;
         complete.then_some(&self.out[..])
     }
