@@ -12,13 +12,13 @@
 //! |---|---|---|
 //! | 0 | `data` | sequences, labels, data sets |
 //! | 0 | `pmf`, `mirror`, `arrays` | probabilities; channels of the mirrored gripper; named parameters of a model |
-//! | 0 | `temperature` | temperature that calibrates probabilities |
 //! | 0 | [`metrics`] | confusion, calibration, intervals, tests of differences |
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
 //! | 1 | `split`, `learned` | splits into training and test trials; the grasps that a model learned |
+//! | 1 | `temperature` | calibration of probabilities |
 //! | 1 | `gaps` | readings that are not finite numbers |
-//! | 2 | `features` | a grasp as a row of features |
 //! | 1 | `signatures` | mean and spread of each class over time |
+//! | 2 | `features` | a grasp as a row of features |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
