@@ -99,7 +99,8 @@ fn copies_of_a_grasp_are_never_on_both_sides() {
             assert_eq!(used.len(), count, "{plan}: a grasp is used twice");
         }
     }
-    assert_eq!(copied.without_duplicates(), (data(20), 40));
+    let (unique, copies) = copied.without_duplicates();
+    assert_eq!((unique.examples, copies), (data(20).examples, 40));
     let leak = Split { train: vec![0], second: vec![], test: vec![40] };
     assert_eq!(leak.check(&copied), Err(SplitError::Duplicate { first: 100, other: 1100 }));
 }

@@ -121,13 +121,14 @@ mod tests {
     #[test]
     fn a_few_surely_wrong_answers_are_doubt_and_not_temperature() {
         let tried = Temperatures { range: 0.05..=10.0, count: 100 };
-        // Right with the probability that it says, but for one in twenty, which it says is impossible.
+        // Right with the probability that it says, but for every second, of which it is sure and one in twenty wrong.
         let answers: Vec<(Pmf, usize)> = (0..2000)
             .map(|k| {
                 let p = 0.5 + 0.49 * (f64::from(k) / 2000.0);
                 let wrong = f64::from((k * 7919) % 1000) >= 1000.0 * p;
-                let pmf = if k % 20 == 0 { Pmf::from_weights([1.0, 0.0]) } else { Pmf::from_weights([p, 1.0 - p]) };
-                (pmf, usize::from(wrong || k % 20 == 0))
+                let sure = k % 2 == 0;
+                let pmf = Pmf::from_weights(if sure { [1.0, 0.0] } else { [p, 1.0 - p] });
+                (pmf, usize::from(if sure { k % 40 == 0 } else { wrong }))
             })
             .collect();
         let (found, loss) = Calibration::fit(&answers, &tried);

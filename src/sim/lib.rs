@@ -15,13 +15,13 @@
 //! |---|---|---|
 //! | 0 | `version` | version of the physics, hashes of grasps |
 //! | 0 | [`gripper`] | description of finger, pad, taxels, actuation and programme; kinematics of a bent finger |
-//! | 0 | [`objects`] | URDF, OBJ and STL files, the sixteen built-in objects |
-//! | 1 | [`scene`] | scene files: every setting, with its range and default |
-//! | 2 | [`frame`] | samples, plan of effects and numerical quality |
-//! | 3 | [`physics`] | convex implicit step, contact, effects, placement; rapier as a second engine |
-//! | 4 | [`run`] | a simulation on its clock: samples and actuation ticks in order |
-//! | 5 | [`poses`] | random poses of gripper and object, named by a seed |
-//! | 6 | `bench` | benchmark of the simulator alone, a program of its own |
+//! | 1 | [`objects`] | URDF, OBJ and STL files, the sixteen built-in objects |
+//! | 2 | [`scene`] | scene files: every setting, with its range and default |
+//! | 3 | [`frame`] | samples, plan of effects and numerical quality |
+//! | 4 | [`physics`] | convex implicit step, contact, effects, placement; rapier as a second engine |
+//! | 5 | [`run`] | a simulation on its clock: samples and actuation ticks in order |
+//! | 6 | [`poses`] | random poses of gripper and object, named by a seed |
+//! | 7 | `bench` | benchmark of the simulator alone, a program of its own |
 //!
 //! # Example
 //!

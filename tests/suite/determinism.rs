@@ -73,7 +73,7 @@ fn bytes_of_the_program(folder: &Path, name: &str, threads: u32) -> Vec<Vec<u8>>
     let store = folder.join(format!("{name}{threads}.sqlite"));
     let seed = SEED.to_string();
     let mut command = palpate(&store);
-    command.args(["grasp", name, "--seed", &seed, "--layout", "C6+F", "--out"]).arg(&csv);
+    command.args(["grasp", name, "--seed", &seed, "--layout", "C6+F", "--signals", "contact", "--out"]).arg(&csv);
     assert!(command.env("RAYON_NUM_THREADS", threads.to_string()).status().unwrap().success());
     let stored = Store::open(&store).unwrap().load(1).unwrap();
     vec![

@@ -1,7 +1,7 @@
 //! A labelling afternoon in the terminal, on bytes of the emulated gripper: flags, labels, undoing, what gets into a data
 //! set, and what comes out of the store.
 
-use crate::calibration::{calibrated, parts, readings, scenes, stored};
+use crate::calibration::{calibrated, model_of_pads, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
@@ -119,7 +119,8 @@ fn an_afternoon_of_labels_from_the_terminal() {
     assert_eq!((journal.len(), &journal[0]["what"], &journal[1]["what"]), (13, &"plan".into(), &"plan".into()));
     assert!(said(&["trials", "journal"]).contains("undoes 1"));
     refused(at, &["snapshot", "--trial", "1", "--out", "x.png"], &["was not simulated", "palpate trials export 1"]);
-    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted"]);
+    refused(at, &["recognise", "1"], &["trial 1", "do not measure contact pressure"]);
+    refused(at, &["recognise", "1", "--model", &model_of_pads(at)], &["trial 1", "no part is mounted"]);
     refused(at, &["trials", "label", "9", "ball"], &["no trial 9"]);
 }
 
@@ -147,7 +148,8 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
     assert_eq!((ids, data.labels.classes.len()), (vec![kept, other], 2));
     // One without a label is recognised all the same.
-    let said = json(at, &["recognise", &unknown.to_string(), "--json"]);
+    let model = model_of_pads(at);
+    let said = json(at, &["recognise", &unknown.to_string(), "--model", &model, "--json"]);
     assert!(said["trials"][0]["truth"].is_null() && said["trials"][0]["decided"].is_string(), "{said}");
     refused(at, &["recognise", &discarded.to_string()], &["restore"]);
     store.labels().set_guess(kept, "ds-lstm", &[("ball".to_owned(), 0.75), ("lemon".to_owned(), 0.25)]).unwrap();

@@ -24,7 +24,7 @@ fn csv(at: &Path, name: &str, trials: usize, labels: &[&str], properties: bool) 
             let t = f64::from(k) * 0.02;
             let press = (t - 0.3).max(0.0) * (1.0 + kind as f64 * 2.0) + 0.01 * ((trial * 7 + k as usize) % 5) as f64;
             // No two grasps are the same.
-            let press = press + 0.001 * trial as f64;
+            let press = press + 0.0001 * trial as f64;
             writeln!(text, "{trial},{},{words}{t:.2},{press:.4},{:.4}", labels[kind], t * 3.0).unwrap();
         }
     }
@@ -57,6 +57,7 @@ fn from_nothing_to_a_table_and_a_model() {
     let again = json(at, &[&evaluate[..], &["--threads", "1"]].concat());
     assert_eq!((&again[0]["f1_macro"], &again[1]["confusion"]), (&rows[0]["f1_macro"], &rows[1]["confusion"]));
 
+    std::fs::create_dir(at.join("models")).unwrap();
     let trained =
         json(at, &["train", "ids-lstm", "--quick", "--trials", "8", "--out", "models/own.safetensors", "--json"]);
     assert_eq!(trained["channels"].as_array().unwrap().len(), 4);

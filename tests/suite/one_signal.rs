@@ -99,12 +99,14 @@ fn a_grasp_reads_the_same_in_simulation_and_through_the_board() {
             let degree = 1f64.to_radians() / StripPart::ACTIVE_LENGTH;
             assert!((wanted - read).abs() < degree, "{side} at {t_s} s: {read} of {wanted} 1/m");
             let [wanted, read] = both("pressure");
-            // A pad is right within 5 % of its load, which bending is a part of, and below its threshold not at all.
+            // A pad is right within 5 % of its load, and below its threshold not at all. Bending, which no empty close has
+            // measured here, is a part of what it reads.
             let bending = MOST_BENDING_LOAD * at(&simulated, &format!("curvature_{side}"), t_s);
             let force = wanted * PadPart::ACTIVE_AREA;
-            let within = (0.05 * (force + bending) + 0.02) / PadPart::ACTIVE_AREA;
+            let within = 0.05 * (force + bending) + 0.02;
             assert!(force + bending > 1.3 * PadPart::LEAST_FORCE, "too light a grasp: {force} N");
-            assert!((wanted - read).abs() < within, "{side} at {t_s} s: {read} of {wanted} Pa");
+            let more = read * PadPart::ACTIVE_AREA - force;
+            assert!((-within..bending + within).contains(&more), "{side} at {t_s} s: {read} of {wanted} Pa");
         }
     }
 }

@@ -9,7 +9,7 @@ use palpate::app::{Mode, StudyAction, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable, Verdict,
+    Agreement, Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable,
 };
 use palpate_lab::workers::StudyRequest;
 use palpate_learn::metrics::Interval;
@@ -36,7 +36,7 @@ pub(crate) fn scripted_result(store: &mut Store) {
             table.push(cells, vec![k as i64 + 1, 1]);
         }
     }
-    let finding = |section: &str, claim: &str, found: &str, verdict: Verdict| Finding {
+    let finding = |section: &str, claim: &str, found: &str, verdict: Agreement| Finding {
         section: section.to_owned(),
         claim: claim.to_owned(),
         found: found.to_owned(),
@@ -44,10 +44,10 @@ pub(crate) fn scripted_result(store: &mut Store) {
         why: "Agrees where every interval of the difference lies above zero".to_owned(),
     };
     let findings = vec![
-        finding("V-D", "Ensembles are best", "extra-trees .83 (.79 to .86), macro-layer .79", Verdict::Agrees),
-        finding("V-D", "The SVM is as good as networks", "SVM .64, macro-layer .79", Verdict::Disagrees),
-        finding("VI", "It costs less", "training 3.0 s and 1.5 s", Verdict::Partly),
-        finding("VI", "It is small", "", Verdict::NotMeasured),
+        finding("V-D", "Ensembles are best", "extra-trees .83 (.79 to .86), macro-layer .79", Agreement::Agrees),
+        finding("V-D", "The SVM is as good as networks", "SVM .64, macro-layer .79", Agreement::Disagrees),
+        finding("VI", "It costs less", "training 3.0 s and 1.5 s", Agreement::Partly),
+        finding("VI", "It is small", "", Agreement::NotMeasured),
     ];
     let data = vec!["virtual sensors: 320 grasps of 16 objects, preset B, layout C1".to_owned()];
     let fingerprint = StudyPlan::of_size(StudySize::Quick).fingerprint();

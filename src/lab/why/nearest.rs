@@ -149,7 +149,8 @@ mod tests {
     fn the_nearest_of_a_copy_is_itself_and_other_objects_are_farther() {
         let folder = tempfile::tempdir().unwrap();
         let mut store = Store::open(&folder.path().join("s.sqlite")).unwrap();
-        let view = SensorView::default();
+        let model = shipped_model().unwrap();
+        let view = SensorView::of_model(&model.card);
         let mut grasps = Vec::new();
         // With seeds of their own: the store keeps one trial of each grasp.
         for (seed, name) in ["lemon", "tomato", "lemon", "case"].into_iter().enumerate() {
@@ -159,7 +160,6 @@ mod tests {
             grasps.push(sequence_of(&view.signals(&trial).unwrap()));
             store.insert(&trial).unwrap();
         }
-        let model = shipped_model().unwrap();
         let examples = grasps.iter().zip([10, 16, 10, 4]).enumerate();
         let examples = examples.map(|(k, (grasp, class))| Example {
             id: k as i64,

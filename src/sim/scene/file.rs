@@ -17,10 +17,12 @@ pub enum SceneError {
         cause: String,
     },
     /// A name that no scene has.
-    #[error("no scene is called \"{name}\"; choose {}, or name a file (.toml)", super::named::SCENES.map(|scene| scene.name).join(" or "))]
+    #[error("no scene is called \"{name}\"; choose {known}, or name a file (.toml)")]
     UnknownName {
         /// The name.
         name: String,
+        /// Names of the scenes.
+        known: String,
     },
     /// Not TOML, or a value of the wrong kind.
     #[error("the scene is not understood: {0}")]

@@ -50,7 +50,10 @@ impl Scene {
         let name = source.to_str().filter(|_| source.extension().is_none() && source.components().count() == 1);
         match name.map(|name| (name, NamedScene::named(name))) {
             Some((_, Some(named))) => Ok(named.scene()),
-            Some((name, None)) if !source.is_file() => Err(SceneError::UnknownName { name: name.to_owned() }),
+            Some((name, None)) if !source.is_file() => {
+                let known = SCENES.map(|scene| scene.name).join(" or ");
+                Err(SceneError::UnknownName { name: name.to_owned(), known })
+            }
             Some(_) | None => Self::from_file(source),
         }
     }

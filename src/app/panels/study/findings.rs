@@ -7,14 +7,14 @@ use crate::app::theme::{colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Frame, Margin, RichText, ScrollArea, Ui};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::study::paper::{Finding, Verdict};
+use palpate_lab::study::paper::{Agreement, Finding};
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(result) = result_ui(ui, context, "study-findings", "findings", actions) else { return };
     let findings = &result.stored.result.findings;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let count = |verdict: Verdict| findings.iter().filter(|finding| finding.verdict == verdict).count();
-        let counts = [Verdict::Agrees, Verdict::Partly, Verdict::Disagrees, Verdict::NotMeasured]
+        let count = |verdict: Agreement| findings.iter().filter(|finding| finding.verdict == verdict).count();
+        let counts = [Agreement::Agrees, Agreement::Partly, Agreement::Disagrees, Agreement::NotMeasured]
             .map(|verdict| (count(verdict), verdict.name()));
         let shown = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
         let text = format!("Claims of the paper: {}", shown.collect::<Vec<_>>().join(", "));
@@ -29,13 +29,13 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
 }
 
 /// Sign and colour of a verdict.
-fn sign(verdict: Verdict, theme: Theme) -> (&'static str, Rgb) {
+fn sign(verdict: Agreement, theme: Theme) -> (&'static str, Rgb) {
     let colours = theme.colours();
     match verdict {
-        Verdict::Agrees => ("✔", colours.good),
-        Verdict::Partly => ("±", colours.warning),
-        Verdict::Disagrees => ("✖", colours.error),
-        Verdict::NotMeasured => ("–", colours.quiet_text),
+        Agreement::Agrees => ("✔", colours.good),
+        Agreement::Partly => ("±", colours.warning),
+        Agreement::Disagrees => ("✖", colours.error),
+        Agreement::NotMeasured => ("–", colours.quiet_text),
     }
 }
 

@@ -5,7 +5,7 @@ use super::answers::{ModelAnswers, Pool, TestPart, judge};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::StudyPlan;
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::datasets::{SensorView, noise_seed, sequence_of};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
@@ -353,16 +353,16 @@ fn findings(measured: &[MeasuredDrift]) -> Vec<Finding> {
                 Some((format!("{sensors}, {model}, {condition}"), pick(one)?))
             })
             .collect();
-        let verdict = Verdict::of_all(own.iter().map(|(_, gain)| {
+        let verdict = Agreement::of_all(own.iter().map(|(_, gain)| {
             let (low, high) = if sign < 0.0 { (-gain.high, -gain.low) } else { (gain.low, gain.high) };
-            Verdict::of_gain(Some(Interval { estimate: sign * gain.estimate, low, high }))
+            Agreement::of_gain(Some(Interval { estimate: sign * gain.estimate, low, high }))
         }));
         let listed: Vec<String> = own.iter().map(|(name, gain)| format!("{name}: {}", points(*gain))).collect();
         (format!("points of macro F1: {}", listed.join("; ")), verdict)
     };
     let mut findings = Vec::new();
-    let mut add = |claim: &str, (found, verdict): (String, Verdict), why: &str| {
-        if verdict != Verdict::NotMeasured {
+    let mut add = |claim: &str, (found, verdict): (String, Agreement), why: &str| {
+        if verdict != Agreement::NotMeasured {
             let (section, claim, why) = ("VI".to_owned(), claim.to_owned(), why.to_owned());
             findings.push(Finding { section, claim, found, verdict, why });
         }

@@ -8,7 +8,7 @@ use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, add_new, better_than_each, finding, finding_on_gains, points};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::grasping::SUCCESSION;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
@@ -346,11 +346,11 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
             merged.most()
         ));
         verdicts.push(if late.high < NO_CHANGE {
-            Verdict::Agrees
+            Agreement::Agrees
         } else if late.low > NO_CHANGE {
-            Verdict::Disagrees
+            Agreement::Disagrees
         } else {
-            Verdict::Partly
+            Agreement::Partly
         });
     }
     let against_product: Vec<(String, Gains)> = papers
@@ -376,9 +376,9 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
     let wrong: Vec<(String, usize, Interval)> = wrong.filter(|(_, count, _)| *count > 0).collect();
     let promised = 1.0 - StopRule::default().threshold;
     let verdict = |share: &Interval| match (share.high < promised, share.low > promised) {
-        (true, _) => Verdict::Agrees,
-        (_, true) => Verdict::Disagrees,
-        (false, false) => Verdict::Partly,
+        (true, _) => Agreement::Agrees,
+        (_, true) => Agreement::Disagrees,
+        (false, false) => Agreement::Partly,
     };
     let listed = wrong.iter().map(|(kind, count, share)| {
         let [estimate, low, high] = [share.estimate, share.low, share.high].map(|x| 100.0 * x);
@@ -394,7 +394,7 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
                  above",
             ),
             found.join("; "),
-            Verdict::of_all(verdicts),
+            Agreement::of_all(verdicts),
         ),
         finding_on_gains(
             (
@@ -412,7 +412,7 @@ fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
                 "Agrees where the 95 % interval of wrong decisions among confident ones stays below one minus the threshold",
             ),
             listed.collect::<Vec<_>>().join("; "),
-            Verdict::of_all(wrong.iter().map(|(_, _, share)| verdict(share))),
+            Agreement::of_all(wrong.iter().map(|(_, _, share)| verdict(share))),
         ),
     ]
 }

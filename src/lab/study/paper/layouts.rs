@@ -5,7 +5,7 @@ use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, named_columns, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, percent, points};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::datasets::SensorView;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
@@ -264,11 +264,11 @@ fn findings(pooled: &[Pooled<'_>], recommended: &StudyTable) -> Vec<Finding> {
             points(gain)
         ));
         verdicts.push(if gain.low > MINIMAL {
-            Verdict::Disagrees
+            Agreement::Disagrees
         } else if gain.high < MINIMAL {
-            Verdict::Agrees
+            Agreement::Agrees
         } else {
-            Verdict::Partly
+            Agreement::Partly
         });
     }
     for row in 0..recommended.rows.len() {
@@ -284,7 +284,7 @@ fn findings(pooled: &[Pooled<'_>], recommended: &StudyTable) -> Vec<Finding> {
     let enough = finding(
         ("V-B", "The simplest layout, C1, is enough: more sensors add little or nothing", why),
         found.join("; "),
-        Verdict::of_all(verdicts),
+        Agreement::of_all(verdicts),
     );
     let over_zuo: Vec<(String, Gains)> = kinds
         .iter()

@@ -31,8 +31,8 @@ pub use claims::stored_report;
 pub use folder::StudyFolder;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub use report::{
-    Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow, StudyTable,
-    Verdict,
+    Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow,
+    StudyTable,
 };
 pub use run::run_study;
 

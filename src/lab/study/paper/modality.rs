@@ -5,7 +5,7 @@ use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, confusion_plot, confusion_table, named_columns, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::datasets::SensorView;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
@@ -287,9 +287,9 @@ fn confused([a, b]: [&str; 2], whole: &[(&str, &Pool)]) -> Finding {
             100.0 * average
         ));
         verdicts.push(match (share.low > average, share.high < average) {
-            (true, _) => Verdict::Agrees,
-            (_, true) => Verdict::Disagrees,
-            (false, false) => Verdict::Partly,
+            (true, _) => Agreement::Agrees,
+            (_, true) => Agreement::Disagrees,
+            (false, false) => Agreement::Partly,
         });
     }
     let why =
@@ -297,7 +297,7 @@ fn confused([a, b]: [&str; 2], whole: &[(&str, &Pool)]) -> Finding {
     finding(
         ("V-B", &format!("{a} and {b} are confused, since shape and size are similar"), why),
         found.join("; "),
-        Verdict::of_all(verdicts),
+        Agreement::of_all(verdicts),
     )
 }
 

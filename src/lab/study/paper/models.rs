@@ -7,7 +7,7 @@ use super::plan::StudyPlan;
 use super::pools::{
     Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, negated, no_worse_than_any,
 };
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::study::comparison::in_table_order;
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, Marker, Plot, PlotAxis};
@@ -300,7 +300,7 @@ fn findings(all: &[Measured]) -> Vec<Finding> {
     ]
 }
 
-fn cost_finding(all: &[Measured], papers: &str, first: &str) -> (String, Verdict) {
+fn cost_finding(all: &[Measured], papers: &str, first: &str) -> (String, Agreement) {
     let costs = |wanted: &dyn Fn(&Measured) -> bool| -> Vec<(&'static str, ModelCost)> {
         let rows = all.iter().filter(|row| row.kind == first && wanted(row));
         rows.filter_map(|row| Some((row.method.key, row.cost?))).collect()
@@ -308,7 +308,7 @@ fn cost_finding(all: &[Measured], papers: &str, first: &str) -> (String, Verdict
     let own = costs(&|row| row.method.key == papers);
     let ensembles = costs(&|row| row.method.kind == MethodKind::Ensemble);
     let ([(key, own)], false) = (own.as_slice(), ensembles.is_empty()) else {
-        return (String::new(), Verdict::NotMeasured);
+        return (String::new(), Agreement::NotMeasured);
     };
     let listed = std::iter::once((*key, *own)).chain(ensembles.iter().copied());
     let listed = listed.map(|(key, cost)| format!("{key} {:.1} s and {:.2} ms", cost.train_cpu_s, cost.answer_ms));
@@ -316,9 +316,9 @@ fn cost_finding(all: &[Measured], papers: &str, first: &str) -> (String, Verdict
     let cheaper = |cost: &ModelCost| [own.train_cpu_s < cost.train_cpu_s, own.answer_ms < cost.answer_ms];
     let all_cheaper: Vec<bool> = ensembles.iter().flat_map(|(_, cost)| cheaper(cost)).collect();
     let verdict = match (all_cheaper.iter().all(|c| *c), all_cheaper.iter().any(|c| *c)) {
-        (true, _) => Verdict::Agrees,
-        (false, true) => Verdict::Partly,
-        (false, false) => Verdict::Disagrees,
+        (true, _) => Agreement::Agrees,
+        (false, true) => Agreement::Partly,
+        (false, false) => Agreement::Disagrees,
     };
     (found, verdict)
 }

@@ -3,7 +3,7 @@
 use super::UnitResult;
 use super::answers::{Judged, PairedDifference, Pool};
 use super::bench::StudyError;
-use super::report::{Finding, Verdict};
+use super::report::{Agreement, Finding};
 use palpate_learn::metrics::{Interval, holm};
 use std::collections::BTreeMap;
 
@@ -64,22 +64,22 @@ pub(super) fn adjusted(differences: &[Option<PairedDifference>]) -> Vec<Option<f
 /// Gains over others, by name.
 pub(super) type Gains = Vec<(String, Interval)>;
 
-/// Verdict on a claim to be better than all others: an interval below zero refutes it.
-pub(super) fn better_than_each(gains: &[(String, Interval)]) -> Verdict {
+/// Agreement with a claim to be better than all others: an interval below zero refutes it.
+pub(super) fn better_than_each(gains: &[(String, Interval)]) -> Agreement {
     match gains {
-        [] => Verdict::NotMeasured,
-        _ if gains.iter().any(|(_, gain)| gain.high < 0.0) => Verdict::Disagrees,
-        _ if gains.iter().all(|(_, gain)| gain.low > 0.0) => Verdict::Agrees,
-        _ => Verdict::Partly,
+        [] => Agreement::NotMeasured,
+        _ if gains.iter().any(|(_, gain)| gain.high < 0.0) => Agreement::Disagrees,
+        _ if gains.iter().all(|(_, gain)| gain.low > 0.0) => Agreement::Agrees,
+        _ => Agreement::Partly,
     }
 }
 
-/// Verdict on a claim to be as good as all others: an interval below zero refutes it.
-pub(super) fn no_worse_than_any(gains: &[(String, Interval)]) -> Verdict {
+/// Agreement with a claim to be as good as all others: an interval below zero refutes it.
+pub(super) fn no_worse_than_any(gains: &[(String, Interval)]) -> Agreement {
     match gains {
-        [] => Verdict::NotMeasured,
-        _ if gains.iter().any(|(_, gain)| gain.high < 0.0) => Verdict::Disagrees,
-        _ => Verdict::Agrees,
+        [] => Agreement::NotMeasured,
+        _ if gains.iter().any(|(_, gain)| gain.high < 0.0) => Agreement::Disagrees,
+        _ => Agreement::Agrees,
     }
 }
 
@@ -104,7 +104,7 @@ pub(super) fn points(Interval { estimate, low, high }: Interval) -> String {
 pub(super) fn finding_on_gains(
     (section, claim, why): (&str, &str, &str),
     kinds: &[(String, Gains)],
-    rule: fn(&[(String, Interval)]) -> Verdict,
+    rule: fn(&[(String, Interval)]) -> Agreement,
 ) -> Finding {
     let measured: Vec<&(String, Gains)> = kinds.iter().filter(|(_, gains)| !gains.is_empty()).collect();
     let described = measured.iter().map(|(kind, gains)| {
@@ -115,11 +115,11 @@ pub(super) fn finding_on_gains(
         true => "not measured".to_owned(),
         false => format!("points of macro F1; {}", described.collect::<Vec<_>>().join("; ")),
     };
-    finding((section, claim, why), found, Verdict::of_all(measured.iter().map(|(_, gains)| rule(gains))))
+    finding((section, claim, why), found, Agreement::of_all(measured.iter().map(|(_, gains)| rule(gains))))
 }
 
 /// A finding.
-pub(super) fn finding((section, claim, why): (&str, &str, &str), found: String, verdict: Verdict) -> Finding {
+pub(super) fn finding((section, claim, why): (&str, &str, &str), found: String, verdict: Agreement) -> Finding {
     Finding { section: section.to_owned(), claim: claim.to_owned(), found, verdict, why: why.to_owned() }
 }
 
@@ -132,12 +132,12 @@ mod tests {
         let gain = |low: f64, high: f64| (String::new(), Interval { estimate: 0.5 * (low + high), low, high });
         let (up, down, open) = (gain(0.1, 0.2), gain(-0.2, -0.1), gain(-0.1, 0.1));
         let judged = |gains: &[(String, Interval)]| [better_than_each(gains), no_worse_than_any(gains)];
-        assert_eq!(judged(&[up.clone(), up.clone()]), [Verdict::Agrees, Verdict::Agrees]);
-        assert_eq!(judged(&[up.clone(), open]), [Verdict::Partly, Verdict::Agrees]);
-        assert_eq!(judged(&[up.clone(), down]), [Verdict::Disagrees, Verdict::Disagrees]);
+        assert_eq!(judged(&[up.clone(), up.clone()]), [Agreement::Agrees, Agreement::Agrees]);
+        assert_eq!(judged(&[up.clone(), open]), [Agreement::Partly, Agreement::Agrees]);
+        assert_eq!(judged(&[up.clone(), down]), [Agreement::Disagrees, Agreement::Disagrees]);
         let rule = ("V-D", "better", "rule");
         let found = finding_on_gains(rule, &[("virtual".to_owned(), vec![up])], better_than_each);
         assert!(found.found.contains("virtual:  +15.0 (+10.0 to +20.0)"), "{}", found.found);
-        assert_eq!(finding_on_gains(rule, &[], better_than_each).verdict, Verdict::NotMeasured);
+        assert_eq!(finding_on_gains(rule, &[], better_than_each).verdict, Agreement::NotMeasured);
     }
 }

@@ -75,7 +75,7 @@ pub struct Finding {
     /// Our result, with numbers.
     pub found: String,
     /// Agreement.
-    pub verdict: Verdict,
+    pub verdict: Agreement,
     /// Rule of the verdict, or reason of a difference.
     pub why: String,
 }
@@ -83,7 +83,7 @@ pub struct Finding {
 /// Agreement of a finding with the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum Agreement {
     /// Our numbers support the claim.
     Agrees,
     /// Our numbers contradict the claim.
@@ -94,7 +94,7 @@ pub enum Verdict {
     NotMeasured,
 }
 
-impl Verdict {
+impl Agreement {
     /// Word for tables.
     pub fn name(self) -> &'static str {
         match self {
@@ -105,7 +105,7 @@ impl Verdict {
         }
     }
 
-    /// Verdict on a claim that a difference is positive: settled only where its interval leaves out zero.
+    /// Agreement with a claim that a difference is positive: settled only where its interval leaves out zero.
     pub fn of_gain(difference: Option<Interval>) -> Self {
         match difference {
             None => Self::NotMeasured,
@@ -115,7 +115,7 @@ impl Verdict {
         }
     }
 
-    /// Verdict on several claims at once: all agree, all disagree, or something between.
+    /// Agreement with several claims at once: all agree, all disagree, or something between.
     pub fn of_all(parts: impl IntoIterator<Item = Self>) -> Self {
         let measured: Vec<Self> = parts.into_iter().filter(|part| *part != Self::NotMeasured).collect();
         match measured.as_slice() {
@@ -345,14 +345,14 @@ mod tests {
 
     #[test]
     fn a_verdict_needs_an_interval_without_zero() {
-        let of = |low: f64, high: f64| Verdict::of_gain(Some(interval(0.5 * (low + high), low, high)));
+        let of = |low: f64, high: f64| Agreement::of_gain(Some(interval(0.5 * (low + high), low, high)));
         assert_eq!(
-            [of(0.1, 0.2), of(-0.2, -0.1), of(-0.1, 0.2), Verdict::of_gain(None)],
-            [Verdict::Agrees, Verdict::Disagrees, Verdict::Partly, Verdict::NotMeasured]
+            [of(0.1, 0.2), of(-0.2, -0.1), of(-0.1, 0.2), Agreement::of_gain(None)],
+            [Agreement::Agrees, Agreement::Disagrees, Agreement::Partly, Agreement::NotMeasured]
         );
-        let all = |parts: &[Verdict]| Verdict::of_all(parts.iter().copied());
-        assert_eq!(all(&[Verdict::Agrees, Verdict::Agrees, Verdict::NotMeasured]), Verdict::Agrees);
-        assert_eq!(all(&[Verdict::Agrees, Verdict::Disagrees]), Verdict::Partly);
-        assert_eq!(all(&[]), Verdict::NotMeasured);
+        let all = |parts: &[Agreement]| Agreement::of_all(parts.iter().copied());
+        assert_eq!(all(&[Agreement::Agrees, Agreement::Agrees, Agreement::NotMeasured]), Agreement::Agrees);
+        assert_eq!(all(&[Agreement::Agrees, Agreement::Disagrees]), Agreement::Partly);
+        assert_eq!(all(&[]), Agreement::NotMeasured);
     }
 }

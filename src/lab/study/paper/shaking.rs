@@ -5,7 +5,7 @@ use super::answers::{Judged, Pool, TestPart, fit_and_judge};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, named_rows, percent_row};
 use super::plan::{DataWanted, StudyPlan};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
@@ -261,7 +261,7 @@ fn finding(set: &str, measured: &[(&'static str, String, Interval)]) -> Finding 
             true => "shaken grasps are missing: they are simulated only without options that choose stored trials".to_owned(),
             false => format!("points of macro F1 over still: {}", listed.collect::<Vec<_>>().join("; ")),
         },
-        verdict: Verdict::of_all(own.iter().map(|(_, _, gain)| Verdict::of_gain(Some(*gain)))),
+        verdict: Agreement::of_all(own.iter().map(|(_, _, gain)| Agreement::of_gain(Some(*gain)))),
         why: "Agrees where the 95 % interval of the gain over a hand that holds still for as long is above zero in each case, disagrees \
               where it is below"
             .to_owned(),

@@ -9,7 +9,7 @@ use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, confusion_plot, confusion_table, named_rows, percent_row};
 use super::plan::StudyPlan;
 use super::pools::{Gains, Pools, adjusted, better_than_each, finding, finding_on_gains, percent};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, Marker, Plot, PlotAxis};
 use palpate_learn::{Class, Dataset, Example, Labels, Method, Model, Pmf, Sequence, SplitPlan, method};
@@ -175,7 +175,7 @@ impl PaperStudy for Stages {
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let grasps = plan.grasps(PARTS * TRAIN, QUICK);
         let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         let [first, second] = halves(&train, plan.seed)?;
         let first_stage = |property: usize| -> Result<Option<(Model, Judged)>, StudyError> {
@@ -341,11 +341,11 @@ fn findings(first: &[Pooled<'_>], second: &[Pooled<'_>]) -> Vec<Finding> {
                 let Some(f1) = of(first, *kind, property).and_then(Pool::f1) else { continue };
                 found.push(format!("{}, {}: {}", kind.0, kind.1, percent(f1)));
                 let is_near = f1.low <= papers + NEAR && f1.high >= papers - NEAR;
-                verdicts.push(if is_near { Verdict::Agrees } else { Verdict::Disagrees });
+                verdicts.push(if is_near { Agreement::Agrees } else { Agreement::Disagrees });
             }
             let claim = format!("Stage one recognises the {property} with an F1 of {:.0} %", 100.0 * papers);
             let why = "Agrees where the 95 % interval comes within 5 points of the paper's number";
-            finding(("V-C", &claim, why), found.join("; "), Verdict::of_all(verdicts))
+            finding(("V-C", &claim, why), found.join("; "), Agreement::of_all(verdicts))
         })
         .collect();
     let gains = |name: &str, over: &[&str]| -> Vec<(String, Gains)> {

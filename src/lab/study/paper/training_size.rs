@@ -5,7 +5,7 @@ use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::StudyPlan;
 use super::pools::{Gains, Pools, better_than_each, finding, finding_on_gains, no_worse_than_any, points};
-use super::report::{Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, Verdict};
+use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 use palpate_learn::metrics::Interval;
@@ -245,7 +245,7 @@ fn findings(curves: &[Point<'_>], least: &StudyTable) -> Vec<Finding> {
 fn one_finding(
     words: (&str, &str, &str),
     kinds: &[(String, Gains)],
-    rule: fn(&[(String, Interval)]) -> Verdict,
+    rule: fn(&[(String, Interval)]) -> Agreement,
 ) -> Finding {
     let all: Gains = kinds.iter().flat_map(|(_, gains)| gains.clone()).collect();
     Finding { verdict: rule(&all), ..finding_on_gains(words, kinds, rule) }
@@ -286,9 +286,9 @@ fn gains_shrink(curves: &[Point<'_>], sensors: &[&str], least: &StudyTable) -> F
                 points(last.f1)
             ));
             verdicts.push(match (first.f1.low > last.f1.high, first.f1.high < last.f1.low) {
-                (true, _) => Verdict::Agrees,
-                (_, true) => Verdict::Disagrees,
-                (false, false) => Verdict::Partly,
+                (true, _) => Agreement::Agrees,
+                (_, true) => Agreement::Disagrees,
+                (false, false) => Agreement::Partly,
             });
         }
     }
@@ -305,7 +305,7 @@ fn gains_shrink(curves: &[Point<'_>], sensors: &[&str], least: &StudyTable) -> F
     finding(
         ("V-C", "With more grasps the gain becomes less pronounced: there is a smallest set that is enough", why),
         found.join("; "),
-        Verdict::of_all(verdicts),
+        Agreement::of_all(verdicts),
     )
 }
 

@@ -2,7 +2,7 @@
 
 use super::bodies::Summary;
 use super::{DEFAULT, PAPER};
-use crate::study::paper::report::{Finding, Verdict};
+use crate::study::paper::report::{Agreement, Finding};
 
 /// Sentences in numbers for one kind of grasps with one gripper.
 pub(super) struct Measured {
@@ -16,7 +16,7 @@ pub(super) struct Sentence {
     claim: &'static str,
     rule: &'static str,
     found: String,
-    pub(super) verdict: Verdict,
+    pub(super) verdict: Agreement,
 }
 
 /// Least rank correlation of what is said to go together.
@@ -32,11 +32,11 @@ const SOON_S: f64 = 0.20;
 /// Most pressure before contact, as a share of the hold's, that is low.
 const LOW: f64 = 0.05;
 
-fn judged(parts: &[Option<bool>]) -> Verdict {
-    Verdict::of_all(parts.iter().map(|part| match part {
-        None => Verdict::NotMeasured,
-        Some(true) => Verdict::Agrees,
-        Some(false) => Verdict::Disagrees,
+fn judged(parts: &[Option<bool>]) -> Agreement {
+    Agreement::of_all(parts.iter().map(|part| match part {
+        None => Agreement::NotMeasured,
+        Some(true) => Agreement::Agrees,
+        Some(false) => Agreement::Disagrees,
     }))
 }
 
@@ -114,7 +114,7 @@ pub(super) fn findings(measured: &[Measured]) -> Vec<Finding> {
                 section: "V-A".to_owned(),
                 claim: format!("{}{about}", judged[0][at].claim),
                 found: found.collect::<Vec<_>>().join("; "),
-                verdict: Verdict::of_all(judged.iter().map(|all| all[at].verdict)),
+                verdict: Agreement::of_all(judged.iter().map(|all| all[at].verdict)),
                 why: judged[0][at].rule.to_owned(),
             });
         }
@@ -140,10 +140,10 @@ mod tests {
             size: Some(-0.95),
             ..Summary::default()
         };
-        assert_eq!(verdicts(&good), [Verdict::Agrees; 5]);
+        assert_eq!(verdicts(&good), [Agreement::Agrees; 5]);
         let bad = Summary { round_rate: Some(0.4), rise_s: Some(1.0), flat_line: None, ..good };
-        let wanted = [Verdict::Agrees, Verdict::Partly, Verdict::Agrees, Verdict::Disagrees, Verdict::Agrees];
+        let wanted = [Agreement::Agrees, Agreement::Partly, Agreement::Agrees, Agreement::Disagrees, Agreement::Agrees];
         assert_eq!(verdicts(&bad), wanted);
-        assert_eq!(verdicts(&Summary::default()), [Verdict::NotMeasured; 5]);
+        assert_eq!(verdicts(&Summary::default()), [Agreement::NotMeasured; 5]);
     }
 }

@@ -481,7 +481,7 @@ fn add_setting(table: &mut StudyTable, at: usize, value: f64, summary: &Summary)
         (false, true) => PAPER,
         (false, false) => "",
     };
-    let held = findings::sentences(summary).iter().filter(|own| own.verdict == super::Verdict::Agrees).count();
+    let held = findings::sentences(summary).iter().filter(|own| own.verdict == super::Agreement::Agrees).count();
     table.push(
         vec![
             Cell::text(varied.name),
