@@ -1,5 +1,6 @@
 //! Data sets from the store, and the folder of trained models.
 
+mod card;
 mod origin;
 mod query;
 mod reading;

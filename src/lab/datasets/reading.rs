@@ -1,6 +1,7 @@
 //! Data sets read from the store: the trials that a query chooses, those that are left out and why, and their card.
 
-use super::origin::{TrialOrigin, card};
+use super::card::card;
+use super::origin::TrialOrigin;
 use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
 use palpate_learn::{Dataset, Example, Sequence};
 use palpate_sim::objects::{EMPTY, catalogue};

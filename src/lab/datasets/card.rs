@@ -1,0 +1,106 @@
+//! Card of a data set: where its trials come from, and what was mixed without being asked for.
+
+use super::origin::TrialOrigin;
+use super::query::{DatasetQuery, SensorView};
+use super::sampling::Cut;
+use palpate_learn::DataCard;
+use palpate_store::TrialRow;
+use palpate_tactile::trial::TrialSource;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Card of a data set.
+pub(super) fn card(
+    query: &DatasetQuery,
+    asked: &str,
+    rows: &[&TrialRow],
+    origins: &[TrialOrigin],
+    view: &SensorView,
+    left_out_for: BTreeMap<String, usize>,
+) -> DataCard {
+    let collections: Vec<Option<&String>> = rows.iter().map(|row| query.collection_of(row)).collect();
+    let simulated: Vec<(Option<&'static str>, bool)> = origins.iter().filter_map(|origin| origin.simulated).collect();
+    let sources: BTreeSet<&str> = rows.iter().map(|row| row.source.name()).collect();
+    let presets: BTreeSet<Option<&str>> = simulated.iter().map(|(preset, _)| *preset).collect();
+    let fixed: BTreeSet<bool> = simulated.iter().map(|(_, fixed)| *fixed).collect();
+    let of_simulation = rows.iter().filter(|row| row.source == TrialSource::Simulated);
+    let physics: BTreeSet<Option<u32>> = of_simulation.map(|row| row.physics).collect();
+    let calibrations: BTreeSet<&[i64]> =
+        origins.iter().map(|origin| &*origin.calibrations).filter(|ids| !ids.is_empty()).collect();
+    let distinct: BTreeSet<Option<&String>> = collections.into_iter().collect();
+
+    let mut mixed = Vec::new();
+    let mut note = |count: usize, named: bool, what: &str, which: Vec<String>, option: &str| {
+        if count > 1 && !named {
+            mixed.push(format!("{count} {what} ({}); {option}", which.join(", ")));
+        }
+    };
+    let texts = |all: &BTreeSet<Option<&String>>| -> Vec<String> {
+        all.iter().map(|name| name.map_or_else(|| "none".to_owned(), Clone::clone)).collect()
+    };
+    note(distinct.len(), query.collection.is_some(), "collections", texts(&distinct), "--collection selects one");
+    note(
+        sources.len(),
+        query.source.is_some(),
+        "sources",
+        sources.iter().map(|name| (*name).to_owned()).collect(),
+        "--source selects one",
+    );
+    let named = |preset: &Option<&str>| preset.unwrap_or("others").to_owned();
+    note(
+        presets.len(),
+        query.preset.is_some(),
+        "pose presets",
+        presets.iter().map(named).collect(),
+        "--preset selects one",
+    );
+    note(
+        fixed.len(),
+        false,
+        "kinds of support",
+        vec!["free".to_owned(), "fixed".to_owned()],
+        "--collection selects one",
+    );
+    let version = |physics: &Option<u32>| physics.map_or_else(|| "unknown".to_owned(), |version| version.to_string());
+    note(
+        physics.len(),
+        query.physics.is_some(),
+        "versions of the physics",
+        physics.iter().map(version).collect(),
+        "--physics selects one",
+    );
+    let ids = |ids: &&[i64]| ids.iter().map(i64::to_string).collect::<Vec<_>>().join("+");
+    note(
+        calibrations.len(),
+        !query.calibrations.is_empty(),
+        "sets of calibrations",
+        calibrations.iter().map(ids).collect(),
+        "--calibration selects one",
+    );
+
+    let object = match (fixed.len(), fixed.contains(&true)) {
+        (0, _) => "recorded",
+        (1, true) => "fixed",
+        (1, false) => "free",
+        _ => "free and fixed",
+    };
+    let only =
+        |set: &BTreeSet<Option<&str>>| set.first().copied().flatten().filter(|_| set.len() == 1).map(str::to_owned);
+    let seen = !simulated.is_empty();
+    DataCard {
+        collections: distinct.into_iter().flatten().cloned().collect(),
+        preset: only(&presets),
+        object: object.to_owned(),
+        grasps: rows.len(),
+        layout: seen.then(|| view.layout.to_ascii_uppercase()),
+        sensors: seen.then(|| view.sensors.name().to_owned()),
+        signals: seen.then(|| view.signals.name().to_owned()),
+        rate_hz: view.rate_hz,
+        cut: (view.cut != Cut::default()).then(|| view.cut.to_string()),
+        left_out: left_out_for.values().sum(),
+        left_out_for,
+        query: asked.to_owned(),
+        mixed,
+        physics: physics.first().copied().flatten().filter(|_| physics.len() == 1),
+        calibrations: calibrations.into_iter().flatten().copied().collect::<BTreeSet<i64>>().into_iter().collect(),
+    }
+}
