@@ -73,6 +73,7 @@ const RANDOM: &[&str] = &[
     "src/lab/grasping/shuffled_objects.rs",
     "src/lab/study/effect_audit",
     "src/lab/study/network_cost.rs",
+    "src/lab/study/paper",
     "src/lab/study/stability",
     "src/learn",
     "src/sim/physics/placement.rs",

@@ -44,6 +44,7 @@ fn every_panel_in_both_themes() {
                 "studies" => bench.until_shown(true, "not run"),
                 "study-figure" | "study-tables" | "study-findings" => {
                     bench.tell(StudyAction::Choose("models".to_owned()));
+                    bench.harness.run_steps(4);
                     let text = match panel.name {
                         "study-figure" => "than today's",
                         "study-tables" => "Row virtual, svm",
