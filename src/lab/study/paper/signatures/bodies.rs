@@ -83,29 +83,53 @@ pub(super) struct Summary {
     pub(super) size: Option<f64>,
 }
 
+/// Median of a number of the signatures of one shape, or of all.
+fn median_of(all: &[&Signature], shape: Option<&str>, number: impl Fn(&Signature) -> Option<f64>) -> Option<f64> {
+    median(all.iter().filter(|own| shape.is_none_or(|shape| own.of.shape == shape)).filter_map(|own| number(own)))
+}
+
+/// Rank correlation of a number with the width, for signatures of one shape or all.
+fn with_width(all: &[&Signature], shape: Option<&str>, number: impl Fn(&Signature) -> f64) -> Option<f64> {
+    let kept = all.iter().filter(|own| shape.is_none_or(|shape| own.of.shape == shape));
+    let (widths, numbers): (Vec<f64>, Vec<f64>) = kept.filter_map(|own| Some((own.of.width_mm?, number(own)))).unzip();
+    rank_correlation(&widths, &numbers)
+}
+
+/// A number over many grasps.
+pub(super) type Statistic = fn(&[&Signature]) -> Option<f64>;
+
+/// The numbers of a [`Summary`], in its order.
+pub(super) const STATISTICS: [Statistic; 10] = [
+    |all| median_of(all, None, |own| own.rises),
+    |all| median_of(all, None, |own| Some(own.before)),
+    |all| median_of(all, Some(ROUND), |own| own.rate),
+    |all| median_of(all, Some(FLAT), |own| own.rate),
+    |all| median_of(all, Some(FLAT), |own| own.line),
+    |all| median_of(all, Some(ROUND), |own| Some(own.share)),
+    |all| median_of(all, Some(FLAT), |own| Some(own.share)),
+    |all| with_width(all, Some(ROUND), |own| own.bend).map(|falls| -falls),
+    |all| median_of(all, None, |own| Some(own.rise_s)),
+    |all| with_width(all, None, |own| own.onset_s),
+];
+
 impl Summary {
     pub(super) fn of<'a>(signatures: impl IntoIterator<Item = &'a Signature>) -> Self {
         let all: Vec<&Signature> = signatures.into_iter().collect();
-        let of_shape = |shape: &'static str| all.iter().filter(move |signature| signature.of.shape == shape);
-        let (round, flat) = (|| of_shape(ROUND), || of_shape(FLAT));
-        let with_width = |only: Option<&'static str>, value: fn(&Signature) -> f64| {
-            let kept = all.iter().filter(|own| only.is_none_or(|shape| own.of.shape == shape));
-            let (widths, values): (Vec<f64>, Vec<f64>) =
-                kept.filter_map(|own| Some((own.of.width_mm?, value(own)))).unzip();
-            rank_correlation(&widths, &values)
-        };
+        let numbers = STATISTICS.map(|statistic| statistic(&all));
+        let [rises, before, round_rate, flat_rate, flat_line, round_share, flat_share, curvature, rise_s, size] =
+            numbers;
         Self {
             grasps: all.len(),
-            rises: median(all.iter().filter_map(|own| own.rises)),
-            before: median(all.iter().map(|own| own.before)),
-            round_rate: median(round().filter_map(|own| own.rate)),
-            flat_rate: median(flat().filter_map(|own| own.rate)),
-            flat_line: median(flat().filter_map(|own| own.line)),
-            round_share: median(round().map(|own| own.share)),
-            flat_share: median(flat().map(|own| own.share)),
-            curvature: with_width(Some(ROUND), |own| own.bend).map(|falls| -falls),
-            rise_s: median(all.iter().map(|own| own.rise_s)),
-            size: with_width(None, |own| own.onset_s),
+            rises,
+            before,
+            round_rate,
+            flat_rate,
+            flat_line,
+            round_share,
+            flat_share,
+            curvature,
+            rise_s,
+            size,
         }
     }
 }

@@ -149,10 +149,12 @@ pub(super) fn rank_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 }
 
 fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
     let rank = |value: &f64| {
-        let below = values.iter().filter(|other| *other < value).count();
-        let equal = values.iter().filter(|other| *other == value).count();
-        below as f64 + 0.5 * (equal as f64 + 1.0)
+        let below = sorted.partition_point(|other| other < value);
+        let up_to = sorted.partition_point(|other| other <= value);
+        0.5 * (below + up_to + 1) as f64
     };
     values.iter().map(rank).collect()
 }

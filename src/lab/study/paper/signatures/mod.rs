@@ -12,7 +12,7 @@ use super::report::{Cell, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{PaperStudy, StudyCard, UnitResult};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
-use bodies::{FLAT, ROUND, Summary, VARIED, WIDTHS, papers_scene, papers_view};
+use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, WIDTHS, papers_scene, papers_view};
 use course::{Course, Grasped, Signature, median};
 use findings::{Measured, findings};
 use palpate_learn::metrics::Bootstrap;
@@ -21,7 +21,7 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, TrialId};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct TactileSignatures;
 
@@ -305,22 +305,15 @@ impl PaperStudy for TactileSignatures {
 const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 500, seed: 0 };
 
 /// A statistic of signatures, with its interval where there are several grasps of an object.
-fn interval(all: &[&Signature], statistic: impl Fn(&Summary) -> Option<f64>) -> Cell {
-    let mut names: Vec<&str> = Vec::new();
-    let objects: Vec<usize> = all
-        .iter()
-        .map(|own| {
-            names.iter().position(|name| *name == own.of.object).unwrap_or_else(|| {
-                names.push(&own.of.object);
-                names.len() - 1
-            })
-        })
-        .collect();
-    let of = |kept: &[usize]| statistic(&Summary::of(kept.iter().map(|k| all[*k])));
+fn interval(all: &[&Signature], statistic: Statistic) -> Cell {
     if all.iter().all(|own| own.of.trial.is_none()) {
-        return Cell::number(statistic(&Summary::of(all.iter().copied())));
+        return Cell::number(statistic(all));
     }
-    Cell::interval(BOOTSTRAP.interval(&objects, of))
+    let names: BTreeSet<&str> = all.iter().map(|own| own.of.object.as_str()).collect();
+    let names: Vec<&str> = names.into_iter().collect();
+    let objects: Vec<usize> =
+        all.iter().map(|own| names.iter().position(|name| *name == own.of.object).unwrap_or_default()).collect();
+    Cell::interval(BOOTSTRAP.interval(&objects, |kept| statistic(&kept.iter().map(|k| all[*k]).collect::<Vec<_>>())))
 }
 
 fn sentence_table(plan: &StudyPlan) -> StudyTable {
@@ -348,28 +341,11 @@ fn sentence_table(plan: &StudyPlan) -> StudyTable {
 
 fn add_sentences(table: &mut StudyTable, gripper: &str, kind: &str, found: &Found, summary: &Summary) {
     let all: Vec<&Signature> = found.signatures.iter().collect();
-    let of = |statistic: fn(&Summary) -> Option<f64>| interval(&all, statistic);
-    let trials: Vec<TrialId> =
-        all.iter().filter_map(|own| own.of.trial).step_by(37).take(super::answers::SHOWN).collect();
-    table.push(
-        vec![
-            Cell::text(gripper),
-            Cell::text(kind),
-            Cell::Number(summary.grasps as f64),
-            Cell::Number(found.lost as f64),
-            of(|s| s.rises),
-            of(|s| s.before),
-            of(|s| s.round_rate),
-            of(|s| s.flat_rate),
-            of(|s| s.flat_line),
-            of(|s| s.round_share),
-            of(|s| s.flat_share),
-            of(|s| s.curvature),
-            of(|s| s.rise_s),
-            of(|s| s.size),
-        ],
-        trials,
-    );
+    let trials: Vec<TrialId> = all.iter().filter_map(|own| own.of.trial).collect();
+    let shown = trials.iter().step_by(1 + trials.len() / super::answers::SHOWN).copied().collect();
+    let counts = [summary.grasps, found.lost].map(|count| Cell::Number(count as f64));
+    let numbers = STATISTICS.map(|statistic| interval(&all, statistic));
+    table.push([Cell::text(gripper), Cell::text(kind)].into_iter().chain(counts).chain(numbers).collect(), shown);
 }
 
 fn object_table() -> StudyTable {
