@@ -143,7 +143,7 @@ fn the_window_in_both_themes_and_small() {
 fn stored_trials_are_compared_in_both_themes() {
     let by = driver().driver;
     for (name, theme, size) in
-        [("inspect_dark", Theme::Dark, [1120.0, 720.0]), ("inspect_light", Theme::Light, [880.0, 560.0])]
+        [("inspect_dark", Theme::Dark, [960.0, 640.0]), ("inspect_light", Theme::Light, [760.0, 500.0])]
     {
         let mut bench = window_on(theme, size, three_trials);
         bench.tell(InspectAction::Open(1));

@@ -162,7 +162,7 @@ pub enum DatasetError {
     },
     /// A trial of a real gripper, asked for channels of the simulation.
     #[error(
-        "trial {id} is of a real gripper, whose pads do not measure contact pressure: choose --signals parts, or --rig \
+        "trial {id} is of a real gripper, whose pads do not measure contact pressure: choose --signals parts, or --source \
          sim for simulated trials alone"
     )]
     OnlySimulated {

@@ -97,6 +97,13 @@ pub(super) fn fit_and_judge(
     }
 }
 
+/// Size of the model's file (bytes), without the digits of the time that its training took.
+fn file_size(model: &Model) -> usize {
+    let mut timeless = model.clone();
+    timeless.card.train_cpu_s = 0.0;
+    timeless.to_bytes().map_or(0, |bytes| bytes.len())
+}
+
 /// A model's answers to test grasps.
 pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
     let recogniser = model.recogniser.as_ref();
@@ -114,7 +121,7 @@ pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
             train_cpu_s: model.card.train_cpu_s,
             answer_ms: 1e-3 * answers.step_us * samples as f64 / test.examples.len().max(1) as f64,
             step_us: live_step_us(model, test),
-            bytes: model.to_bytes().map_or(0, |bytes| bytes.len()),
+            bytes: file_size(model),
             parameters: model.card.parameters,
         },
         truth: answers.truth,
