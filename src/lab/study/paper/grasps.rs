@@ -173,7 +173,7 @@ impl PaperStudy for Grasps {
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let wanted = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
         let Some(data) = bench.data(&wanted)? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         // Stored trials hold both, told apart by the trial before them.
         let released = DataWanted { between: Between::AsReleased, grasps: plan.grasps(RELEASED, 2 * MOST), ..wanted };
