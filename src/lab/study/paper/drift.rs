@@ -211,7 +211,7 @@ impl PaperStudy for Drift {
         let plan = bench.plan();
         let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let (grasps, of) = (plan.grasps(PARTS * TRAIN, QUICK), plan.pick(PARTS, 2, 2));
+        let (grasps, of) = (plan.grasps(PARTS * TRAIN, QUICK), plan.pick(PARTS, 2, 3));
         let answers = match case {
             Case::Drifted { sensors, reading, method, part } => {
                 let Some(data) = bench.data(&plan.wanted(grasps, sensors))? else { return Ok(None) };

@@ -18,7 +18,7 @@ use palpate_sim::scene::Between;
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Grasps;
 
@@ -111,13 +111,16 @@ impl CourseRound {
     }
 }
 
-/// Grasps in a row as indices: each test grasp with others of its object after it.
+/// Grasps in a row as indices: each test grasp with others of its object after it. Grasps of objects that stayed as released
+/// follow each other in their own order, and are left out.
 fn placed_anew(data: &Dataset) -> Vec<Vec<usize>> {
+    let left: BTreeSet<TrialId> = data.examples.iter().filter_map(|example| example.after).collect();
+    let is_anew = |k: &usize| data.examples[*k].after.is_none() && !left.contains(&data.examples[*k].id);
     let rounds = data.by_class().into_iter().flat_map(|members| {
+        let members: Vec<usize> = members.into_iter().filter(is_anew).collect();
         let count = members.len();
-        (0..count)
-            .map(move |first| (0..MOST.min(count)).map(|k| members[(first + k) % count]).collect())
-            .collect::<Vec<_>>()
+        let round = |first: usize| (0..MOST.min(count)).map(|k| members[(first + k) % count]).collect();
+        (0..count).map(round).collect::<Vec<Vec<usize>>>()
     });
     rounds.collect()
 }
@@ -487,8 +490,11 @@ mod tests {
             rounds.iter().map(|round| round.iter().map(|k| data.examples[*k].id).collect()).collect()
         };
         assert_eq!(ids(left_as_released(&data)), [vec![1, 2, 3], vec![4, 5]]);
-        let anew = ids(placed_anew(&data));
-        assert_eq!((anew.len(), anew[0].clone(), anew[6].clone()), (7, vec![1, 2, 3, 7], vec![9, 5, 4]));
+        // Only the last of the first class was put down anew, and nothing followed it.
+        assert_eq!(ids(placed_anew(&data)), [vec![7]]);
+        let example = |id: i64| example((id, 0, None));
+        let anew = Dataset { examples: (0..3).map(example).collect(), ..data.clone() };
+        assert_eq!(placed_anew(&anew), [vec![0, 1, 2], vec![1, 2, 0], vec![2, 0, 1]]);
     }
 
     #[test]

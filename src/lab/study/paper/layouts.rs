@@ -135,7 +135,7 @@ impl PaperStudy for Layouts {
             let what = "simulated trials: recorded and imported ones have the channels that they have";
             return Err(StudyError::Missing(what.to_owned()));
         }
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
     }

@@ -145,7 +145,7 @@ impl PaperStudy for Modality {
         let usual = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
         let view = SensorView { layout: case.pattern.layout.to_owned(), ..usual.view.clone() };
         let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         let modality = case.pattern.modality;
         let judged =

@@ -96,7 +96,7 @@ impl PaperStudy for Models {
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let grasps = plan.grasps(PARTS * TRAIN, QUICK);
         let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let most = if case.imbalanced { TRAIN * 55 / 50 } else { TRAIN };
         let (train, test) = TestPart { of, part: case.part, train: most }.split(&data, plan.seed)?;
         // 40 to 55 grasps of each object, as in the paper, or the same share of fewer.

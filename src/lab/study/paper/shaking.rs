@@ -151,7 +151,7 @@ impl PaperStudy for Shaken {
         let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let Some(data) = grasps(bench, &case)? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 2);
+        let of = plan.pick(PARTS, 2, 3);
         let mut parts: Vec<Judged> = Vec::new();
         for part in 0..of {
             let (train, test) = TestPart { of, part, train: usize::MAX / of }.split(&data, plan.seed)?;

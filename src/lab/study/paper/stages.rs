@@ -178,18 +178,27 @@ impl PaperStudy for Stages {
         let of = plan.pick(PARTS, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
         let [first, second] = halves(&train, plan.seed)?;
-        let first_stage = |property: usize| -> Result<Option<(Model, Judged)>, StudyError> {
+        // None where it was cancelled; without a model where it cannot be fitted to these grasps.
+        let first_stage = |property: usize| -> Result<Option<(Option<Model>, Judged)>, StudyError> {
             let pair = of_property(&first, property).zip(of_property(&test, property));
             let no_properties = || StudyError::Missing("a size and a shape of every object".to_owned());
             let (first, test) = pair.ok_or_else(no_properties)?;
-            let fitted = bench.fit(case.method, &first)?;
-            Ok(fitted.map(|model| {
-                let judged = Judged::Answers(judge(&model, &test));
-                (model, judged)
-            }))
+            match bench.fit(case.method, &first) {
+                Ok(Some(model)) => {
+                    let judged = Judged::Answers(judge(&model, &test));
+                    Ok(Some((Some(model), judged)))
+                }
+                Ok(None) => Ok(None),
+                Err(StudyError::Fit { cause, .. }) => Ok(Some((None, Judged::NotFitted(cause.to_string())))),
+                Err(other) => Err(other),
+            }
         };
         let Some((sizes, of_size)) = first_stage(0)? else { return Ok(None) };
         let Some((shapes, of_shape)) = first_stage(1)? else { return Ok(None) };
+        let stage_one = [of_size, of_shape];
+        let (Some(sizes), Some(shapes)) = (sizes, shapes) else {
+            return UnitResult::new(&StagesResult { stage_one, stage_two: Vec::new() }).map(Some);
+        };
         let estimates = |data: &Dataset| -> Vec<Estimates> {
             let of = |model: &Model, example: &Example| model.recogniser.recognise(&example.grasp, None).pmf;
             data.examples.iter().map(|example| [of(&sizes, example), of(&shapes, example)]).collect()
@@ -210,7 +219,6 @@ impl PaperStudy for Stages {
         if !add(ONE_STAGE, &train, &test)? {
             return Ok(None);
         }
-        let stage_one = [of_size, of_shape];
         UnitResult::new(&StagesResult { stage_one, stage_two }).map(Some)
     }
 

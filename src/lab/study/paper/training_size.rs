@@ -42,7 +42,7 @@ const MOST_OF_TUNED: usize = 400;
 const MOST_OF_NETWORK: usize = 200;
 
 fn sizes(plan: &StudyPlan) -> &'static [usize] {
-    plan.pick(&[5, 10, 20, 50, 100, 200, 400, 800][..], &[5, 10, 20][..], &[2, 3][..])
+    plan.pick(&[5, 10, 20, 50, 100, 200, 400, 800][..], &[5, 10, 20][..], &[2, 4][..])
 }
 
 /// A unit: a method fitted to so many grasps of each object.
@@ -98,7 +98,7 @@ impl PaperStudy for TrainingSize {
         let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let grasps = plan.grasps(MOST + TEST, 40);
         let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
-        let of = plan.pick((MOST + TEST) / TEST, 2, 2);
+        let of = plan.pick((MOST + TEST) / TEST, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: case.size }.split(&data, plan.seed)?;
         fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
     }
