@@ -1,9 +1,11 @@
 //! Models fitted and judged in a study: their answers to test grasps, with intervals and paired differences.
 
 use super::bench::{StudyBench, StudyError};
+use super::plan::{DataWanted, StudyPlan};
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, McNemar};
 use palpate_learn::{Dataset, Method, Model, SplitError, SplitPlan};
+use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -73,7 +75,24 @@ pub(super) struct TestPart {
     pub(super) train: usize,
 }
 
+/// Parts of the grasps, of which a unit tests one, and training grasps of each object in the others.
+pub(super) const PARTS: usize = 3;
+pub(super) const TRAIN: usize = 50;
+/// Grasps of each object in the quick form.
+const QUICK: usize = 40;
+
+/// Grasps that most studies share.
+pub(super) fn usual_grasps(plan: &StudyPlan, sensors: SensorModel) -> DataWanted {
+    plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), sensors)
+}
+
 impl TestPart {
+    /// A part of the [`usual_grasps`].
+    pub(super) fn usual(plan: &StudyPlan, part: usize) -> Self {
+        // With three parts, samples of six grasps train on the four that dual-stage networks need.
+        Self { of: plan.pick(PARTS, 2, 3), part, train: TRAIN }
+    }
+
     /// Training and test set.
     pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<(Dataset, Dataset), StudyError> {
         let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1)?;

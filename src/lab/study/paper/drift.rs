@@ -1,12 +1,13 @@
 //! Sensors that drift (section VI): gains and zeros that are others in the test than in the training, with and without a
 //! zero taken before contact, and hysteresis that the training has not seen.
 
-use super::answers::{ModelAnswers, Pool, TestPart, judge};
+use super::answers::{ModelAnswers, PARTS, Pool, TestPart, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::StudyPlan;
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use crate::datasets::{SensorView, noise_seed, sequence_of};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
@@ -30,10 +31,6 @@ const CARD: StudyCard = StudyCard {
 
 /// Methods: trees on features of the whole grasp, and the paper's network.
 const METHODS: [&str; 2] = ["extra-trees", "macro-layer"];
-/// Parts and training grasps of each object, as in the comparison of methods.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-const QUICK: usize = 30;
 
 /// What drifts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,12 +61,12 @@ const READINGS: [&str; 2] = [AS_READ, ZEROED];
 /// Beginning of a grasp over which zeros are taken (s): fingers have hardly begun to bend.
 const ZERO_S: f32 = 0.1;
 
-enum Case {
+pub(super) enum Case {
     Drifted { sensors: SensorModel, reading: &'static str, method: &'static Method, part: usize },
     Hysteresis { method: &'static Method, part: usize },
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let methods = || METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
         let parts = plan.pick(PARTS, 1, 1);
@@ -198,24 +195,17 @@ const HYSTERESIS: [(&str, bool, bool); 4] = [
     ("hysteresis in the training alone", true, false),
 ];
 
-impl PaperStudy for Drift {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Drift {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let (grasps, of) = (plan.grasps(PARTS * TRAIN, QUICK), plan.pick(PARTS, 2, 3));
         let answers = match case {
             Case::Drifted { sensors, reading, method, part } => {
-                let Some(data) = bench.data(&plan.wanted(grasps, sensors))? else { return Ok(None) };
-                let (train, test) = TestPart { of, part, train: TRAIN }.split(&data, plan.seed)?;
+                let Some(data) = bench.data(&usual_grasps(plan, sensors))? else { return Ok(None) };
+                let (train, test) = TestPart::usual(plan, part).split(&data, plan.seed)?;
                 let ranges = ranges(&train);
                 let read = |data: Dataset| if reading == ZEROED { zeroed(&data) } else { data };
                 let Some(model) = bench.fit(method, &read(train))? else { return Ok(None) };
@@ -226,13 +216,13 @@ impl PaperStudy for Drift {
                 judged.take_while(|_| !bench.is_cancelled()).collect::<Answers>()
             }
             Case::Hysteresis { method, part } => {
-                let Some(data) = bench.data(&plan.wanted(grasps, SensorModel::PhysicalLike))? else { return Ok(None) };
+                let Some(data) = bench.data(&usual_grasps(plan, SensorModel::PhysicalLike))? else { return Ok(None) };
                 let read = [read_again(bench, &data, false)?, read_again(bench, &data, true)?];
                 let [Some(without), Some(with)] = read else {
                     return Err(StudyError::Missing("simulated grasps".to_owned()));
                 };
                 let mut answers = Answers::new();
-                let (train, test) = TestPart { of, part, train: TRAIN }.split(&data, plan.seed)?;
+                let (train, test) = TestPart::usual(plan, part).split(&data, plan.seed)?;
                 for (name, in_training, in_test) in HYSTERESIS {
                     let of = |on: bool, grasps: &Dataset| same_grasps(if on { &with } else { &without }, grasps);
                     let (train, test) = (of(in_training, &train), of(in_test, &test));

@@ -3,13 +3,14 @@
 //! Grasps are combined in two ways: the iterated network is fed with the probabilities of those before, and the product of
 //! experts multiplies the probabilities of each grasp alone.
 
-use super::answers::{Pool, SHOWN, TestPart};
+use super::answers::{PARTS, Pool, SHOWN, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, add_new, better_than_each, finding, finding_on_gains, points};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use crate::grasping::SUCCESSION;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
@@ -35,10 +36,6 @@ const CARD: StudyCard = StudyCard {
 const MODELS: [&str; 4] = ["paper-ids-lstm", "ids-lstm", "macro-layer", "extra-trees"];
 /// Grasps in a row.
 const MOST: usize = SUCCESSION as usize;
-/// Parts and training grasps of each object, as in the comparison of methods.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-const QUICK: usize = 40;
 /// Grasps of each object that were left as released.
 const RELEASED: usize = 10 * MOST;
 /// Grasps after which the paper sees no change, and the largest change that is none.
@@ -51,13 +48,13 @@ const LEFT: &str = "left as released";
 const FEEDBACK: &str = "feedback";
 const PRODUCT: &str = "product of experts";
 
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     method: &'static Method,
     part: usize,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for (number, &sensors) in plan.sensors.iter().enumerate() {
@@ -161,23 +158,16 @@ fn course(model: &Model, data: &Dataset, alone: &[Pmf], rounds: &[Vec<usize>], f
     rounds.iter().filter(|grasps| !grasps.is_empty()).map(run).collect()
 }
 
-impl PaperStudy for Grasps {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Grasps {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let wanted = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
+        let wanted = usual_grasps(plan, case.sensors);
         let Some(data) = bench.data(&wanted)? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 3);
-        let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
+        let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         // Stored trials hold both, told apart by the trial before them.
         let released = DataWanted { between: Between::AsReleased, grasps: plan.grasps(RELEASED, 2 * MOST), ..wanted };
         let released = if plan.query.is_some() { Some(data.clone()) } else { bench.data(&released)? };

@@ -1,12 +1,13 @@
 //! Sensor layouts (Fig. 5a): which are enough.
 
-use super::answers::{Pool, TestPart, fit_and_judge};
+use super::answers::{PARTS, Pool, TestPart, fit_and_judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, named_columns, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, percent, points};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use crate::datasets::SensorView;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::{Method, method};
@@ -29,10 +30,6 @@ const CARD: StudyCard = StudyCard {
 const MODELS: [&str; 3] = ["paper-macro-layer", "zuo", "extra-trees"];
 /// The simplest layout, which the paper chooses.
 const SIMPLEST: &str = "C1";
-/// Parts and training grasps of each object, as in the comparison of methods.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-const QUICK: usize = 40;
 /// Gain below which two layouts are as good as each other.
 const MINIMAL: f64 = 0.02;
 
@@ -68,14 +65,14 @@ impl Signals {
     }
 }
 
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     signals: Signals,
     method: &'static Method,
     part: usize,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for &sensors in &plan.sensors {
@@ -114,20 +111,14 @@ fn channels(name: &str) -> Option<usize> {
     Some(layout.channels(&GripperModel::default(), signals.definition).ok()?.len())
 }
 
-impl PaperStudy for Layouts {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Layouts {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let usual = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
+        let usual = usual_grasps(plan, case.sensors);
         let view =
             SensorView { layout: case.signals.layout.clone(), signals: case.signals.definition, ..usual.view.clone() };
         let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
@@ -135,8 +126,7 @@ impl PaperStudy for Layouts {
             let what = "simulated trials: recorded and imported ones have the channels that they have";
             return Err(StudyError::Missing(what.to_owned()));
         }
-        let of = plan.pick(PARTS, 2, 3);
-        let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
+        let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
     }
 

@@ -4,10 +4,11 @@
 //! [`UnitResult`]; finished units are kept, so that a study that was stopped goes on where it stopped. From all units it
 //! makes a [`StudyReport`]: tables, and a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
 //!
-//! To add a study, write its file and add it to [`PAPER_STUDIES`].
+//! To add a study, write its file and add it to [`PAPER_STUDIES`]. Most have units of one kind: their `cases`.
 
 mod answers;
 mod bench;
+mod cases;
 mod claims;
 mod drawing;
 mod drift;

@@ -1,12 +1,13 @@
 //! Curvature, pressure, and both (Fig. 5b to 5d).
 
-use super::answers::{Pool, TestPart, fit_and_judge};
+use super::answers::{PARTS, Pool, TestPart, fit_and_judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, confusion_plot, confusion_table, named_columns, percent_point};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use crate::datasets::SensorView;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
@@ -28,10 +29,6 @@ const CARD: StudyCard = StudyCard {
 /// The paper's network, strict and tuned, for whole fingers, and a method of seconds for every pattern.
 const MODELS: [&str; 3] = ["paper-macro-layer", NETWORK, "extra-trees"];
 const NETWORK: &str = "macro-layer";
-/// Parts and training grasps of each object, as in the comparison of methods.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-const QUICK: usize = 40;
 
 /// Some channels of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,14 +65,14 @@ const PATTERNS: [Pattern; 14] = [
     pattern("C8", BOTH, "C8"),
 ];
 
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     pattern: Pattern,
     method: &'static Method,
     part: usize,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for &sensors in &plan.sensors {
@@ -129,24 +126,17 @@ fn with_modality(data: &Dataset, modality: &str) -> Result<Dataset, StudyError> 
     })
 }
 
-impl PaperStudy for Modality {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Modality {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let usual = plan.wanted(plan.grasps(PARTS * TRAIN, QUICK), case.sensors);
+        let usual = usual_grasps(plan, case.sensors);
         let view = SensorView { layout: case.pattern.layout.to_owned(), ..usual.view.clone() };
         let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 3);
-        let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
+        let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         let modality = case.pattern.modality;
         let judged =
             fit_and_judge(bench, case.method, &with_modality(&train, modality)?, &with_modality(&test, modality)?)?;

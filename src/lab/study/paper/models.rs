@@ -1,14 +1,17 @@
 //! All methods side by side (Fig. 7): scores, paired differences, and what a model costs.
 
-use super::answers::{Judged, ModelAnswers, ModelCost, PairedDifference, Pool, TestPart, fit_and_judge};
+use super::answers::{
+    Judged, ModelAnswers, ModelCost, PARTS, PairedDifference, Pool, TRAIN, TestPart, fit_and_judge, usual_grasps,
+};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, named_rows, percent_point, percent_row};
 use super::plan::StudyPlan;
 use super::pools::{
     Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, negated, no_worse_than_any,
 };
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use crate::study::comparison::in_table_order;
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, Marker, Plot, PlotAxis};
 use palpate_learn::{Method, MethodKind, method};
@@ -17,11 +20,6 @@ use std::collections::BTreeMap;
 
 pub(super) struct Models;
 
-/// Parts of the grasps, each of which is tested once, and training grasps of each object.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-/// Grasps of each object in a quick study, half of them to test.
-const QUICK: usize = 40;
 /// The paper's model: its strict recipe where there is one.
 const PAPERS_MODEL: [&str; 2] = ["paper-ds-lstm", "ds-lstm"];
 
@@ -34,7 +32,7 @@ const CARD: StudyCard = StudyCard {
 };
 
 /// A unit: a method fitted to one kind of data and judged on one part.
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     imbalanced: bool,
     method: &'static Method,
@@ -50,7 +48,7 @@ fn papers_model() -> Option<&'static Method> {
     PAPERS_MODEL.into_iter().find_map(method)
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for (number, &sensors) in plan.sensors.iter().enumerate() {
@@ -81,24 +79,16 @@ fn is_of_papers_table(method: &Method) -> bool {
     matches!(method.kind, MethodKind::Single | MethodKind::Ensemble) || PAPERS_MODEL.contains(&method.key)
 }
 
-impl PaperStudy for Models {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Models {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let grasps = plan.grasps(PARTS * TRAIN, QUICK);
-        let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 3);
+        let Some(data) = bench.data(&usual_grasps(plan, case.sensors))? else { return Ok(None) };
         let most = if case.imbalanced { TRAIN * 55 / 50 } else { TRAIN };
-        let (train, test) = TestPart { of, part: case.part, train: most }.split(&data, plan.seed)?;
+        let (train, test) = TestPart { train: most, ..TestPart::usual(plan, case.part) }.split(&data, plan.seed)?;
         // 40 to 55 grasps of each object, as in the paper, or the same share of fewer.
         let most = train.by_class().iter().map(Vec::len).max().unwrap_or(0);
         let train = if case.imbalanced { train.imbalanced((40 * most).div_ceil(55)..=most, plan.seed) } else { train };

@@ -3,10 +3,11 @@
 
 use super::answers::{Judged, Pool, TestPart, fit_and_judge};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, named_rows, percent_row};
 use super::plan::{DataWanted, StudyPlan};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Class, Dataset, Example, Labels, Method, method};
@@ -63,14 +64,14 @@ const PARTS: usize = 3;
 const GRASPS: usize = 60;
 const QUICK: usize = 8;
 
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     set: &'static str,
     motion: Motion,
     method: &'static Method,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         // What a motion adds needs grasps with that motion.
         if plan.query.is_some() {
@@ -137,19 +138,13 @@ fn grasps(bench: &StudyBench<'_>, case: &Case) -> Result<Option<Dataset>, StudyE
     Ok(merged)
 }
 
-impl PaperStudy for Shaken {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Shaken {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let Some(data) = grasps(bench, &case)? else { return Ok(None) };
         let of = plan.pick(PARTS, 2, 3);
         let mut parts: Vec<Judged> = Vec::new();

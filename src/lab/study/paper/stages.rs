@@ -4,13 +4,14 @@
 //! trained on the other half, for which stage one's probabilities are further channels, constant over a grasp. In place of
 //! them it gets nothing (uniform probabilities), one of both, or the true size and shape.
 
-use super::answers::{Judged, Pool, TestPart, fit_and_judge, judge};
+use super::answers::{Judged, PARTS, Pool, TestPart, fit_and_judge, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, confusion_plot, confusion_table, named_rows, percent_row};
 use super::plan::StudyPlan;
 use super::pools::{Gains, Pools, adjusted, better_than_each, finding, finding_on_gains, percent};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, Marker, Plot, PlotAxis};
 use palpate_learn::{Class, Dataset, Example, Labels, Method, Model, Pmf, Sequence, SplitPlan, method};
 use palpate_tactile::model::SensorModel;
@@ -30,10 +31,6 @@ const CARD: StudyCard = StudyCard {
 
 /// The network of both stages, and a method of seconds.
 const MODELS: [&str; 2] = ["macro-layer", "extra-trees"];
-/// Parts and training grasps of each object, as in the comparison of methods.
-const PARTS: usize = 3;
-const TRAIN: usize = 50;
-const QUICK: usize = 40;
 
 /// What stage two knows beside the grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +74,7 @@ const PROPERTIES: [(&str, f64); 2] = [(SIZE, 0.90), (SHAPE, 0.81)];
 /// Distance within which an F1 is that of the paper.
 const NEAR: f64 = 0.05;
 
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     method: &'static Method,
     part: usize,
@@ -91,7 +88,7 @@ struct StagesResult {
     stage_two: Vec<(String, Judged)>,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for (number, &sensors) in plan.sensors.iter().enumerate() {
@@ -160,23 +157,15 @@ fn halves(train: &Dataset, seed: u64) -> Result<[Dataset; 2], StudyError> {
     Ok([train.part(&split.train), train.part(&split.test)])
 }
 
-impl PaperStudy for Stages {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for Stages {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
-        let grasps = plan.grasps(PARTS * TRAIN, QUICK);
-        let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 3);
-        let (train, test) = TestPart { of, part: case.part, train: TRAIN }.split(&data, plan.seed)?;
+        let Some(data) = bench.data(&usual_grasps(plan, case.sensors))? else { return Ok(None) };
+        let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         let [first, second] = halves(&train, plan.seed)?;
         // None where it was cancelled; without a model where it cannot be fitted to these grasps.
         let first_stage = |property: usize| -> Result<Option<(Option<Model>, Judged)>, StudyError> {

@@ -2,11 +2,12 @@
 
 use super::answers::{PairedDifference, Pool, TestPart, fit_and_judge};
 use super::bench::{StudyBench, StudyError};
+use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{F1_PERCENT, percent_point};
 use super::plan::StudyPlan;
 use super::pools::{Gains, Pools, better_than_each, finding, finding_on_gains, no_worse_than_any, points};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{StudyCard, UnitResult};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Method, MethodKind, method};
@@ -46,14 +47,14 @@ fn sizes(plan: &StudyPlan) -> &'static [usize] {
 }
 
 /// A unit: a method fitted to so many grasps of each object.
-struct Case {
+pub(super) struct Case {
     sensors: SensorModel,
     size: usize,
     method: &'static Method,
     part: usize,
 }
 
-impl Case {
+impl StudyCase for Case {
     fn all(plan: &StudyPlan) -> Vec<Self> {
         let mut cases = Vec::new();
         for (number, &sensors) in plan.sensors.iter().enumerate() {
@@ -83,19 +84,13 @@ impl Case {
     }
 }
 
-impl PaperStudy for TrainingSize {
-    fn card(&self) -> StudyCard {
-        CARD
-    }
+impl CaseStudy for TrainingSize {
+    type Case = Case;
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Case::all(plan).iter().map(Case::name).collect()
-    }
+    const CARD: StudyCard = CARD;
 
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let case = Case::all(plan).into_iter().find(|case| case.name() == unit);
-        let case = case.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))?;
         let grasps = plan.grasps(MOST + TEST, 40);
         let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
         let of = plan.pick((MOST + TEST) / TEST, 2, 3);
