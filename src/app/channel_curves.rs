@@ -8,8 +8,8 @@ use palpate_sim::gripper::Side;
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::{Channel, Quantity, SignalDefinition, Span};
 
-/// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and their unit; or the raw counts of their
-/// sensors, where those are chosen.
+/// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and
+/// their unit; or the raw counts of their sensors, where those are chosen.
 pub(super) fn channel_curves<'a>(
     context: &PanelContext<'_>,
     quantity: Quantity,

@@ -130,7 +130,7 @@ impl<'a> PanelContext<'a> {
                 ViewSource::Gripper => "record a trial (R)",
                 ViewSource::Trial => "open a trial",
             };
-            return Err(format!("Here is why the model gave its answer, once a grasp is finished: {start}."));
+            return Err(format!("The explanation appears when a grasp ends: {start}."));
         };
         Ok(ExplainRequest { grasp, trial: None })
     }

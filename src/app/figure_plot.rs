@@ -83,7 +83,8 @@ pub(super) fn show(
     if height > ROOM_FOR_TITLES {
         widget = widget.x_axis_label(plot.x.title.clone()).y_axis_label(plot.y.title.clone());
     } else {
-        let axes = format!("{} against {}", plot.y.title, plot.x.title);
+        let titles = [plot.y.title.as_str(), plot.x.title.as_str()];
+        let axes = titles.into_iter().filter(|title| !title.is_empty()).collect::<Vec<_>>().join(" against ");
         ui.add(egui::Label::new(RichText::new(axes).small().weak()).truncate());
     }
     if legend && ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {

@@ -44,8 +44,9 @@ impl Thumbnails {
             let drawn = texture(ctx, &portrait.source, [PORTRAIT_SIDE; 2], rgba);
             // Trials and classes name an object without its folder.
             let stem = Path::new(&portrait.source).file_stem().and_then(|stem| stem.to_str());
-            if let Some(stem) = stem {
-                self.textures.entry(stem.to_owned()).or_insert_with(|| drawn.clone());
+            // Of files with one name the newest counts, but never before a built-in object.
+            if let Some(stem) = stem.filter(|stem| thumbnail(stem).is_none()) {
+                self.textures.insert(stem.to_owned(), drawn.clone());
             }
             self.textures.insert(portrait.source.clone(), drawn);
         }

@@ -80,7 +80,6 @@ fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
     let folder = tempfile::tempdir()?;
     for study in PAPER_STUDIES {
         let card = study.card();
-        let start = std::time::Instant::now();
         assert!(sample(*study, folder.path(), 2, Some(1))?.is_none(), "{}: stopped after a unit", card.key);
         let stored = sample(*study, folder.path(), 2, Some(usize::MAX))?.expect("finished");
         let report = &stored.result;
@@ -114,7 +113,6 @@ fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
         }
         let again = sample(*study, folder.path(), 1, None)?.expect("finished");
         assert_eq!(without_times(&again.result), without_times(report), "{} on one thread", card.key);
-        println!("{}: {:.1} s", card.key, start.elapsed().as_secs_f64());
     }
     Ok(())
 }

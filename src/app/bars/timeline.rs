@@ -43,7 +43,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         let font = FontId::proportional(10.5);
         let word = painter.layout_no_wrap(span.phase.name().to_owned(), font, veil(colours.text, 0.85));
         if word.size().x + 8.0 < right - left {
-            painter.galley(pos2(left + 4.0, rect.top() + 1.0), word, colour(colours.text));
+            let at = pos2(left + 4.0, rect.top() + 1.0);
+            painter.rect_filled(Rect::from_min_size(at, word.size()).expand(1.0), 2.0, veil(colours.background, 0.7));
+            painter.galley(at, word, colour(colours.text));
         }
     }
     if let Some(own) = context.inspected.filter(|own| is_corrected_by_hand(context, own)) {

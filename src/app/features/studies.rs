@@ -40,7 +40,7 @@ pub struct Studies {
     student: Student,
     store: PathBuf,
     chosen: &'static dyn PaperStudy,
-    /// Origin of the result that is shown; the first one where that is not there.
+    /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
     /// Runs asked for, the running one first.
@@ -87,9 +87,9 @@ impl Studies {
         self.view().result(self.chosen.card().key, self.origin).cloned()
     }
 
-    /// Number of the figure that is shown.
-    pub fn figure(&self) -> usize {
-        self.figure
+    /// Number of the figure of a result that is shown.
+    pub fn figure_of(&self, result: &StudyResult) -> usize {
+        self.figure.min(result.figures.len().saturating_sub(1))
     }
 
     /// True where a study is asked for and has not begun.
@@ -101,9 +101,8 @@ impl Studies {
     /// The figure that is shown with its origin in the note, and its size (points).
     pub(in crate::app) fn exported(&self) -> Option<LinkedFigure> {
         let result = self.result()?;
-        let mut linked = result.figures.get(self.figure)?.clone();
-        linked.figure.note += &format!("\n{}", result.stored.origin().replace('`', ""));
-        Some(linked)
+        let linked = result.figures.get(self.figure_of(&result))?.clone();
+        Some(linked.with_note(&result.stored.plain_origin()))
     }
 
     fn choose(&mut self, study: &'static dyn PaperStudy) {
@@ -118,9 +117,12 @@ impl Studies {
             match outcome {
                 StudyOutcome::Finished => {
                     notices.info(format!("Study finished: {title}."));
-                    self.origin = Some(StudyOrigin::Run(request.size));
+                    if request.key == self.chosen.card().key {
+                        (self.origin, self.figure) = (Some(StudyOrigin::Run(request.size)), 0);
+                    }
                 }
-                StudyOutcome::Stopped => notices.info(format!("Study stopped: {title}. Another run goes on there.")),
+                StudyOutcome::Stopped => notices.info(format!("Study stopped: {title}. Run it again to resume.")),
+                StudyOutcome::Withdrawn => {}
                 StudyOutcome::Failed(cause) => notices.error(format!("Study {title} failed: {cause}")),
             }
             self.reported = *number;
@@ -131,7 +133,9 @@ impl Studies {
     /// Applies an action; what follows for the inspection.
     pub(in crate::app) fn apply(&mut self, action: StudyAction, notices: &mut Notices) -> Vec<InspectAction> {
         match action {
-            StudyAction::Look => self.student.ask(StudentCommand::Look),
+            // A run looks at its end, and other panels may have asked already.
+            StudyAction::Look if self.student.is_settled() => self.student.ask(StudentCommand::Look),
+            StudyAction::Look => {}
             StudyAction::Choose(key) => {
                 if let Some(study) = paper_study(&key) {
                     self.choose(study);

@@ -27,7 +27,7 @@ const KEYS: &[Binding] = &[
     // Those with more modifiers come first, so that they win.
     key(Modifiers::SHIFT, Key::Enter, "run the study in full", |c| run(c, StudySize::Full)),
     key(Modifiers::NONE, Key::Enter, "run the study in its quick form", |c| run(c, StudySize::Quick)),
-    key(Modifiers::NONE, Key::Delete, "stop the running study; another run goes on", |c| {
+    key(Modifiers::NONE, Key::Delete, "stop the running study, which can be resumed", |c| {
         c.studies.view().running.as_ref()?;
         Some(StudyAction::Stop.into())
     })

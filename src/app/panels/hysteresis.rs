@@ -4,10 +4,11 @@
 use crate::app::actions::Actions;
 use crate::app::channel_curves::{colour_of, shows};
 use crate::app::context::PanelContext;
+use crate::app::plots::value_marks;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use egui::{Color32, Ui};
-use egui_plot::{Line, LineStyle, Plot, PlotPoints, Points};
+use egui_plot::{GridInput, Line, LineStyle, Plot, PlotPoints, Points};
 use palpate_geometry::palette::series_colour;
 use palpate_sim::gripper::Side;
 use palpate_tactile::{Channel, Quantity};
@@ -42,6 +43,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
     Plot::new("hysteresis")
         .x_axis_label("curvature (1/m)")
         .y_axis_label("pressure (kPa)")
+        .x_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
         .show_background(false)
         .allow_scroll(false)
         .show_x(false)

@@ -52,7 +52,7 @@ pub(super) fn plain(value: f64) -> String {
 }
 
 /// About four marks at round values.
-pub(super) fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
+pub(in crate::app) fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
     let rough = (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();

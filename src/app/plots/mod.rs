@@ -8,7 +8,7 @@ mod labels;
 mod layers;
 mod mouse;
 
-pub(super) use axes::static_plot;
+pub(super) use axes::{static_plot, value_marks};
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;

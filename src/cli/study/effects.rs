@@ -77,5 +77,5 @@ fn print(stored: &StoredStudy<AuditReport>) -> Result<(), Failure> {
         "seen: curvature changes by more than 0.1 1/m or force by more than 10 mN (RMS), and by more than twice what a",
     )?;
     say("tenth of the tolerance or a push of 10 um changes")?;
-    say(stored.origin().replace('`', ""))
+    say(stored.plain_origin())
 }

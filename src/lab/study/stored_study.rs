@@ -53,6 +53,11 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
         };
         format!("`{}`, {time}, version {}", self.command, self.program)
     }
+
+    /// The origin without Markdown, for pictures and terminals.
+    pub fn plain_origin(&self) -> String {
+        self.origin().replace('`', "")
+    }
 }
 
 /// Part of a document between two comments, written from a stored result.

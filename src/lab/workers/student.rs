@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 pub enum StudentCommand {
     /// Read all results.
     Look,
-    /// Run a study; one that was stopped goes on.
+    /// Run a study, or resume it.
     Run(StudyRequest),
 }
 
@@ -73,8 +73,10 @@ pub struct StudyFiles {
 pub enum StudyOutcome {
     /// The result is there.
     Finished,
-    /// Stopped; another run goes on.
+    /// Stopped; the next run resumes it.
     Stopped,
+    /// Stopped before it began.
+    Withdrawn,
     /// Not possible.
     Failed(Arc<StudentError>),
 }
@@ -182,7 +184,9 @@ impl Service {
     }
 
     fn run(&mut self, request: StudyRequest, stop: &AtomicBool, outlet: &Outlet<StudentView>) {
+        let withdrawn = stop.load(Ordering::Relaxed);
         let outcome = match self.finished(&request, stop, outlet) {
+            _ if withdrawn => StudyOutcome::Withdrawn,
             Ok(true) => StudyOutcome::Finished,
             Ok(false) => StudyOutcome::Stopped,
             Err(cause) => StudyOutcome::Failed(Arc::new(cause)),
@@ -192,7 +196,9 @@ impl Service {
         if self.view.outcomes.len() > OUTCOMES {
             self.view.outcomes.pop_front();
         }
-        self.look();
+        if !withdrawn {
+            self.look();
+        }
     }
 
     /// Runs a study to its end; false where it was stopped.
@@ -268,7 +274,7 @@ impl StudyOrigin {
 }
 
 impl StudentView {
-    /// Result of a study from an origin; the first one where none is named or that is not there.
+    /// Result of a study from an origin; the first one where none is named or it is missing.
     pub fn result(&self, key: &str, origin: Option<StudyOrigin>) -> Option<&Arc<StudyResult>> {
         let results = &self.studies.get(key)?.results;
         let wanted = |result: &&Arc<StudyResult>| origin.is_some_and(|origin| origin.is_like(result.origin));

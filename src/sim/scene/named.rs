@@ -2,6 +2,7 @@
 
 use super::{Scene, SceneError};
 use std::path::Path;
+use std::sync::LazyLock;
 
 /// A scene with a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +30,13 @@ impl NamedScene {
         self.text.lines().next().unwrap_or_default().trim_start_matches('#').trim()
     }
 
-    /// Its settings.
+    /// Its settings, read once.
     pub fn scene(&self) -> Scene {
-        Scene::from_toml(self.text).expect("named scenes are embedded and tested")
+        static READ: LazyLock<[Scene; 2]> = LazyLock::new(|| {
+            SCENES.map(|named| Scene::from_toml(named.text).expect("named scenes are embedded and tested"))
+        });
+        let at = SCENES.iter().position(|named| named.name == self.name);
+        at.map_or_else(Scene::default, |at| READ[at].clone())
     }
 
     /// Its gripper, programme and way of holding the object, with everything else of another scene.

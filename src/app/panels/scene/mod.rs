@@ -41,7 +41,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 /// Scenes with a name; each keeps the object, its poses and the solver.
 fn named_scenes_ui(ui: &mut Ui, scene: &mut Scene) {
     ui.horizontal_wrapped(|ui| {
-        ui.label("Gripper of");
+        ui.label("Scene");
         for named in SCENES {
             let applied = named.applied_to(scene);
             let chosen = applied == *scene;

@@ -21,7 +21,7 @@ const BELOW: f32 = 46.0;
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(result) = result_ui(ui, context, "study-figure", "figures", actions) else { return };
-    let number = context.studies.figure().min(result.figures.len().saturating_sub(1));
+    let number = context.studies.figure_of(&result);
     header_ui(ui, context, &result, number, actions);
     let Some(linked) = result.figures.get(number) else {
         ui.weak("This result has no figure.");
@@ -33,7 +33,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
         for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
             wrapped(ui, RichText::new(line).small().weak());
         }
-        wrapped(ui, RichText::new(result.stored.origin().replace('`', "")).small().weak());
+        wrapped(ui, RichText::new(result.stored.plain_origin()).small().weak());
     });
 }
 

@@ -20,7 +20,8 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
         let text = format!("Claims of the paper: {}", shown.collect::<Vec<_>>().join(", "));
         wrapped(
             ui,
-            RichText::new(if findings.is_empty() { "The paper claims nothing here.".to_owned() } else { text }).weak(),
+            RichText::new(if findings.is_empty() { "The paper has no claim about this.".to_owned() } else { text })
+                .weak(),
         );
         for finding in findings {
             finding_ui(ui, context.view.theme, finding);

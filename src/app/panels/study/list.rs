@@ -86,7 +86,7 @@ fn state(context: &PanelContext<'_>, view: &StudentView, key: &str) -> (String, 
         return (progress.map_or("begins ..".to_owned(), progress_text), colours.accent);
     }
     if context.studies.waits(key) {
-        return ("waits for those before".to_owned(), colours.accent);
+        return ("queued".to_owned(), colours.accent);
     }
     if let Some((_, StudyOutcome::Failed(_))) = view.last(key) {
         return ("failed".to_owned(), colours.error);
@@ -96,7 +96,7 @@ fn state(context: &PanelContext<'_>, view: &StudentView, key: &str) -> (String, 
     };
     let stopped = if begun.is_empty() { "" } else { ", another stopped" };
     let text = match results.first() {
-        None if !begun.is_empty() => return ("stopped: a run goes on there".to_owned(), colours.warning),
+        None if !begun.is_empty() => return ("stopped, can be resumed".to_owned(), colours.warning),
         None => return ("not run".to_owned(), colours.quiet_text),
         Some(result) => match result.origin {
             StudyOrigin::Run(StudySize::Full) => "run in full",

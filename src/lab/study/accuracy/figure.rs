@@ -24,7 +24,7 @@ pub fn accuracy_figure(stored: &StoredStudy<AccuracyStudy>) -> Figure {
     let note = format!(
         "Medians over {objects} shapes in {poses} poses, with quartiles. Errors of motion: against a tolerance of 1e-7; of \
          joints and taxels: against 40 joints and 120 × 12 taxels.\n{}",
-        stored.origin().replace('`', "")
+        stored.plain_origin()
     );
     Figure { title: "What accuracy costs, and what it is worth".to_owned(), plots, columns: 2, note }
 }

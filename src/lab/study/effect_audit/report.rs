@@ -178,7 +178,7 @@ pub fn audit_figure(stored: &StoredStudy<AuditReport>) -> Figure {
         title: format!("What auto leaves out: {} random scenes, each effect flipped", report.scenes),
         columns: 1,
         plots: PLOTS.iter().map(|(title, effects)| plot(report, title, effects)).collect(),
-        note: format!("90th percentile of the scenes; crosses: missed. {}", stored.origin().replace('`', "")),
+        note: format!("90th percentile of the scenes; crosses: missed. {}", stored.plain_origin()),
     }
 }
 

@@ -35,7 +35,7 @@ pub enum StudyError {
     /// The trials cannot be divided into training and test grasps.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// A preset or method that is not there.
+    /// A preset or method that does not exist.
     #[error("there is no {0}")]
     Unknown(String),
     /// The trials lack something that the study needs.

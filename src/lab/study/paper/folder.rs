@@ -88,8 +88,8 @@ impl StudyFolder {
         for table in &stored.result.tables {
             put(format!("{}.csv", table.name), Ok(table.csv()))?;
         }
-        for mut linked in study.figures(&stored.result) {
-            linked.figure.note += &format!("\n{}", stored.origin().replace('`', ""));
+        for linked in study.figures(&stored.result) {
+            let linked = linked.with_note(&stored.plain_origin());
             put(format!("{}.svg", linked.name), draw(&linked))?;
         }
         Ok(names)

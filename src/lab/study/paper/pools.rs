@@ -47,7 +47,7 @@ impl<K: PartialEq> Pools<K> {
     }
 }
 
-/// Adds a text that is not there yet.
+/// Adds a text once.
 pub(super) fn add_new(known: &mut Vec<String>, text: &str) {
     if !known.iter().any(|own| own == text) {
         known.push(text.to_owned());

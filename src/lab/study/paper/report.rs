@@ -139,6 +139,15 @@ pub struct LinkedFigure {
     pub links: Vec<FigureLink>,
 }
 
+impl LinkedFigure {
+    /// The figure with another line in its note.
+    #[must_use]
+    pub fn with_note(mut self, line: &str) -> Self {
+        self.figure.note += &format!("\n{line}");
+        self
+    }
+}
+
 /// A mark of a figure, and the row of a table behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FigureLink {

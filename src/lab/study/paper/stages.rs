@@ -289,7 +289,7 @@ fn of<'a>(pooled: &'a [Pooled<'a>], kind: (&'static str, &'static str), name: &s
 fn second_table(plan: &StudyPlan, second: &[Pooled<'_>]) -> StudyTable {
     let mut table = StudyTable::new(
         CARD.key,
-        format!("Stage two by what it is told, {}; differences to nothing", plan.described()),
+        format!("Stage two by its extra input, {}; differences to none", plan.described()),
         &[
             ("sensors", ""),
             ("model", ""),
@@ -397,8 +397,7 @@ fn second_figure(at: usize, table: &StudyTable) -> LinkedFigure {
         let (x, y) = (PlotAxis::linear(F1_PERCENT), named_rows(&names));
         plots.push(Plot { title: format!("{sensors} sensors"), x, y, series, sideways: true, ..Plot::default() });
     }
-    let note =
-        "Macro F1 of stage two after one grasp, with 95 % intervals, by what it is told beside the grasp.".to_owned();
+    let note = "Macro F1 of stage two after one grasp, with 95 % intervals, by its input beside the grasp.".to_owned();
     let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
     LinkedFigure { name: CARD.key.to_owned(), figure, size: [1080, 420], links }
 }

@@ -162,7 +162,7 @@ pub fn stability_figure(stored: &StoredStudy<StabilityReport>) -> Figure {
             },
         ],
         columns: 1,
-        note: format!("{} random scenes; {}", random.scenes, stored.origin().replace('`', "")),
+        note: format!("{} random scenes; {}", random.scenes, stored.plain_origin()),
     }
 }
 

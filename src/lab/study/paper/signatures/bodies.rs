@@ -164,7 +164,7 @@ pub(super) fn papers_scene() -> Scene {
     NamedScene::named("paper").map(|named| named.scene()).unwrap_or_default()
 }
 
-/// The settings that decide, and two that do not.
+/// Settings varied about the paper's scene.
 pub(super) const VARIED: [Varied; 6] = [
     Varied {
         name: "torque at 1 bar",
@@ -189,8 +189,10 @@ pub(super) const VARIED: [Varied; 6] = [
         values: &[0.1, 0.2, 0.5, 1.0, 2.0],
         set: |scene, value| {
             let ticks = (value * f64::from(scene.timing.actuation_hz)).round().max(1.0);
+            // The hold takes what is left of the time.
+            let whole = scene.programme.close_ticks() + scene.programme.hold_ticks;
             scene.programme.close_bar_per_tick = scene.programme.peak_bar / ticks;
-            scene.programme.hold_ticks = 30_u32.saturating_sub(ticks as u32);
+            scene.programme.hold_ticks = whole.saturating_sub(ticks as u32);
         },
         get: |scene| f64::from(scene.programme.close_ticks()) / f64::from(scene.timing.actuation_hz.max(1)),
     },

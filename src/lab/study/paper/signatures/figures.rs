@@ -99,53 +99,63 @@ fn thresholds() -> Vec<ReferenceLine> {
     vec![line(20.0, "steady below"), line(25.0, "increase above")]
 }
 
-/// Rates and the rise of pressure against each setting of the paper's scene.
+/// Longest rise of pressure that is early.
+fn soon() -> ReferenceLine {
+    ReferenceLine { horizontal: true, at: 0.2, text: String::new() }
+}
+
+/// Rates, and below them the rise of pressure, against each setting of the paper's scene.
 fn settings((at, table): (usize, &StudyTable)) -> LinkedFigure {
+    const RATES: [(&str, &str, Marker); 2] =
+        [("rate after contact, round", "round", Marker::Dot), ("rate after contact, flat", "flat", Marker::Square)];
+    const RISE: [(&str, &str, Marker); 1] = [("time to 90 % of pressure", "both", Marker::Ring)];
+    let rows_of = [(&RATES[..], "rate after contact (%)", 100.0), (&RISE[..], "time to 90 % of pressure (s)", 1.0)];
     let (mut plots, mut links) = (Vec::new(), Vec::new());
-    for varied in &VARIED {
-        let rows = table.rows_with(&[("setting", varied.name)]);
-        let title =
-            if varied.unit.is_empty() { varied.name.to_owned() } else { format!("{} ({})", varied.name, varied.unit) };
-        let [usual, papers] = varied.known();
-        let vertical = |at: f64, text: &str| ReferenceLine { horizontal: false, at, text: text.to_owned() };
-        let both = (usual - papers).abs() < 1e-9 * papers.abs();
-        let marks =
-            if both { vec![vertical(papers, "both")] } else { vec![vertical(usual, DEFAULT), vertical(papers, PAPER)] };
-        let mut plot = Plot {
-            x: PlotAxis::logarithmic(title),
-            y: PlotAxis { range: Some([-10.0, 120.0]), ..PlotAxis::linear("%") },
-            references: thresholds()
-                .into_iter()
-                .map(|line| ReferenceLine { text: String::new(), ..line })
-                .chain(marks)
-                .collect(),
-            ..Plot::default()
-        };
-        let columns = [
-            ("rate after contact, round", "rate after contact, round", 100.0, Marker::Dot),
-            ("rate after contact, flat", "rate after contact, flat", 100.0, Marker::Square),
-            ("time to 90 % of pressure", "time to 90 % of pressure (100 %: 1 s)", 100.0, Marker::Ring),
-        ];
-        for (colour, (column, name, scale, marker)) in columns.into_iter().enumerate() {
-            for (point, row) in rows.iter().enumerate() {
-                let mark = FigureMark::Point(plot.series.len(), point);
-                links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
+    for (columns, title, scale) in rows_of {
+        for varied in &VARIED {
+            let rows = table.rows_with(&[("setting", varied.name)]);
+            let unit = if varied.unit.is_empty() { String::new() } else { format!(" ({})", varied.unit) };
+            let [usual, papers] = varied.known();
+            let vertical = |at: f64, text: &str| ReferenceLine { horizontal: false, at, text: text.to_owned() };
+            let both = (usual - papers).abs() < 1e-9 * papers.abs();
+            let marks = if both {
+                vec![vertical(papers, "both")]
+            } else {
+                vec![vertical(usual, DEFAULT), vertical(papers, PAPER)]
+            };
+            let limits = if scale == 1.0 { vec![soon()] } else { thresholds() };
+            let mut plot = Plot {
+                x: PlotAxis::logarithmic(format!("{}{unit}", varied.name)),
+                y: PlotAxis::linear(title),
+                references: limits
+                    .into_iter()
+                    .map(|line| ReferenceLine { text: String::new(), ..line })
+                    .chain(marks)
+                    .collect(),
+                ..Plot::default()
+            };
+            for (colour, (column, name, marker)) in columns.iter().enumerate() {
+                for (point, row) in rows.iter().enumerate() {
+                    let mark = FigureMark::Point(plot.series.len(), point);
+                    links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
+                }
+                let points = rows
+                    .iter()
+                    .map(|row| DataPoint::new(value(table, *row, "value"), scale * value(table, *row, column)));
+                let name = if plots.is_empty() { (*name).to_owned() } else { String::new() };
+                let (line, marker) = (LineStyle::Thin, *marker);
+                plot.series.push(DataSeries { name, colour, marker, line, points: points.collect() });
             }
-            let points =
-                rows.iter().map(|row| DataPoint::new(value(table, *row, "value"), scale * value(table, *row, column)));
-            let name = if plots.is_empty() { name.to_owned() } else { String::new() };
-            let line = LineStyle::Thin;
-            plot.series.push(DataSeries { name, colour, marker, line, points: points.collect() });
+            plots.push(plot);
         }
-        plots.push(plot);
     }
     let figure = Figure {
         title: "For what finger the sentences hold: scene paper with one setting changed".to_owned(),
         plots,
-        columns: 3,
-        note: "Rates of bending as shares of that before contact: round objects steady below 20 %, flat ones increasing above 25 %; \
-               pressure saturates early below 20 % (0.2 s)."
+        columns: VARIED.len(),
+        note: "Bending after contact over that before it: round objects steady below 20 %, flat ones increasing above 25 %; \
+               pressure saturates early below 0.2 s."
             .to_owned(),
     };
-    LinkedFigure { name: "signatures-settings".to_owned(), figure, size: [1180, 760], links }
+    LinkedFigure { name: "signatures-settings".to_owned(), figure, size: [1560, 620], links }
 }

@@ -32,12 +32,18 @@ const SOON_S: f64 = 0.20;
 /// Most pressure before contact, as a share of the hold's, that is low.
 const LOW: f64 = 0.05;
 
+/// Agreement of a sentence with its rule, all parts of which must hold.
 fn judged(parts: &[Option<bool>]) -> Agreement {
-    Agreement::of_all(parts.iter().map(|part| match part {
-        None => Agreement::NotMeasured,
-        Some(true) => Agreement::Agrees,
-        Some(false) => Agreement::Disagrees,
-    }))
+    let all = |wanted: Option<bool>| parts.iter().all(|part| *part == wanted);
+    if all(None) {
+        Agreement::NotMeasured
+    } else if all(Some(true)) {
+        Agreement::Agrees
+    } else if all(Some(false)) {
+        Agreement::Disagrees
+    } else {
+        Agreement::Partly
+    }
 }
 
 fn number(value: Option<f64>) -> String {
@@ -142,7 +148,8 @@ mod tests {
         };
         assert_eq!(verdicts(&good), [Agreement::Agrees; 5]);
         let bad = Summary { round_rate: Some(0.4), rise_s: Some(1.0), flat_line: None, ..good };
-        let wanted = [Agreement::Agrees, Agreement::Partly, Agreement::Agrees, Agreement::Disagrees, Agreement::Agrees];
+        // Half of the rule about flat objects is not measured.
+        let wanted = [Agreement::Agrees, Agreement::Partly, Agreement::Partly, Agreement::Disagrees, Agreement::Agrees];
         assert_eq!(verdicts(&bad), wanted);
         assert_eq!(verdicts(&Summary::default()), [Agreement::NotMeasured; 5]);
     }
