@@ -104,7 +104,7 @@ fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     bench.until_shown(true, "measuring, ");
     bench.harness.get_by_label("Stop study").click();
     bench.until_told("Study stopped: ");
-    bench.until_shown(true, "stopped: a run goes on there");
+    bench.until_shown(true, "stopped, can be resumed");
     bench.tell(request(false));
     bench.until_told("Study finished: ");
     bench.until_shown(true, "A short form: do not quote its numbers.");

@@ -99,7 +99,7 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     let size = [280.0, 760.0];
     let setup = BenchSetup { panel: Some(panel()), model, fill, theme: Theme::Light, size, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    assert!(bench.harness.query_by_label_contains("once a grasp is finished: press play").is_some());
+    assert!(bench.harness.query_by_label_contains("appears when a grasp ends: press play").is_some());
     run_out(&mut bench);
     bench.until_shown(true, "Trial 1, Lemon, sim, distance 0.00, same readings");
     compare("why_found", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
