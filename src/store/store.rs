@@ -192,7 +192,7 @@ impl Store {
     }
 
     /// Ends a trial, whose quality, warnings and pulls are now known. It is removed where another trial holds the same
-    /// grasp.
+    /// grasp, unless it has a note, tag or other change by a person.
     pub fn finish(&mut self, id: TrialId, quality: &Quality, header: &TrialHeader) -> Result<Stored, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
@@ -437,14 +437,16 @@ fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) ->
     Ok(())
 }
 
-/// Completes a simulated trial, or removes it where another trial holds the same grasp.
+/// Completes a simulated trial, or removes it where another trial holds the same grasp and nobody has annotated this one.
 fn end(
     transaction: &Transaction<'_>,
     id: TrialId,
     quality: &Quality,
     header: &TrialHeader,
 ) -> rusqlite::Result<Stored> {
-    if let Some(other) = known(transaction, header, id)? {
+    if let Some(other) = known(transaction, header, id)?
+        && !is_annotated(transaction, id)?
+    {
         transaction.execute("DELETE FROM trials WHERE id = ?1", [id])?;
         return Ok(Stored::Known(other));
     }
@@ -454,6 +456,13 @@ fn end(
         params![id, header.origin.as_ref().map(json), header.identity()],
     )?;
     Ok(Stored::New(id))
+}
+
+/// True for a trial with a note, a tag or any change in the journal.
+fn is_annotated(transaction: &Transaction<'_>, id: TrialId) -> rusqlite::Result<bool> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE id = ?1 AND (note <> '' OR tags <> '[]'
+        OR EXISTS (SELECT 1 FROM journal WHERE journal.trial = trials.uid)))";
+    transaction.query_row(sql, [id], |row| row.get(0))
 }
 
 pub(super) fn set_complete(

@@ -1,12 +1,13 @@
 //! The store itself: what goes in comes out, together with other programs, from old versions, and not from foreign files.
 
+use super::identity::Stored;
 use super::store::*;
 use super::store_error::StoreError;
 use crate::test_trials::grasp;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::trial::{GraspOrigin, SimulatedTrial};
 use rusqlite::Connection;
 
 fn trial(seed: u64) -> SimulatedTrial {
@@ -44,6 +45,30 @@ fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
     assert_eq!(store.list(false)?[0].state, "recording");
     store.finish(id, &trial.data.quality, &trial.header)?;
     assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
+    Ok(())
+}
+
+#[test]
+fn a_copy_goes_at_its_end_unless_somebody_annotated_it() -> Result<(), StoreError> {
+    let folder = folder();
+    let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+    let mut trial = trial(1);
+    trial.header.origin = Some(GraspOrigin::default());
+    let first = store.insert(&trial)?.id();
+    let (quality, header) = (&trial.data.quality, &trial.header);
+    let plain = store.begin(&trial)?;
+    assert_eq!(store.finish(plain, quality, header)?, Stored::Known(first));
+
+    let noted = store.begin(&trial)?;
+    store.labels().set_note(noted, "slipped")?;
+    assert_eq!(store.finish(noted, quality, header)?, Stored::New(noted));
+    let undone = store.begin(&trial)?;
+    store.labels().set_tags(undone, &["wet".to_owned()])?;
+    store.journal().undo()?;
+    assert_eq!(store.finish(undone, quality, header)?, Stored::New(undone));
+    let rows = store.list(false)?;
+    let told: Vec<_> = rows.iter().map(|row| (row.id, row.duplicate_of, row.note.as_str())).collect();
+    assert_eq!(told, [(first, None, ""), (noted, Some(first), "slipped"), (undone, Some(first), "")]);
     Ok(())
 }
 
