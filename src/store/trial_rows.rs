@@ -118,7 +118,7 @@ impl RowReader {
         let duplicate_of = row.get::<_, Option<TrialId>>(23)?;
         flags.extend(duplicate_of.map(|first| FlagRemark {
             flag: Flag::Duplicate,
-            remark: format!("the same grasp as trial {first}; data sets use that one"),
+            remark: format!("the same grasp as trial {first}; a data set with both uses that one"),
         }));
         let origin: Option<GraspOrigin> =
             row.get::<_, Option<String>>(21)?.and_then(|origin| serde_json::from_str(&origin).ok());

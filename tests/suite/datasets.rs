@@ -1,6 +1,7 @@
 //! Data sets that can be trusted: each grasp once, nothing mixed in silence, few and foreign trials judged without flags.
 
 use crate::program::{json, refused, run};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::grasp;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
@@ -116,6 +117,31 @@ fn the_same_grasp_is_one_trial_collected_or_not() {
     assert_eq!(merged.code, Some(0), "{merged:?}");
     let rows = trials(third.path()).list(false).unwrap();
     assert!(rows.len() == 5 && rows.iter().all(|row| row.duplicate_of.is_none()), "{rows:?}");
+}
+
+#[test]
+fn a_query_keeps_a_copy_whose_original_it_does_not_select() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = trials(folder.path());
+    for object in ["ball", "box"] {
+        let scene = scene_of(object);
+        let mut trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+        trial.header.collection = Some("first".to_owned());
+        assert_eq!(store.insert_collected([&trial].into_iter()).unwrap(), 1);
+        trial.header.collection = Some("second".to_owned());
+        let id = store.begin(&trial).unwrap();
+        store.append(id, trial.frames()).unwrap();
+        store.labels().set_note(id, "kept").unwrap();
+        assert!(store.finish(id, &trial.data.quality, &trial.header).unwrap().is_new());
+    }
+    let read = |collection: Option<&str>| {
+        let query = DatasetQuery { collection: collection.map(str::to_owned), ..DatasetQuery::default() };
+        let data = query.read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
+        (data.examples.iter().map(|example| example.id).collect::<Vec<_>>(), data.about.left_out)
+    };
+    assert_eq!(read(Some("first")), (vec![1, 3], 0));
+    assert_eq!(read(Some("second")), (vec![2, 4], 0));
+    assert_eq!(read(None), (vec![1, 3], 2), "each once");
 }
 
 #[test]

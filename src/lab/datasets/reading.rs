@@ -5,10 +5,11 @@ use super::origin::TrialOrigin;
 use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
 use palpate_learn::{Dataset, Example, Sequence};
 use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_store::labels::Flag;
 use palpate_store::{Library, Store, TrialRow};
 use palpate_tactile::trial::TrialId;
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Numbers of trials left out, by reason.
@@ -16,8 +17,8 @@ type LeftOut = BTreeMap<String, usize>;
 
 impl DatasetQuery {
     /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
-    /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial are left out and
-    /// counted. `progress` gets the number of trials read and their total.
+    /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
+    /// out and counted. `progress` gets the number of trials read and their total.
     pub fn read(
         &self,
         store: &Store,
@@ -39,6 +40,15 @@ impl DatasetQuery {
                 false
             }
             None => true,
+        });
+        // The original of a copy may be outside the query, so only copies within it are left out.
+        let mut held = BTreeSet::new();
+        rows.retain(|row| {
+            let first = row.identity.as_ref().is_none_or(|identity| held.insert(identity.clone()));
+            if !first {
+                *left_out.entry(COPIES.to_owned()).or_default() += 1;
+            }
+            first
         });
         if rows.is_empty() {
             let about = self.about(store);
@@ -72,9 +82,7 @@ impl DatasetQuery {
             Some(NOT_SOUND)
         } else if row.pulled {
             Some("pulled by hand")
-        } else if row.duplicate_of.is_some() {
-            Some(COPIES)
-        } else if !row.flags.is_empty() && !self.include_flagged {
+        } else if row.flags.iter().any(|found| found.flag != Flag::Duplicate) && !self.include_flagged {
             Some("flagged")
         } else {
             None
