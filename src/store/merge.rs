@@ -25,14 +25,21 @@ const CHOOSE_INCOMING: &str = "
             ours.identity = theirs.identity AND ours.state = 'complete' AND ours.deleted IS NULL));
 ";
 
-/// Grasps that this store has already belong to the other's collections too.
+/// Grasps that this store has already belong to the other's collections too: the same trial, else the oldest that holds
+/// the grasp.
 const ADD_MEMBERSHIPS: &str = "
     INSERT OR IGNORE INTO main.memberships (trial, collection)
-    SELECT ours.id, theirs.collection FROM other.trials AS theirs
-    JOIN main.trials AS ours ON ours.identity = theirs.identity AND ours.uid <> theirs.uid
-    WHERE theirs.collection IS NOT NULL AND theirs.collection IS NOT ours.collection
-        AND ours.deleted IS NULL AND theirs.deleted IS NULL
-        AND theirs.uid NOT IN (SELECT uid FROM temp.incoming);
+    SELECT holder.id, known.collection FROM (
+        SELECT belongs.collection, coalesce(
+            (SELECT ours.id FROM main.trials AS ours WHERE ours.uid = theirs.uid),
+            (SELECT min(ours.id) FROM main.trials AS ours
+                WHERE ours.identity = theirs.identity AND ours.state = 'complete' AND ours.deleted IS NULL)) AS id
+        FROM (SELECT id AS trial, collection FROM other.trials WHERE collection IS NOT NULL
+            UNION SELECT trial, collection FROM other.memberships) AS belongs
+        JOIN other.trials AS theirs ON theirs.id = belongs.trial
+        WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)) AS known
+    JOIN main.trials AS holder ON holder.id = known.id
+    WHERE holder.collection IS NOT known.collection;
 ";
 
 /// Calibrations come along, so that signals can be derived here too. Mountings and the plan stay with each store.
@@ -110,6 +117,7 @@ mod tests {
     use super::*;
     use crate::test_trials::grasp;
     use palpate_sim::scene::Scene;
+    use palpate_tactile::trial::{GraspOrigin, SimulatedTrial};
 
     #[test]
     fn merging_adds_what_is_new_and_only_once() -> Result<(), StoreError> {
@@ -133,6 +141,69 @@ mod tests {
         }
         assert!(matches!(all.merge_from(&path("gone.sqlite")), Err(StoreError::Open { .. })));
         assert!(!path("gone.sqlite").exists());
+        Ok(())
+    }
+
+    /// A store in a folder.
+    fn open(folder: &tempfile::TempDir, name: &str) -> Result<Store, StoreError> {
+        Store::open(&folder.path().join(name))
+    }
+
+    /// A grasp whose identity is known, in a collection.
+    fn collected(collection: &str) -> SimulatedTrial {
+        let mut trial = grasp(&Scene::default(), None, 0);
+        trial.header.origin = Some(GraspOrigin::default());
+        trial.header.collection = Some(collection.to_owned());
+        trial
+    }
+
+    fn collections_of(store: &Store) -> Result<Vec<Vec<String>>, StoreError> {
+        Ok(store.list(false)?.iter().map(|row| row.collections().cloned().collect()).collect())
+    }
+
+    #[test]
+    fn a_trial_merged_earlier_joins_the_collections_that_it_has_joined_since() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (mut all, mut shard) = (open(&folder, "all.sqlite")?, open(&folder, "shard.sqlite")?);
+        shard.insert_collected([&collected("first")].into_iter())?;
+        all.merge_from(shard.path())?;
+        assert_eq!(shard.insert_collected([&collected("second")].into_iter())?, 0, "it has joined");
+        for _ in 0..2 {
+            assert_eq!(all.merge_from(shard.path())?.added, 0);
+            assert_eq!(collections_of(&all)?, [["first", "second"]]);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_grasp_known_here_joins_all_collections_of_the_other_store() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (mut all, mut shard) = (open(&folder, "all.sqlite")?, open(&folder, "shard.sqlite")?);
+        all.insert_collected([&collected("own")].into_iter())?;
+        for collection in ["first", "second", "own"] {
+            shard.insert_collected([&collected(collection)].into_iter())?;
+        }
+        assert_eq!(all.merge_from(shard.path())?.added, 0);
+        assert_eq!(collections_of(&all)?, [["own", "first", "second"]]);
+        Ok(())
+    }
+
+    #[test]
+    fn of_several_copies_the_oldest_complete_one_joins() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (mut all, mut shard) = (open(&folder, "all.sqlite")?, open(&folder, "shard.sqlite")?);
+        let mut alone = collected("first");
+        shard.insert_collected([&alone].into_iter())?;
+        alone.header.collection = None;
+        let recording = all.begin(&alone)?;
+        let oldest = all.insert(&alone)?.id();
+        let copy = all.begin(&alone)?;
+        all.labels().set_note(copy, "kept")?;
+        assert!(all.finish(copy, &alone.data.quality, &alone.header)?.is_new());
+        all.merge_from(shard.path())?;
+        let joined = |row: &crate::TrialRow| !row.also_in.is_empty();
+        let found: Vec<_> = all.list(false)?.iter().map(|row| (row.id, joined(row))).collect();
+        assert_eq!(found, [(recording, false), (oldest, true), (copy, false)]);
         Ok(())
     }
 }
