@@ -179,6 +179,15 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
                 let merged = store.merge_from(other)?;
                 let (added, known) = (merged.added, merged.known);
                 say(format!("{}: {added} trial(s) added, {known} already there", other.display()))?;
+                if merged.annotated > 0 {
+                    warn(&format!(
+                        "{}: {} known trial(s) have labels, notes, tags or corrected phases that were not merged; `palpate \
+                         trials list --store {}` shows them",
+                        other.display(),
+                        merged.annotated,
+                        other.display()
+                    ));
+                }
             }
             Ok(())
         }

@@ -15,6 +15,8 @@ pub struct Merged {
     pub added: u64,
     /// Trials that were in this store already.
     pub known: u64,
+    /// Those of them that have a label, note, tag or corrected phase in the other store alone, which stays there.
+    pub annotated: u64,
 }
 
 const CHOOSE_INCOMING: &str = "
@@ -57,8 +59,8 @@ const COPY_JOURNAL: &str = "
     WHERE theirs.uid NOT IN (SELECT uid FROM main.journal) ORDER BY theirs.number;
 ";
 
-/// Copies the chosen trials with everything that belongs to them; returns how many.
-fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<u64> {
+/// Copies the chosen trials with everything that belongs to them; returns how many, and how many others are annotated.
+fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<(u64, i64)> {
     transaction.execute_batch(CHOOSE_INCOMING)?;
     let columns = columns_of(transaction, "trials", "id")?;
     let sql = format!(
@@ -78,9 +80,20 @@ fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<u64> {
     transaction.execute_batch(ADD_MEMBERSHIPS)?;
     transaction.execute_batch(COPY_CALIBRATIONS)?;
     transaction.execute_batch(COPY_JOURNAL)?;
+    let annotated = transaction.query_row(COUNT_ANNOTATED, [], |row| row.get(0))?;
     transaction.execute_batch("DROP TABLE temp.incoming")?;
-    Ok(added)
+    Ok((added, annotated))
 }
+
+/// Trials known here, about which the other store's journal says more, or that have a note or tag there and another
+/// uid here.
+const COUNT_ANNOTATED: &str = "
+    SELECT count(*) FROM other.trials AS theirs
+    WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming) AND (
+        EXISTS (SELECT 1 FROM other.journal AS told
+            WHERE told.trial = theirs.uid AND told.uid NOT IN (SELECT uid FROM main.journal))
+        OR (theirs.note <> '' OR theirs.tags <> '[]') AND theirs.uid NOT IN (SELECT uid FROM main.trials));
+";
 
 /// All columns of a table but its key, separated by commas.
 fn columns_of(transaction: &Transaction<'_>, table: &str, key: &str) -> rusqlite::Result<String> {
@@ -103,9 +116,10 @@ impl Store {
         let merged = self.write().and_then(|transaction| {
             let count = "SELECT count(*) FROM other.trials";
             let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
-            let added = copy(&transaction).map_err(fault)?;
+            let (added, annotated) = copy(&transaction).map_err(fault)?;
             transaction.commit().map_err(fault)?;
-            Ok(Merged { added, known: total.cast_unsigned().saturating_sub(added) })
+            let known = total.cast_unsigned().saturating_sub(added);
+            Ok(Merged { added, known, annotated: annotated.cast_unsigned() })
         });
         self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;
         merged
@@ -133,8 +147,8 @@ mod tests {
         }
         // The same trial of the same collection, made elsewhere.
         all.insert_collected([&trial].into_iter())?;
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 2, known: 1 });
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3 });
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 2, known: 1, annotated: 0 });
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3, annotated: 0 });
         assert_eq!(all.collected("set")?.len(), 3);
         for id in 1..=3 {
             assert!(all.load(id)?.frames() == trial.frames());
@@ -185,6 +199,27 @@ mod tests {
         }
         assert_eq!(all.merge_from(shard.path())?.added, 0);
         assert_eq!(collections_of(&all)?, [["own", "first", "second"]]);
+        Ok(())
+    }
+
+    #[test]
+    fn what_people_noted_on_known_grasps_is_counted() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (mut all, mut shard) = (open(&folder, "all.sqlite")?, open(&folder, "shard.sqlite")?);
+        all.insert(&collected("own"))?;
+        let id = shard.insert(&collected("first"))?.id();
+        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 1, annotated: 0 });
+        shard.labels().set_note(id, "slipped")?;
+        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 1, annotated: 1 });
+
+        // A trial merged earlier, annotated since; what has come along already does not count.
+        let mut other = collected("own");
+        other.header.seed = 1;
+        let id = shard.insert(&other)?.id();
+        shard.labels().set_tags(id, &["wet".to_owned()])?;
+        assert_eq!(all.merge_from(shard.path())?, Merged { added: 1, known: 1, annotated: 1 });
+        shard.labels().set_note(id, "late")?;
+        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 2, annotated: 2 });
         Ok(())
     }
 
