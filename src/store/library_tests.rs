@@ -5,7 +5,7 @@ use crate::labels::TrialEdit;
 use crate::test_trials::{header, without_frames};
 use palpate_sim::scene::PosePreset;
 use palpate_tactile::Signals;
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::trial::{GraspOrigin, SimulatedTrial, TrialId, TrialSource};
 use proptest::prelude::*;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -24,6 +24,23 @@ fn simulate(store: &mut Store, object: &str, preset: &str) -> Result<TrialId, St
     let mut trial = without_frames(object);
     trial.header.scene.pose = PosePreset::named(preset).expect("a preset").poses();
     store.insert(&trial).map(Stored::id)
+}
+
+/// A simulated grasp of a collection, whose identity is known.
+fn known_grasp() -> SimulatedTrial {
+    let mut trial = without_frames("ball");
+    trial.header.origin = Some(GraspOrigin::default());
+    trial.header.collection = Some("set".to_owned());
+    trial
+}
+
+/// Records that grasp alone, with a note, so that it stays where another trial holds it.
+fn copy(store: &mut Store) -> Result<TrialId, StoreError> {
+    let mut trial = known_grasp();
+    trial.header.collection = None;
+    let id = store.begin(&trial)?;
+    store.labels().set_note(id, "kept")?;
+    Ok(store.finish(id, &trial.data.quality, &trial.header)?.id())
 }
 
 fn import(store: &mut Store, label: &str) -> Result<u32, StoreError> {
@@ -170,9 +187,34 @@ enum Event {
     Begin,
     End,
     Edit(Vec<TrialId>, u8),
+    Copy,
+    Join,
     Undo,
     Redo,
     Purge,
+}
+
+#[test]
+fn copies_and_members_of_collections_follow_changes_of_other_trials() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = open(&folder)?;
+    let (first, second) = (copy(&mut store)?, copy(&mut store)?);
+    let mut library = Library::read(&store)?;
+    let mut read = |store: &Store| -> Result<(Option<TrialId>, Vec<String>), StoreError> {
+        library.catch_up(store)?;
+        Ok(library.trial(second).map(|trial| (trial.row.duplicate_of, trial.row.also_in.clone())).unwrap_or_default())
+    };
+    assert_eq!(read(&store)?, (Some(first), vec![]));
+    store.delete(&[first])?;
+    assert_eq!(read(&store)?, (None, vec![]));
+    store.restore(&[first])?;
+    assert_eq!(read(&store)?, (Some(first), vec![]));
+    store.delete(&[first])?;
+    store.purge()?;
+    assert_eq!(read(&store)?, (None, vec![]), "deleted and purged between two looks");
+    assert_eq!(store.insert_collected([&known_grasp()].into_iter())?, 0);
+    assert_eq!(read(&store)?, (None, vec!["set".to_owned()]));
+    Ok(())
 }
 
 fn event() -> impl Strategy<Value = Event> {
@@ -183,6 +225,8 @@ fn event() -> impl Strategy<Value = Event> {
         Just(Event::Begin),
         Just(Event::End),
         (some, 0..6u8).prop_map(|(ids, what)| Event::Edit(ids, what)),
+        Just(Event::Copy),
+        Just(Event::Join),
         Just(Event::Undo),
         Just(Event::Redo),
         Just(Event::Purge),
@@ -210,6 +254,8 @@ fn apply(store: &mut Store, event: Event, begun: &mut Vec<TrialId>) -> Result<()
             // Refused for trials that do not exist, or are deleted.
             let _refused = store.labels().edit(&ids, &edit[usize::from(what)]);
         }
+        Event::Copy => drop(copy(store)?),
+        Event::Join => drop(store.insert_collected([&known_grasp()].into_iter())?),
         Event::Undo => drop(store.journal().undo()?),
         Event::Redo => drop(store.journal().redo()?),
         Event::Purge => drop(store.purge()?),

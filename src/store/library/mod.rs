@@ -1,8 +1,9 @@
 //! The library: all trials in memory, read once and kept up to date, so that search, filters and order of 100 000 trials
 //! take milliseconds.
 //!
-//! New trials have higher numbers, and every other change of a row has an entry in the journal, so that few rows are
-//! read again. The rows of trials that were being recorded at the last look are read again too.
+//! New trials have higher numbers, and most other changes of a row have an entry in the journal, so that few rows are
+//! read again. Read again too are trials that were being recorded at the last look, the other copies of a changed
+//! grasp, whose flag depends on it, and trials that have joined a collection.
 
 mod counts;
 mod order;
@@ -106,19 +107,39 @@ impl Library {
         let newest = self.trials.keys().next_back().copied().unwrap_or(oldest);
         self.journal = Some(last_entry(store)?);
         let mut stale: BTreeSet<TrialId> = changed_since(store, journal)?;
-        stale.retain(|id| (oldest..=newest).contains(id));
         stale.extend(&self.recording);
-        let stale: Vec<TrialId> = stale.into_iter().collect();
+        stale.extend(copies_of(store, &stale)?);
+        stale.extend(self.joined(store)?);
+        stale.retain(|id| (oldest..=newest).contains(id));
         let mut rows = store.rows("WHERE id > ?1 ORDER BY id", [newest])?;
         rows.extend(store.rows("WHERE id IN (SELECT value FROM json_each(?1))", [json(&stale)])?);
         let mut changed = self.take(rows);
         if self.complete && count(store)? != self.trials.len() {
             let kept = ids(store)?;
+            let gone = self.trials.iter().filter(|(id, _)| !kept.contains(id));
+            let identities: Vec<String> = gone.filter_map(|(_, trial)| trial.row.identity.clone()).collect();
             self.trials.retain(|id, _| kept.contains(id));
             self.recording.retain(|id| kept.contains(id));
+            let mut copies = store.rows("WHERE identity IN (SELECT value FROM json_each(?1))", [json(&identities)])?;
+            copies.retain(|row| self.trials.contains_key(&row.id));
+            self.take(copies);
             changed = true;
         }
         Ok(changed)
+    }
+
+    /// Trials that have joined a further collection since they were read.
+    fn joined(&self, store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
+        let sql = "SELECT trial, count(*) FROM memberships GROUP BY trial";
+        let members = store.connection.prepare_cached(sql).and_then(|mut statement| {
+            let members = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+            members.collect::<Result<Vec<(TrialId, i64)>, _>>()
+        });
+        let members = members.map_err(|e| store.fault(&e))?.into_iter();
+        let other = |(id, count): &(TrialId, i64)| {
+            self.trials.get(id).is_some_and(|trial| usize::try_from(*count) != Ok(trial.row.also_in.len()))
+        };
+        Ok(members.filter(other).map(|(id, _)| id).collect())
     }
 
     /// True where a row was new or other than before.
@@ -173,6 +194,15 @@ fn changed_since(store: &Store, entry: i64) -> Result<BTreeSet<TrialId>, StoreEr
     let sql = "SELECT trials.id FROM journal JOIN trials ON trials.uid = journal.trial WHERE journal.number > ?1";
     let found = store.connection.prepare_cached(sql);
     let found = found.and_then(|mut statement| statement.query_map([entry], |row| row.get(0))?.collect());
+    found.map_err(|e| store.fault(&e))
+}
+
+/// Trials that hold the same grasps as these.
+fn copies_of(store: &Store, trials: &BTreeSet<TrialId>) -> Result<BTreeSet<TrialId>, StoreError> {
+    let sql = "SELECT other.id FROM trials JOIN trials AS other ON other.identity = trials.identity
+        WHERE trials.id IN (SELECT value FROM json_each(?1))";
+    let found = store.connection.prepare_cached(sql);
+    let found = found.and_then(|mut statement| statement.query_map([json(trials)], |row| row.get(0))?.collect());
     found.map_err(|e| store.fault(&e))
 }
 
