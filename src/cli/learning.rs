@@ -18,7 +18,7 @@ pub(super) struct QueryArguments {
     /// Only simulated trials of this version of the physics, or of an unknown one.
     #[arg(long, value_name = "N|unknown")]
     physics: Option<PhysicsVersion>,
-    /// Only trials of a real gripper with these calibrations, by their numbers, separated by commas.
+    /// Only trials of a real gripper that these calibrations serve; name one for each part, separated by commas.
     #[arg(long, value_name = "N,..", value_delimiter = ',')]
     calibration: Vec<CalibrationId>,
     /// Keep trials with flags.

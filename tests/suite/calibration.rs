@@ -10,6 +10,7 @@ use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
 use palpate_device::protocol::{DecodedEvent, Decoder};
+use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::gripper::Listen;
 use palpate_lab::study::{FingerFit, Known, Observation, Trust, fit_finger};
 use palpate_sim::gripper::Phase;
@@ -442,6 +443,12 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     assert_eq!(twin.gripper.finger.bending_stiffness, stiffness);
     let found = run(at, &["recognise", "1", "2", "--model", &model]);
     assert!(found.code == Some(0) && found.out.contains("bigball"), "{found:?}");
+    // Every calibration of a trial must be named: one of four is not enough, and the reason says so.
+    let one = ["train", "knn", "--calibration", "1", "--include-flagged", "--out", "m.safetensors"];
+    refused(at, &one, &["(calibrations 1, with flagged trials) is usable: 3 with other calibrations"]);
+    let query = DatasetQuery { calibrations: vec![1, 2, 3, 4], include_flagged: true, ..DatasetQuery::default() };
+    let data = query.read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
+    assert_eq!((data.examples.len(), data.about.calibrations), (3, vec![1, 2, 3, 4]));
     // Another strip calibration, and the old trial reads differently.
     let mut record = calibrations[0].1.record.clone();
     record.points.iter_mut().for_each(|point| point.stimulus *= 0.9);

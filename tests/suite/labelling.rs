@@ -119,7 +119,11 @@ fn an_afternoon_of_labels_from_the_terminal() {
     assert_eq!((journal.len(), &journal[0]["what"], &journal[1]["what"]), (13, &"plan".into(), &"plan".into()));
     assert!(said(&["trials", "journal"]).contains("undoes 1"));
     refused(at, &["snapshot", "--trial", "1", "--out", "x.png"], &["was not simulated", "palpate trials export 1"]);
-    refused(at, &["recognise", "1"], &["trial 1", "do not measure contact pressure"]);
+    refused(
+        at,
+        &["recognise", "1"],
+        &["trial 1", "do not measure contact pressure: choose a model of the signals of parts"],
+    );
     refused(at, &["recognise", "1", "--model", &model_of_pads(at)], &["trial 1", "no part is mounted"]);
     refused(at, &["trials", "label", "9", "ball"], &["no trial 9"]);
 }

@@ -91,7 +91,7 @@ fn no_data_set_takes_what_cannot_be_trusted() {
     assert_eq!((ids, data.about.left_out), (vec![kept[0].id], 2));
     assert!(data.about.described().contains("2 left out"), "{}", data.about.described());
     let alone = DatasetQuery::default().read_trial(&store, marked[0].id, &SensorView::default());
-    assert!(matches!(alone, Err(DatasetError::Unsound { left_out: 1, .. })), "{alone:?}");
+    assert!(matches!(alone, Err(DatasetError::TrialUnsound { id }) if id == marked[0].id), "{alone:?}");
 }
 
 #[test]
@@ -105,6 +105,7 @@ fn the_terminal_marks_them_and_leaves_them_out() {
     assert!(shown.out.contains("static residual at hold") && shown.out.contains("unsound"), "{shown:?}");
     assert!(shown.err.contains("missed the solver's tolerance, the first at"), "{shown:?}");
     assert!(!run(at, &["trials", "show", "1"]).out.contains("unsound"));
+    refused(at, &["recognise", "2"], &["trial 2 is not sound: `palpate trials show 2` says why"]);
     let exported = run(at, &["trials", "export", "1", "2", "3", "--out", "csv"]);
     assert!(exported.code == Some(0) && exported.err.contains("trial 2, 3 excluded"), "{exported:?}");
     assert_eq!(std::fs::read_dir(at.join("csv")).unwrap().count(), 2, "one trial and its contacts");

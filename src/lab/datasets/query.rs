@@ -140,10 +140,14 @@ pub enum DatasetError {
     Unsound {
         /// The query.
         about: String,
-        /// Matching trials.
-        left_out: usize,
-        /// Their numbers by reason.
+        /// Numbers of matching trials by reason.
         reasons: String,
+    },
+    /// A trial asked for by its number is not sound.
+    #[error("trial {id} is not sound: `palpate trials show {id}` says why")]
+    TrialUnsound {
+        /// The trial.
+        id: TrialId,
     },
     /// Trials with different channels.
     #[error(
@@ -161,13 +165,12 @@ pub enum DatasetError {
         other_channels: String,
     },
     /// A trial of a real gripper, asked for channels of the simulation.
-    #[error(
-        "trial {id} is of a real gripper, whose pads do not measure contact pressure: choose --signals parts, or --source \
-         sim for simulated trials alone"
-    )]
+    #[error("trial {id} is of a real gripper, whose pads do not measure contact pressure: choose {choice}")]
     OnlySimulated {
         /// The trial.
         id: TrialId,
+        /// What to choose instead.
+        choice: &'static str,
     },
     /// A trial of the real gripper whose channels cannot be derived.
     #[error("trial {id} of the real gripper does not give the channels of layout {layout}: {why}")]
@@ -353,7 +356,8 @@ fn board_signals(
     calibrations: &[CalibrationId],
 ) -> Result<(TrialSignals, Vec<CalibrationId>), DatasetError> {
     if view.signals != SignalDefinition::Parts {
-        return Err(DatasetError::OnlySimulated { id });
+        let choice = "--signals parts, or --source sim for simulated trials alone";
+        return Err(DatasetError::OnlySimulated { id, choice });
     }
     let read = store.board_signals(id, calibrations).map_err(|cause| DatasetError::Store { cause })?;
     let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;

@@ -54,7 +54,7 @@ impl DatasetQuery {
             let about = self.about(store);
             return Err(match matching {
                 0 => DatasetError::Nothing { about },
-                _ => DatasetError::Unsound { about, left_out: matching, reasons: palpate_learn::counted(&left_out) },
+                _ => DatasetError::Unsound { about, reasons: palpate_learn::counted(&left_out) },
             });
         }
         self.read_rows(store, &rows, view, &before, left_out, progress)
@@ -67,13 +67,17 @@ impl DatasetQuery {
         match rows.first() {
             // Loading returns the reason.
             None => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
-            Some(row) if !row.sound => {
-                let reasons = format!("1 {NOT_SOUND}");
-                return Err(DatasetError::Unsound { about: String::new(), left_out: 1, reasons });
-            }
+            Some(row) if !row.sound => return Err(DatasetError::TrialUnsound { id }),
             Some(_) => {}
         }
-        self.read_rows(store, &rows, view, &Predecessors::default(), LeftOut::new(), &mut |_, _| ())
+        let read = self.read_rows(store, &rows, view, &Predecessors::default(), LeftOut::new(), &mut |_, _| ());
+        read.map_err(|error| match error {
+            // Who names a trial has a model and no options for signals.
+            DatasetError::OnlySimulated { id, .. } => {
+                DatasetError::OnlySimulated { id, choice: "a model of the signals of parts" }
+            }
+            other => other,
+        })
     }
 
     /// Reason why a trial that matches is left out.
@@ -157,7 +161,10 @@ impl DatasetQuery {
             left_out.insert("not calibrated".to_owned(), uncalibrated);
         }
         if read.is_empty() {
-            return Err(DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing });
+            return Err(match uncalibrated {
+                0 => DatasetError::Unsound { about: self.about(store), reasons: palpate_learn::counted(&left_out) },
+                _ => DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing },
+            });
         }
         let labels = labels(&named);
         let used: Vec<&TrialRow> = read.iter().map(|(row, ..)| *row).collect();
