@@ -32,10 +32,19 @@ impl BoardSignals {
     /// the end of the hold. None where a channel could not be derived.
     pub fn grasp(&self, channels: &[String]) -> Option<Signals> {
         let until = self.derived.signals.chosen(channels)?.until(self.release_s.unwrap_or(f64::INFINITY));
-        Some(match self.closing_s {
-            Some(closing_s) => until.since(closing_s),
-            None => until,
-        })
+        Some(self.since_closing(until))
+    }
+
+    /// The same to another end (s), counted from the beginning of the closing, where known.
+    pub fn grasp_until(&self, channels: &[String], end_s: f64) -> Option<Signals> {
+        Some(self.since_closing(self.derived.signals.chosen(channels)?).until(end_s))
+    }
+
+    fn since_closing(&self, signals: Signals) -> Signals {
+        match self.closing_s {
+            Some(closing_s) => signals.since(closing_s),
+            None => signals,
+        }
     }
 }
 

@@ -367,12 +367,7 @@ fn board_signals(
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
     let cut = match view.cut {
         Cut::HoldEnd => read.grasp(&wanted),
-        cut @ (Cut::Whole | Cut::Seconds(_)) => read
-            .derived
-            .signals
-            .chosen(&wanted)
-            .map(|signals| read.closing_s.map_or(signals.clone(), |closing_s| signals.since(closing_s)))
-            .map(|signals| signals.until(cut.end(f64::INFINITY))),
+        cut @ (Cut::Whole | Cut::Seconds(_)) => read.grasp_until(&wanted, cut.end(f64::INFINITY)),
     };
     let signals = cut.ok_or_else(|| DatasetError::Uncalibrated {
         id,

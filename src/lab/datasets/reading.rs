@@ -28,10 +28,10 @@ impl DatasetQuery {
         view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
         let failed = |cause| DatasetError::Store { cause };
         let library = Library::read(store).map_err(failed)?;
-        let mut rows: Vec<TrialRow> =
-            library.find(store, &self.library_query()).map_err(failed)?.iter().map(|trial| trial.row.clone()).collect();
+        let before = Predecessors::of(library.rows());
+        let found = library.find(store, &self.library_query()).map_err(failed)?;
+        let mut rows: Vec<&TrialRow> = found.iter().map(|trial| &trial.row).collect();
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
-        let before = Predecessors::of(&store.list(true).map_err(failed)?);
         let mut left_out = LeftOut::new();
         let matching = rows.len();
         rows.retain(|row| match self.refused(row) {
@@ -44,7 +44,7 @@ impl DatasetQuery {
         // The original of a copy may be outside the query, so only copies within it are left out.
         let mut held = BTreeSet::new();
         rows.retain(|row| {
-            let first = row.identity.as_ref().is_none_or(|identity| held.insert(identity.clone()));
+            let first = row.identity.as_ref().is_none_or(|identity| held.insert(identity));
             if !first {
                 *left_out.entry(COPIES.to_owned()).or_default() += 1;
             }
@@ -62,8 +62,8 @@ impl DatasetQuery {
 
     /// Reads one trial, labelled or not, flagged or not, as a data set.
     pub fn read_trial(&self, store: &Store, id: TrialId, view: &SensorView) -> Result<Dataset, DatasetError> {
-        let mut rows = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
-        rows.retain(|row| row.id == id);
+        let listed = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
+        let rows: Vec<&TrialRow> = listed.iter().filter(|row| row.id == id).collect();
         match rows.first() {
             // Loading returns the reason.
             None => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
@@ -96,7 +96,7 @@ impl DatasetQuery {
     fn read_rows(
         &self,
         store: &Store,
-        rows: &[TrialRow],
+        rows: &[&TrialRow],
         view: &SensorView,
         before: &Predecessors,
         mut left_out: LeftOut,
@@ -108,7 +108,7 @@ impl DatasetQuery {
             *count += 1;
             self.most_of_each.is_none_or(|most| *count <= most)
         };
-        let rows: Vec<&TrialRow> = rows.iter().filter(few_enough).collect();
+        let rows: Vec<&TrialRow> = rows.iter().copied().filter(few_enough).collect();
         if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
             return Err(DatasetError::NoSuchObject { object: object.clone() });
         }
@@ -207,7 +207,7 @@ struct Predecessors {
 }
 
 impl Predecessors {
-    fn of(rows: &[TrialRow]) -> Self {
+    fn of<'a>(rows: impl Iterator<Item = &'a TrialRow>) -> Self {
         let mut found = Self::default();
         let mut newest = BTreeMap::new();
         for row in rows {

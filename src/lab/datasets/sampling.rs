@@ -68,8 +68,7 @@ pub(super) fn resampled(signals: Signals, rate_hz: Option<f64>) -> Signals {
     let count = ((last - first) * rate_hz + 1e-6).floor() as usize;
     for k in 0..=count {
         let t = first + k as f64 / rate_hz;
-        let after =
-            signals.t_s.partition_point(|own| *own < t).clamp(1, signals.len().max(2) - 1).min(signals.len() - 1);
+        let after = signals.t_s.partition_point(|own| *own < t).min(signals.len() - 1);
         let before = after.saturating_sub(1);
         let (from, to) = (signals.t_s[before], signals.t_s[after]);
         let share = if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) as f32 } else { 1.0 };

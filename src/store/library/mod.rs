@@ -168,6 +168,11 @@ impl Library {
         Ok(query.order.sorted(&found))
     }
 
+    /// All trials, oldest first; deleted ones too.
+    pub fn rows(&self) -> impl Iterator<Item = &TrialRow> {
+        self.trials.values().map(|trial| &trial.row)
+    }
+
     /// A trial by its number.
     pub fn trial(&self, id: TrialId) -> Option<&Arc<LibraryTrial>> {
         self.trials.get(&id)
