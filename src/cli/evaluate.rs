@@ -1,13 +1,13 @@
 //! `palpate evaluate`: compares methods on stored trials, or evaluates a saved model on trials it has not seen.
 
 use super::Failure;
-use super::learning::{DataArguments, known_method, progress_bar};
+use super::learning::{DataArguments, known_method, parts};
 use super::setup::read_store;
 use super::terminal::{say, say_json, table, warn};
-use palpate_lab::study::{Comparison, ComparisonRow, Controls, compare, in_table_order};
+use palpate_lab::study::{ComparisonRow, Controls, in_table_order};
 use palpate_learn::evaluation::StageOneScores;
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan, StopRule};
+use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -81,25 +81,9 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         true => Vec::new(),
         false => plan.splits(&data, arguments.data.seed, usize::from(arguments.repeats))?,
     };
-    let parts: Vec<[Dataset; 3]> =
-        splits.iter().map(|split| [&split.train, &split.second, &split.test].map(|part| data.part(part))).collect();
-    let interrupted = AtomicBool::new(false);
-    let comparisons: Vec<Comparison<'_>> = parts
-        .iter()
-        .map(|[train, second, test]| arguments.comparison([train, test], Some(second), &interrupted))
-        .collect();
-    let threads = match arguments.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
     let mut rows = Vec::new();
     if !methods.is_empty() {
-        let bar = progress_bar("training and testing")?;
-        bar.set_length((methods.len() * comparisons.len()) as u64);
-        bar.tick();
-        let compared = compare(&comparisons, &methods, threads, &|_, _| bar.inc(1));
-        bar.finish_and_clear();
-        let compared = compared?;
+        let compared = arguments.data.compare(&data, &splits, &methods, arguments.threads)?;
         rows = compared.rows;
         for (method, reason) in &compared.left_out {
             warn(&format!("{method} is left out: {reason}"));
@@ -110,14 +94,15 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         [split] => split.test.clone(),
         _ => (0..data.examples.len()).collect(),
     };
-    let nothing = data.part(&[]);
+    let interrupted = AtomicBool::new(false);
     for (name, model) in &models {
-        let unseen = unseen(name, model, &data, &tested)?;
-        let comparison = arguments.comparison([&nothing, &unseen], None, &interrupted);
-        rows.push(comparison.of_fitted(name, model)?);
+        let unseen = [data.part(&[]), data.part(&[]), unseen(name, model, &data, &tested)?];
+        rows.push(arguments.data.comparison(&unseen, &interrupted).of_fitted(name, model)?);
     }
-    let controls = match (methods.first().filter(|_| arguments.controls), comparisons.first()) {
-        (Some(method), Some(first)) => Some(first.controls(method)?),
+    let controls = match (methods.first().filter(|_| arguments.controls), splits.first()) {
+        (Some(method), Some(first)) => {
+            Some(arguments.data.comparison(&parts(&data, first), &interrupted).controls(method)?)
+        }
         _ => None,
     };
     match (arguments.json, controls) {
@@ -134,18 +119,6 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
 }
 
 impl EvaluateArguments {
-    /// Comparison on one split.
-    fn comparison<'a>(
-        &self,
-        [train, test]: [&'a Dataset; 2],
-        second: Option<&'a Dataset>,
-        interrupted: &'a AtomicBool,
-    ) -> Comparison<'a> {
-        let (seed, quick) = (self.data.seed, self.data.quick);
-        let second = second.filter(|second| !second.examples.is_empty());
-        Comparison { train, second, test, seed, quick, stop: StopRule::default(), interrupted }
-    }
-
     /// Largest number of trials of each object that the options use.
     fn most_of_each(&self, methods: &[&Method]) -> Option<usize> {
         let train = if methods.is_empty() { 0 } else { self.train_trials.unwrap_or(TRAIN_TRIALS) };

@@ -6,9 +6,11 @@ use super::setup::{SignalArguments, within};
 use super::terminal::warn;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
-use palpate_learn::{Dataset, METHODS, Method, counted, method};
+use palpate_lab::study::{Compared, Comparison, compare};
+use palpate_learn::{Dataset, METHODS, Method, Split, StopRule, counted, method};
 use palpate_store::{CalibrationId, Store};
 use palpate_tactile::model::SensorModel;
+use std::sync::atomic::AtomicBool;
 
 /// Selection of trials.
 #[derive(Clone, Debug, clap::Args)]
@@ -107,6 +109,42 @@ impl DataArguments {
         }
         Ok(data)
     }
+
+    /// Fits and tests methods on all splits, on this many threads, or one per core.
+    pub(super) fn compare(
+        &self,
+        data: &Dataset,
+        splits: &[Split],
+        methods: &[&'static Method],
+        threads: Option<u16>,
+    ) -> Result<Compared, Failure> {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let interrupted = AtomicBool::new(false);
+        let parts: Vec<[Dataset; 3]> = splits.iter().map(|split| parts(data, split)).collect();
+        let comparisons: Vec<Comparison<'_>> = parts.iter().map(|parts| self.comparison(parts, &interrupted)).collect();
+        let bar = progress_bar("training and testing")?;
+        bar.set_length((methods.len() * splits.len()) as u64);
+        bar.tick();
+        let compared = compare(&comparisons, methods, threads.map_or_else(cores, usize::from), &|_, _| bar.inc(1));
+        bar.finish_and_clear();
+        Ok(compared?)
+    }
+
+    /// Comparison on one split, of its three parts.
+    pub(super) fn comparison<'a>(
+        &self,
+        [train, second, test]: &'a [Dataset; 3],
+        interrupted: &'a AtomicBool,
+    ) -> Comparison<'a> {
+        let second = Some(second).filter(|second| !second.examples.is_empty());
+        let (seed, quick) = (self.seed, self.quick);
+        Comparison { train, second, test, seed, quick, stop: StopRule::default(), interrupted }
+    }
+}
+
+/// Training set, that of stage two, and test set of a split.
+pub(super) fn parts(data: &Dataset, split: &Split) -> [Dataset; 3] {
+    [&split.train, &split.second, &split.test].map(|part| data.part(part))
 }
 
 /// A progress bar on standard error, visible only on a terminal.

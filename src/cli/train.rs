@@ -6,9 +6,9 @@ use super::output::check_folder;
 use super::setup::read_store;
 use super::terminal::{say, say_json, table};
 use palpate_lab::datasets::{make_models_folder, models_folder};
-use palpate_lab::study::{Comparison, SearchRow, compare, search};
+use palpate_lab::study::{SearchRow, search};
 use palpate_learn::evaluation::Evaluation;
-use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan, StopRule};
+use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -87,6 +87,14 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     }
     let store = read_store(store)?;
     let data = arguments.data.read(&store, false, arguments.trials)?;
+    // Before the training, which may take long.
+    let out = match &arguments.out {
+        Some(out) => out.clone(),
+        None => {
+            make_models_folder(&models_folder())?;
+            models_folder().join(format!("{}.safetensors", method.key))
+        }
+    };
     let mut settings = parse_settings(&arguments.settings)?;
     let search = if arguments.search { Some(searched(method, &data, arguments, &mut settings)?) } else { None };
     let mut model = fitted(method, &data, arguments, settings)?;
@@ -96,10 +104,6 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan)).transpose()?;
     if let Some((test, evaluation)) = &judged {
         model.card.metrics = evaluation.metrics(test);
-    }
-    let out = arguments.out.clone().unwrap_or_else(|| models_folder().join(format!("{}.safetensors", method.key)));
-    if arguments.out.is_none() {
-        make_models_folder(&models_folder())?;
     }
     model.save(&out)?;
     let report = Report {
@@ -173,23 +177,9 @@ fn judged(
     arguments: &TrainArguments,
     plan: &SplitPlan,
 ) -> Result<(String, Evaluation), Failure> {
-    let (seed, quick, stop) = (arguments.data.seed, arguments.data.quick, StopRule::default());
-    let splits = plan.splits(data, seed, 1)?;
-    let parts: Vec<[Dataset; 3]> =
-        splits.iter().map(|split| [&split.train, &split.second, &split.test].map(|part| data.part(part))).collect();
-    let interrupted = AtomicBool::new(false);
-    let comparisons: Vec<Comparison<'_>> = parts
-        .iter()
-        .map(|[train, second, test]| {
-            let second = Some(second).filter(|second| !second.examples.is_empty());
-            Comparison { train, second, test, seed, quick, stop, interrupted: &interrupted }
-        })
-        .collect();
-    let bar = progress_bar("judging")?;
-    bar.set_length(splits.len() as u64);
-    let compared = compare(&comparisons, &[method], 1, &|_, _| bar.inc(1));
-    bar.finish_and_clear();
-    let row = compared?.rows.into_iter().next().ok_or("no test grasps left")?;
+    let splits = plan.splits(data, arguments.data.seed, 1)?;
+    let compared = arguments.data.compare(data, &splits, &[method], None)?;
+    let row = compared.rows.into_iter().next().ok_or("no test grasps left")?;
     let trials = row.evaluation.trials;
     Ok((format!("{}, {trials} trials tested: {}", plan.described(), data.about.lines().join("; ")), row.evaluation))
 }

@@ -4,10 +4,10 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// The program, with no display and a store of its own.
+/// The program, with no display, a store of its own and a folder "data" beside it for what it keeps for itself.
 pub(crate) fn palpate(store: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
-    command.arg("--store").arg(store);
+    command.arg("--store").arg(store).env("XDG_DATA_HOME", store.with_file_name("data"));
     for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
         command.env_remove(variable);
     }
