@@ -152,7 +152,7 @@ fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
         };
         pair("hold force", hold.force_n, "N")?;
         pair("curvature", hold.curvature_per_m, "1/m")?;
-        pair("pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa of the pads")?;
+        pair("pad pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa")?;
         pair("at contact", hold.contact_pressure_pa.map(|p| p * 1e-3), "kPa")?;
         if let Some(shape) = &hold.out_of_plane {
             pair("tips sideways", shape.tip_m.map(mm), "mm")?;

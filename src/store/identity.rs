@@ -1,7 +1,8 @@
 //! Identity of grasps: one grasp is one trial, recorded alone or in several collections.
 //!
-//! A grasp of this version has the identity of its header ([`TrialHeader::identity`]). Trials of older versions do not tell
-//! the object's files and the physics; theirs is made of their frames, so that copies among them are found.
+//! A grasp of this version has the identity of its header ([`TrialHeader::identity`]). Trials of older versions do not
+//! record the object's files and the physics; their identity is a hash of their frames, so that copies among them are
+//! found.
 
 use palpate_sim::fingerprint;
 use palpate_tactile::trial::{TrialHeader, TrialId};

@@ -1,10 +1,11 @@
 //! Export of all labelled trials of the real gripper into a folder for other programs:
 //!
 //! ```text
-//! trials.csv               one row per trial: label, note, tags, flags, prediction, calibrations, cadence signals.csv
-//! trial, label, size, shape, t_s, channels of layout C1+F, closing and hold: input of `trials import`
-//! raw/trial_7_lemon.csv    raw counts, one row per reading raw/trial_7_lemon.bytes  received bytes, a capture file
-//! that can be replayed like a port
+//! trials.csv               one row per trial: label, note, tags, flags, prediction, calibrations, cadence
+//! signals.csv              trial, label, size, shape, t_s, and curvature, pressure and force of each finger, closing
+//!                          and hold: input of `trials import`
+//! raw/trial_7_lemon.csv    raw counts, one row per reading
+//! raw/trial_7_lemon.bytes  received bytes, a capture file that can be replayed like a port
 //! ```
 //!
 //! The folder appears whole or not at all: it is written under another name and renamed. Unlabelled, deleted and incomplete

@@ -153,7 +153,7 @@ pub(super) const MIGRATIONS: [&str; 13] = [
      ALTER TABLE trials ADD COLUMN phases TEXT NOT NULL DEFAULT 'null';",
     // Names the changes that were made, and are undone, together.
     "ALTER TABLE journal ADD COLUMN batch TEXT;",
-    // `origin` is JSON; `identity` is equal for equal grasps. Those of older trials follow in `identity`.
+    // `origin` is JSON; `identity` is equal for equal grasps. The module `identity` fills it in for older trials.
     "ALTER TABLE trials ADD COLUMN origin TEXT;
      ALTER TABLE trials ADD COLUMN identity TEXT;
      CREATE INDEX trials_by_identity ON trials (identity) WHERE identity IS NOT NULL;

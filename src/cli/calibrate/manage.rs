@@ -80,7 +80,9 @@ pub(super) fn without_store(command: &CalibrateCommand) -> Result<(), Failure> {
         CalibrateCommand::List { json: true, .. } => say_json(&ListReport::default()),
         CalibrateCommand::Drift(arguments) if arguments.json => say_json(&[(); 0]),
         CalibrateCommand::List { .. } | CalibrateCommand::Drift(_) => say(none),
-        CalibrateCommand::Tare(_) => Err(format!("no mounted part is calibrated, so there is no zero: {none}").into()),
+        CalibrateCommand::Tare(_) => {
+            Err("no calibrations yet, so there is no zero; `palpate help gripper` says how to calibrate".into())
+        }
         _ => Err(none.into()),
     }
 }

@@ -92,7 +92,7 @@ impl Replay {
             TrialData::Simulated(_) => {
                 let (gripper, identification) = (&trial.header.scene.gripper, identification(model));
                 let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
-                // One channel to a name: those that the model reads are shown, too.
+                // All channels use the model's definition of the signals, so that a name means one channel.
                 let signals = more.first().map(|channel| channel.signals).unwrap_or_default();
                 let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, signals, &more)?;
                 let names = reader.channels().iter().map(Channel::name).collect();
