@@ -23,10 +23,10 @@ use std::path::{Path, PathBuf};
 /// Arguments of every study of the paper.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct PaperArguments {
-    /// Take less than a minute: fewer grasps, small networks, few epochs.
+    /// Take less than a minute for each study: fewer grasps, small networks, few epochs.
     #[arg(long)]
     quick: bool,
-    /// Sensor model of simulated grasps: virtual or physical-like (default: both).
+    /// Sensor model of simulated grasps: virtual or physical-like (default: both; virtual for stored trials).
     #[arg(long, value_name = "MODEL", value_parser = parse_sensors)]
     sensors: Option<SensorModel>,
     #[command(flatten)]
@@ -56,10 +56,14 @@ pub(super) struct PaperCommand {
 
 const ALL: &str = "all";
 
+/// Where the grasps of a study come from.
+const GRASPS: &str =
+    "Grasps: simulated, with --preset in the poses of that preset; any other filter reads stored trials.";
+
 /// Subcommands, one for each study.
 fn subcommands() -> Vec<Command> {
     let of = |name: &'static str, about: String, examples: String| {
-        PaperArguments::augment_args(Command::new(name)).about(about).after_help(examples)
+        PaperArguments::augment_args(Command::new(name)).about(about).after_help(format!("{GRASPS}\n\n{examples}"))
     };
     let studies = PAPER_STUDIES.iter().map(|study| {
         let StudyCard { key, about, paper, budget, .. } = study.card();
@@ -165,7 +169,7 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
         if arguments.json {
             reports.push((key, stored));
         } else {
-            print(*study, &stored)?;
+            print(*study, &stored, arguments.quick)?;
             say(format!("\n{:.0} CPU minutes. {written}\n", stored.cpu_hours * 60.0))?;
         }
     }
@@ -184,7 +188,7 @@ fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &Stu
     Ok(format!("Written to {}: {}", folder.path().display(), names.join(", ")))
 }
 
-fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>) -> Result<(), Failure> {
+fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, quick: bool) -> Result<(), Failure> {
     let card = study.card();
     say(format!("{} ({} of the paper)", card.title, card.paper))?;
     for line in &stored.result.data {
@@ -198,7 +202,7 @@ fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>) -> Result<()
         say(format!("  found: {}", finding.found))?;
         say(format!("  {}", finding.why))?;
     }
-    if stored.command.contains("--quick") {
+    if quick {
         note("a quick study: do not quote its numbers");
     }
     Ok(())
