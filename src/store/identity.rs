@@ -39,10 +39,11 @@ pub(super) fn known(connection: &Connection, header: &TrialHeader, but: TrialId)
     connection.query_row(sql, params![identity, but], |row| row.get(0)).optional().map(Option::flatten)
 }
 
-/// Adds a trial to a further collection.
+/// Adds a trial to a collection other than its own.
 pub(super) fn add_to(transaction: &Transaction<'_>, id: TrialId, collection: Option<&str>) -> rusqlite::Result<()> {
-    let sql = "INSERT OR IGNORE INTO memberships (trial, collection) VALUES (?1, ?2)";
-    collection.map_or(Ok(0), |collection| transaction.execute(sql, params![id, collection])).map(|_| ())
+    let sql = "INSERT OR IGNORE INTO memberships (trial, collection)
+        SELECT id, ?2 FROM trials WHERE id = ?1 AND ?2 IS NOT NULL AND collection IS NOT ?2";
+    transaction.execute(sql, params![id, collection]).map(drop)
 }
 
 /// Gives simulated trials of older versions an identity.

@@ -365,8 +365,11 @@ fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqli
 fn is_collected(transaction: &Transaction<'_>, header: &TrialHeader) -> rusqlite::Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE collection = ?1 AND object = ?2 AND seed = ?3)
         OR EXISTS (SELECT 1 FROM trials JOIN memberships ON memberships.trial = trials.id
-            WHERE memberships.collection = ?1 AND object = ?2 AND seed = ?3)";
-    transaction.query_row(sql, params![header.collection, header.object, header.seed.cast_signed()], |row| row.get(0))
+            WHERE memberships.collection = ?1 AND object = ?2 AND seed = ?3)
+        OR EXISTS (SELECT 1 FROM trials WHERE identity = ?4 AND (collection = ?1 OR EXISTS (
+            SELECT 1 FROM memberships WHERE memberships.trial = trials.id AND memberships.collection = ?1)))";
+    let seed = header.seed.cast_signed();
+    transaction.query_row(sql, params![header.collection, header.object, seed, header.identity()], |row| row.get(0))
 }
 
 /// Header of a stored trial.

@@ -73,6 +73,23 @@ fn a_copy_goes_at_its_end_unless_somebody_annotated_it() -> Result<(), StoreErro
 }
 
 #[test]
+fn a_renamed_object_does_not_bring_a_trial_into_its_own_collection_again() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = folder();
+    let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+    let mut trial = trial(1);
+    trial.header.origin = Some(GraspOrigin::default());
+    trial.header.collection = Some("set".to_owned());
+    assert_eq!(store.insert_collected([&trial].into_iter())?, 1);
+    store.connection.execute("UPDATE trials SET object = 'mug'", [])?;
+    assert_eq!(store.insert_collected([&trial].into_iter())?, 0);
+    assert_eq!(store.list(false)?[0].collections().collect::<Vec<_>>(), ["set"]);
+    // Nor is it made again where it was deleted.
+    store.delete(&[1])?;
+    assert_eq!(store.insert_collected([&trial].into_iter())?, 0);
+    Ok(())
+}
+
+#[test]
 fn two_programs_share_a_store() -> Result<(), StoreError> {
     let folder = folder();
     let path = folder.path().join("trials.sqlite");
