@@ -123,9 +123,12 @@ fn the_same_grasp_is_one_trial_collected_or_not() {
 fn a_query_keeps_a_copy_whose_original_it_does_not_select() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = trials(folder.path());
+    let mut before = None;
     for object in ["ball", "box"] {
         let scene = scene_of(object);
         let mut trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
+        trial.header.origin.as_mut().unwrap().after = before.take();
+        before = trial.header.identity();
         trial.header.collection = Some("first".to_owned());
         assert_eq!(store.insert_collected([&trial].into_iter()).unwrap(), 1);
         trial.header.collection = Some("second".to_owned());
@@ -137,11 +140,11 @@ fn a_query_keeps_a_copy_whose_original_it_does_not_select() {
     let read = |collection: Option<&str>| {
         let query = DatasetQuery { collection: collection.map(str::to_owned), ..DatasetQuery::default() };
         let data = query.read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
-        (data.examples.iter().map(|example| example.id).collect::<Vec<_>>(), data.about.left_out)
+        (data.examples.iter().map(|example| (example.id, example.after)).collect::<Vec<_>>(), data.about.left_out)
     };
-    assert_eq!(read(Some("first")), (vec![1, 3], 0));
-    assert_eq!(read(Some("second")), (vec![2, 4], 0));
-    assert_eq!(read(None), (vec![1, 3], 2), "each once");
+    assert_eq!(read(Some("first")), (vec![(1, None), (3, Some(1))], 0));
+    assert_eq!(read(Some("second")), (vec![(2, None), (4, Some(2))], 0));
+    assert_eq!(read(None), (vec![(1, None), (3, Some(1))], 2), "each once");
 }
 
 #[test]

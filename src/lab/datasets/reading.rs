@@ -28,7 +28,7 @@ impl DatasetQuery {
         view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
         let failed = |cause| DatasetError::Store { cause };
         let library = Library::read(store).map_err(failed)?;
-        let before = Predecessors::of(library.rows());
+        let mut before = Predecessors::of(library.rows());
         let found = library.find(store, &self.library_query()).map_err(failed)?;
         let mut rows: Vec<&TrialRow> = found.iter().map(|trial| &trial.row).collect();
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
@@ -50,6 +50,8 @@ impl DatasetQuery {
             }
             first
         });
+        // Of equal grasps, the one within the query comes before those that follow it.
+        before.by_identity.extend(rows.iter().filter_map(|row| Some((row.identity.clone()?, row.id))));
         if rows.is_empty() {
             let about = self.about(store);
             return Err(match matching {
