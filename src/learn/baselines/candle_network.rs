@@ -246,9 +246,8 @@ impl Work<'_> {
         let settings = ParamsAdamW { lr: N::RATE, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
         let mut optimiser = AdamW::new(network.by_name.values().cloned().collect(), settings)?;
         let mut order = grasps.to_vec();
-        // Batches of nearly equal size: normalisation needs more than one sequence.
-        let of_epoch = order.len().div_ceil(BATCH).max(1);
-        let (size, batches) = (order.len().div_ceil(of_epoch).max(1), (of_epoch * learned.epochs) as f64);
+        let size = batch_size(order.len());
+        let batches = (order.len().div_ceil(size).max(1) * learned.epochs) as f64;
         let mut done = 0;
         for epoch in 0..learned.epochs {
             order.shuffle(&mut random);
@@ -277,6 +276,17 @@ impl Work<'_> {
         }
         Ok(network)
     }
+}
+
+/// Number of sequences per optimiser step, for steps of nearly equal size. No step has one sequence alone, which
+/// normalisation over a batch would divide by zero.
+fn batch_size(sequences: usize) -> usize {
+    let steps = sequences.div_ceil(BATCH).max(1);
+    let mut size = sequences.div_ceil(steps).max(1);
+    while sequences > 1 && sequences % size == 1 {
+        size += 1;
+    }
+    size
 }
 
 /// Share of the highest learning rate at a share of the training: half a cosine up, another down.
@@ -322,6 +332,13 @@ mod tests {
     use super::super::guide_network::Perceptron;
     use super::*;
     use crate::conformance_tests::{made_up, quick};
+
+    #[test]
+    fn no_step_has_one_sequence_alone() {
+        assert_eq!((batch_size(992), batch_size(993)), (32, 33));
+        assert_eq!([0, 1, 2, 33, 64, 65].map(batch_size), [1, 1, 2, 17, 32, 22]);
+        assert!((2..5000).all(|sequences| sequences % batch_size(sequences) != 1));
+    }
 
     #[test]
     fn the_network_of_the_guide_is_as_printed_and_learns() {
