@@ -2,7 +2,8 @@
 //!
 //! A [`SplitPlan`] is stratified: it divides each class by itself. Trials with equal [`Example::content`] are one grasp,
 //! of which only the first trial takes part, so that no recogniser is tested on a grasp that it has learned. Random plans
-//! keep grasps that follow each other on one object ([`Example::after`]) on one side: their poses resemble each other.
+//! keep grasps that follow each other on one object ([`Example::after`]) on one side: their poses resemble each other. A
+//! grasp that is left out of the data breaks such a succession, whose ends may then land on different sides.
 //!
 //! ```
 //! use palpate_learn::{Class, Dataset, Example, Labels, SplitPlan};
@@ -28,7 +29,8 @@ use std::str::FromStr;
 /// Trials to learn from and to test with, as indices into a data set.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Split {
-    /// Training trials, in the order drawn: the first ones of a class are a random choice.
+    /// Training trials. Random plans list them in the order drawn, with grasps that follow each other in a row; the others
+    /// list the oldest first.
     pub train: Vec<usize>,
     /// Training trials of stage two, as in the paper's 40/40/20; empty otherwise.
     pub second: Vec<usize>,
@@ -55,6 +57,22 @@ pub enum SplitError {
         /// Number of trials.
         trials: usize,
         /// Number of different grasps needed.
+        needed: usize,
+    },
+    /// A class whose object was placed too seldom.
+    #[error(
+        "object \"{class}\" was placed {placings} time(s) for {grasps} grasps, {needed} are needed: grasps that follow \
+         each other on one object cannot be both learned and tested. Place it anew between grasps, or leave it out with \
+         --objects"
+    )]
+    TooFewPlacings {
+        /// Name of the class.
+        class: String,
+        /// Number of different grasps.
+        grasps: usize,
+        /// Number of successions of grasps.
+        placings: usize,
+        /// Number of successions needed.
         needed: usize,
     },
     /// A class whose trials all have the same pose.
@@ -157,6 +175,9 @@ impl SplitPlan {
     pub fn splits(&self, data: &Dataset, seed: u64, repeats: usize) -> Result<Vec<Split>, SplitError> {
         let grasps = different_grasps(data, self.needed())?;
         let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| chains(data, members)).collect();
+        if let Self::Shares(_) | Self::Folds { .. } = self {
+            check_placings(data, &successions, self.needed())?;
+        }
         let mut draws = (0..repeats.max(1) as u64).map(|repeat| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             random.set_stream(repeat);
@@ -175,12 +196,12 @@ impl SplitPlan {
         }
     }
 
-    /// Smallest number of different grasps of each class.
+    /// Smallest number of different grasps of each class; of placings too, where the plan is random.
     fn needed(&self) -> usize {
         match self {
             Self::Shares(shares) => shares.iter().filter(|share| **share > 0.0).count(),
             Self::Folds { .. } | Self::LeavePoseOut => 2,
-            Self::FirstOfEach { train, .. } => train + 1,
+            Self::FirstOfEach { train, .. } => train.saturating_add(1),
         }
     }
 
@@ -274,6 +295,20 @@ fn checked(shares: [f64; 3]) -> Result<(), SplitError> {
     if valid { Ok(()) } else { Err(SplitError::Shares) }
 }
 
+/// Refuses classes with too few successions: random plans hand them out whole.
+fn check_placings(data: &Dataset, successions: &[Vec<Vec<usize>>], needed: usize) -> Result<(), SplitError> {
+    let mut classes = successions.iter().zip(&data.labels.classes);
+    match classes.find(|(chains, _)| (1..needed).contains(&chains.len())) {
+        Some((chains, class)) => Err(SplitError::TooFewPlacings {
+            class: class.name.clone(),
+            grasps: chains.iter().map(Vec::len).sum(),
+            placings: chains.len(),
+            needed,
+        }),
+        None => Ok(()),
+    }
+}
+
 /// Each class as successions of grasps of one object, in a random order.
 type Drawn = [Vec<Vec<usize>>];
 
@@ -298,21 +333,21 @@ fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
     checked(shares)?;
     let mut split = Split::default();
     for class in drawn.iter().filter(|class| !class.is_empty()) {
-        // Each share that is not empty gets at least one grasp.
+        // Each share that is not empty gets at least one succession.
         let least = shares.map(|share| usize::from(share > 0.0));
         let count: usize = class.iter().map(Vec::len).sum();
         let rounded = |sum: f64| (count as f64 * sum).round() as usize;
         let first = rounded(shares[0]).clamp(least[0], count - least[1] - least[2]);
         let second = rounded(shares[0] + shares[1]).clamp(first + least[1], count - least[2]);
-        let mut taken = 0;
-        for chain in class {
-            let part = match taken {
-                taken if taken < first => &mut split.train,
-                taken if taken < second => &mut split.second,
-                _ => &mut split.test,
-            };
-            part.extend_from_slice(chain);
-            taken += chain.len();
+        let ends = [first, second, count];
+        let (mut part, mut of_part, mut taken) = (0, 0, 0);
+        for (n, chain) in class.iter().enumerate() {
+            let needed_later = |part: usize| least[part + 1..].iter().sum::<usize>();
+            while part < 2 && of_part >= least[part] && (taken >= ends[part] || class.len() - n <= needed_later(part)) {
+                (part, of_part) = (part + 1, 0);
+            }
+            [&mut split.train, &mut split.second, &mut split.test][part].extend_from_slice(chain);
+            (of_part, taken) = (of_part + 1, taken + chain.len());
         }
     }
     split.test.sort_unstable();
@@ -323,6 +358,8 @@ fn by_folds(drawn: &Drawn, folds: usize) -> Result<Vec<Split>, SplitError> {
     if folds < 2 {
         return Err(SplitError::Folds);
     }
+    // More folds than successions would be empty.
+    let folds = folds.min(drawn.iter().map(Vec::len).sum());
     let mut splits = vec![Split::default(); folds];
     // Each class goes on where the one before ended, so that folds have equal size.
     for (n, chain) in drawn.iter().flatten().enumerate() {
@@ -330,7 +367,6 @@ fn by_folds(drawn: &Drawn, folds: usize) -> Result<Vec<Split>, SplitError> {
             if n % folds == fold { &mut split.test } else { &mut split.train }.extend_from_slice(chain);
         }
     }
-    splits.retain(|split| !split.test.is_empty());
     splits.iter_mut().for_each(|split| split.test.sort_unstable());
     Ok(splits)
 }
@@ -378,14 +414,5 @@ impl Dataset {
         }
         kept.sort_unstable();
         self.part(&kept)
-    }
-
-    /// Leaves out trials of a grasp that an earlier trial holds already; returns how many.
-    pub fn without_duplicates(&self) -> (Self, usize) {
-        let mut met = BTreeSet::new();
-        let is_new = |example: &Example| met.insert(example.content);
-        let is_new: Vec<bool> = self.examples.iter().map(is_new).collect();
-        let kept: Vec<usize> = (0..is_new.len()).filter(|k| is_new[*k]).collect();
-        (self.part(&kept), is_new.len() - kept.len())
     }
 }

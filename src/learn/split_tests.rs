@@ -99,8 +99,6 @@ fn copies_of_a_grasp_are_never_on_both_sides() {
             assert_eq!(used.len(), count, "{plan}: a grasp is used twice");
         }
     }
-    let (unique, copies) = copied.without_duplicates();
-    assert_eq!((unique.examples, copies), (data(20).examples, 40));
     let leak = Split { train: vec![0], second: vec![], test: vec![40] };
     assert_eq!(leak.check(&copied), Err(SplitError::Duplicate { first: 100, other: 1100 }));
 }
@@ -132,6 +130,53 @@ fn grasps_that_follow_each_other_stay_on_one_side() {
             assert!((16..=24).contains(&split.test.len()), "{plan}: {:?}", split.test);
         }
     }
+}
+
+/// Two classes as successions of the same lengths.
+fn successions(lengths: &[usize]) -> Dataset {
+    let mut followed = data(lengths.iter().sum());
+    let starts: Vec<usize> =
+        lengths.iter().scan(0, |end, length| Some(std::mem::replace(end, *end + length))).collect();
+    for k in 2..followed.examples.len() {
+        followed.examples[k].after = (!starts.contains(&(k / 2))).then(|| followed.examples[k - 2].id);
+    }
+    followed
+}
+
+#[test]
+fn every_part_gets_a_succession_however_long_the_others_are() {
+    for (lengths, plan) in [(&[1, 9][..], "80/20"), (&[9, 1, 1], "40/40/20")] {
+        let (data, plan) = (successions(lengths), plan.parse::<SplitPlan>().unwrap());
+        for split in plan.splits(&data, 3, 20).unwrap() {
+            let parts = [&split.train, &split.test, &split.second].into_iter().take(lengths.len());
+            for part in parts {
+                assert!((0..2).all(|class| part.iter().any(|k| data.examples[*k].class == class)), "{plan}: {split:?}");
+            }
+            assert_eq!(counts(&split).iter().sum::<usize>(), data.examples.len());
+        }
+    }
+}
+
+#[test]
+fn an_object_that_was_placed_once_is_refused_by_random_plans() {
+    for (lengths, plan, needed) in [(&[10][..], "80/20", 2), (&[10], "folds:5", 2), (&[9, 1], "40/40/20", 3)] {
+        let refused = plan.parse::<SplitPlan>().unwrap().splits(&successions(lengths), 1, 1).unwrap_err();
+        let expected =
+            SplitError::TooFewPlacings { class: "ball".to_owned(), grasps: 10, placings: lengths.len(), needed };
+        assert_eq!(refused, expected, "{plan}");
+    }
+    for plan in ["first:6", "leave-a-pose-out"] {
+        assert!(plan.parse::<SplitPlan>().unwrap().splits(&successions(&[10]), 1, 1).is_ok(), "{plan}");
+    }
+}
+
+#[test]
+fn extreme_counts_are_no_fault() {
+    let splits = "folds:99999999999999".parse::<SplitPlan>().unwrap().splits(&data(5), 1, 1).unwrap();
+    assert_eq!(splits.len(), 10);
+    assert!(splits.iter().all(|split| counts(split) == [9, 0, 1]));
+    let all = SplitPlan::FirstOfEach { train: usize::MAX, test: None }.splits(&data(5), 1, 1);
+    assert!(matches!(all, Err(SplitError::TooFew { needed: usize::MAX, .. })), "{all:?}");
 }
 
 #[test]
