@@ -6,8 +6,10 @@ use crate::{
     ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
     ModelCard, ModelError, Numbers, Pmf, Sequence, Signatures, StopRule, method, shipped_model,
 };
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -114,6 +116,33 @@ fn folds_are_stratified() {
 }
 
 #[test]
+fn folds_keep_grasps_that_follow_each_other_together() {
+    let mut data = made_up(12, 6);
+    // Without successions each grasp is drawn by itself.
+    let (mut random, mut expected) = (ChaCha8Rng::seed_from_u64(2), vec![0; data.examples.len()]);
+    for (class, mut members) in data.by_class().into_iter().enumerate() {
+        members.shuffle(&mut random);
+        members.into_iter().enumerate().for_each(|(n, k)| expected[k] = (n + class) % 4);
+    }
+    assert_eq!(data.folds(4, 2), expected);
+    // Three placings of each object but the first, which was placed once.
+    let by_class = data.by_class();
+    for (class, members) in by_class.iter().enumerate() {
+        for (n, pair) in members.windows(2).enumerate() {
+            let anew = class > 0 && (n + 1) % 4 == 0;
+            data.examples[pair[1]].after = (!anew).then(|| data.examples[pair[0]].id);
+        }
+    }
+    let folds = data.folds(4, 2);
+    let parts = |grasps: &[usize]| grasps.iter().map(|k| folds[*k]).collect::<BTreeSet<_>>().len();
+    assert_eq!(parts(&by_class[0]), 4);
+    for members in &by_class[1..] {
+        assert_eq!(parts(members), 3);
+        assert!(members.chunks(4).all(|placing| parts(placing) == 1), "{folds:?}");
+    }
+}
+
+#[test]
 fn more_grasps_do_not_reduce_f1() {
     let (train, test) = (made_up(12, 7), made_up(8, 8));
     let model = trained(method("ids-lstm").expect("in the list"), &train);
@@ -192,7 +221,7 @@ fn methods_say_whether_they_need_size_and_shape() {
 
 #[test]
 fn fingerprints_and_deviations_tell_methods_apart() {
-    let prints: std::collections::BTreeSet<String> = METHODS.iter().map(Method::fingerprint).collect();
+    let prints: BTreeSet<String> = METHODS.iter().map(Method::fingerprint).collect();
     assert_eq!(prints.len(), METHODS.len());
     for method in &METHODS {
         assert_eq!(method.fingerprint().len(), 8, "{}", method.key);

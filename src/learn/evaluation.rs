@@ -5,7 +5,6 @@ use crate::data::{Class, Dataset, Example};
 use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, Scores};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
-use crate::split::chains;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -125,20 +124,22 @@ pub struct Round {
 /// placed anew for every grasp, they are drawn at random.
 fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let by_class = data.by_class();
-    let chains: Vec<Vec<Vec<usize>>> = by_class.iter().map(|members| chains(data, members)).collect();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut after = |(first, example): (usize, &Example)| {
-        let members = &by_class[example.class];
-        if members.iter().any(|k| data.examples[*k].after.is_some()) {
-            let chain = chains[example.class].iter().find(|chain| chain.contains(&first));
-            let rest = chain.map_or(&[][..], |chain| chain);
-            return rest.iter().copied().skip_while(|k| *k != first).take(MOST_GRASPS).collect();
+    let mut successions = vec![Vec::new(); data.examples.len()];
+    for members in by_class.iter().filter(|members| members.iter().any(|k| data.examples[*k].after.is_some())) {
+        for chain in data.chains(members) {
+            for (n, k) in chain.iter().enumerate() {
+                successions[*k] = chain[n..].iter().copied().take(MOST_GRASPS).collect();
+            }
         }
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for (first, succession) in successions.iter_mut().enumerate().filter(|(_, succession)| succession.is_empty()) {
+        let members = &by_class[data.examples[first].class];
         let mut others: Vec<usize> = members.iter().copied().filter(|k| *k != first).collect();
         others.shuffle(&mut random);
-        std::iter::once(first).chain(others).take(MOST_GRASPS).collect()
-    };
-    data.examples.iter().enumerate().map(&mut after).collect()
+        *succession = std::iter::once(first).chain(others).take(MOST_GRASPS).collect();
+    }
+    successions
 }
 
 /// Runs successive grasps with feedback, one round starting at each test grasp.

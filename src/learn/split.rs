@@ -174,7 +174,7 @@ impl SplitPlan {
     /// the seed, once.
     pub fn splits(&self, data: &Dataset, seed: u64, repeats: usize) -> Result<Vec<Split>, SplitError> {
         let grasps = different_grasps(data, self.needed())?;
-        let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| chains(data, members)).collect();
+        let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| data.chains(members)).collect();
         if let Self::Shares(_) | Self::Folds { .. } = self {
             check_placings(data, &successions, self.needed())?;
         }
@@ -311,23 +311,6 @@ fn check_placings(data: &Dataset, successions: &[Vec<Vec<usize>>], needed: usize
 
 /// Each class as successions of grasps of one object, in a random order.
 type Drawn = [Vec<Vec<usize>>];
-
-/// Grasps of one class as successions: each follows the one before it while the object stays as released. A grasp that
-/// follows none begins its own.
-pub(crate) fn chains(data: &Dataset, members: &[usize]) -> Vec<Vec<usize>> {
-    let mut ends: BTreeMap<i64, usize> = BTreeMap::new();
-    let mut chains: Vec<Vec<usize>> = Vec::new();
-    for &k in members {
-        let example = &data.examples[k];
-        let chain = example.after.and_then(|before| ends.remove(&before)).unwrap_or_else(|| {
-            chains.push(Vec::new());
-            chains.len() - 1
-        });
-        chains[chain].push(k);
-        ends.insert(example.id, chain);
-    }
-    chains
-}
 
 fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
     checked(shares)?;
