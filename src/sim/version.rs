@@ -1,7 +1,9 @@
 //! Version of the physics, and hashes that tell grasps apart.
 
-/// Version of the physics. It rises when, and only when, equal scenes give other frames than before; a test beside it
-/// compares frames of six scenes with stored ones.
+/// Version of the physics. It rises when equal scenes give other frames than before, and when the default of a setting
+/// changes, because identities of grasps name only what differs from the defaults
+/// ([`Scene::differences`](crate::scene::Scene::differences)). A test beside it compares frames of six scenes with stored
+/// ones.
 pub const PHYSICS_VERSION: u32 = 1;
 
 /// Hash (FNV-1a) of several byte strings. Stored with trials: it must never change.

@@ -102,12 +102,12 @@ impl Svm {
         Ok(Machine { pair, bias, terms })
     }
 
-    /// Description of the fit for the model's card.
     /// Settings of every fit.
     pub(super) fn decided_by() -> String {
         format!("Gaussian kernel, gamma one over columns, C {COST}, one against one, steepness {STEEPNESS}")
     }
 
+    /// Description of the fit for the model's card.
     pub(super) fn described(&self) -> String {
         let vectors = self.vectors.len() / self.columns.max(1);
         format!("Gaussian kernel, gamma {:.3e}, C {COST}, one against one, {vectors} support vectors", self.gamma)

@@ -136,7 +136,8 @@ impl Scene {
     }
 
     /// Settings that differ from the defaults, one a line, without the object's name or path: equal for equal scenes, also
-    /// for a later version that has more settings.
+    /// for a later version that has more settings. Whoever changes a default raises [`crate::PHYSICS_VERSION`]: the same
+    /// lines then stand for another scene.
     pub fn differences(&self) -> String {
         let values = |table: &toml::Table| {
             let mut values = Vec::new();
