@@ -234,6 +234,14 @@ fn fingerprints_and_deviations_tell_methods_apart() {
     let fitting = Fitting { settings, ..quick(1) };
     let changed = method("paper-macro-layer").expect("in the list").train(&made_up(4, 1), &fitting).expect("fits");
     assert!(matches!(&changed.card.deviations[..], [one] if one.contains("noise")), "{:?}", changed.card.deviations);
+    let of = |changes: serde_json::Value| {
+        let recipe = method("paper-macro-layer").and_then(|method| method.recipe).expect("a network")();
+        recipe.deviations_with(changes.as_object().expect("an object")).expect("known settings")
+    };
+    let changed = of(serde_json::json!({ "dropout": 0.2, "epochs": 60, "rate_hz": 75, "units": 16 }));
+    assert_eq!(changed, ["dropout to 0.2", "units to 16"].map(|one| format!("sets {one}, unlike the strict network")));
+    let tuned = of(serde_json::json!({ "strict": false }));
+    assert!(tuned[0].contains("strict to false") && tuned.len() > 2, "{tuned:?}");
 }
 
 #[test]

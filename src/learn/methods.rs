@@ -124,7 +124,7 @@ impl Method {
             (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
         })?;
         let data = fitting.joined(data)?;
-        let recipe = self.recipe.map(|recipe| recipe().adjusted(fitting)).transpose()?;
+        let deviations = self.recipe.map(|recipe| recipe().deviations_with(&fitting.settings)).transpose()?;
         let card = ModelCard {
             method: self.key.to_owned(),
             channels: data.channels.clone(),
@@ -133,7 +133,7 @@ impl Method {
             learned: LearnedGrasps::of(&data),
             settings: recogniser.settings(),
             fingerprint: Some(self.fingerprint()),
-            deviations: recipe.map(|recipe| recipe.deviations()).unwrap_or_default(),
+            deviations: deviations.unwrap_or_default(),
             stop: StopRule::default(),
             rejection: recogniser.rejection().cloned(),
             seed: fitting.seed,
@@ -158,8 +158,8 @@ impl Method {
         format!("{:08x}", hash as u32 ^ (hash >> 32) as u32)
     }
 
-    /// Differences from the network of the paper that it stands for; empty for strict recipes and for methods that the paper
-    /// does not define.
+    /// Differences from the network of the paper that it stands for; empty for strict recipes as they stand and for
+    /// methods that the paper does not define.
     pub fn deviations(&self) -> Vec<String> {
         self.recipe.map(|recipe| recipe().deviations()).unwrap_or_default()
     }

@@ -3,6 +3,7 @@
 use super::training::Training;
 use crate::fitting::{Fitting, LearnError};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 /// Structure and training of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -137,7 +138,7 @@ impl Recipe {
         Training { epochs: base.epochs.div_ceil(8), learning_rate: 0.1 * base.learning_rate, ..*base }
     }
 
-    /// Differences from the paper, section III, V-C and V-E, for people; none for strict recipes.
+    /// Differences from the paper, section III, V-C and V-E, for people; none for strict recipes as they stand.
     pub fn deviations(&self) -> Vec<String> {
         let mut list = Vec::new();
         let mut differs = |yes: bool, what: &str| {
@@ -145,12 +146,10 @@ impl Recipe {
                 list.push(what.to_owned());
             }
         };
-        if (self.rate_hz - PAPER_RATE_HZ).abs() > f32::EPSILON {
-            differs(
-                true,
-                &format!("averages readings to {} steps a second; the paper reads 75 samples a second", self.rate_hz),
-            );
-        }
+        differs(
+            (self.rate_hz - PAPER_RATE_HZ).abs() > f32::EPSILON,
+            &format!("averages readings to {} steps a second; the paper reads 75 samples a second", self.rate_hz),
+        );
         differs(
             !self.strict,
             "compresses channels that span decades and adds the deviation from the mean course of all grasps to each; the \
@@ -193,20 +192,26 @@ impl Recipe {
         list
     }
 
+    /// The same for this recipe with settings of a fit. A strict recipe names each setting that they change.
+    pub(crate) fn deviations_with(self, settings: &Map<String, Value>) -> Result<Vec<String>, LearnError> {
+        let changed = self.with(settings)?;
+        if !self.strict {
+            return Ok(changed.deviations());
+        }
+        let [before, after] = [self, changed].map(|recipe| serde_json::to_value(recipe).unwrap_or_default());
+        let of = |value: &Value, name: &str| value.get(name).or_else(|| value["training"].get(name)).cloned();
+        let changes = settings.iter().filter(|(name, _)| of(&before, name) != of(&after, name));
+        let mut list: Vec<String> =
+            changes.map(|(name, wanted)| format!("sets {name} to {wanted}, unlike the strict network")).collect();
+        if !changed.strict {
+            list.extend(changed.deviations());
+        }
+        Ok(list)
+    }
+
     /// Applies the settings of a fit, and shortens it if quick. Refuses settings that are unknown or out of range.
     pub fn adjusted(self, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
-        let mut value = serde_json::to_value(self).map_err(LearnError::failed)?;
-        for (name, wanted) in &fitting.settings {
-            let known = value.get(name).is_some();
-            let place = if known { value.get_mut(name) } else { value["training"].get_mut(name) };
-            let Some(place) = place.filter(|place| !place.is_object()) else {
-                let cause = "no such setting; `palpate train --print-settings` lists them".to_owned();
-                return Err(LearnError::Setting { name: name.clone(), cause });
-            };
-            *place = wanted.clone();
-        }
-        let mut recipe: Self = serde_json::from_value(value)
-            .map_err(|e| LearnError::Setting { name: "of the network".to_owned(), cause: e.to_string() })?;
+        let mut recipe = self.with(&fitting.settings)?;
         if fitting.quick {
             recipe.units = recipe.units.min(32);
             recipe.hidden = recipe.hidden.min(32);
@@ -216,6 +221,22 @@ impl Recipe {
         }
         recipe.check()?;
         Ok(recipe)
+    }
+
+    /// Replaces settings by name; refuses unknown ones.
+    fn with(self, settings: &Map<String, Value>) -> Result<Self, LearnError> {
+        let mut value = serde_json::to_value(self).map_err(LearnError::failed)?;
+        for (name, wanted) in settings {
+            let known = value.get(name).is_some();
+            let place = if known { value.get_mut(name) } else { value["training"].get_mut(name) };
+            let Some(place) = place.filter(|place| !place.is_object()) else {
+                let cause = "no such setting; `palpate train --print-settings` lists them".to_owned();
+                return Err(LearnError::Setting { name: name.clone(), cause });
+            };
+            *place = wanted.clone();
+        }
+        serde_json::from_value(value)
+            .map_err(|e| LearnError::Setting { name: "of the network".to_owned(), cause: e.to_string() })
     }
 
     /// Refuses values out of range.
