@@ -11,23 +11,18 @@ pub(crate) fn filled(grasp: &Sequence) -> Cow<'_, Sequence> {
         return Cow::Borrowed(grasp);
     }
     let width = grasp.values.len() / grasp.len().max(1);
-    let mut last = vec![0.0; width];
+    let mut last = vec![0.0; width.max(1)];
     let mut values = grasp.values.clone();
     for row in values.chunks_exact_mut(width.max(1)) {
-        fill(row, &mut last);
+        keep(row, &mut last);
+        row.copy_from_slice(&last);
     }
     Cow::Owned(Sequence { t_s: grasp.t_s.clone(), values })
 }
 
-/// Replaces gaps of a row by the last readings, and keeps its readings as the last.
-pub(crate) fn fill(row: &mut [f32], last: &mut [f32]) {
-    for (x, last) in row.iter_mut().zip(last) {
-        if x.is_finite() {
-            *last = *x;
-        } else {
-            *x = *last;
-        }
-    }
+/// Keeps the readings of a row as the last ones; where it has a gap, the last one stays.
+pub(crate) fn keep(row: &[f32], last: &mut [f32]) {
+    last.iter_mut().zip(row).filter(|(_, x)| x.is_finite()).for_each(|(last, x)| *last = *x);
 }
 
 /// A data set without gaps.

@@ -177,8 +177,7 @@ pub(crate) struct Binner {
     completed: usize,
     step: u32,
     sums: Vec<f32>,
-    /// The reading, and the last readings, for gaps.
-    row: Vec<f32>,
+    /// The last readings, which stay in gaps.
     last: Vec<f32>,
     count: u32,
     out: Vec<f32>,
@@ -208,7 +207,6 @@ impl Binner {
             completed: 0,
             step: 0,
             sums: vec![0.0; channels],
-            row: Vec::with_capacity(channels),
             last: vec![0.0; channels],
             count: 0,
             out: vec![0.0; channels],
@@ -237,10 +235,8 @@ impl Binner {
             self.close();
         }
         self.step = step;
-        self.row.clear();
-        self.row.extend_from_slice(row);
-        gaps::fill(&mut self.row, &mut self.last);
-        self.sums.iter_mut().zip(&self.row).for_each(|(sum, x)| *sum += x);
+        gaps::keep(row, &mut self.last);
+        self.sums.iter_mut().zip(&self.last).for_each(|(sum, x)| *sum += x);
         self.count += 1;
         complete.then_some(&self.out[..])
     }
