@@ -70,7 +70,7 @@ impl Calibration {
             let probabilities: Vec<f64> = answers.iter().map(sharpened).collect();
             for doubt in DOUBTS {
                 let of = |(p, (pmf, _)): (&f64, &(Pmf, usize))| -mixed(*p, doubt, pmf.classes()).ln();
-                let loss = probabilities.iter().zip(answers).map(of).sum::<f64>() / answers.len().max(1) as f64;
+                let loss = probabilities.iter().zip(answers).map(of).sum::<f64>() / answers.len() as f64;
                 if loss < best.1 {
                     best = (Self { temperature: temperature as f32, doubt: doubt as f32 }, loss);
                 }

@@ -1,7 +1,7 @@
 //! Recognisers that turn a grasp into a row of features and classify the row.
 //!
-//! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests and boosted
-//! trees order the classes well, but are far too unsure or too sure of them.
+//! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests
+//! and boosted trees order the classes well, but are far too unsure or too sure of them.
 
 use super::neighbours::Neighbours;
 use super::row_model::{RowModel, Rows};
@@ -203,7 +203,7 @@ impl Classifier {
 }
 
 /// Scaled features of all grasps.
-struct Ground<'a> {
+struct FeatureRows<'a> {
     data: &'a Dataset,
     columns: usize,
     own: Vec<Vec<f32>>,
@@ -211,7 +211,7 @@ struct Ground<'a> {
     mirrored: Option<Vec<Vec<f32>>>,
 }
 
-impl Ground<'_> {
+impl FeatureRows<'_> {
     fn rows(&self, grasps: impl Iterator<Item = usize>, mirroring: Mirroring) -> Rows {
         let classes = self.data.labels.classes.len();
         let mut rows = Rows { values: Vec::new(), columns: self.columns, labels: Vec::new(), classes };
@@ -281,34 +281,36 @@ impl Tabular {
             let rows = data.examples.iter().filter_map(|e| features.mirrored(&e.grasp));
             rows.collect()
         });
-        let mut ground = Ground { data, columns: features.width(), own, mirrored };
+        let mut grasps = FeatureRows { data, columns: features.width(), own, mirrored };
         let all = || 0..data.examples.len();
         let with_both = Mirroring { rows: true, views: true };
-        let scaling = if kind.wants_scaling() { scaling(&ground.rows(all(), with_both)) } else { Vec::new() };
-        ground.own.iter_mut().chain(ground.mirrored.iter_mut().flatten()).for_each(|row| scale(row, &scaling));
+        let scaling = if kind.wants_scaling() { scaling(&grasps.rows(all(), with_both)) } else { Vec::new() };
+        grasps.own.iter_mut().chain(grasps.mirrored.iter_mut().flatten()).for_each(|row| scale(row, &scaling));
         (fitting.progress)(0.1);
         fitting.check()?;
         let classifier = Classifier::of(kind, fitting);
-        let tried = if ground.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
-        let mut best: Option<(Mirroring, Calibration, f64)> = None;
-        for (number, &mirroring) in tried.iter().enumerate() {
+        let tried = if grasps.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
+        let calibrated = |number: usize| {
             let progress = |share: f64| (fitting.progress)(0.1 + 0.6 * (number as f64 + share) / tried.len() as f64);
-            let (calibration, loss) = ground.calibrated((kind, &classifier), mirroring, fitting, &progress)?;
-            if best.is_none_or(|(_, _, least)| loss < least) {
-                best = Some((mirroring, calibration, loss));
+            grasps.calibrated((kind, &classifier), tried[number], fitting, &progress)
+        };
+        let (mut mirroring, (mut calibration, mut least)) = (tried[0], calibrated(0)?);
+        for number in 1..tried.len() {
+            let (other, loss) = calibrated(number)?;
+            if loss < least {
+                (mirroring, calibration, least) = (tried[number], other, loss);
             }
         }
-        let (mirroring, calibration) =
-            best.map_or((with_both, None), |(mirroring, calibration, _)| (mirroring, Some(calibration)));
         fitting.check()?;
         let last = Fitting {
             progress: &|share| (fitting.progress)(0.7 + 0.3 * share),
             settings: fitting.settings.clone(),
             ..*fitting
         };
-        let (model, description) = classifier.fit(&ground.rows(all(), mirroring), &last)?;
+        let (model, description) = classifier.fit(&grasps.rows(all(), mirroring), &last)?;
         (fitting.progress)(1.0);
         let both_views = mirroring.views && features.has_mirror();
+        let calibration = Some(calibration);
         let learned = Learned { kind, features, scaling, model: description, calibration, both_views };
         Ok(Self { learned, model })
     }
