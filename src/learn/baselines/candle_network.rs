@@ -67,6 +67,7 @@ impl Pass<'_> {
 /// Fitted network in plain candle.
 pub(crate) struct Candle<N> {
     learned: Learned,
+    classes: usize,
     network: Variables<N>,
 }
 
@@ -160,7 +161,7 @@ impl<N: CandleNetwork> Candle<N> {
         let network = network.map_err(LearnError::failed)?;
         fitting.check()?;
         learned.temperature = temperature as f32;
-        Ok(Self { learned, network })
+        Ok(Self { learned, classes: data.labels.classes.len(), network })
     }
 
     /// Everything that decides a fit, besides the data, the seed and the options of the fit.
@@ -189,13 +190,13 @@ impl<N: CandleNetwork> Candle<N> {
             return Err(LoadError::Card { part: "the temperature" });
         }
         let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
-        let mut random = ChaCha8Rng::seed_from_u64(0);
-        let network = Variables::<N>::new(width, card.labels.classes.len(), &mut random).map_err(failed)?;
+        let (classes, mut random) = (card.labels.classes.len(), ChaCha8Rng::seed_from_u64(0));
+        let network = Variables::<N>::new(width, classes, &mut random).map_err(failed)?;
         for (name, var) in &network.by_name {
             let values = Tensor::from_slice(arrays.f32s(name, var.dims())?, var.dims(), &Device::Cpu);
             values.and_then(|values| var.set(&values)).map_err(failed)?;
         }
-        Ok(Self { learned, network })
+        Ok(Self { learned, classes, network })
     }
 }
 
@@ -301,10 +302,11 @@ fn one_cycle(share: f64) -> f64 {
 
 impl<N: CandleNetwork> Recogniser for Candle<N> {
     fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
-        // Shapes were checked when the network was made; on failure all classes would be equally likely.
-        let logarithms = logarithms(&self.network, &self.learned, &inputs(&self.learned, grasp)).unwrap_or_default();
         let temperature = f64::from(self.learned.temperature);
-        let pmf = Pmf::from_scores(logarithms.into_iter().map(|log| f64::from(log) / temperature));
+        let calibrated = |logs: Vec<f32>| Pmf::from_scores(logs.into_iter().map(|log| f64::from(log) / temperature));
+        let logarithms = logarithms(&self.network, &self.learned, &inputs(&self.learned, grasp));
+        // Shapes were checked when the network was made, so that no grasp should make it fail.
+        let pmf = logarithms.map_or_else(|_failed| Pmf::uniform(self.classes), calibrated);
         Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
     }
 
@@ -348,6 +350,10 @@ mod tests {
         assert!(guide.contains(&format!("```rust,ignore\n{code}```")), "{code}");
         let (train, test) = (made_up(12, 1), made_up(6, 2));
         let network = Candle::<Perceptron>::fit(&train, &quick(1)).expect("fits");
+        // A network that does not fit its inputs knows nothing.
+        let broken = Variables::new(1, 4, &mut ChaCha8Rng::seed_from_u64(1)).expect("has layers");
+        let broken = Candle::<Perceptron> { network: broken, ..network };
+        assert_eq!(broken.recognise(&test.examples[0].grasp, None).pmf, Pmf::uniform(4));
         let right = test.examples.iter().filter(|e| network.recognise(&e.grasp, None).pmf.top().0 == e.class).count();
         assert!(right as f64 > 0.8 * test.examples.len() as f64, "{right} of {}", test.examples.len());
     }
