@@ -33,11 +33,9 @@ impl Sequence {
         self.t_s.iter().copied().zip(self.values.chunks_exact(width.max(1)))
     }
 
-    /// Hash (FNV-1a) of times and readings: equal for copies of one grasp.
+    /// Hash of times and readings: equal for copies of one grasp.
     pub fn content(&self) -> u64 {
-        let numbers = self.t_s.iter().chain(&self.values).flat_map(|x| x.to_bits().to_le_bytes());
-        let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        numbers.fold(0xcbf2_9ce4_8422_2325, mix)
+        fnv_1a(self.t_s.iter().chain(&self.values).flat_map(|x| x.to_bits().to_le_bytes()))
     }
 
     /// Truncates the sequence after a time (s).
@@ -46,6 +44,12 @@ impl Sequence {
         let width = self.values.len() / self.t_s.len().max(1);
         Self { t_s: self.t_s[..count].to_vec(), values: self.values[..count * width].to_vec() }
     }
+}
+
+/// Hash of bytes (Fowler-Noll-Vo, FNV-1a).
+pub(crate) fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, mix)
 }
 
 /// Object class, with its size and shape class for stage one.
@@ -145,7 +149,7 @@ pub struct DataCard {
 }
 
 impl DataCard {
-    /// One-line summary: `preset B, object free, virtual sensors, C1+F`.
+    /// One-line summary: `preset B, object free, virtual sensors, C1`.
     pub fn described(&self) -> String {
         let mut parts = Vec::new();
         parts.extend(self.preset.as_ref().map(|preset| format!("preset {preset}")));
@@ -224,6 +228,13 @@ impl Dataset {
         shuffled
     }
 
+    /// Median duration of the grasps (s); 1 without grasps.
+    pub(crate) fn median_duration_s(&self) -> f32 {
+        let mut ends: Vec<f32> = self.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
+        ends.sort_by(f32::total_cmp);
+        ends.get(ends.len() / 2).copied().unwrap_or(1.0)
+    }
+
     /// Class of each grasp.
     pub fn truth(&self) -> Vec<usize> {
         self.examples.iter().map(|example| example.class).collect()
@@ -272,5 +283,29 @@ impl Dataset {
             }
         }
         fold
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_its_authors() {
+        assert_eq!(fnv_1a([]), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(fnv_1a("foobar".bytes()), 0x8594_4171_f739_67e8);
+    }
+
+    #[test]
+    fn the_median_is_that_of_the_ends() {
+        let example = |end: f32| Example {
+            grasp: Arc::new(Sequence { t_s: vec![0.0, end], values: vec![0.0; 2] }),
+            ..Example::default()
+        };
+        let of = |ends: &[f32]| {
+            let examples = ends.iter().copied().map(example).collect();
+            Dataset { examples, ..Dataset::default() }.median_duration_s()
+        };
+        assert_eq!([of(&[]), of(&[4.0, 2.0, 9.0]), of(&[2.0, 4.0])], [1.0, 4.0, 4.0]);
     }
 }

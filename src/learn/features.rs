@@ -77,9 +77,7 @@ const MEASURES: usize = 9;
 impl Features {
     pub(crate) fn fit(kind: FeatureKind, data: &Dataset) -> Self {
         let channels = data.channels.len();
-        let mut lengths: Vec<f32> = data.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
-        lengths.sort_by(f32::total_cmp);
-        let duration_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0).max(1e-3);
+        let duration_s = data.median_duration_s().max(1e-3);
         let mut range = vec![(f32::INFINITY, f32::NEG_INFINITY); channels];
         for (_, row) in data.examples.iter().flat_map(|e| e.grasp.rows()) {
             for ((low, high), x) in range.iter_mut().zip(row) {

@@ -3,7 +3,7 @@
 use crate::arrays::Arrays;
 use crate::baselines::{Candle, Convolution, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
-use crate::data::Dataset;
+use crate::data::{Dataset, fnv_1a};
 use crate::fitting::{Fitting, LearnError};
 use crate::gaps;
 use crate::learned::LearnedGrasps;
@@ -69,7 +69,7 @@ macro_rules! network {
 }
 
 macro_rules! baseline {
-    ($key:literal, $title:literal, $kind:ident, $about:literal, $fit:expr, $type:ident, $decided_by:expr) => {
+    ($key:literal, $title:literal, $kind:ident, $about:literal, $fit:expr, $type:ty, $decided_by:expr) => {
         Method {
             key: $key,
             title: $title,
@@ -78,7 +78,7 @@ macro_rules! baseline {
             needs_properties: false,
             recipe: None,
             fit: |data, fitting| Ok(Box::new($fit(&*fitting.joined(data)?, fitting)?)),
-            load: |card, arrays| Ok(Box::new($type::load(card, arrays)?)),
+            load: |card, arrays| Ok(Box::new(<$type>::load(card, arrays)?)),
             decided_by: $decided_by,
         }
     };
@@ -100,17 +100,15 @@ macro_rules! tabular {
 
 macro_rules! candle {
     ($key:literal, $title:literal, $kind:ident, $about:literal, $network:ident) => {
-        Method {
-            key: $key,
-            title: $title,
-            kind: MethodKind::$kind,
-            about: $about,
-            needs_properties: false,
-            recipe: None,
-            fit: |data, fitting| Ok(Box::new(Candle::<$network>::fit(&*fitting.joined(data)?, fitting)?)),
-            load: |card, arrays| Ok(Box::new(Candle::<$network>::load(card, arrays)?)),
-            decided_by: Candle::<$network>::decided_by,
-        }
+        baseline!(
+            $key,
+            $title,
+            $kind,
+            $about,
+            Candle::<$network>::fit,
+            Candle<$network>,
+            Candle::<$network>::decided_by
+        )
     };
 }
 
@@ -152,9 +150,7 @@ impl Method {
     /// and the versions of their code. Results with another one are of another method.
     pub fn fingerprint(&self) -> String {
         let decided_by = (self.decided_by)().to_string();
-        // Fowler-Noll-Vo hash.
-        let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
-        let hash = self.key.bytes().chain(decided_by.bytes()).fold(0xcbf2_9ce4_8422_2325, mix);
+        let hash = fnv_1a(self.key.bytes().chain(decided_by.bytes()));
         format!("{:08x}", hash as u32 ^ (hash >> 32) as u32)
     }
 

@@ -133,9 +133,7 @@ impl<N: CandleNetwork> Candle<N> {
     pub(crate) fn fit(data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, LearnError> {
         check_enough(data, 2)?;
         fitting.refuse_settings()?;
-        let mut lengths: Vec<f32> = data.examples.iter().filter_map(|e| e.grasp.t_s.last().copied()).collect();
-        lengths.sort_by(f32::total_cmp);
-        let duration_s = lengths.get(lengths.len() / 2).copied().unwrap_or(1.0).max(0.05);
+        let duration_s = data.median_duration_s().max(0.05);
         let preparation = Preparation::fit(data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0));
         let channels = data.channels.len();
         let of_inputs = |own: Vec<usize>| -> Vec<usize> {
@@ -350,11 +348,11 @@ mod tests {
         assert!(guide.contains(&format!("```rust,ignore\n{code}```")), "{code}");
         let (train, test) = (made_up(12, 1), made_up(6, 2));
         let network = Candle::<Perceptron>::fit(&train, &quick(1)).expect("fits");
+        let right = test.examples.iter().filter(|e| network.recognise(&e.grasp, None).pmf.top().0 == e.class).count();
+        assert!(right as f64 > 0.8 * test.examples.len() as f64, "{right} of {}", test.examples.len());
         // A network that does not fit its inputs knows nothing.
         let broken = Variables::new(1, 4, &mut ChaCha8Rng::seed_from_u64(1)).expect("has layers");
         let broken = Candle::<Perceptron> { network: broken, ..network };
         assert_eq!(broken.recognise(&test.examples[0].grasp, None).pmf, Pmf::uniform(4));
-        let right = test.examples.iter().filter(|e| network.recognise(&e.grasp, None).pmf.top().0 == e.class).count();
-        assert!(right as f64 > 0.8 * test.examples.len() as f64, "{right} of {}", test.examples.len());
     }
 }
