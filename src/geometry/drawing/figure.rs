@@ -138,16 +138,15 @@ impl Plot {
             let ([left, right], [top, bottom]) = (heat.x.range, heat.y.range);
             return [left..=right, -bottom..=-top];
         }
-        let points = || self.series.iter().flat_map(|series| &series.points);
+        let points = self.series.iter().flat_map(|series| &series.points);
+        let places: Vec<[f64; 2]> =
+            points.flat_map(|point| self.spread(point).into_iter().flatten().chain([point.at])).collect();
         let lines =
             |horizontal| self.references.iter().filter(move |line| line.horizontal == horizontal).map(|line| line.at);
-        let spreads = points().flat_map(|point| point.spread.into_iter().flatten());
         let bands = || self.bands.iter().flat_map(|band| &band.points);
         let edges = bands().flat_map(|[_, low, high]| [*low, *high]);
-        let (of_x, of_y): (Vec<f64>, Vec<f64>) =
-            if self.sideways { (spreads.collect(), Vec::new()) } else { (Vec::new(), spreads.collect()) };
-        let x = points().map(|point| point.at[0]).chain(of_x).chain(bands().map(|at| at[0]));
-        let y = points().map(|point| point.at[1]).chain(of_y).chain(edges);
+        let x = places.iter().map(|at| at[0]).chain(bands().map(|at| at[0]));
+        let y = places.iter().map(|at| at[1]).chain(edges);
         [self.x.bounds(x.chain(lines(false))), self.y.bounds(y.chain(lines(true)))]
     }
 
