@@ -207,22 +207,6 @@ pub fn evaluate(
     evaluate_stopped(data, answers, rounds, &stops(recogniser, rounds, stop), stop, bootstrap)
 }
 
-/// Indices of the test grasps of each trial, which may have been tested several times, in different splits; and the class
-/// of each trial.
-fn trials(data: &Dataset) -> (Vec<Vec<usize>>, Vec<usize>) {
-    let mut at: BTreeMap<(i64, usize), usize> = BTreeMap::new();
-    let (mut of_trial, mut truth): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
-    for (k, example) in data.examples.iter().enumerate() {
-        let trial = *at.entry((example.id, example.class)).or_insert_with(|| {
-            of_trial.push(Vec::new());
-            truth.push(example.class);
-            of_trial.len() - 1
-        });
-        of_trial[trial].push(k);
-    }
-    (of_trial, truth)
-}
-
 /// The same for answers of several recognisers, each tested on its own split: `data` holds the test grasps of all splits,
 /// one after the other. The interval is over trials, however often each was tested.
 pub fn evaluate_stopped(
@@ -264,6 +248,22 @@ pub fn evaluate_stopped(
         trials: of_trial.len(),
         confusion,
     })
+}
+
+/// Indices of the test grasps of each trial, which may have been tested several times, in different splits; and the class
+/// of each trial.
+fn trials(data: &Dataset) -> (Vec<Vec<usize>>, Vec<usize>) {
+    let mut at: BTreeMap<(i64, usize), usize> = BTreeMap::new();
+    let (mut of_trial, mut truth): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (k, example) in data.examples.iter().enumerate() {
+        let trial = *at.entry((example.id, example.class)).or_insert_with(|| {
+            of_trial.push(Vec::new());
+            truth.push(example.class);
+            of_trial.len() - 1
+        });
+        of_trial[trial].push(k);
+    }
+    (of_trial, truth)
 }
 
 fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
