@@ -114,7 +114,7 @@ impl Model {
         let mut difference = parts.join(", and ");
         if missing.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE)) {
             difference += ". Contact pressure exists only in simulations: no real gripper can run this model. Train one \
-                           on the pads' pressure (--signals parts)";
+                           on the pads' pressure (--signals parts); simulated grasps need --signals contact";
         }
         Err(ModelError::Channels { difference })
     }

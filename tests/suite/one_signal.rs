@@ -164,6 +164,7 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
         ["curvature_left", "curvature_right", "pressure_left", "pressure_right"].map(str::to_owned).to_vec();
     let refused = old.check_channels(&board).expect_err("pads measure no contact pressure").to_string();
     assert!(refused.contains("no real gripper can run this model"), "{refused}");
+    assert!(refused.contains("simulated grasps need --signals contact"), "{refused}");
     // One that was trained on a board's readings stays as it was.
     let mut recorded = shipped_model().unwrap();
     (recorded.card.data.signals, recorded.card.data.sensors) = (None, None);
