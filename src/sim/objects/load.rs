@@ -49,8 +49,8 @@ impl Content {
         read.inspect(|bytes| self.0.set(crate::fingerprint([self.0.get().to_le_bytes().as_slice(), bytes])))
     }
 
-    /// The object that the files make.
-    fn names(self, object: ObjectModel) -> ObjectModel {
+    /// Stores the hash in the object that was made of the files.
+    fn stamped(self, object: ObjectModel) -> ObjectModel {
         ObjectModel { content: self.0.get(), ..object }
     }
 }
@@ -68,7 +68,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
     }
     let content = Content::default();
     let object = blueprint(source, &content)?.build(options)?;
-    Ok(Some(content.names(object)))
+    Ok(Some(content.stamped(object)))
 }
 
 /// Surface of the object in a URDF, OBJ or STL file, in the file's own units. It may be open or tangled: it is for looking
@@ -121,7 +121,7 @@ fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, Objec
     let read = |path: &str| content.of(read_embedded(Path::new(path)));
     let mesh = |reference: &str| read_mesh(&folder.join(reference).to_string_lossy(), &read);
     let object = urdf::parse(name, &bytes, &mesh)?.build(options)?;
-    Ok(content.names(object))
+    Ok(content.stamped(object))
 }
 
 fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
