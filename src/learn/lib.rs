@@ -49,7 +49,8 @@
 //!     ..Dataset::default()
 //! };
 //! let (progress, stop) = (|_| {}, AtomicBool::new(false));
-//! let fitting = Fitting { seed: 1, quick: true, settings: Default::default(), second: None, progress: &progress, stop: &stop };
+//! let settings = Default::default();
+//! let fitting = Fitting { seed: 1, quick: true, settings, second: None, progress: &progress, stop: &stop };
 //! let model = method("decision-tree").expect("in METHODS").train(&data, &fitting)?;
 //! let verdict = model.recogniser.recognise(&grasp(1.0), None);
 //! assert_eq!(verdict.pmf.top().0, 1);

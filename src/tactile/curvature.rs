@@ -3,9 +3,10 @@
 //! A flex strip measures the bend of the length that it covers: kappa = sum(w q) / length, where w is the share of a
 //! joint's segment under the strip, over which the angle q of the joint is spread evenly.
 //!
-//! In the paper's simulation (section IV-A1) it is that of a circle through the tracked joints, kappa = 1 / r. The circle through the joints of a chain that bends by phi per segment of length l has curvature
-//! 2 sin(phi / 2) / l, which is phi / l less phi² / 24 of it: 0.09 % low at 8 degrees per joint. A section with
-//! fewer than three joints has no circle; there the sum of its joint angles over its length is read instead.
+//! In the paper's simulation (section IV-A1) it is that of a circle through the tracked joints, kappa = 1 / r. The
+//! circle through the joints of a chain that bends by phi per segment of length l has curvature 2 sin(phi / 2) / l,
+//! which is phi / l less phi² / 24 of it: 0.09 % low at 8 degrees per joint. A section with fewer than three joints has
+//! no circle; there the sum of its joint angles over its length is read instead.
 
 use super::Span;
 use glam::DVec2;

@@ -4,9 +4,9 @@
 //!
 //! A **layout** (C1 .. C8) places curvature and pressure sensors on the fingers; each gives a **channel**, whose
 //! **signal** is what a part of a real gripper measures, or a quantity that only simulations have
-//! ([`SignalDefinition`]). Channels over time are [`Signals`]. A real **board** sends **readings**: counts of its converter. A **calibration** of each
-//! part turns counts into angle, curvature, force and pressure; a **zero** (tare) removes drift. Trials keep raw data,
-//! so that any layout and calibration can be applied later.
+//! ([`SignalDefinition`]). Channels over time are [`Signals`]. A real **board** sends **readings**: counts of its
+//! converter. A **calibration** of each part turns counts into angle, curvature, force and pressure; a **zero** (tare)
+//! removes drift. Trials keep raw data, so that any layout and calibration can be applied later.
 //!
 //! # Modules, lowest layer first
 //!

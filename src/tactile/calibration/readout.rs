@@ -40,7 +40,8 @@ impl SensorEstimate {
 /// A whole trial as derived.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Derived {
-    /// Curvature, pressure and force of each finger, as far as they could be derived. Readings in which one of them is missing are left out.
+    /// Curvature, pressure and force of each finger, as far as they could be derived. Readings in which one of them is
+    /// missing are left out.
     pub signals: Signals,
     /// Drift of the zeros before the closing.
     pub drift: Vec<Drift>,
