@@ -219,7 +219,9 @@ impl Channel {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LayoutError {
     /// The name is not in the catalogue.
-    #[error("unknown sensor layout \"{name}\"; choose C1 to C8, or with force C1+F to C8+F")]
+    #[error(
+        "unknown sensor layout \"{name}\"; choose C1 to C8, or with --signals contact also C1+F to C8+F, with force"
+    )]
     Unknown {
         /// The name given.
         name: String,
@@ -421,7 +423,8 @@ mod tests {
             CATALOGUE[3].channels(&gripper, SignalDefinition::Parts),
             Err(LayoutError::EmptySpan { sensors: 80, .. })
         ));
-        assert!(SensorLayout::named("C9").is_err());
+        let unknown = SensorLayout::named("C9").expect_err("there are eight").to_string();
+        assert!(unknown.contains("with --signals contact also C1+F"), "{unknown}");
         assert!(SensorLayout::named("c1+f").is_ok_and(|layout| layout.force));
     }
 }
