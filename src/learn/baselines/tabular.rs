@@ -290,15 +290,15 @@ impl Tabular {
         fitting.check()?;
         let classifier = Classifier::of(kind, fitting);
         let tried = if grasps.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
-        let calibrated = |number: usize| {
+        let calibrated = |number: usize, mirroring: Mirroring| {
             let progress = |share: f64| (fitting.progress)(0.1 + 0.6 * (number as f64 + share) / tried.len() as f64);
-            grasps.calibrated((kind, &classifier), tried[number], fitting, &progress)
+            grasps.calibrated((kind, &classifier), mirroring, fitting, &progress)
         };
-        let (mut mirroring, (mut calibration, mut least)) = (tried[0], calibrated(0)?);
-        for number in 1..tried.len() {
-            let (other, loss) = calibrated(number)?;
+        let (mut mirroring, (mut calibration, mut least)) = (tried[0], calibrated(0, tried[0])?);
+        for (number, other) in tried.iter().enumerate().skip(1) {
+            let (with_other, loss) = calibrated(number, *other)?;
             if loss < least {
-                (mirroring, calibration, least) = (tried[number], other, loss);
+                (mirroring, calibration, least) = (*other, with_other, loss);
             }
         }
         fitting.check()?;
