@@ -334,7 +334,7 @@ fn a_tare_is_taken_kept_and_shown_beside_the_drift_of_trials() {
     let at = folder.path();
     let parts = parts(7, false);
     let (board, calibrations) = calibrated(&parts, 7);
-    refused(at, &["calibrate", "tare", "--port", "rest.bytes"], &["calibrated"]);
+    refused(at, &["calibrate", "tare", "--port", "rest.bytes"], &["no calibrations yet", "palpate help gripper"]);
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
         store.calibrations().add(&calibration.record).unwrap();
