@@ -198,3 +198,39 @@ fn dropout_keeps_the_mean_loss() {
     assert!(!varies_plain && varies);
     assert!((plain - dropped).abs() < 0.05, "{plain} and {dropped}");
 }
+
+/// Largest gradient of an input weight of a layer that is read out 300 steps after its only input.
+fn gradient_of_an_early_input(layer: &MacroLayer) -> f32 {
+    let shape = layer.shape();
+    let steps = 300;
+    let mut x = vec![0.0; steps * shape.inputs];
+    x[..shape.inputs].fill(1.0);
+    let batch = Batch {
+        x,
+        steps,
+        sequences: 1,
+        read_outs: vec![ReadOut { step: steps - 1, sequence: 0, weight: 1.0 }],
+        targets: vec![1],
+        log_prior: Vec::new(),
+    };
+    let (mut pass, mut gradient) = (Pass::new(shape), vec![0.0; shape.parameters()]);
+    layer.loss(&batch, NONE, &mut random(0), &mut gradient, &mut pass);
+    gradient[shape.blocks()[0].place.clone()].iter().fold(0.0, |most, g| most.max(g.abs()))
+}
+
+#[test]
+fn units_begin_with_memories_of_all_lengths() {
+    let shape = MacroShape { inputs: 2, units: 64, hidden: None, groups: vec![3], with_prior: false };
+    let forgetful = MacroLayer::new(shape.clone(), &mut random(9));
+    let mut layer = forgetful.clone();
+    layer.remember(300, &mut random(10));
+    let bias = layer.values()[shape.blocks()[2].place.clone()].to_vec();
+    // A unit with memory m keeps m / (m + 1) of its cell and takes in 1 / (m + 1).
+    let memories: Vec<f32> = bias[64..128].iter().map(|b| b.exp()).collect();
+    assert!(bias[..64].iter().zip(&memories).all(|(b, m)| (b.exp() - 1.0 / m).abs() < 1e-5), "{bias:?}");
+    assert!(memories.iter().all(|m| (1.0..299.1).contains(m)), "{memories:?}");
+    let mean = memories.iter().sum::<f32>() / 64.0;
+    assert!((mean - 150.0).abs() < 4.0 * 299.0 / (12.0 * 64.0_f32).sqrt(), "mean {mean}");
+    let [early, with_memory] = [&forgetful, &layer].map(gradient_of_an_early_input);
+    assert!(with_memory > 1e-6 && early < 1e-20, "{early} {with_memory}");
+}

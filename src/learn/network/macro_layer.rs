@@ -200,6 +200,23 @@ impl MacroLayer {
         Self { shape, blocks, values }
     }
 
+    /// Sets the biases of the gates for memories of one to `longest` steps, spread uniformly over the units: a gate with bias
+    /// b and inputs of mean zero forgets a share 1 - sigmoid(b) per step (chrono initialisation, Tallec and Ollivier, ICLR
+    /// 2018, eq. 16).
+    pub fn remember(&mut self, longest: usize, random: &mut impl Rng) {
+        let units = self.shape.units;
+        let Some(bias) = self.blocks.iter().find(|block| block.name == "lstm.bias").map(|block| block.place.clone())
+        else {
+            return;
+        };
+        let longest = longest.max(3) as f32;
+        for unit in 0..units {
+            let memory = ((longest - 2.0) * random.random::<f32>()).ln_1p();
+            self.values[bias.start + unit] = -memory;
+            self.values[bias.start + units + unit] = memory;
+        }
+    }
+
     /// Creates a macro-layer from parameters in the order of [`MacroShape::blocks`]; `None` if their number is wrong or one
     /// is not finite.
     pub fn from_values(shape: MacroShape, values: Vec<f32>) -> Option<Self> {

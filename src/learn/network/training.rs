@@ -49,6 +49,15 @@ pub struct Training {
     pub early_share: f32,
     /// Largest norm of a gradient; longer ones are scaled down.
     pub longest_gradient: f64,
+    /// Longest memory of a unit at the start (steps): units begin with memories of all lengths up to it (chrono
+    /// initialisation, Tallec and Ollivier 2018). Zero for forget gates with a bias of one, which remember for a few steps.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub longest_memory: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde expects")]
+fn is_zero(steps: &usize) -> bool {
+    *steps == 0
 }
 
 /// Share of the training in which the learning rate rises.
@@ -75,7 +84,11 @@ pub(super) fn train(
     seed: u64,
     go_on: &mut dyn FnMut(usize, f64) -> bool,
 ) -> MacroLayer {
-    let mut layer = MacroLayer::new(shape, &mut ChaCha8Rng::seed_from_u64(seed));
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut layer = MacroLayer::new(shape, &mut random);
+    if training.longest_memory > 0 {
+        layer.remember(training.longest_memory, &mut random);
+    }
     train_on(&mut layer, set, training, seed ^ 0x7ea1, go_on);
     layer
 }
