@@ -102,15 +102,10 @@ pub(super) fn show(
             let axis = if line.horizontal { &plot.y } else { &plot.x };
             let Some(at) = axis.coordinate(line.at) else { continue };
             let (ink, dashes) = (veil(quiet, 0.8), Dashes::dashed_loose());
-            let word = RichText::new(&line.text).small();
             if line.horizontal {
                 plot_ui.hline(HLine::new("", at).color(ink).width(1.0).style(dashes));
-                let place = PlotPoint::new(*x_bounds.start(), at);
-                plot_ui.text(Text::new("", place, word).color(ink).anchor(Align2::LEFT_BOTTOM));
             } else {
                 plot_ui.vline(VLine::new("", at).color(ink).width(1.0).style(dashes));
-                let place = PlotPoint::new(at, *y_bounds.end());
-                plot_ui.text(Text::new("", place, word).color(ink).anchor(Align2::LEFT_TOP));
             }
         }
         for series in &plot.series {
@@ -121,6 +116,17 @@ pub(super) fn show(
                 let text = Text::new("", PlotPoint::new(x, y), word).color(colour(theme.colours().text));
                 plot_ui.text(text.anchor(Align2::LEFT_CENTER));
             }
+        }
+        for line in plot.references.iter().filter(|line| !line.text.is_empty()) {
+            let axis = if line.horizontal { &plot.y } else { &plot.x };
+            let Some(at) = axis.coordinate(line.at) else { continue };
+            let (place, anchor) = if line.horizontal {
+                (PlotPoint::new(*x_bounds.start(), at), Align2::LEFT_BOTTOM)
+            } else {
+                (PlotPoint::new(at, *y_bounds.end()), Align2::LEFT_TOP)
+            };
+            let word = RichText::new(&line.text).small().background_color(veil(theme.colours().background, 0.8));
+            plot_ui.text(Text::new("", place, word).color(colour(quiet)).anchor(anchor));
         }
     });
     let shown = ShownPlot { response: shown.response, transform: shown.transform };

@@ -255,15 +255,15 @@ pub const fn series_colour(number: usize, theme: Theme) -> Rgb {
 /// Number of different series colours.
 pub const SERIES_COLOURS: usize = 7;
 
-/// After Okabe and Ito: blue, vermilion, green, purple, amber, sky, grey; shifted as those of [`Trace`].
+/// After Okabe and Ito: blue, vermilion, green, purple, amber, grey, sky; shifted as those of [`Trace`].
 const SERIES_DARK: [Rgb; SERIES_COLOURS] = [
     Rgb(61, 155, 214),
     Rgb(230, 112, 38),
     Rgb(0, 158, 115),
     Rgb(214, 132, 178),
     Rgb(230, 159, 0),
-    Rgb(120, 200, 245),
     Rgb(152, 162, 174),
+    Rgb(120, 200, 245),
 ];
 const SERIES_LIGHT: [Rgb; SERIES_COLOURS] = [
     Rgb(0, 114, 178),
@@ -271,8 +271,8 @@ const SERIES_LIGHT: [Rgb; SERIES_COLOURS] = [
     Rgb(0, 128, 93),
     Rgb(174, 82, 134),
     Rgb(168, 112, 0),
-    Rgb(43, 140, 196),
     Rgb(90, 98, 108),
+    Rgb(43, 140, 196),
 ];
 
 #[cfg(test)]

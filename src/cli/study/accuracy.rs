@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
     }
     print(&stored.result)?;
     say("")?;
-    say(format!("{:.0} CPU minutes. {written}", stored.cpu_hours * 60.0))
+    say(format!("{}. {written}", stored.cpu_time()))
 }
 
 /// The command that repeats the study, without where it writes to.

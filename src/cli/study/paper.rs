@@ -170,7 +170,7 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
             reports.push((key, stored));
         } else {
             print(*study, &stored, arguments.quick)?;
-            say(format!("\n{:.0} CPU minutes. {written}\n", stored.cpu_hours * 60.0))?;
+            say(format!("\n{}. {written}\n", stored.cpu_time()))?;
         }
     }
     match (reports.as_slice(), key) {

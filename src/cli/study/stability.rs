@@ -92,12 +92,13 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     }
     let stored = StoredStudy::new(&arguments.command(), cpu_hours, plan.report(&results));
     let written = folder.write("stability", &stored, &stability_figure(&stored))?;
+    let cpu_time = stored.cpu_time();
     let report = Report { table: plan.case_rows(&results), report: stored.result, cpu_hours };
     if arguments.json {
         say_json(&report)?;
     } else {
         print(&report)?;
-        say(format!("{:.0} CPU minutes. {written}", cpu_hours * 60.0))?;
+        say(format!("{cpu_time}. {written}"))?;
     }
     match report.table.iter().filter(|row| !row.holds).count() + report.report.random.non_finite {
         0 => Ok(()),

@@ -32,6 +32,13 @@ impl PlotAxis {
         coordinate.filter(|c| c.is_finite())
     }
 
+    /// Linear axis of a count, with marks at whole numbers only.
+    pub fn count(title: impl Into<String>, most: usize) -> Self {
+        let every = most.div_ceil(10).max(1);
+        let ticks = (0..=most).step_by(every).map(|n| (n as f64, n.to_string())).collect();
+        Self { ticks, ..Self::linear(title) }
+    }
+
     /// Shown range in coordinates: its own, or that of the values with a margin.
     pub(super) fn bounds(&self, values: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
         if let Some([low, high]) = self.range.map(|ends| ends.map(|end| self.coordinate(end)))
@@ -64,7 +71,7 @@ impl PlotAxis {
 /// Room beyond the outermost points, as a share of their range.
 const MARGIN: f64 = 0.07;
 
-/// Decades, with their multiples; a narrow range has numbers at 2 and 5 too.
+/// Decades, with their multiples; narrow ranges have numbers at some multiples too.
 fn logarithmic_marks(bounds: &RangeInclusive<f64>) -> Vec<(f64, String)> {
     let (first, last) = (bounds.start().floor() as i32, bounds.end().ceil() as i32);
     let decades = bounds.end() - bounds.start();
@@ -76,7 +83,7 @@ fn logarithmic_marks(bounds: &RangeInclusive<f64>) -> Vec<(f64, String)> {
                 1 => decade.rem_euclid(every) == 0,
                 2 | 5 => decades < 1.7,
                 3 => decades < 0.7,
-                _ => false,
+                _ => decades < 0.5,
             };
             let text = if numbered { number(value) } else { String::new() };
             (decades < 7.0 || numbered).then_some((value.log10(), text))
@@ -98,9 +105,10 @@ fn linear_marks(bounds: &RangeInclusive<f64>) -> Vec<(f64, String)> {
 
 /// Number at a mark of a logarithmic axis.
 fn number(value: f64) -> String {
-    let exponent = value.log10().round() as i32;
+    // The product of a factor and a power of ten may lie just below a power of ten.
+    let exponent = (value.log10() + 1e-9).floor() as i32;
     match exponent {
-        -3..0 => format!("{value:.*}", exponent.unsigned_abs() as usize + 1).trim_end_matches('0').to_owned(),
+        -3..0 => format!("{value:.*}", exponent.unsigned_abs() as usize),
         0..5 => format!("{value:.0}"),
         _ => format!("{value:.0e}"),
     }
@@ -122,6 +130,8 @@ mod tests {
         let logarithmic = PlotAxis::logarithmic("ms");
         assert_eq!(texts(&logarithmic, -2.2..=1.1), ["0.01", "0.1", "1", "10"]);
         assert_eq!(texts(&logarithmic, 0.2..=1.1), ["2", "5", "10"]);
+        assert_eq!(texts(&logarithmic, -0.8..=0.35), ["0.2", "0.5", "1", "2"]);
+        assert_eq!(texts(&logarithmic, 1.6..=1.97), ["40", "50", "60", "70", "80", "90"]);
         assert_eq!(texts(&logarithmic, -6.0..=5.0), ["1e-6", "1e-4", "0.01", "1", "100", "10000"][..].to_vec());
         let named = PlotAxis { ticks: vec![(0.0, "ball".to_owned()), (9.0, "box".to_owned())], ..linear };
         assert_eq!(texts(&named, -0.5..=1.5), ["ball"]);

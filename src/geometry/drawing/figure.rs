@@ -5,6 +5,7 @@
 
 use super::axis::PlotAxis;
 use super::heat_map::HeatMap;
+use crate::palette::SERIES_COLOURS;
 use std::ops::RangeInclusive;
 
 /// A figure: plots beside each other.
@@ -115,6 +116,13 @@ pub enum Marker {
     Square,
     /// Cross: something failed.
     Cross,
+}
+
+impl Marker {
+    /// Sign of a series by its number, filled. It changes where the colours begin again.
+    pub fn of_series(number: usize) -> Self {
+        if (number / SERIES_COLOURS).is_multiple_of(2) { Self::Dot } else { Self::Square }
+    }
 }
 
 impl DataPoint {

@@ -43,15 +43,21 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
         })
     }
 
-    /// Origin of the result, as a line below a table or picture.
-    pub fn origin(&self) -> String {
+    /// CPU time that the study took, in words.
+    pub fn cpu_time(&self) -> String {
         let minutes = self.cpu_hours * 60.0;
-        let time = if minutes < 90.0 {
+        if minutes < 2.0 {
+            format!("{:.0} CPU seconds", minutes * 60.0)
+        } else if minutes < 90.0 {
             format!("{minutes:.0} CPU minutes")
         } else {
             format!("{:.1} CPU hours", self.cpu_hours)
-        };
-        format!("`{}`, {time}, version {}", self.command, self.program)
+        }
+    }
+
+    /// Origin of the result, as a line below a table or picture.
+    pub fn origin(&self) -> String {
+        format!("`{}`, {}, version {}", self.command, self.cpu_time(), self.program)
     }
 
     /// The origin without Markdown, for pictures and terminals.

@@ -135,6 +135,7 @@ fn draw_plot<B: DrawingBackend>(
     for series in &plot.series {
         draw_series(canvas, plot, &frame, series)?;
     }
+    draw_reference_texts(canvas, plot, &frame)?;
     draw_labels(canvas, plot, &frame)
 }
 
@@ -186,15 +187,36 @@ fn draw_axes<B: DrawingBackend>(
         if line.horizontal {
             let [_, y] = frame.at([x_first, at]);
             dashes(canvas, &[[left, y], [right, y]], REFERENCE_DASHES, quiet)?;
-            let at = [right - 2.0, y - 4.0];
-            canvas.text(&Text { text: &line.text, at, align: Align::Right, size: SMALL, colour: quiet })?;
         } else {
             let [x, _] = frame.at([at, y_first]);
             dashes(canvas, &[[x, top], [x, bottom]], REFERENCE_DASHES, quiet)?;
-            let fits = x + 4.0 + canvas.width(&line.text, SMALL)? <= right;
-            let (align, x) = if fits { (Align::Left, x + 4.0) } else { (Align::Right, x - 4.0) };
-            canvas.text(&Text { text: &line.text, at: [x, top + SMALL], align, size: SMALL, colour: quiet })?;
         }
+    }
+    Ok(())
+}
+
+/// Texts of the reference lines, above all series, which show through their ground.
+fn draw_reference_texts<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    plot: &Plot,
+    frame: &Frame,
+) -> Result<(), FigureError> {
+    let [[_, top], [right, _]] = frame.room;
+    let (ground, colour) = (canvas.colours.background, canvas.colours.quiet_text);
+    for line in plot.references.iter().filter(|line| !line.text.is_empty()) {
+        let (axis, range) = if line.horizontal { (&plot.y, &frame.y) } else { (&plot.x, &frame.x) };
+        let Some(at) = axis.coordinate(line.at).filter(|at| range.contains(at)) else { continue };
+        let width = canvas.width(&line.text, SMALL)?;
+        let (low, base) = if line.horizontal {
+            let [_, y] = frame.at([*frame.x.start(), at]);
+            (right - 2.0 - width, y - 4.0)
+        } else {
+            let [x, _] = frame.at([at, *frame.y.start()]);
+            (if x + 4.0 + width <= right { x + 4.0 } else { x - 4.0 - width }, top + SMALL)
+        };
+        let (high, above, below) = (low + width, base - SMALL + 1.0, base + 2.5);
+        canvas.veil(&[[low, above], [high, above], [high, below], [low, below]], ground, 0.8)?;
+        canvas.text(&Text { text: &line.text, at: [low, base], align: Align::Left, size: SMALL, colour })?;
     }
     Ok(())
 }

@@ -429,7 +429,7 @@ fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
                     let mark = FigureMark::Point(series.len(), point);
                     links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
                 }
-                let shift = 0.06 * (colour as f64 - 1.5);
+                let shift = 0.06 * (colour as f64 - 0.5 * (names.len() - 1) as f64);
                 let points = own.iter().map(|row| {
                     let grasps = table.cell(*row, "grasps").value().unwrap_or(f64::NAN);
                     percent_point(table, *row, "F1", grasps + shift)
@@ -439,12 +439,14 @@ fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
                     name: name.clone(),
                     colour,
                     line,
-                    marker: Marker::Dot,
+                    marker: Marker::of_series(colour),
                     points: points.collect(),
                 });
             }
             if !series.is_empty() {
-                let (x, y) = (PlotAxis::linear("grasps of the object"), PlotAxis::linear(F1_PERCENT));
+                let most = rows.iter().filter_map(|row| table.cell(*row, "grasps").value()).fold(0.0, f64::max);
+                let x = PlotAxis::count("grasps of the object", most as usize);
+                let y = PlotAxis::linear(F1_PERCENT);
                 plots.push(Plot { title: format!("{sensors} sensors, {placed}"), x, y, series, ..Plot::default() });
             }
         }

@@ -3,7 +3,7 @@
 use super::answers::{PARTS, Pool, TestPart, fit_and_judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{F1_PERCENT, named_columns, percent_point};
+use super::drawing::{F1_PERCENT, named_rows, percent_row};
 use super::plan::{DataWanted, StudyPlan};
 use super::pools::{Gains, Pools, add_new, adjusted, better_than_each, finding, finding_on_gains, percent, points};
 use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
@@ -302,7 +302,7 @@ fn findings(pooled: &[Pooled<'_>], recommended: &StudyTable) -> Vec<Finding> {
     vec![Finding { found: enough.found.clone() + &in_short, ..enough }, better]
 }
 
-/// A plot for each sensor model: layouts side by side, a colour for each model.
+/// A plot for each sensor model: a row for each layout, a colour for each model.
 fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
     let (mut plots, mut links) = (Vec::new(), Vec::new());
     let models = table.texts("model");
@@ -316,7 +316,7 @@ fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
                 let place = names.iter().position(|name| name == table.text(row, "layout")).unwrap_or(0) as f64;
                 let mark = FigureMark::Point(series.len(), points.len());
                 links.push(FigureLink { plot: plots.len(), mark, table: at, row });
-                points.push(percent_point(table, row, "F1", place + 0.14 * (colour as f64 - 1.0)));
+                points.push(percent_row(table, row, "F1", -place - 0.2 * (colour as f64 - 1.0)));
             }
             if !points.is_empty() {
                 series.push(DataSeries {
@@ -329,10 +329,10 @@ fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
             }
         }
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let (x, y) = (named_columns("sensor layout", &names), PlotAxis::linear(F1_PERCENT));
-        plots.push(Plot { title: format!("{sensors} sensors"), x, y, series, ..Plot::default() });
+        let (x, y) = (PlotAxis::linear(F1_PERCENT), named_rows(&names));
+        plots.push(Plot { title: format!("{sensors} sensors"), x, y, series, sideways: true, ..Plot::default() });
     }
     let note = "Macro F1 after one grasp with 95 % intervals, by bootstrap over test grasps.".to_owned();
-    let figure = Figure { title: table.title.clone(), plots, columns: 1, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1080, 760], links }
+    let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
+    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1080, 720], links }
 }

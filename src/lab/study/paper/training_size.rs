@@ -320,7 +320,7 @@ fn figure(at: usize, table: &StudyTable, report: &StudyReport) -> LinkedFigure {
             });
             let line = if model == PAPERS_MODEL { LineStyle::Bold } else { LineStyle::Thin };
             let points = points.collect();
-            series.push(DataSeries { name: model.to_owned(), colour, line, marker: Marker::Dot, points });
+            series.push(DataSeries { name: model.to_owned(), colour, line, marker: Marker::of_series(colour), points });
         }
         let enough = report.table("training-size-least").and_then(|(_, least)| {
             let row = *least.rows_with(&[("sensors", sensors), ("model", PAPERS_MODEL)]).first()?;
