@@ -115,12 +115,18 @@ macro_rules! candle {
 impl Method {
     /// Fits a model to data, fills in its card and adds the class signatures. Runs on one thread, whose CPU time is recorded.
     pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, LearnError> {
-        // candle and smartcore would spread over all cores, which is slower for models this small.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?;
-        let (recogniser, train_cpu_s) = pool.install(|| {
+        let timed = || {
             let start = cpu_time::ThreadTime::now();
             (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
-        })?;
+        };
+        // candle and smartcore would spread over all cores, which is slower for models this small. A caller with a thread of
+        // its own counts the CPU time of the fit there.
+        let has_own_thread = rayon::current_thread_index().is_some() && rayon::current_num_threads() == 1;
+        let (recogniser, train_cpu_s) = if has_own_thread {
+            timed()
+        } else {
+            rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?.install(timed)
+        }?;
         let data = fitting.joined(data)?;
         let deviations = self.recipe.map(|recipe| recipe().deviations_with(&fitting.settings)).transpose()?;
         let card = ModelCard {
