@@ -54,8 +54,8 @@ fn opening(result: &StudyResult, row: &StudyRow) -> Option<StudyAction> {
 /// What a click on a row does, or why it does nothing.
 fn hint(result: &StudyResult, row: &StudyRow) -> String {
     match (row.trials.as_slice(), result.origin) {
-        ([], _) => "No trials are kept for this row".to_owned(),
         (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
+        ([], _) => "No trials are kept for this row".to_owned(),
         ([only], _) => format!("Click to open trial {only} in Inspect"),
         ([first, others @ ..], _) => {
             format!("Click to open trial {first} in Inspect, with {} others beside it", others.len())

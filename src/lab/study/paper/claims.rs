@@ -30,7 +30,18 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
     if !missing.is_empty() {
         parts.push(format!("Not run in full with this version: {}.", missing.join(", ")));
     }
-    Ok(vec![GeneratedSection { document: "assets/help/paper.md", name: "claims", text: parts.join("\n\n") }])
+    let claims = GeneratedSection { document: "assets/help/paper.md", name: "claims", text: parts.join("\n\n") };
+    let studies = GeneratedSection { document: "assets/help/studies.md", name: "studies", text: overview() };
+    Ok(vec![claims, studies])
+}
+
+/// Table of the studies and of what they cost.
+fn overview() -> String {
+    let rows = PAPER_STUDIES.iter().map(|study| {
+        let card = study.card();
+        [format!("`{}`", card.key).as_str(), card.about, card.paper, card.budget].map(str::to_owned).to_vec()
+    });
+    markdown_table(&["study", "shows", "paper", "cost of the full form"], &rows.collect::<Vec<_>>())
 }
 
 fn claims(findings: &[Finding]) -> String {

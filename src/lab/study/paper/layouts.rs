@@ -21,7 +21,7 @@ pub(super) struct Layouts;
 const CARD: StudyCard = StudyCard {
     key: "layouts",
     title: "Sensor layouts",
-    about: "C1 to C8 of parts and of contact pressure, with and without force, and the layout with the fewest channels that is as good as the best",
+    about: "layouts C1 to C8 of real parts and of contact pressure, with and without force, and the layout with the fewest channels that is as good as the best",
     paper: "Fig. 5a",
     budget: "about 50 CPU minutes",
 };
