@@ -9,7 +9,8 @@ use palpate::app::{Mode, StudyAction, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    Agreement, Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable,
+    Agreement, Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable, paper_study,
+    study_fingerprint,
 };
 use palpate_lab::workers::StudyRequest;
 use palpate_learn::metrics::Interval;
@@ -50,7 +51,7 @@ pub(crate) fn scripted_result(store: &mut Store) {
         finding("VI", "It is small", "", Agreement::NotMeasured),
     ];
     let data = vec!["virtual sensors: 320 grasps of 16 objects, preset B, layout C1".to_owned()];
-    let fingerprint = StudyPlan::of_size(StudySize::Quick).fingerprint();
+    let fingerprint = study_fingerprint(paper_study("models").expect("known"), &StudyPlan::of_size(StudySize::Quick));
     let report = StudyReport { fingerprint, data, tables: vec![table], findings };
     let mut stored = StoredStudy::new("palpate study models --quick", 0.25, report);
     // Programs of other versions have the same picture.

@@ -20,7 +20,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct ResultFile<U> {
     file: Option<(PathBuf, File)>,
     units: BTreeMap<String, U>,
-    cpu_s: f64,
+    /// CPU time of each unit (s).
+    cpu_s: BTreeMap<String, f64>,
 }
 
 /// What is computed; a file with another first line is refused.
@@ -76,7 +77,7 @@ pub enum ResultFileError {
 impl<U: Serialize + DeserializeOwned> ResultFile<U> {
     /// Results in memory only, for measurements that take seconds.
     pub fn in_memory() -> Self {
-        Self { file: None, units: BTreeMap::new(), cpu_s: 0.0 }
+        Self { file: None, units: BTreeMap::new(), cpu_s: BTreeMap::new() }
     }
 
     /// Opens the file of a study, or starts it. `plan` is everything else that its results depend on.
@@ -121,7 +122,7 @@ impl<U: Serialize + DeserializeOwned> ResultFile<U> {
     }
 
     fn keep(&mut self, line: Line<U>) {
-        self.cpu_s += line.cpu_s;
+        self.cpu_s.insert(line.unit.clone(), line.cpu_s);
         self.units.insert(line.unit, line.result);
     }
 
@@ -148,9 +149,15 @@ impl<U: Serialize + DeserializeOwned> ResultFile<U> {
         &self.units
     }
 
+    /// Leaves out all other units, such as those of an earlier version of a recogniser; they stay in the file.
+    pub fn retain(&mut self, is_wanted: impl Fn(&str) -> bool) {
+        self.units.retain(|unit, _| is_wanted(unit));
+        self.cpu_s.retain(|unit, _| is_wanted(unit));
+    }
+
     /// CPU time of all finished units (h).
     pub fn cpu_hours(&self) -> f64 {
-        self.cpu_s / 3600.0
+        self.cpu_s.values().sum::<f64>() / 3600.0
     }
 }
 

@@ -5,7 +5,7 @@ use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use crate::study::paper::{
     LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyFolder, StudyPlan, StudyProgress,
-    StudyReport, StudySize, StudyWork, paper_study, run_study, stored_report,
+    StudyReport, StudySize, StudyWork, paper_study, run_study, stored_report, study_fingerprint,
 };
 use crate::study::{ResultFileError, StoredStudy, program};
 use palpate_store::{Store, StoreError};
@@ -246,11 +246,12 @@ fn shown(
     stored: StoredStudy<StudyReport>,
     program: &str,
 ) -> Arc<StudyResult> {
+    let is_current = |size| stored.result.fingerprint == study_fingerprint(study, &StudyPlan::of_size(size));
     let current = match origin {
         // Samples are of many sizes.
         StudyOrigin::Run(StudySize::Sample { .. }) => true,
-        StudyOrigin::Run(size) => stored.result.fingerprint == StudyPlan::of_size(size).fingerprint(),
-        StudyOrigin::Shipped => stored.result.fingerprint == StudyPlan::of_size(StudySize::Full).fingerprint(),
+        StudyOrigin::Run(size) => is_current(size),
+        StudyOrigin::Shipped => is_current(StudySize::Full),
     };
     let (current, figures) = (current && stored.program == program, study.figures(&stored.result));
     Arc::new(StudyResult { origin, stored, figures, current })

@@ -1,7 +1,8 @@
 //! Studies whose units are cases of one kind.
 
 use super::report::{LinkedFigure, StudyReport};
-use super::{PaperStudy, StudyBench, StudyCard, StudyError, StudyPlan, UnitResult};
+use super::{PaperStudy, StudyBench, StudyCard, StudyError, StudyPlan, StudyUnit, UnitResult};
+use palpate_learn::Method;
 use std::collections::BTreeMap;
 
 /// A unit of work by its settings.
@@ -11,6 +12,9 @@ pub(super) trait StudyCase: Sized {
 
     /// Name of its unit.
     fn name(&self) -> String;
+
+    /// Method that is fitted.
+    fn method(&self) -> &'static Method;
 }
 
 /// A [`PaperStudy`] whose units are cases.
@@ -36,8 +40,9 @@ impl<S: CaseStudy> PaperStudy for S {
         S::CARD
     }
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        S::Case::all(plan).iter().map(StudyCase::name).collect()
+    fn units(&self, plan: &StudyPlan) -> Vec<StudyUnit> {
+        let unit = |case: &S::Case| StudyUnit { name: case.name(), method: Some(case.method()) };
+        S::Case::all(plan).iter().map(unit).collect()
     }
 
     fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {

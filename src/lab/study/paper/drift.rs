@@ -94,6 +94,12 @@ impl StudyCase for Case {
             Self::Hysteresis { method, part } => format!("hysteresis, {}, part {}", method.key, part + 1),
         }
     }
+
+    fn method(&self) -> &'static Method {
+        match self {
+            Self::Drifted { method, .. } | Self::Hysteresis { method, .. } => method,
+        }
+    }
 }
 
 /// A copy of the grasps with other readings.

@@ -69,6 +69,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {}, part {}", self.sensors.name(), self.method.key, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 /// Result of a unit.

@@ -102,6 +102,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {}, {}, part {}", self.sensors.name(), self.signals.name(), self.method.key, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 /// Number of channels on both fingers.

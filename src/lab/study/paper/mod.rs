@@ -35,8 +35,9 @@ pub use report::{
     Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow,
     StudyTable,
 };
-pub use run::run_study;
+pub use run::{run_study, study_fingerprint};
 
+use palpate_learn::Method;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -74,18 +75,35 @@ pub struct StudyCard {
     pub budget: &'static str,
 }
 
+/// A unit of work of a study: the part of it that is computed at once and kept.
+#[derive(Clone, Debug)]
+pub struct StudyUnit {
+    /// Its name, different for each unit of a plan.
+    pub name: String,
+    /// Method that is fitted, on whose version the result depends.
+    pub method: Option<&'static Method>,
+}
+
+impl StudyUnit {
+    /// Name of its result: results of another version of the method are others.
+    fn stored_name(&self) -> String {
+        let version = self.method.map(|method| format!(" ({})", method.fingerprint()));
+        format!("{}{}", self.name, version.unwrap_or_default())
+    }
+}
+
 /// A study of the paper.
 pub trait PaperStudy: Sync {
     /// Name and purpose.
     fn card(&self) -> StudyCard;
 
-    /// Names of the units of work. Units of the same data set follow each other.
-    fn units(&self, plan: &StudyPlan) -> Vec<String>;
+    /// The units of work. Units of the same data set follow each other.
+    fn units(&self, plan: &StudyPlan) -> Vec<StudyUnit>;
 
-    /// Computes a unit; none where it was cancelled.
+    /// Computes a unit by its name; none where it was cancelled.
     fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError>;
 
-    /// Tables and findings from the results of all units.
+    /// Tables and findings from the results of all units, by name.
     fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError>;
 
     /// Figures, drawn from the tables.

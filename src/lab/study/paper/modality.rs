@@ -99,6 +99,10 @@ impl StudyCase for Case {
         let Pattern { modality, name, .. } = self.pattern;
         format!("{}, {modality} {name}, {}, part {}", self.sensors.name(), self.method.key, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 /// The data set with some of its channels: those of curvature, those of pressure and force, or all.

@@ -67,6 +67,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {}, part {}", kind(self.sensors, self.imbalanced), self.method.key, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 /// True for networks that are many in one.

@@ -1,7 +1,6 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
 use crate::datasets::{DatasetQuery, PhysicsVersion, SensorView};
-use palpate_learn::METHODS;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::model::SensorModel;
@@ -116,22 +115,14 @@ impl StudyPlan {
         }
     }
 
-    /// Fingerprint of the plan and of the recognisers: results with another one are out of date.
-    pub fn fingerprint(&self) -> String {
-        format!("{:016x}", palpate_sim::fingerprint([self.header().to_string().as_bytes()]))
-    }
-
-    /// The plan as stored with results: other plans do not continue them. Methods are part of it, since a method whose
-    /// recipe has changed gives other results.
+    /// The plan as stored with results: other plans do not continue them.
     pub(super) fn header(&self) -> serde_json::Value {
-        let recipes: Vec<_> = METHODS.iter().map(|method| (method.key, method.fingerprint())).collect();
         serde_json::json!({
             "size": self.size,
             "preset": self.preset,
             "sensors": self.sensors,
             "query": self.query.as_ref().map(|query| format!("{query:?}")),
             "seed": self.seed,
-            "methods": recipes,
         })
     }
 

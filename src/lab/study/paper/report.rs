@@ -349,7 +349,10 @@ mod tests {
         assert_eq!((table.texts("model"), table.rows_with(&[("model", "c")])), (vec!["a, \"b\"", "c"], vec![1]));
         let report = StudyReport { tables: vec![table], ..StudyReport::default() };
         let text = serde_json::to_string(&report).expect("writes");
-        assert!(text.contains(r#"{"estimate":0.5,"low":0.25,"high":0.75},1.5]"#) && text.contains("null,null"), "{text}");
+        assert!(
+            text.contains(r#"{"estimate":0.5,"low":0.25,"high":0.75},1.5]"#) && text.contains("null,null"),
+            "{text}"
+        );
         assert_eq!(serde_json::from_str::<StudyReport>(&text).expect("reads"), report);
     }
 

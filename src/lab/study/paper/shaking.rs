@@ -94,6 +94,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {}, {}, {}", self.set, self.motion.name, self.sensors.name(), self.method.key)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 fn scene(motion: Motion) -> Scene {

@@ -103,6 +103,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {}, part {}", self.sensors.name(), self.method.key, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 /// The data set with sizes, or with shapes, as its classes.

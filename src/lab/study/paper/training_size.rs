@@ -82,6 +82,10 @@ impl StudyCase for Case {
     fn name(&self) -> String {
         format!("{}, {} of {} grasps, part {}", self.sensors.name(), self.method.key, self.size, self.part + 1)
     }
+
+    fn method(&self) -> &'static Method {
+        self.method
+    }
 }
 
 impl CaseStudy for TrainingSize {

@@ -9,7 +9,7 @@ mod findings;
 use super::bench::{StudyBench, StudyError};
 use super::plan::{DataWanted, StudyPlan};
 use super::report::{Cell, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, UnitResult};
+use super::{PaperStudy, StudyCard, StudyUnit, UnitResult};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
 use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, WIDTHS, papers_scene, papers_view};
@@ -234,8 +234,8 @@ impl PaperStudy for TactileSignatures {
         CARD
     }
 
-    fn units(&self, plan: &StudyPlan) -> Vec<String> {
-        Unit::all(plan).iter().map(|unit| unit.name(plan)).collect()
+    fn units(&self, plan: &StudyPlan) -> Vec<StudyUnit> {
+        Unit::all(plan).iter().map(|unit| StudyUnit { name: unit.name(plan), method: None }).collect()
     }
 
     fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
