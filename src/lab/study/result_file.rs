@@ -275,6 +275,9 @@ mod tests {
         assert_eq!(file.get("unit 4"), Some(&16));
         file.add("later", 1, 7200.0)?;
         assert!(ResultFile::<u64>::open(&path, "squares", &5)?.cpu_hours() > 2.0);
+        file.retain(|unit| unit != "later" && unit != "unit 4");
+        assert!(file.cpu_hours() < 1.0 && file.units().len() == 4);
+        assert_eq!(squares(&mut file, 5, None)?, (true, 1));
         Ok(())
     }
 
