@@ -61,6 +61,8 @@ pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failur
 }
 
 pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
+    // Training takes minutes: what cannot be written fails before it.
+    std::fs::create_dir_all(out)?;
     let [train, test] = [collected(0, store)?, collected(1, store)?];
     let method = method(METHOD).ok_or("the method is gone")?;
     let settings = serde_json::json!({ "epochs": EPOCHS }).as_object().cloned().unwrap_or_default();
