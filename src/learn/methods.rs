@@ -160,6 +160,11 @@ impl Method {
         format!("{:08x}", hash as u32 ^ (hash >> 32) as u32)
     }
 
+    /// True for networks as the paper has them, which read whole grasps.
+    pub fn is_strict(&self) -> bool {
+        self.recipe.is_some_and(|recipe| recipe().strict)
+    }
+
     /// Differences from the network of the paper that it stands for; empty for strict recipes as they stand and for
     /// methods that the paper does not define.
     pub fn deviations(&self) -> Vec<String> {

@@ -389,14 +389,22 @@ pub(crate) fn stored(
     id
 }
 
-/// File of the shipped model's weights on what a board's pads measure, in a folder: any answer will do.
+/// File of the shipped model as one of contact pressure, which only simulations have, in a folder.
+pub(crate) fn model_of_contact(at: &Path) -> String {
+    let mut model = palpate_learn::shipped_model().unwrap();
+    model.card.data.signals = Some("contact".to_owned());
+    for channel in &mut model.card.channels {
+        *channel = channel.replace("pressure_", "contact_pressure_");
+    }
+    model.save(&at.join("contact.safetensors")).unwrap();
+    "contact.safetensors".to_owned()
+}
+
+/// File of the shipped model as one that was trained on trials of a board, in a folder: any answer will do.
 pub(crate) fn model_of_pads(at: &Path) -> String {
     let mut model = palpate_learn::shipped_model().unwrap();
     let data = &mut model.card.data;
     (data.signals, data.sensors, data.layout) = (None, None, None);
-    for channel in &mut model.card.channels {
-        *channel = channel.replace("contact_pressure_", "pressure_");
-    }
     model.save(&at.join("pads.safetensors")).unwrap();
     "pads.safetensors".to_owned()
 }

@@ -1,7 +1,7 @@
 //! A labelling afternoon in the terminal, on bytes of the emulated gripper: flags, labels, undoing, what gets into a data
 //! set, and what comes out of the store.
 
-use crate::calibration::{calibrated, model_of_pads, parts, readings, scenes, stored};
+use crate::calibration::{calibrated, model_of_contact, model_of_pads, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
@@ -119,12 +119,12 @@ fn an_afternoon_of_labels_from_the_terminal() {
     assert_eq!((journal.len(), &journal[0]["what"], &journal[1]["what"]), (13, &"plan".into(), &"plan".into()));
     assert!(said(&["trials", "journal"]).contains("undoes 1"));
     refused(at, &["snapshot", "--trial", "1", "--out", "x.png"], &["was not simulated", "palpate trials export 1"]);
+    refused(at, &["recognise", "1"], &["trial 1", "no part is mounted"]);
     refused(
         at,
-        &["recognise", "1"],
+        &["recognise", "1", "--model", &model_of_contact(at)],
         &["trial 1", "do not measure contact pressure: choose a model of the signals of parts"],
     );
-    refused(at, &["recognise", "1", "--model", &model_of_pads(at)], &["trial 1", "no part is mounted"]);
     refused(at, &["trials", "label", "9", "ball"], &["no trial 9"]);
 }
 

@@ -20,7 +20,7 @@ use palpate_store::labels::Flag;
 use palpate_store::{ImportedTrial, Store};
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, TrialId};
-use palpate_tactile::{Channel, SensorLayout, SignalDefinition, Signals, whole_fingers};
+use palpate_tactile::{Channel, SensorLayout, Signals};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -235,10 +235,7 @@ fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
     capture(&parts, "rest=2.5; close empty bar=0.8; rest=3", "", 12.0, &bytes);
     json(at, &["record", "--port", "grasp.bytes", "--speed", "0", "--json"]);
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
-    // Its weights on what pads measure: any answer will do.
-    let mut model = shipped_model().unwrap();
-    model.card.channels = whole_fingers(SignalDefinition::Parts).iter().map(Channel::name).collect();
-    let model = Arc::new(model);
+    let model = Arc::new(shipped_model().unwrap());
     let options = LinkOptions { path: Some(bytes), replay_speed: f64::INFINITY, ..LinkOptions::default() };
     let gripper = SerialGripper::new(Box::new(SerialLink::open(&options).unwrap()));
     let from_bytes = played(Replay::of_capture(gripper, Some(&store), Some(Arc::clone(&model))).unwrap());

@@ -152,9 +152,6 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     // As versions wrote it that knew no definition: contact pressure was called pressure.
     model.card.data.signals = None;
     model.card.data.sensors = Some("virtual".to_owned());
-    for channel in &mut model.card.channels {
-        *channel = channel.replace("contact_pressure_", "pressure_");
-    }
     model.save(&path).unwrap();
     let old = Model::load(&path).unwrap();
     assert!(old.card.only_simulated() && old.card.described().contains("simulation only"), "{}", old.card.described());
@@ -168,9 +165,6 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     // One that was trained on a board's readings stays as it was.
     let mut recorded = shipped_model().unwrap();
     (recorded.card.data.signals, recorded.card.data.sensors) = (None, None);
-    for channel in &mut recorded.card.channels {
-        *channel = channel.replace("contact_pressure_", "pressure_");
-    }
     recorded.save(&path).unwrap();
     assert_eq!(Model::load(&path).unwrap().card.channels, recorded.card.channels);
 }

@@ -51,6 +51,10 @@ impl TrainingSet for Subset<'_> {
         self.kept.len()
     }
 
+    fn longest(&self) -> usize {
+        self.inputs.longest()
+    }
+
     fn draw(&self, k: usize, random: &mut dyn rand::Rng, drawn: &mut TrainingSequence) {
         self.inputs.draw(self.kept[k], random, drawn);
     }

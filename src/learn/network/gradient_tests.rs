@@ -232,5 +232,5 @@ fn units_begin_with_memories_of_all_lengths() {
     let mean = memories.iter().sum::<f32>() / 64.0;
     assert!((mean - 150.0).abs() < 4.0 * 299.0 / (12.0 * 64.0_f32).sqrt(), "mean {mean}");
     let [early, with_memory] = [&forgetful, &layer].map(gradient_of_an_early_input);
-    assert!(with_memory > 1e-6 && early < 1e-20, "{early} {with_memory}");
+    assert!(with_memory > 1e-6 && early < 1e-15, "{early} {with_memory}");
 }

@@ -45,9 +45,6 @@ pub(super) const MOST_MEMBERS: usize = 20;
 /// Sampling rate of the paper: 300 samples in 4 s (Hz).
 const PAPER_RATE_HZ: f32 = 75.0;
 
-/// Samples of a grasp of the paper.
-const PAPER_STEPS: usize = 300;
-
 /// Committee size in files without one.
 pub(super) fn one() -> usize {
     1
@@ -78,7 +75,7 @@ impl Recipe {
                 early_read_outs: 10,
                 early_share: 0.5,
                 longest_gradient: 1.0,
-                longest_memory: 0,
+                long_memory: false,
             },
         }
     }
@@ -97,7 +94,7 @@ impl Recipe {
             learning_rate: 3e-3,
             weight_decay: 0.01,
             early_read_outs: 0,
-            longest_memory: PAPER_STEPS,
+            long_memory: true,
             ..base.training
         };
         Self { rate_hz: PAPER_RATE_HZ, parts: 2, mirror: false, noise: 0.0, strict: true, training, ..base }

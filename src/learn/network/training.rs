@@ -12,6 +12,9 @@ pub(super) trait TrainingSet {
     /// Number of sequences.
     fn count(&self) -> usize;
 
+    /// Number of steps of the longest sequence.
+    fn longest(&self) -> usize;
+
     /// Writes an augmented copy of sequence `k`.
     fn draw(&self, k: usize, random: &mut dyn Rng, drawn: &mut TrainingSequence);
 }
@@ -49,15 +52,10 @@ pub struct Training {
     pub early_share: f32,
     /// Largest norm of a gradient; longer ones are scaled down.
     pub longest_gradient: f64,
-    /// Longest memory of a unit at the start (steps): units begin with memories of all lengths up to it (chrono
-    /// initialisation, Tallec and Ollivier 2018). Zero for forget gates with a bias of one, which remember for a few steps.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub longest_memory: usize,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde expects")]
-fn is_zero(steps: &usize) -> bool {
-    *steps == 0
+    /// True for units that begin with memories of all lengths up to the longest sequence (chrono initialisation, Tallec and
+    /// Ollivier 2018), false for forget gates with a bias of one, which remember for a few steps.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub long_memory: bool,
 }
 
 /// Share of the training in which the learning rate rises.
@@ -86,8 +84,8 @@ pub(super) fn train(
 ) -> MacroLayer {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut layer = MacroLayer::new(shape, &mut random);
-    if training.longest_memory > 0 {
-        layer.remember(training.longest_memory, &mut random);
+    if training.long_memory {
+        layer.remember(set.longest(), &mut random);
     }
     train_on(&mut layer, set, training, seed ^ 0x7ea1, go_on);
     layer

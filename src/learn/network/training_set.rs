@@ -67,6 +67,10 @@ impl TrainingSet for StageInputs {
         self.sequences.len()
     }
 
+    fn longest(&self) -> usize {
+        self.sequences.iter().map(Vec::len).max().unwrap_or(0) / self.width.max(1)
+    }
+
     fn draw(&self, k: usize, random: &mut dyn Rng, drawn: &mut TrainingSequence) {
         drawn.targets.clone_from(&self.targets[k]);
         let sequence = &self.sequences[k];

@@ -169,7 +169,7 @@ impl CaseStudy for Grasps {
 
     fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let wanted = usual_grasps(plan, case.sensors);
+        let wanted = usual_grasps(plan, case.sensors).read_by(case.method);
         let Some(data) = bench.data(&wanted)? else { return Ok(None) };
         let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         // Stored trials hold both, told apart by the trial before them.

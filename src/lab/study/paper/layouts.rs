@@ -125,7 +125,7 @@ impl CaseStudy for Layouts {
         let usual = usual_grasps(plan, case.sensors);
         let view =
             SensorView { layout: case.signals.layout.clone(), signals: case.signals.definition, ..usual.view.clone() };
-        let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
+        let Some(data) = bench.data(&DataWanted { view, ..usual }.read_by(case.method))? else { return Ok(None) };
         if data.about.object == "recorded" {
             let what = "simulated trials: recorded and imported ones have the channels that they have";
             return Err(StudyError::Missing(what.to_owned()));

@@ -139,7 +139,7 @@ impl CaseStudy for Modality {
         let plan = bench.plan();
         let usual = usual_grasps(plan, case.sensors);
         let view = SensorView { layout: case.pattern.layout.to_owned(), ..usual.view.clone() };
-        let Some(data) = bench.data(&DataWanted { view, ..usual })? else { return Ok(None) };
+        let Some(data) = bench.data(&DataWanted { view, ..usual }.read_by(case.method))? else { return Ok(None) };
         let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         let modality = case.pattern.modality;
         let judged =

@@ -90,7 +90,7 @@ impl CaseStudy for Models {
 
     fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let Some(data) = bench.data(&usual_grasps(plan, case.sensors))? else { return Ok(None) };
+        let Some(data) = bench.data(&usual_grasps(plan, case.sensors).read_by(case.method))? else { return Ok(None) };
         let most = if case.imbalanced { TRAIN * 55 / 50 } else { TRAIN };
         let (train, test) = TestPart { train: most, ..TestPart::usual(plan, case.part) }.split(&data, plan.seed)?;
         // 40 to 55 grasps of each object, as in the paper, or the same share of fewer.

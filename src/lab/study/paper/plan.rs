@@ -1,6 +1,7 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
-use crate::datasets::{DatasetQuery, PhysicsVersion, SensorView};
+use crate::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
+use palpate_learn::Method;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::model::SensorModel;
@@ -40,6 +41,16 @@ pub struct DataWanted {
     pub grasps: usize,
     /// Sensors.
     pub view: SensorView,
+}
+
+impl DataWanted {
+    /// The same for a method: networks as the paper has them read whole grasps, the others until the end of the hold.
+    pub fn read_by(mut self, method: &Method) -> Self {
+        if method.is_strict() {
+            self.view.cut = Cut::Whole;
+        }
+        self
+    }
 }
 
 /// Plan of a study: everything that its results depend on, but the program.

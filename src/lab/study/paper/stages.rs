@@ -168,7 +168,7 @@ impl CaseStudy for Stages {
 
     fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let Some(data) = bench.data(&usual_grasps(plan, case.sensors))? else { return Ok(None) };
+        let Some(data) = bench.data(&usual_grasps(plan, case.sensors).read_by(case.method))? else { return Ok(None) };
         let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
         let [first, second] = halves(&train, plan.seed)?;
         // None where it was cancelled; without a model where it cannot be fitted to these grasps.

@@ -96,7 +96,7 @@ impl CaseStudy for TrainingSize {
     fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
         let grasps = plan.grasps(MOST + TEST, 40);
-        let Some(data) = bench.data(&plan.wanted(grasps, case.sensors))? else { return Ok(None) };
+        let Some(data) = bench.data(&plan.wanted(grasps, case.sensors).read_by(case.method))? else { return Ok(None) };
         let of = plan.pick((MOST + TEST) / TEST, 2, 3);
         let (train, test) = TestPart { of, part: case.part, train: case.size }.split(&data, plan.seed)?;
         fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
