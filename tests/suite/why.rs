@@ -41,7 +41,7 @@ fn the_command_says_why_and_names_the_nearest_trials() {
         "trial 1: ",
         ", then ",
         "left pad pressure",
-        "in the hold",
+        "in contact",
         "whole grasp",
         "all channels",
         "before this grasp",
