@@ -135,14 +135,19 @@ fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
             _ => break,
         }
     }
-    // Where first cells wrap, rows need a gap between them.
-    let spread = rows.iter().any(|row| widths.first().is_some_and(|width| cell(row, 0).chars().count() > *width));
+    let wrap = |row: &Vec<String>| -> Vec<Vec<String>> {
+        widths.iter().enumerate().map(|(k, w)| wrapped(&cell(row, k), *w)).collect()
+    };
+    let wrapped_rows: Vec<Vec<Vec<String>>> = rows.iter().map(wrap).collect();
+    // Where first cells wrap, or others over many lines, rows need a gap between them.
+    const MANY: usize = 3;
+    let is_tall = |parts: &Vec<Vec<String>>| parts[0].len() > 1 || parts.iter().any(|part| part.len() > MANY);
+    let spread = columns > 0 && wrapped_rows.iter().any(is_tall);
     let mut lines = Vec::new();
-    for (number, row) in rows.iter().enumerate() {
+    for (number, parts) in wrapped_rows.into_iter().enumerate() {
         if spread && number > 1 {
             lines.push(String::new());
         }
-        let parts: Vec<Vec<String>> = widths.iter().enumerate().map(|(k, w)| wrapped(&cell(row, k), *w)).collect();
         for height in 0..parts.iter().map(Vec::len).max().unwrap_or(0) {
             let padded = parts.iter().zip(&widths).map(|(part, width)| {
                 let text = part.get(height).map_or("", String::as_str);

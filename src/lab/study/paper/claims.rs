@@ -5,7 +5,7 @@ use super::{PAPER_STUDIES, PaperStudy};
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 
 /// Results of full runs by the key of their study: files of `assets/studies/paper`.
-const STORED: &[(&str, &str)] = &[];
+const STORED: &[(&str, &str)] = &[("signatures", include_str!("../../../../assets/studies/paper/signatures.json"))];
 
 /// Stored report of a study; none where it has not been run in full.
 pub fn stored_report(study: &dyn PaperStudy) -> Result<Option<StoredStudy<StudyReport>>, serde_json::Error> {
@@ -49,5 +49,5 @@ fn claims(findings: &[Finding]) -> String {
         let Finding { section, claim, found, verdict, why } = finding;
         vec![section.clone(), claim.clone(), found.clone(), format!("**{}**", verdict.name()), why.clone()]
     });
-    markdown_table(&["section", "the paper", "here", "", "rule or reason"], &rows.collect::<Vec<_>>())
+    markdown_table(&["section", "the paper", "here", "verdict", "rule or reason"], &rows.collect::<Vec<_>>())
 }
