@@ -4,7 +4,7 @@ mod why;
 
 use super::Failure;
 use super::setup::read_store;
-use super::terminal::{say, say_json, table};
+use super::terminal::{say, say_json, table, warn};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
 use palpate_store::labels::shown_title;
@@ -110,10 +110,12 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let labels = &model.card.labels;
     let mut belief = Belief::default();
     let mut trials = Vec::new();
+    let mut is_foreign = false;
     let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
+        is_foreign |= data.about.sensors.is_none() && model.card.learned_from_perfect_sensors();
         let grasp = &data.examples[0].grasp;
         let alone = model.recogniser.recognise(grasp, None);
         let with = belief
@@ -146,6 +148,12 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         probability: pmf.top().1,
         pmf: named(&model, pmf),
     });
+    if is_foreign {
+        warn(
+            "the model knows perfect sensors only, so most of its answers to trials of a real gripper are wrong; train one on \
+              your trials: palpate train --source serial",
+        );
+    }
     if arguments.json {
         return say_json(&Report { trials, together });
     }

@@ -136,6 +136,11 @@ impl ModelCard {
         Ok(card)
     }
 
+    /// True where it learned from simulated grasps through perfect sensors: on a real gripper most of its answers are wrong.
+    pub fn learned_from_perfect_sensors(&self) -> bool {
+        self.data.sensors.as_deref() == Some("virtual")
+    }
+
     /// True where it reads channels that only simulations have.
     pub fn only_simulated(&self) -> bool {
         self.channels.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE))

@@ -112,6 +112,8 @@ pub struct IdentificationView {
     pub beliefs: Vec<Pmf>,
     /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
+    /// True where the model learned from perfect sensors, which no real gripper has.
+    pub from_perfect_sensors: bool,
     /// Class signatures of the model, where its file has them.
     pub signatures: Option<Arc<Signatures>>,
     /// The last finished grasp of this object.
@@ -289,6 +291,7 @@ impl Identification {
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
+            from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
             signatures: self.model.signatures.clone(),
             last: self.last.clone(),
         }

@@ -19,7 +19,7 @@ use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
-use words::{Headline, percent, reason};
+use words::{FOREIGN, Headline, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -208,11 +208,13 @@ impl Part<'_, '_> {
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
-        let why = reason(self.view, self.recognised);
+        let is_foreign = self.view.from_perfect_sensors && self.context.shown().board().is_some();
+        let why = if is_foreign { FOREIGN.to_owned() } else { reason(self.view, self.recognised) };
+        let ink = colour(if is_foreign { colours.warning } else { colours.quiet_text });
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
         // No line break between number and unit.
-        let lines = ui.painter().layout(why.replace(" %", "\u{a0}%"), font, colour(colours.quiet_text), rect.width());
+        let lines = ui.painter().layout(why.replace(" %", "\u{a0}%"), font, ink, rect.width());
         put(ui, lines, rect, Align2::LEFT_CENTER);
     }
 

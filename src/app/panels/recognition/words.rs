@@ -9,6 +9,9 @@ use palpate_sim::objects::object_title;
 /// Least probability at which a running first grasp names its leader.
 const WORTH_NAMING: f64 = 0.4;
 
+/// Warning about a model on a gripper whose sensors it does not know.
+pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
+
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Headline {
@@ -138,6 +141,7 @@ mod tests {
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
+            from_perfect_sensors: false,
             signatures: None,
             last: None,
         }
