@@ -5,7 +5,13 @@ use super::{PAPER_STUDIES, PaperStudy};
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 
 /// Results of full runs by the key of their study: files of `assets/studies/paper`.
-const STORED: &[(&str, &str)] = &[("signatures", include_str!("../../../../assets/studies/paper/signatures.json"))];
+const STORED: &[(&str, &str)] = &[
+    ("signatures", include_str!("../../../../assets/studies/paper/signatures.json")),
+    ("layouts", include_str!("../../../../assets/studies/paper/layouts.json")),
+];
+
+/// Descriptions of grasps below the claims of a study: the others differ in layout or signals.
+const DATA_LINES: usize = 6;
 
 /// Stored report of a study; none where it has not been run in full.
 pub fn stored_report(study: &dyn PaperStudy) -> Result<Option<StoredStudy<StudyReport>>, serde_json::Error> {
@@ -20,7 +26,11 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
         let card = study.card();
         match stored_report(*study)? {
             Some(stored) => {
-                let data = stored.result.data.iter().map(|line| format!("- {line}\n")).collect::<String>();
+                let lines = &stored.result.data;
+                let mut data = lines.iter().take(DATA_LINES).map(|line| format!("- {line}\n")).collect::<String>();
+                if let Some(more @ 1..) = lines.len().checked_sub(DATA_LINES) {
+                    data += &format!("- and {more} more, above the tables of `palpate study {}`\n", card.key);
+                }
                 let table = claims(&stored.result.findings);
                 parts.push(format!("## {} ({})\n\n{table}\n\n{data}\n{}.", card.title, card.paper, stored.origin()));
             }

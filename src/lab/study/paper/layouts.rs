@@ -23,7 +23,7 @@ const CARD: StudyCard = StudyCard {
     title: "Sensor layouts",
     about: "layouts C1 to C8 of real parts and of contact pressure, with and without force, and the layout with the fewest channels that is as good as the best",
     paper: "Fig. 5a",
-    budget: "about 50 CPU minutes",
+    budget: "about 40 CPU minutes",
 };
 
 /// The paper's network, the one that it is compared with, both strict, and a method of seconds.

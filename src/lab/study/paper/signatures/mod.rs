@@ -30,7 +30,7 @@ const CARD: StudyCard = StudyCard {
     title: "Tactile signatures",
     about: "bending and pressure before and after contact; which of the paper's sentences hold, and for what finger",
     paper: "Fig. 4a",
-    budget: "about 4 CPU minutes",
+    budget: "about 1 CPU minute",
 };
 
 /// Grasps of each object in random poses.
