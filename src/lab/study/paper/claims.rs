@@ -8,6 +8,8 @@ use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 const STORED: &[(&str, &str)] = &[
     ("signatures", include_str!("../../../../assets/studies/paper/signatures.json")),
     ("layouts", include_str!("../../../../assets/studies/paper/layouts.json")),
+    ("modality", include_str!("../../../../assets/studies/paper/modality.json")),
+    ("stages", include_str!("../../../../assets/studies/paper/stages.json")),
 ];
 
 /// Descriptions of grasps below the claims of a study: the others differ in layout or signals.

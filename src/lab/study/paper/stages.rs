@@ -26,7 +26,7 @@ const CARD: StudyCard = StudyCard {
     title: "Two stages",
     about: "confusions of size and shape in stage one, and stage two with size, shape, both, the true ones or none",
     paper: "Fig. 6a and 6b",
-    budget: "about 40 CPU minutes",
+    budget: "about 20 CPU minutes",
 };
 
 /// The network of both stages, and a method of seconds.
