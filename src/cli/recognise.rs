@@ -99,6 +99,16 @@ pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
     })
 }
 
+/// Warns about a model from perfect sensors that answers readings of a real gripper.
+pub(super) fn warn_of_perfect_sensors(model: &Model) {
+    if model.card.learned_from_perfect_sensors() {
+        warn(
+            "the model knows perfect sensors only, so most of its answers to trials of a real gripper are wrong; train one on \
+             your trials: palpate train --source serial",
+        );
+    }
+}
+
 /// Probabilities by name, for JSON.
 pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
     model.card.labels.classes.iter().map(|c| c.name.clone()).zip(pmf.probabilities().iter().copied()).collect()
@@ -110,12 +120,12 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let labels = &model.card.labels;
     let mut belief = Belief::default();
     let mut trials = Vec::new();
-    let mut is_foreign = false;
+    let mut is_real = false;
     let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
-        is_foreign |= data.about.sensors.is_none() && model.card.learned_from_perfect_sensors();
+        is_real |= data.about.sensors.is_none();
         let grasp = &data.examples[0].grasp;
         let alone = model.recogniser.recognise(grasp, None);
         let with = belief
@@ -148,11 +158,8 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         probability: pmf.top().1,
         pmf: named(&model, pmf),
     });
-    if is_foreign {
-        warn(
-            "the model knows perfect sensors only, so most of its answers to trials of a real gripper are wrong; train one on \
-              your trials: palpate train --source serial",
-        );
+    if is_real {
+        warn_of_perfect_sensors(&model);
     }
     if arguments.json {
         return say_json(&Report { trials, together });

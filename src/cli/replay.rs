@@ -1,7 +1,7 @@
 //! `palpate replay`: plays a stored trial or captured bytes as the live gripper: rows and recognition.
 
 use super::Failure;
-use super::recognise::{StageOne, load_model, named};
+use super::recognise::{StageOne, load_model, named, warn_of_perfect_sensors};
 use super::setup::{existing_store, read_store};
 use super::terminal::{note, say, say_json};
 use palpate_device::serial::{LinkOptions, SerialLink};
@@ -99,6 +99,9 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
         (None, None) => Some("no grasp was found".to_owned()),
     };
     let decided = answer(&replay);
+    if let Some(own) = identification.filter(|_| decided.is_some() && replay.is_of_board()) {
+        warn_of_perfect_sensors(own.model());
+    }
     if arguments.json {
         let model = identification.map(Identification::model);
         return say_json(&Report {

@@ -125,6 +125,8 @@ fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
     const GAP: usize = 2;
     /// No column is made narrower than this.
     const NARROWEST: usize = 10;
+    /// Lines of a row from which on it is tall.
+    const MANY: usize = 3;
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
     let longest = |column: usize| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0);
@@ -140,7 +142,6 @@ fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
     };
     let wrapped_rows: Vec<Vec<Vec<String>>> = rows.iter().map(wrap).collect();
     // Where first cells wrap, or others over many lines, rows need a gap between them.
-    const MANY: usize = 3;
     let is_tall = |parts: &Vec<Vec<String>>| parts[0].len() > 1 || parts.iter().any(|part| part.len() > MANY);
     let spread = columns > 0 && wrapped_rows.iter().any(is_tall);
     let mut lines = Vec::new();

@@ -26,17 +26,17 @@ impl PlotAxis {
         Self { title: title.into(), logarithmic: true, ..Self::default() }
     }
 
-    /// Coordinate along the axis in which it is linear; `None` for values that it cannot show.
-    pub fn coordinate(&self, value: f64) -> Option<f64> {
-        let coordinate = if self.logarithmic { (value > 0.0).then(|| value.log10()) } else { Some(value) };
-        coordinate.filter(|c| c.is_finite())
-    }
-
     /// Linear axis of a count, with marks at whole numbers only.
     pub fn count(title: impl Into<String>, most: usize) -> Self {
         let every = most.div_ceil(10).max(1);
         let ticks = (0..=most).step_by(every).map(|n| (n as f64, n.to_string())).collect();
         Self { ticks, ..Self::linear(title) }
+    }
+
+    /// Coordinate along the axis in which it is linear; `None` for values that it cannot show.
+    pub fn coordinate(&self, value: f64) -> Option<f64> {
+        let coordinate = if self.logarithmic { (value > 0.0).then(|| value.log10()) } else { Some(value) };
+        coordinate.filter(|c| c.is_finite())
     }
 
     /// Shown range in coordinates: its own, or that of the values with a margin.

@@ -160,6 +160,11 @@ impl Replay {
         self.identification.as_ref()
     }
 
+    /// True for readings of a real gripper.
+    pub fn is_of_board(&self) -> bool {
+        matches!(self.reader, RowReader::Board(_))
+    }
+
     /// Reason why nothing is recognised.
     pub fn why_off(&self) -> Option<&IdentifyError> {
         self.off.as_ref()

@@ -9,9 +9,10 @@
 //!
 //! What the paper leaves open is chosen so: AdamW with one cycle of the learning rate, gradients of at most unit length,
 //! units that begin with memories of up to a whole grasp (the fingers have let go at the last sample, where the network is
-//! read out: with forget gates that begin at a bias of one it learns nothing, F1 .01 instead of .53); standardisation by mean and deviation of all training readings; the first grasp
-//! follows a uniform PMF, as do half of the training grasps of the iterated form; its mock network answers each half of
-//! the grasps of stage two after learning from the other half, so that no PMF is of a grasp it has learned from.
+//! read out: with forget gates that begin at a bias of one it learns nothing, F1 .01 instead of .53); standardisation by mean and
+//! deviation of all training readings; the first grasp follows a uniform PMF, as do half of the training grasps of the
+//! iterated form; its mock network answers each half of the grasps of stage two after learning from the other half, so that
+//! no PMF is of a grasp it has learned from.
 
 use super::calibrated::{Subset, progress_of};
 use super::macro_layer::{LiveMacroLayer, MacroLayer, MacroShape};

@@ -5,7 +5,7 @@ use super::areas::{bar_room, draw_band, draw_bar, draw_cells};
 use super::canvas::{Canvas, Text};
 use super::frame::{Frame, SMALL};
 use super::labels::{Box2, NEAR, Wanted, place};
-use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
+use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, series_colour};
 use plotters::prelude::DrawingBackend;
 use std::ops::RangeInclusive;
@@ -176,23 +176,49 @@ fn draw_axes<B: DrawingBackend>(
         canvas.text(&Text { text: mark, at, align: Align::Right, size: SMALL, colour: quiet })?;
     }
     canvas.path(&[[left, top], [left, bottom], [right, bottom]], 1.0, border)?;
-    for line in &plot.references {
-        let axis: &PlotAxis = if line.horizontal { &plot.y } else { &plot.x };
-        let Some(at) = axis.coordinate(line.at) else { continue };
-        let range = if line.horizontal { &frame.y } else { &frame.x };
-        if !range.contains(&at) {
-            continue;
-        }
-        let (x_first, y_first) = (*frame.x.start(), *frame.y.start());
-        if line.horizontal {
-            let [_, y] = frame.at([x_first, at]);
-            dashes(canvas, &[[left, y], [right, y]], REFERENCE_DASHES, quiet)?;
-        } else {
-            let [x, _] = frame.at([at, y_first]);
-            dashes(canvas, &[[x, top], [x, bottom]], REFERENCE_DASHES, quiet)?;
-        }
+    for reference in placed_references(canvas, plot, frame)? {
+        dashes(canvas, &reference.ends, REFERENCE_DASHES, quiet)?;
     }
     Ok(())
+}
+
+/// A reference line in a plot.
+struct PlacedReference<'a> {
+    ends: [[f64; 2]; 2],
+    text: &'a str,
+    /// Room of the text.
+    ground: Box2,
+}
+
+impl PlacedReference<'_> {
+    /// Depth of the text's room below its base line.
+    const DESCENT: f64 = 2.5;
+}
+
+/// The reference lines that lie within the plot.
+fn placed_references<'a, B: DrawingBackend>(
+    canvas: &Canvas<B>,
+    plot: &'a Plot,
+    frame: &Frame,
+) -> Result<Vec<PlacedReference<'a>>, FigureError> {
+    let [[left, top], [right, bottom]] = frame.room;
+    let mut placed = Vec::new();
+    for line in &plot.references {
+        let (axis, range) = if line.horizontal { (&plot.y, &frame.y) } else { (&plot.x, &frame.x) };
+        let Some(at) = axis.coordinate(line.at).filter(|at| range.contains(at)) else { continue };
+        let width = canvas.width(&line.text, SMALL)?;
+        let (ends, low, base) = if line.horizontal {
+            let [_, y] = frame.at([*frame.x.start(), at]);
+            ([[left, y], [right, y]], right - 2.0 - width, y - 4.0)
+        } else {
+            let [x, _] = frame.at([at, *frame.y.start()]);
+            let beside = if x + 4.0 + width <= right { x + 4.0 } else { x - 4.0 - width };
+            ([[x, top], [x, bottom]], beside, top + SMALL)
+        };
+        let ground = [[low, base - SMALL + 1.0], [low + width, base + PlacedReference::DESCENT]];
+        placed.push(PlacedReference { ends, text: &line.text, ground });
+    }
+    Ok(placed)
 }
 
 /// Texts of the reference lines, above all series, which show through their ground.
@@ -201,22 +227,13 @@ fn draw_reference_texts<B: DrawingBackend>(
     plot: &Plot,
     frame: &Frame,
 ) -> Result<(), FigureError> {
-    let [[_, top], [right, _]] = frame.room;
-    let (ground, colour) = (canvas.colours.background, canvas.colours.quiet_text);
-    for line in plot.references.iter().filter(|line| !line.text.is_empty()) {
-        let (axis, range) = if line.horizontal { (&plot.y, &frame.y) } else { (&plot.x, &frame.x) };
-        let Some(at) = axis.coordinate(line.at).filter(|at| range.contains(at)) else { continue };
-        let width = canvas.width(&line.text, SMALL)?;
-        let (low, base) = if line.horizontal {
-            let [_, y] = frame.at([*frame.x.start(), at]);
-            (right - 2.0 - width, y - 4.0)
-        } else {
-            let [x, _] = frame.at([at, *frame.y.start()]);
-            (if x + 4.0 + width <= right { x + 4.0 } else { x - 4.0 - width }, top + SMALL)
-        };
-        let (high, above, below) = (low + width, base - SMALL + 1.0, base + 2.5);
-        canvas.veil(&[[low, above], [high, above], [high, below], [low, below]], ground, 0.8)?;
-        canvas.text(&Text { text: &line.text, at: [low, base], align: Align::Left, size: SMALL, colour })?;
+    let (behind, colour) = (canvas.colours.background, canvas.colours.quiet_text);
+    for PlacedReference { text, ground: [[low, above], [high, below]], .. } in placed_references(canvas, plot, frame)? {
+        if !text.is_empty() {
+            canvas.veil(&[[low, above], [high, above], [high, below], [low, below]], behind, 0.8)?;
+            let at = [low, below - PlacedReference::DESCENT];
+            canvas.text(&Text { text, at, align: Align::Left, size: SMALL, colour })?;
+        }
     }
     Ok(())
 }
@@ -331,7 +348,13 @@ fn draw_series<B: DrawingBackend>(
 fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &Frame) -> Result<(), FigureError> {
     const SIZE: f64 = SMALL - 0.5;
     let around = |[x, y]: [f64; 2], radius: f64| [[x - radius, y - radius], [x + radius, y + radius]];
-    let mut obstacles = reference_places(canvas, plot, frame)?;
+    let mut obstacles: Vec<Box2> = Vec::new();
+    for PlacedReference { ends: [[left, top], [right, bottom]], text, ground } in
+        placed_references(canvas, plot, frame)?
+    {
+        obstacles.push([[left - 1.5, top - 1.5], [right + 1.5, bottom + 1.5]]);
+        obstacles.extend((!text.is_empty()).then_some(ground));
+    }
     let mut wanted = Vec::new();
     let mut texts = Vec::new();
     for series in plot.series.iter().rev() {
@@ -364,31 +387,6 @@ fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &F
         canvas.text(&Text { text, at, align: Align::Centre, size: SIZE, colour })?;
     }
     Ok(())
-}
-
-/// Reference lines and their texts, for labels to avoid.
-fn reference_places<B: DrawingBackend>(
-    canvas: &Canvas<B>,
-    plot: &Plot,
-    frame: &Frame,
-) -> Result<Vec<Box2>, FigureError> {
-    let [[left, top], [right, bottom]] = frame.room;
-    let mut places = Vec::new();
-    for line in &plot.references {
-        let axis = if line.horizontal { &plot.y } else { &plot.x };
-        let Some(at) = axis.coordinate(line.at) else { continue };
-        let width = canvas.width(&line.text, SMALL)?;
-        if line.horizontal {
-            let [_, y] = frame.at([*frame.x.start(), at]);
-            places.push([[left, y - 1.5], [right, y + 1.5]]);
-            places.push([[right - width, y - LINE], [right, y]]);
-        } else {
-            let [x, _] = frame.at([at, *frame.y.start()]);
-            places.push([[x - 1.5, top], [x + 1.5, bottom]]);
-            places.push([[x - width - 4.0, top], [x + width + 4.0, top + LINE]]);
-        }
-    }
-    Ok(places)
 }
 
 /// Places along a line, for labels to avoid.

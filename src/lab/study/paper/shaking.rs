@@ -59,7 +59,6 @@ const VARIED: [&str; 4] = ["ball", "cube", "cylinder", "parallelepiped"];
 const FACTORS: [f64; 2] = [0.5, 1.5];
 
 const METHODS: [&str; 2] = ["extra-trees", "macro-layer"];
-const PARTS: usize = 3;
 /// Grasps of each class.
 const GRASPS: usize = 60;
 const QUICK: usize = 8;
@@ -150,10 +149,10 @@ impl CaseStudy for Shaken {
     fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
         let Some(data) = grasps(bench, &case)? else { return Ok(None) };
-        let of = plan.pick(PARTS, 2, 3);
         let mut parts: Vec<Judged> = Vec::new();
-        for part in 0..of {
-            let (train, test) = TestPart { of, part, train: usize::MAX / of }.split(&data, plan.seed)?;
+        for part in 0..TestPart::usual(plan, 0).of {
+            let all = TestPart { train: usize::MAX, ..TestPart::usual(plan, part) };
+            let (train, test) = all.split(&data, plan.seed)?;
             let Some(judged) = fit_and_judge(bench, case.method, &train, &test)? else { return Ok(None) };
             parts.push(judged);
         }
