@@ -90,6 +90,11 @@ fn no_data_set_takes_what_cannot_be_trusted() {
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
     assert_eq!((ids, data.about.left_out), (vec![kept[0].id], 2));
     assert!(data.about.described().contains("2 left out"), "{}", data.about.described());
+    let first = DatasetQuery { most_of_each: Some(1), ..DatasetQuery::default() };
+    let first = first.read(&store, &SensorView::default(), &mut |_, _| ()).unwrap();
+    let met: Vec<_> = marked.iter().filter(|row| row.object != kept[0].object || row.id < kept[0].id).collect();
+    assert_eq!((first.examples.len(), first.about.left_out), (1, met.len()), "none after the last that is read");
+    assert!(met.len() < 2, "{marked:?}");
     let alone = DatasetQuery::default().read_trial(&store, marked[0].id, &SensorView::default());
     assert!(matches!(alone, Err(DatasetError::TrialUnsound { id }) if id == marked[0].id), "{alone:?}");
 }

@@ -18,7 +18,7 @@ type LeftOut = BTreeMap<String, usize>;
 impl DatasetQuery {
     /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
     /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
-    /// out and counted. `progress` gets the number of trials read and their total.
+    /// out and counted, but not those after the last one that `most_of_each` allows. `progress` gets the number of trials read and their total.
     pub fn read(
         &self,
         store: &Store,
@@ -34,21 +34,20 @@ impl DatasetQuery {
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
         let mut left_out = LeftOut::new();
         let matching = rows.len();
-        rows.retain(|row| match self.refused(row) {
-            Some(reason) => {
-                *left_out.entry(reason.to_owned()).or_default() += 1;
-                false
-            }
-            None => true,
-        });
-        // The original of a copy may be outside the query, so only copies within it are left out.
-        let mut held = BTreeSet::new();
+        let (mut kept, mut held) = (BTreeMap::<&str, usize>::new(), BTreeSet::new());
         rows.retain(|row| {
-            let first = row.identity.as_ref().is_none_or(|identity| held.insert(identity));
-            if !first {
-                *left_out.entry(COPIES.to_owned()).or_default() += 1;
+            let count = kept.entry(row.object.as_str()).or_default();
+            if self.most_of_each.is_some_and(|most| *count >= most) {
+                return false;
             }
-            first
+            // The original of a copy may be outside the query, so only copies within it are left out.
+            let mut is_copy = || row.identity.as_ref().is_some_and(|identity| !held.insert(identity));
+            let reason = self.refused(row).or_else(|| is_copy().then_some(COPIES));
+            match reason {
+                Some(reason) => *left_out.entry(reason.to_owned()).or_default() += 1,
+                None => *count += 1,
+            }
+            reason.is_none()
         });
         // Of equal grasps, the one within the query comes before those that follow it.
         before.by_identity.extend(rows.iter().filter_map(|row| Some((row.identity.clone()?, row.id))));
@@ -104,13 +103,6 @@ impl DatasetQuery {
         mut left_out: LeftOut,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
-        let mut met: BTreeMap<String, usize> = BTreeMap::new();
-        let few_enough = |row: &&TrialRow| {
-            let count = met.entry(row.object.clone()).or_default();
-            *count += 1;
-            self.most_of_each.is_none_or(|most| *count <= most)
-        };
-        let rows: Vec<&TrialRow> = rows.iter().copied().filter(few_enough).collect();
         if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
             return Err(DatasetError::NoSuchObject { object: object.clone() });
         }
