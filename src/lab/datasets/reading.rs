@@ -18,7 +18,8 @@ type LeftOut = BTreeMap<String, usize>;
 impl DatasetQuery {
     /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
     /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
-    /// out and counted, but not those after the last one that `most_of_each` allows. `progress` gets the number of trials read and their total.
+    /// out and counted, but not those after the last one that `most_of_each` allows. `progress` gets the number of trials
+    /// read and their total.
     pub fn read(
         &self,
         store: &Store,
