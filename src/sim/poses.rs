@@ -2,12 +2,13 @@
 //! that a seed names a pose.
 
 use crate::frame::Frame;
+use crate::gripper::GripperModel;
 use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
 use crate::physics::natural_rotations;
 use crate::physics::random_rotation;
 use crate::run::SimRun;
-use crate::scene::{Between, Faces, ObjectSetup, Scene, SupportKind};
+use crate::scene::{BUILD, Between, Faces, ObjectSetup, Scene, SupportKind};
 use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -99,6 +100,23 @@ impl PoseSampler {
             Faces::Any if self.scene.holds_object() => lay(drawn, random_rotation(random)),
             Faces::Any | Faces::Nominal | Faces::Natural => {}
         }
+        if spread.build > 0.0 {
+            self.draw_build(&mut drawn.gripper, random);
+        }
+    }
+
+    /// Another gripper of the same kind.
+    fn draw_build(&self, drawn: &mut GripperModel, random: &mut ChaCha8Rng) {
+        let (nominal, share) = (&self.scene.gripper, self.scene.pose.build);
+        let mut factor = |[low, high]: [f64; 2]| 1.0 + share * (random.random_range(low..=high) - 1.0);
+        drawn.finger.bending_stiffness = nominal.finger.bending_stiffness * factor(BUILD.stiffness);
+        drawn.pad.modulus = nominal.pad.modulus * factor(BUILD.pad_modulus);
+        drawn.pad.friction = nominal.pad.friction * factor(BUILD.pad_friction);
+        let torque = factor(BUILD.torque);
+        drawn.actuation.curve.clone_from(&nominal.actuation.curve);
+        drawn.actuation.curve.iter_mut().for_each(|point| point.torque *= torque);
+        let filling_s = share * random.random_range(BUILD.filling_s[0]..=BUILD.filling_s[1]);
+        drawn.actuation.filling_time = nominal.actuation.filling_time + filling_s;
     }
 }
 
@@ -160,6 +178,23 @@ mod tests {
                 .direction(DVec3::Z);
             assert!(up.abs().max_element() > 0.99, "seed {seed}: {up}");
         }
+    }
+
+    #[test]
+    fn builds_differ_around_the_scenes_own_and_poses_stay() {
+        let mut scene = Scene::default();
+        let plain = jittered(&scene, None, 7).0;
+        scene.pose.build = 1.0;
+        let (a, b) = (jittered(&scene, None, 7).0, jittered(&scene, None, 8).0);
+        assert_eq!((&a.gripper.mount, &a.object), (&plain.gripper.mount, &plain.object));
+        assert_eq!(jittered(&scene, None, 7).0.gripper, jittered(&scene, None, 7).0.gripper);
+        let stiffness = [&a, &b].map(|s| s.gripper.finger.bending_stiffness / scene.gripper.finger.bending_stiffness);
+        assert!(stiffness[0] != stiffness[1] && stiffness.iter().all(|f| (0.75..=1.25).contains(f)), "{stiffness:?}");
+        let torque = b.gripper.actuation.torque(1.0) / scene.gripper.actuation.torque(1.0);
+        assert!(torque != 1.0 && (0.83..=1.17).contains(&torque) && b.check().is_ok(), "{torque}");
+        assert!((0.0..=0.12).contains(&b.gripper.actuation.filling_time));
+        scene.pose.build = 2.0;
+        assert!(scene.check().is_err());
     }
 
     #[test]

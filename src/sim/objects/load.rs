@@ -4,7 +4,7 @@ use super::assemble::{Blueprint, ShapeSource};
 use super::catalogue::{catalogue, read_embedded};
 use super::files::{candidates, read_file, read_referenced};
 use super::options::LoadOptions;
-use super::{ObjectError, ObjectModel, urdf};
+use super::{ObjectError, ObjectModel, RandomShape, urdf};
 use palpate_geometry::{MeshFileError, Pose, SurfaceMesh, read_mesh};
 use std::cell::Cell;
 use std::path::Path;
@@ -12,8 +12,11 @@ use std::path::Path;
 /// The name that stands for an empty hand.
 pub const EMPTY: &str = "empty";
 
-/// Title of an object, by the name of its class: that of a built-in one, or else the name itself.
+/// Title of an object, by the name of its class: that of a built-in one or of a random shape, or else the name itself.
 pub fn object_title(name: &str) -> String {
+    if let Some(seed) = RandomShape::seed_of(name) {
+        return format!("Random shape {seed}");
+    }
     let built_in = catalogue().iter().find(|built_in| built_in.name == name).map(|built_in| built_in.title.as_str());
     built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
@@ -55,7 +58,7 @@ impl Content {
     }
 }
 
-/// Loads a built-in object by name, or a URDF, OBJ or STL file by path; `None` for an empty hand.
+/// Loads a built-in object or a [`RandomShape`] by name, or a URDF, OBJ or STL file by path; `None` for an empty hand.
 pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, ObjectError> {
     if source == EMPTY {
         return Ok(None);
@@ -65,6 +68,9 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         object.class = Some(built_in.class());
         object.friction = built_in.friction;
         return Ok(Some(object));
+    }
+    if let Some(shape) = RandomShape::named(source) {
+        return shape.build(options).map(Some);
     }
     let content = Content::default();
     let object = blueprint(source, &content)?.build(options)?;
@@ -171,6 +177,7 @@ mod tests {
             ["Tennis ball", "Lemon", "Empty hand", "garlic"]
         );
         assert_eq!(["bigball", "lemon"].map(titled), ["Tennis ball (bigball)", "Lemon"]);
+        assert_eq!(["random:7", "random:x"].map(object_title), ["Random shape 7", "random:x"]);
         assert_eq!(
             ["tennis Ball", "ball", " Die ", "garlic"].map(class_of),
             ["bigball", "ball", "smallcube", "garlic"]

@@ -1,4 +1,4 @@
-//! Objects to grasp: the sixteen built-in ones, and whatever a URDF, OBJ or STL file holds.
+//! Objects to grasp: the sixteen built-in ones, random shapes, and whatever a URDF, OBJ or STL file holds.
 
 mod assemble;
 mod catalogue;
@@ -6,6 +6,7 @@ mod files;
 mod load;
 mod model;
 mod options;
+mod random_shape;
 mod urdf;
 mod xml;
 
@@ -13,6 +14,7 @@ pub use catalogue::{BuiltIn, catalogue, thumbnail};
 pub use load::{EMPTY, anchored, class_of, load, load_surface, object_title, titled};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
 pub use options::{CollisionShape, LoadOptions};
+pub use random_shape::RandomShape;
 
 use palpate_geometry::{BakeError, MeshError, MeshFileError};
 use std::path::PathBuf;

@@ -85,6 +85,7 @@ impl Scene {
         ranges.auto("object.scale", object.scale, 1e-9..=1e9);
         ranges.numbers("pose.shift", &self.pose.shift, &(0.0..=0.5));
         ranges.number("pose.yaw_deg", self.pose.yaw_deg, 0.0..=180.0);
+        ranges.number("pose.build", self.pose.build, 0.0..=1.0);
         let support = &self.support;
         ranges.number("support.height", support.height, 0.0..=2.0);
         ranges.number("support.radius", support.radius, 5e-4..=1.0);
