@@ -38,7 +38,8 @@ pub(super) struct DataArguments {
     pub(super) trials: QueryArguments,
     #[command(flatten)]
     pub(super) signals: SignalArguments,
-    /// Sensor model for simulated trials: virtual (perfect) or physical-like (as on the real gripper).
+    /// Sensor model for simulated trials: virtual (perfect), physical-like (as on the real gripper), or drawn (as on any
+    /// gripper, another one for each grasp).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
     /// Read the readings at this rate (Hz; default: as they were sampled).
@@ -57,7 +58,7 @@ pub(super) struct DataArguments {
 
 /// Parser of a sensor model's name.
 pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
-    SensorModel::named(text).ok_or_else(|| "choose virtual or physical-like".to_owned())
+    SensorModel::named(text).ok_or_else(|| "choose virtual, physical-like or drawn".to_owned())
 }
 
 impl QueryArguments {

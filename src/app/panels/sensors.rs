@@ -71,6 +71,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 let hint = match model {
                     SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
                     SensorModel::PhysicalLike => "Strips, pads and clock of a real gripper, with their noise and drift",
+                    SensorModel::Drawn => {
+                        "Those of another gripper for each grasp, whose strips an empty close has calibrated"
+                    }
                 };
                 let label = format!("{} sensors", model.name());
                 if ui.selectable_label(sensors.sensors == model, label).on_hover_text(hint).clicked() {

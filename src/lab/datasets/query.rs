@@ -407,9 +407,9 @@ impl SensorView {
         Self { signals, ..self }
     }
 
-    /// True for the sensors of a real gripper.
+    /// True for sensors such as a real gripper has.
     pub fn is_physical(&self) -> bool {
-        self.sensors == SensorModel::PhysicalLike
+        self.sensors != SensorModel::Virtual
     }
 
     /// The layout, as recognisers learn it.

@@ -19,10 +19,13 @@ impl PhysicalLike {
         let mut values = vec![0.0; instants.len() * width];
         for mut part in self.parts_of(&clean.channels, seed) {
             let trace = Trace::new(clean, part.from);
+            let bend = part.bend.map(|column| Trace::new(clean, column));
             for (instant, row) in instants.iter().zip(values.chunks_exact_mut(width)) {
-                let stimulus =
-                    if self.stepping { stepped(trace, instants[0].t, instant.taken) } else { trace.at(instant.taken) };
-                let reading = part.sensor.read(stimulus * part.scale);
+                let at = |trace: Trace<'_>| {
+                    if self.stepping { stepped(trace, instants[0].t, instant.taken) } else { trace.at(instant.taken) }
+                };
+                let of_bending = bend.map_or(0.0, |trace| part.sensor.of_bending(at(trace)));
+                let reading = part.sensor.read(at(trace) * part.scale + of_bending);
                 for (column, unit) in &part.into {
                     row[*column] = finite(reading / unit);
                 }
@@ -37,8 +40,13 @@ impl PhysicalLike {
 
     /// The parts that measure these channels, each once.
     fn parts_of(&self, channels: &[String], seed: u64) -> Vec<Part> {
-        let alone =
-            |column: usize, sensor: Sensor| Part { sensor, from: column, scale: 1.0, into: vec![(column, 1.0)] };
+        let alone = |column: usize, sensor: Sensor| Part {
+            sensor,
+            from: column,
+            scale: 1.0,
+            bend: None,
+            into: vec![(column, 1.0)],
+        };
         let mut parts = Vec::new();
         for (column, channel) in channels.iter().enumerate() {
             let side = |place: &str| usize::from(place.starts_with("right"));
@@ -59,6 +67,7 @@ impl PhysicalLike {
                         sensor: Sensor::Pad(ReadPad::new(self, side(place), self.streams(seed, &force))),
                         from: column,
                         scale: if quantity == Quantity::Pressure { PadPart::ACTIVE_AREA } else { 1.0 },
+                        bend: self.drawn.then(|| curvature_of(channels, side(place))).flatten(),
                         into: units.into_iter().filter_map(|(column, unit)| Some((column?, unit))).collect(),
                     }
                 }
@@ -69,6 +78,14 @@ impl PhysicalLike {
     }
 }
 
+/// Column of the first strip on a finger.
+fn curvature_of(channels: &[String], side: usize) -> Option<usize> {
+    let finger = ["left", "right"][side];
+    channels.iter().position(|channel| {
+        Quantity::of_name(channel).is_some_and(|(own, place)| own == Quantity::Curvature && place.starts_with(finger))
+    })
+}
+
 /// A part at work: it reads one column and fills one or two.
 struct Part {
     sensor: Sensor,
@@ -76,6 +93,8 @@ struct Part {
     from: usize,
     /// Stimulus per value of that column.
     scale: f64,
+    /// Column of the curvature that it answers to as well.
+    bend: Option<usize>,
     /// Columns of its reading, each with the reading's size of one of its units.
     into: Vec<(usize, f64)>,
 }
@@ -88,6 +107,14 @@ enum Sensor {
 }
 
 impl Sensor {
+    /// What it shows because its finger is bent to a curvature (1/m).
+    fn of_bending(&self, kappa: f64) -> f64 {
+        match self {
+            Self::Pad(pad) => pad.of_bending(kappa),
+            Self::Strip(_) | Self::None => 0.0,
+        }
+    }
+
     fn read(&mut self, stimulus: f64) -> f64 {
         match self {
             Self::Strip(strip) => strip.read(stimulus),

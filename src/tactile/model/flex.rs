@@ -16,6 +16,9 @@ use std::f64::consts::PI;
 /// on the left, and 14.3 1/m, the bend of the simulated finger at 1 bar, makes 45 over the strip: so the left is whole.
 const REACHING: [f64; 2] = [1.0, 32.0 / 47.0];
 
+/// Range of that share on any gripper. Assumed: from a strip that is glued half loose to one that bends over a corner.
+const ANY_REACHING: [f64; 2] = [0.6, 1.05];
+
 /// Deviation of the share that reaches the strip, from grasp to grasp. Assumed: with the drift below it explains why
 /// empty grasps of the real gripper differ by a degree in 44.
 const SLIP: f64 = 0.005;
@@ -29,12 +32,20 @@ pub(super) struct ReadStrip {
     strip: FlexStrip,
     divider: Divider,
     input: Input,
+    /// Gain by which readings are divided: 1 unless an empty close has shown it.
+    known_gain: f64,
 }
 
 impl ReadStrip {
     /// The strip of a channel.
     pub(super) fn new(settings: &PhysicalLike, side: usize, streams: Streams<'_>) -> Self {
-        let mounting = if settings.asymmetry { REACHING[side] } else { 1.0 };
+        let mounting = if settings.drawn {
+            streams.of_gripper("reaching").within(ANY_REACHING[0], ANY_REACHING[1])
+        } else if settings.asymmetry {
+            REACHING[side]
+        } else {
+            1.0
+        };
         let slip = if settings.slip { 1.0 + SLIP * streams.of_trial("slip").normal() } else { 1.0 };
         let [least, most] = StripPart::BENT_OVER_FLAT;
         let (flat_ohm, rise_per_rad) = if settings.parts {
@@ -51,14 +62,21 @@ impl ReadStrip {
         strip.one_way = settings.threshold;
         strip.folds = settings.saturation;
         strip.creeps = settings.hysteresis;
-        Self { strip, divider: Divider::of_strip(StripPart::DIVIDER_OHM), input: Input::new(settings, streams) }
+        let known_gain = if settings.closed_empty {
+            let slip = if settings.slip { 1.0 + SLIP * streams.of_gripper("slip").normal() } else { 1.0 };
+            mounting * slip * rise_per_rad / StripPart::nominal_rise()
+        } else {
+            1.0
+        };
+        let divider = Divider::of_strip(StripPart::DIVIDER_OHM);
+        Self { strip, divider, input: Input::new(settings, streams), known_gain }
     }
 
     /// The curvature (1/m) that is reported of a true one at the next sample.
     pub(super) fn read(&mut self, kappa: f64) -> f64 {
         let relative = self.strip.relative(kappa);
         let relative = self.convert(relative);
-        (relative - 1.0) / (StripPart::nominal_rise() * StripPart::ACTIVE_LENGTH)
+        (relative - 1.0) / (self.known_gain * StripPart::nominal_rise() * StripPart::ACTIVE_LENGTH)
     }
 
     /// A resistance through divider and converter and back, both relative to flat.
@@ -107,6 +125,21 @@ mod tests {
             // A right angle, 28.4 1/m, spans some 800 counts.
             assert!((counted.read(kappa) - kappa).abs() < 0.06, "{kappa}");
         }
+    }
+
+    #[test]
+    fn an_empty_close_shows_the_gain_of_any_strip() {
+        let errors = |settings: fn(u64) -> PhysicalLike| {
+            let error = |gripper: u64| {
+                let still = PhysicalLike { noise: false, hysteresis: false, drift: false, ..settings(gripper) };
+                let streams = Streams { gripper, trial: 5, channel: "curvature_left" };
+                (ReadStrip::new(&still, 0, streams).read(10.0) / 10.0 - 1.0).abs()
+            };
+            (0..50).map(error).sum::<f64>() / 50.0
+        };
+        let (known, unknown) =
+            (errors(PhysicalLike::any), errors(|g| PhysicalLike { closed_empty: false, ..PhysicalLike::any(g) }));
+        assert!(known < 0.01 && unknown > 0.08, "{known} {unknown}");
     }
 
     #[test]

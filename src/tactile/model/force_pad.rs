@@ -20,6 +20,14 @@ const LEAST_FORCE: [f64; 2] = [PadPart::LEAST_FORCE, 0.20];
 /// Share of the load that reaches the pad, left and right. Assumed: the right pad is mounted as poorly as its strip.
 const REACHING: [f64; 2] = [1.0, 0.7];
 
+/// Ranges on any gripper, assumed: share of the load that reaches the pad; threshold over [`PadPart::LEAST_FORCE`]; force
+/// at which the nominal pad saturates (N), on a logarithmic scale and the same for both pads; force that a pad shows
+/// over the curvature of its finger (N m).
+const ANY_REACHING: [f64; 2] = [0.6, 1.0];
+const ANY_THRESHOLD: [f64; 2] = [0.6, 1.6];
+const ANY_FULL: [f64; 2] = [0.2, 1.0];
+const ANY_BENDING: [f64; 2] = [0.005, 0.02];
+
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;
 
@@ -37,6 +45,8 @@ pub(super) struct ReadPad {
     /// Counts conductances in the one at saturation.
     divider: Divider,
     input: Input,
+    /// Force that it shows over the curvature of its finger (N m).
+    bending: f64,
 }
 
 impl ReadPad {
@@ -50,19 +60,29 @@ impl ReadPad {
         } else {
             (1.0, PadPart::NOMINAL_EXPONENT)
         };
-        let part = PadPart {
-            full: settings.full_force,
-            gain: gain * slip,
-            exponent,
-            threshold: settings.threshold.then_some(LEAST_FORCE[mounted]),
-            reaching: REACHING[mounted],
+        let any = |effect: &str, [low, high]: [f64; 2]| streams.of_gripper(effect).within(low, high);
+        let (full, threshold, reaching) = if settings.drawn {
+            let both = Streams { channel: "pads", ..streams };
+            let full = both.of_gripper("full").within(ANY_FULL[0].ln(), ANY_FULL[1].ln()).exp();
+            (full, any("threshold", ANY_THRESHOLD) * PadPart::LEAST_FORCE, any("reaching", ANY_REACHING))
+        } else {
+            (settings.full_force, LEAST_FORCE[mounted], REACHING[mounted])
         };
+        let bending = if settings.drawn { any("bending", ANY_BENDING) } else { 0.0 };
+        let threshold = settings.threshold.then_some(threshold);
+        let part = PadPart { full, gain: gain * slip, exponent, threshold, reaching };
         let mut pad = ForcePad::new(part, SAMPLE_HZ);
         pad.hysteretic = settings.hysteresis;
         pad.drifts = settings.drift;
         pad.ceiling = settings.saturation.then_some(1.0);
         let gain = if settings.saturation { 1.0 / FULL_SHARE } else { 1.0 };
-        Self { pad, divider: Divider { gain, ..Divider::of_pad(FULL_RATIO) }, input: Input::new(settings, streams) }
+        let divider = Divider { gain, ..Divider::of_pad(FULL_RATIO) };
+        Self { pad, divider, input: Input::new(settings, streams), bending }
+    }
+
+    /// Force that it shows because its finger is bent to a curvature (1/m), in N.
+    pub(super) fn of_bending(&self, kappa: f64) -> f64 {
+        self.bending * kappa.max(0.0)
     }
 
     /// The force (N) that is reported of a true one at the next sample. A pull counts as no force.
@@ -114,6 +134,21 @@ mod tests {
             assert!((ideal.read(load * FULL) - load * FULL).abs() <= 1e-12 * FULL * load);
         }
         assert_eq!(ideal.read(-1.0), 0.0);
+    }
+
+    #[test]
+    fn pads_of_any_gripper_fire_when_bent_and_differ() {
+        let pads: Vec<ReadPad> = (0..40)
+            .map(|gripper| {
+                let streams = Streams { gripper, trial: 1, channel: "force_left" };
+                ReadPad::new(&PhysicalLike::any(gripper), 0, streams)
+            })
+            .collect();
+        assert!(pads.iter().all(|pad| (0.05..=0.2).contains(&pad.of_bending(10.0)) && pad.of_bending(-10.0) == 0.0));
+        let thresholds: Vec<f64> = pads.iter().filter_map(|pad| pad.pad.part.threshold).collect();
+        assert!(thresholds.iter().any(|t| *t < 0.12) && thresholds.iter().any(|t| *t > 0.2));
+        assert!(pads.iter().all(|pad| (0.2..=1.0).contains(&pad.pad.part.full)));
+        assert_eq!(pad(&PhysicalLike::default(), 0).of_bending(10.0), 0.0);
     }
 
     #[test]

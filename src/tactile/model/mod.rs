@@ -17,9 +17,9 @@
 //! | noise, counts | divider, converter | divider, amplifier, converter |
 //!
 //! Readings have the units of the clean signals, by a nominal two-point calibration, as a user of the real gripper
-//! would have one: the difference between nominal and actual part stays in the readings. Deliberately left out:
-//! a real pad also fires when it is bent (Interlink's guide, "false triggering"); here channels are independent, so
-//! that a channel reads the same in every layout that has it.
+//! would have one: the difference between nominal and actual part stays in the readings. A real pad also fires when it
+//! is bent (Interlink's guide, "false triggering"). The model of the real gripper leaves it out, so that a channel reads
+//! the same in every layout that has it; that of any gripper draws it.
 //!
 //! Constants without a source are marked as assumed. They were chosen from data sheets and from the published facts
 //! about the real recordings, before any recogniser was trained on the result.
@@ -51,10 +51,15 @@ pub enum SensorModel {
     Virtual,
     /// Such as the real gripper has: [`PhysicalLike`] with everything on.
     PhysicalLike,
+    /// Such as any real gripper may have: parts and their mounting are drawn anew for each grasp, and the strips' gains are
+    /// known from an empty close. For training recognisers for grippers without labelled grasps.
+    Drawn,
 }
 
 impl SensorModel {
-    /// Both, the clean one first.
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Virtual, Self::PhysicalLike, Self::Drawn];
+    /// Those of one gripper, the clean one first.
     pub const BOTH: [Self; 2] = [Self::Virtual, Self::PhysicalLike];
 
     /// The name used in files and on screen.
@@ -62,12 +67,13 @@ impl SensorModel {
         match self {
             Self::Virtual => "virtual",
             Self::PhysicalLike => "physical-like",
+            Self::Drawn => "drawn",
         }
     }
 
     /// A model by its name, in either case.
     pub fn named(name: &str) -> Option<Self> {
-        Self::BOTH.into_iter().find(|model| model.name().eq_ignore_ascii_case(name.trim()))
+        Self::ALL.into_iter().find(|model| model.name().eq_ignore_ascii_case(name.trim()))
     }
 
     /// Readings of a grasp from its clean signals. `seed` determines the grasp's noise, drift, jitter
@@ -76,6 +82,7 @@ impl SensorModel {
         match self {
             Self::Virtual => clean.clone(),
             Self::PhysicalLike => PhysicalLike::default().apply(clean, seed),
+            Self::Drawn => PhysicalLike::any(seed).apply(clean, seed),
         }
     }
 }

@@ -34,6 +34,12 @@ pub struct PhysicalLike {
     pub noise: bool,
     /// Voltages are read in whole counts of 12 bits.
     pub counts: bool,
+    /// Strips and pads sit on the fingers as on any gripper: how much of the bend and load reaches them, their thresholds,
+    /// the load at which pads saturate and how much pads fire when bent are drawn for the gripper, instead of
+    /// `asymmetry`, `full_force` and the thresholds of the real one.
+    pub drawn: bool,
+    /// The gains of the strips are known from one empty close of the hand.
+    pub closed_empty: bool,
     /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only,
     /// idle, touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as
     /// well.
@@ -75,6 +81,13 @@ impl PhysicalLike {
         saturation: false,
         noise: false,
         counts: false,
+        drawn: false,
+        closed_empty: false,
         full_force: 0.3,
     };
+
+    /// Any gripper, with everything on: its parts and their mounting are drawn, and it has closed empty once.
+    pub fn any(gripper: u64) -> Self {
+        Self { gripper, drawn: true, closed_empty: true, ..Self::default() }
+    }
 }
