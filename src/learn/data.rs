@@ -52,6 +52,9 @@ pub(crate) fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, mix)
 }
 
+/// Class of objects that are none of the other classes. Trees give it half of the prior, however many grasps it has.
+pub const OTHER: &str = "other";
+
 /// Object class, with its size and shape class for stage one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Class {
@@ -78,6 +81,11 @@ impl Labels {
     /// Index of a class by its name.
     pub fn class(&self, name: &str) -> Option<usize> {
         self.classes.iter().position(|class| class.name == name)
+    }
+
+    /// Index of the class [`OTHER`].
+    pub fn other(&self) -> Option<usize> {
+        self.class(OTHER)
     }
 
     /// True if at least one class has a size and one a shape, as stage one requires.

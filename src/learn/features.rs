@@ -38,17 +38,17 @@ pub(crate) struct Features {
 
 /// Fixed levels of a channel, in its unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Levels {
+pub(crate) struct Levels {
     /// Start of the logarithmic range of asinh(x / knee); zero for a linear scale.
     knee: f32,
-    /// Levels whose first crossing is an onset.
-    onsets: Vec<f32>,
+    /// Levels whose first crossing is an onset, the lowest first.
+    pub(crate) onsets: Vec<f32>,
 }
 
 impl Levels {
     /// Levels of a channel, by the quantity in its name. A pressure is a force over the area of a pad, 170 mm², a contact
     /// pressure one over the smaller area of contact. Others keep their scale; their onset is at `risen`.
-    fn of(channel: &str, risen: f32) -> Self {
+    pub(crate) fn of(channel: &str, risen: f32) -> Self {
         let starts = |quantity: &str| channel.starts_with(quantity);
         match () {
             () if starts("force") => Self { knee: 0.08, onsets: vec![0.02, 0.1] },

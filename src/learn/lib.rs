@@ -16,6 +16,7 @@
 //! | 1 | `belief`, `fitting` | belief after several grasps, rejection, stop rule; options and errors of a fit |
 //! | 1 | `split`, `learned` | splits into training and test trials; the grasps that a model learned |
 //! | 1 | `temperature` | calibration of probabilities |
+//! | 1 | `tensor_file` | safetensors files |
 //! | 1 | `gaps` | readings that are not finite numbers |
 //! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `features` | a grasp as a row of features |
@@ -23,9 +24,9 @@
 //! | 2 | `forest` | decision trees and their ensembles |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
-//! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution |
+//! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution. The geometry encoder |
 //! | 6 | `methods` | table of all methods |
-//! | 7 | `model_file` | safetensors files; the shipped model |
+//! | 7 | `model_file` | model files; the shipped model |
 //!
 //! To add a recogniser, write its file and add one line to [`METHODS`].
 //!
@@ -82,10 +83,14 @@ mod split;
 #[cfg(test)]
 mod split_tests;
 mod temperature;
+mod tensor_file;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
+pub use baselines::{
+    Estimate, Geometry, GeometryEncoder, GeometryScores, Measure, MeasureScore, Measured, Touch, shipped_encoder,
+};
 pub use belief::{Belief, Rejection, StopReason, StopRule};
-pub use data::{Class, DataCard, Dataset, Example, Labels, Sequence, counted};
+pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};

@@ -5,14 +5,15 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
+//! | `cargo run --release -p palpate-workshop -- encoder` | the geometry encoder below `models` |
 //! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
-//! | `cargo run --release -p palpate-workshop -- scores --store FILE` | the scores of all methods, into `assets/studies/recognition.json`; resumes |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
 //! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
 //! Objects lie as placed: z up, long side along y, so that the fingers close across it along x.
 
+mod encoder;
 mod fuzz;
 mod fuzz_stream;
 mod live_model;
@@ -24,13 +25,12 @@ use clap::{Parser, Subcommand};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
-use palpate_lab::study::{Measuring, generated_sections, measure_scores};
+use palpate_lab::study::generated_sections;
 use palpate_render::figure_svg;
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use tools::Parts;
 
 /// How the physics sees an object.
@@ -100,14 +100,17 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
-    /// Collect grasps, fit all methods and judge them.
-    Scores {
-        /// Result.
-        #[arg(long, default_value = "assets/studies/recognition.json")]
+    /// Grasp random shapes, and train the shipped geometry encoder on them.
+    Encoder {
+        /// Output folder.
+        #[arg(long, default_value = "models")]
         out: PathBuf,
-        /// Trial store that receives the grasps, with the finished methods beside it; a second run computes only the others.
-        #[arg(long)]
-        store: PathBuf,
+        /// Number of shapes.
+        #[arg(long, default_value_t = 1000)]
+        shapes: u64,
+        /// Poses of each shape, grasped free and fixed.
+        #[arg(long, default_value_t = 3)]
+        poses: u64,
     },
     /// Write the tables of the manual and the README, and the picture of the study of accuracy, from stored results.
     Tables,
@@ -137,21 +140,10 @@ fn main() -> Result<(), Failure> {
         }
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
-        Command::Scores { out, store } => write_scores(&out, &store)?,
+        Command::Encoder { out, shapes, poses } => encoder::make(&out, shapes, poses)?,
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
     }
-    Ok(())
-}
-
-fn write_scores(out: &Path, store: &Path) -> Result<(), Failure> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let cancelled = AtomicBool::new(false);
-    let how =
-        Measuring { threads, cancelled: &cancelled, progress: &|done, of| report(format_args!("{done} of {of}")) };
-    let scores = measure_scores(&mut Store::open(store)?, &store.with_extension("scores.jsonl"), &how)?;
-    scores.ok_or("cancelled")?.write(out)?;
-    report(format_args!("scores in {}", out.display()));
     Ok(())
 }
 

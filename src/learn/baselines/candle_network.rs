@@ -50,6 +50,11 @@ pub(crate) trait CandleNetwork: Sized + Send + Sync + 'static {
 pub(crate) struct Pass<'a>(Option<&'a mut ChaCha8Rng>);
 
 impl Pass<'_> {
+    /// The pass of an answer.
+    pub(super) fn answering() -> Self {
+        Self(None)
+    }
+
     /// True while training.
     pub(super) fn is_training(&self) -> bool {
         self.0.is_some()
@@ -92,15 +97,15 @@ const TEMPERATURES: Temperatures = Temperatures { range: 0.1..=10.0, count: 100 
 const REVISION: u32 = 1;
 
 /// Network with its variables by name.
-struct Variables<N> {
-    network: N,
-    by_name: BTreeMap<String, Var>,
+pub(super) struct Variables<N> {
+    pub(super) network: N,
+    pub(super) by_name: BTreeMap<String, Var>,
 }
 
 impl<N: CandleNetwork> Variables<N> {
     /// Creates a network whose weights are drawn uniformly within one over the root of the fan-in, in the order of their
     /// names; vectors keep the values that their layer gives them.
-    fn new(inputs: usize, classes: usize, random: &mut ChaCha8Rng) -> Result<Self> {
+    pub(super) fn new(inputs: usize, classes: usize, random: &mut ChaCha8Rng) -> Result<Self> {
         let variables = VarMap::new();
         let builder = VarBuilder::from_varmap(&variables, DType::F32, &Device::Cpu);
         let network = N::new(inputs, classes, &builder)?;
@@ -120,11 +125,32 @@ impl<N: CandleNetwork> Variables<N> {
         Ok(Self { network, by_name })
     }
 
+    /// Sets the variables to the arrays of a model file.
+    pub(super) fn read(&self, arrays: &Arrays) -> std::result::Result<(), LoadError> {
+        for (name, var) in &self.by_name {
+            let values = Tensor::from_slice(arrays.f32s(name, var.dims())?, var.dims(), &Device::Cpu);
+            let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
+            values.and_then(|values| var.set(&values)).map_err(failed)?;
+        }
+        Ok(())
+    }
+
+    /// The variables as the arrays of a model file.
+    pub(super) fn arrays(&self) -> Arrays {
+        let mut arrays = Arrays::default();
+        for (name, var) in &self.by_name {
+            // Reading a tensor in the memory of the CPU does not fail.
+            let values = var.as_tensor().flatten_all().and_then(|flat| flat.to_vec1()).unwrap_or_default();
+            arrays.put(name.clone(), var.dims(), values);
+        }
+        arrays
+    }
+
     /// Scores of sequences `[inputs][STEPS]`, one class after the other.
     fn scores(&self, sequences: &[&[f32]], width: usize) -> Result<Vec<Vec<f32>>> {
         let x: Vec<f32> = sequences.iter().flat_map(|sequence| sequence.iter().copied()).collect();
         let x = Tensor::from_vec(x, (sequences.len(), width, STEPS), &Device::Cpu)?;
-        self.network.scores(&x, &mut Pass(None))?.to_vec2()
+        self.network.scores(&x, &mut Pass::answering())?.to_vec2()
     }
 }
 
@@ -190,10 +216,7 @@ impl<N: CandleNetwork> Candle<N> {
         let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
         let (classes, mut random) = (card.labels.classes.len(), ChaCha8Rng::seed_from_u64(0));
         let network = Variables::<N>::new(width, classes, &mut random).map_err(failed)?;
-        for (name, var) in &network.by_name {
-            let values = Tensor::from_slice(arrays.f32s(name, var.dims())?, var.dims(), &Device::Cpu);
-            values.and_then(|values| var.set(&values)).map_err(failed)?;
-        }
+        network.read(arrays)?;
         Ok(Self { learned, classes, network })
     }
 }
@@ -208,7 +231,7 @@ fn inputs(learned: &Learned, grasp: &Sequence) -> Vec<f32> {
 }
 
 /// The same inputs with left and right exchanged.
-fn mirrored(mirror: &[usize], own: &[f32]) -> Vec<f32> {
+pub(super) fn mirrored(mirror: &[usize], own: &[f32]) -> Vec<f32> {
     mirror.iter().flat_map(|from| own[from * STEPS..(from + 1) * STEPS].iter().copied()).collect()
 }
 
@@ -238,43 +261,73 @@ struct Work<'a> {
 impl Work<'_> {
     /// Trains on some of the grasps. Progress goes on from `start` by a half.
     fn train<N: CandleNetwork>(&self, grasps: &[usize], start: f64) -> Result<Variables<N>> {
-        let Self { learned, sequences, fitting, .. } = *self;
-        let (width, classes) = (learned.preparation.width(), self.data.labels.classes.len());
+        let Self { data, learned, sequences, fitting } = *self;
+        let width = learned.preparation.width();
+        let batch = |group: &[usize], random: &mut ChaCha8Rng| {
+            let mut x = Vec::with_capacity(group.len() * width * STEPS);
+            for k in group {
+                match learned.mirror.as_ref().filter(|_| random.random::<bool>()) {
+                    Some(mirror) => x.extend(mirrored(mirror, &sequences[*k])),
+                    None => x.extend_from_slice(&sequences[*k]),
+                }
+            }
+            add_noise::<N>(&mut x, random);
+            x
+        };
+        let loss = |scores: &Tensor, group: &[usize]| {
+            let y: Vec<u32> = group.iter().map(|k| data.examples[*k].class as u32).collect();
+            candle_nn::loss::cross_entropy(scores, &Tensor::from_vec(y, group.len(), &Device::Cpu)?)
+        };
+        let progress = |share: f64| (fitting.progress)(start + 0.5 * share);
+        let classes = data.labels.classes.len();
+        Variables::trained((width, classes), grasps, learned.epochs, fitting, (&batch, &loss, &progress))
+    }
+}
+
+/// Inputs of some sequences, `[batch][inputs][STEPS]`.
+type Batch<'a> = &'a dyn Fn(&[usize], &mut ChaCha8Rng) -> Vec<f32>;
+/// Loss of the outputs for the same sequences.
+type Loss<'a> = &'a dyn Fn(&Tensor, &[usize]) -> Result<Tensor>;
+
+impl<N: CandleNetwork> Variables<N> {
+    /// Trains a new network of some inputs and outputs on sequences, given by their indices. Ends early, with what it has
+    /// learned so far, if the fit is stopped.
+    pub(super) fn trained(
+        (inputs, outputs): (usize, usize),
+        sequences: &[usize],
+        epochs: usize,
+        fitting: &Fitting<'_>,
+        (batch, loss, progress): (Batch<'_>, Loss<'_>, &dyn Fn(f64)),
+    ) -> Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(fitting.seed);
-        let network = Variables::<N>::new(width, classes, &mut random)?;
+        let network = Self::new(inputs, outputs, &mut random)?;
         let settings = ParamsAdamW { lr: N::RATE, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
         let mut optimiser = AdamW::new(network.by_name.values().cloned().collect(), settings)?;
-        let mut order = grasps.to_vec();
+        let mut order = sequences.to_vec();
         let size = batch_size(order.len());
-        let batches = (order.len().div_ceil(size).max(1) * learned.epochs) as f64;
+        let batches = (order.len().div_ceil(size).max(1) * epochs) as f64;
         let mut done = 0;
-        for epoch in 0..learned.epochs {
+        for epoch in 0..epochs {
             order.shuffle(&mut random);
             for group in order.chunks(size) {
-                let mut x = Vec::with_capacity(group.len() * width * STEPS);
-                for k in group {
-                    match learned.mirror.as_ref().filter(|_| random.random::<bool>()) {
-                        Some(mirror) => x.extend(mirrored(mirror, &sequences[*k])),
-                        None => x.extend_from_slice(&sequences[*k]),
-                    }
-                }
-                // Uniform noise of unit deviation reaches to the root of three.
-                x.iter_mut().for_each(|x| *x += N::NOISE * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0));
-                let y: Vec<u32> = group.iter().map(|k| self.data.examples[*k].class as u32).collect();
-                let x = Tensor::from_vec(x, (group.len(), width, STEPS), &Device::Cpu)?;
-                let y = Tensor::from_vec(y, group.len(), &Device::Cpu)?;
+                let x = Tensor::from_vec(batch(group, &mut random), (group.len(), inputs, STEPS), &Device::Cpu)?;
                 let scores = network.network.scores(&x, &mut Pass(Some(&mut random)))?;
                 optimiser.set_learning_rate(N::RATE * one_cycle(f64::from(done) / batches));
-                optimiser.backward_step(&candle_nn::loss::cross_entropy(&scores, &y)?)?;
+                optimiser.backward_step(&loss(&scores, group)?)?;
                 done += 1;
             }
-            (fitting.progress)(start + 0.5 * (epoch + 1) as f64 / learned.epochs as f64);
+            progress((epoch + 1) as f64 / epochs as f64);
             if fitting.check().is_err() {
                 break;
             }
         }
         Ok(network)
     }
+}
+
+/// Adds the noise of training. Uniform noise of unit deviation reaches to the root of three.
+pub(super) fn add_noise<N: CandleNetwork>(x: &mut [f32], random: &mut ChaCha8Rng) {
+    x.iter_mut().for_each(|x| *x += N::NOISE * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0));
 }
 
 /// Number of sequences per optimiser step, for steps of nearly equal size. No step has one sequence alone, which
@@ -309,13 +362,7 @@ impl<N: CandleNetwork> Recogniser for Candle<N> {
     }
 
     fn arrays(&self) -> Arrays {
-        let mut arrays = Arrays::default();
-        for (name, var) in &self.network.by_name {
-            // Reading a tensor in the memory of the CPU does not fail.
-            let values = var.as_tensor().flatten_all().and_then(|flat| flat.to_vec1()).unwrap_or_default();
-            arrays.put(name.clone(), var.dims(), values);
-        }
-        arrays
+        self.network.arrays()
     }
 
     fn parameters(&self) -> usize {

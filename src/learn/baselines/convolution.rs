@@ -4,11 +4,16 @@ use super::candle_network::{CandleNetwork, Pass, STEPS};
 use candle_core::{Result, Tensor};
 use candle_nn::{BatchNorm, Linear, Module as _, ModuleT as _, VarBuilder};
 
-/// Three convolutions and a dense layer, each with batch normalisation and GELU, then a linear layer.
+/// [`Trunk`], then a linear layer.
 pub(crate) struct Convolution {
+    trunk: Trunk,
+    last: Linear,
+}
+
+/// Three convolutions and a dense layer, each with batch normalisation and GELU.
+pub(super) struct Trunk {
     convolutions: [Layer; 3],
     dense: Layer,
-    last: Linear,
 }
 
 /// Linear layer with batch normalisation and GELU; on the windows of a sequence, a convolution.
@@ -22,7 +27,7 @@ const CHANNELS: usize = 48;
 /// Kernel width and stride of each (steps).
 const KERNELS: [(usize, usize); 3] = [(5, 1), (5, 2), (3, 2)];
 /// Width of the dense layer.
-const DENSE: usize = 128;
+pub(super) const DENSE: usize = 128;
 /// Share of values dropped before and after the dense layer.
 const DROPOUT: f32 = 0.3;
 
@@ -51,11 +56,8 @@ fn windows(x: &Tensor, kernel: usize, stride: usize) -> Result<Tensor> {
     Tensor::cat(&(0..kernel).map(at).collect::<Result<Vec<_>>>()?, 2)
 }
 
-impl CandleNetwork for Convolution {
-    const REVISION: u32 = 2;
-    const RATE: f64 = 4e-3;
-
-    fn new(inputs: usize, classes: usize, variables: &VarBuilder<'_>) -> Result<Self> {
+impl Trunk {
+    pub(super) fn new(inputs: usize, variables: &VarBuilder<'_>) -> Result<Self> {
         let convolution = |number: usize| {
             let from = if number == 0 { inputs } else { CHANNELS };
             Layer::new(from * KERNELS[number].0, CHANNELS, &variables.pp(format!("convolution.{number}")))
@@ -64,19 +66,35 @@ impl CandleNetwork for Convolution {
         Ok(Self {
             convolutions: [convolution(0)?, convolution(1)?, convolution(2)?],
             dense: Layer::new(CHANNELS * steps, DENSE, &variables.pp("dense"))?,
-            last: candle_nn::linear(DENSE, classes, variables.pp("last"))?,
         })
     }
 
-    fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor> {
+    /// Inputs `[batch][inputs][STEPS]` to `[batch][DENSE]`. Training drops a share of the values before the dense layer.
+    pub(super) fn forward(&self, x: &Tensor, dropout: f32, pass: &mut Pass<'_>) -> Result<Tensor> {
         let mut x = x.transpose(1, 2)?.contiguous()?;
         for (layer, (kernel, stride)) in self.convolutions.iter().zip(KERNELS) {
             let windows = windows(&x, kernel, stride)?;
             let (batch, steps, width) = windows.dims3()?;
             x = layer.forward(&windows.reshape((batch * steps, width))?, pass)?.reshape((batch, steps, CHANNELS))?;
         }
-        let x = pass.dropout(&x.flatten_from(1)?, DROPOUT)?;
-        let x = self.dense.forward(&x, pass)?;
+        let x = pass.dropout(&x.flatten_from(1)?, dropout)?;
+        self.dense.forward(&x, pass)
+    }
+}
+
+impl CandleNetwork for Convolution {
+    const REVISION: u32 = 2;
+    const RATE: f64 = 4e-3;
+
+    fn new(inputs: usize, classes: usize, variables: &VarBuilder<'_>) -> Result<Self> {
+        Ok(Self {
+            trunk: Trunk::new(inputs, variables)?,
+            last: candle_nn::linear(DENSE, classes, variables.pp("last"))?,
+        })
+    }
+
+    fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor> {
+        let x = self.trunk.forward(x, DROPOUT, pass)?;
         self.last.forward(&pass.dropout(&x, DROPOUT)?)
     }
 }

@@ -3,6 +3,7 @@
 
 mod candle_network;
 mod convolution;
+mod geometry;
 #[cfg(test)]
 mod guide_network;
 mod neighbours;
@@ -13,5 +14,8 @@ mod warping;
 
 pub(super) use candle_network::Candle;
 pub(super) use convolution::Convolution;
+pub use geometry::{
+    Estimate, Geometry, GeometryEncoder, GeometryScores, Measure, MeasureScore, Measured, Touch, shipped_encoder,
+};
 pub(super) use tabular::{Tabular, TabularKind};
 pub(super) use warping::Warping;

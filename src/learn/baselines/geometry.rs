@@ -1,0 +1,633 @@
+//! Geometry encoder: what a grasp tells about the size, place, mass and shape of the object, whatever the object is. A
+//! network in plain candle, trained on random shapes; its features serve classifiers of objects.
+//!
+//! It answers from the beginning of a grasp too: half of the training grasps end early, and one input says which steps have
+//! been felt.
+
+use super::candle_network::{CandleNetwork, Pass, STEPS, Variables, add_noise, mirrored};
+use super::convolution::{DENSE, Trunk};
+use crate::arrays::Arrays;
+use crate::data::{Dataset, Example, Sequence, fnv_1a};
+use crate::features::Levels;
+use crate::fitting::{Fitting, LearnError};
+use crate::gaps;
+use crate::mirror::mirror;
+use crate::model::{LoadError, ModelError};
+use crate::network::Preparation;
+use crate::pmf::Pmf;
+use crate::tensor_file::{self, TensorFile};
+use candle_core::{Device, Result, Tensor};
+use candle_nn::{Linear, Module as _, VarBuilder};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, OnceLock};
+
+/// Quantity that the encoder estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Measure {
+    /// Shortest side of the box around the object (m).
+    Short,
+    /// Its middle side (m).
+    Middle,
+    /// Its longest side (m).
+    Long,
+    /// Extent between the fingers, along the way on which they close (m).
+    Width,
+    /// Extent across the fingers (m).
+    Depth,
+    /// Extent along the gripper's axis (m).
+    Height,
+    /// Distance of its middle from the middle between the fingers (m).
+    Aside,
+    /// Distance of its middle from the plane in which the fingers bend (m).
+    Across,
+    /// Distance of its middle from the palm (m).
+    Below,
+    /// Mass (kg).
+    Mass,
+}
+
+impl Measure {
+    /// All, in the order of the network's outputs.
+    pub const ALL: [Self; 10] = [
+        Self::Short,
+        Self::Middle,
+        Self::Long,
+        Self::Width,
+        Self::Depth,
+        Self::Height,
+        Self::Aside,
+        Self::Across,
+        Self::Below,
+        Self::Mass,
+    ];
+
+    /// True for quantities that are estimated on a logarithmic scale.
+    fn is_logarithmic(self) -> bool {
+        !matches!(self, Self::Aside | Self::Across | Self::Below)
+    }
+
+    fn to_scale(self, x: f64) -> f64 {
+        if self.is_logarithmic() { x.max(1e-6).ln() } else { x }
+    }
+
+    fn from_scale(self, x: f64) -> f64 {
+        if self.is_logarithmic() { x.exp() } else { x }
+    }
+}
+
+/// True geometry of a grasped object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Geometry {
+    /// Value of each of [`Measure::ALL`].
+    pub values: [f64; Measure::ALL.len()],
+    /// Approximate shape, an index into the encoder's shapes; `None` if unknown.
+    pub shape: Option<usize>,
+}
+
+/// Grasp of an object of known geometry.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// Readings.
+    pub grasp: Arc<Sequence>,
+    /// The object.
+    pub geometry: Geometry,
+    /// Number of the object: grasps of one object are held out together.
+    pub object: usize,
+}
+
+/// Estimate of one quantity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The quantity.
+    pub measure: Measure,
+    /// Median (m or kg).
+    pub value: f64,
+    /// Ends of the range that holds the true value with 90 % probability (m or kg).
+    pub range: [f64; 2],
+}
+
+/// What one grasp tells about the geometry of the object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Estimate of each of [`Measure::ALL`].
+    pub estimates: Vec<Estimate>,
+    /// Probability of each of the encoder's shapes.
+    pub shape: Pmf,
+}
+
+impl Measured {
+    /// The estimate of a quantity.
+    pub fn of(&self, measure: Measure) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.measure == measure)
+    }
+}
+
+/// How far estimates of a quantity are off.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasureScore {
+    /// The quantity.
+    pub measure: Measure,
+    /// Median distance from the true value (m or kg).
+    pub median_error: f64,
+    /// Share of grasps whose 90 % range holds it.
+    pub inside: f64,
+}
+
+/// How far the estimates on some grasps are off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GeometryScores {
+    /// Each of [`Measure::ALL`].
+    pub measures: Vec<MeasureScore>,
+    /// Share of grasps whose shape is recognised.
+    pub shape: f64,
+    /// Number of grasps.
+    pub grasps: usize,
+}
+
+/// Fitted geometry encoder.
+pub struct GeometryEncoder {
+    learned: Learned,
+    network: Variables<Encoder>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Learned {
+    channels: Vec<String>,
+    shapes: Vec<String>,
+    preparation: Preparation,
+    mirror: Option<Vec<usize>>,
+    revision: u32,
+    /// Mean and standard deviation of each quantity on its scale.
+    scales: Vec<[f64; 2]>,
+    /// Half width of the 90 % range in units of the network's own spread, for each [`STAGE`] of a grasp and each quantity.
+    spreads: Vec<Vec<f64>>,
+    /// Numbers of training grasps and of objects.
+    trained_on: [usize; 2],
+}
+
+/// Name of the shipped encoder.
+const SHIPPED_NAME: &str = "models/geometry.safetensors";
+static SHIPPED: &[u8] = include_bytes!("../../../models/geometry.safetensors");
+
+/// The encoder that ships with the program.
+pub fn shipped_encoder() -> std::result::Result<Arc<GeometryEncoder>, ModelError> {
+    static ENCODER: OnceLock<std::result::Result<Arc<GeometryEncoder>, ModelError>> = OnceLock::new();
+    ENCODER.get_or_init(|| GeometryEncoder::from_bytes(SHIPPED_NAME, SHIPPED).map(Arc::new)).clone()
+}
+
+/// Hash of the shipped encoder, part of the fingerprint of methods that read its features.
+pub(super) fn shipped_content() -> u64 {
+    fnv_1a(SHIPPED.iter().copied())
+}
+
+/// Number of quantities.
+const MEASURES: usize = Measure::ALL.len();
+/// Steps of a grasp for which the 90 % range is measured together.
+const STAGE: usize = 3;
+/// Fewest steps that are read; the fingers touch nothing before.
+const LEAST_FELT: usize = 3;
+/// One in this many objects is held out, to measure how far the estimates are off.
+const HELD_OUT: usize = 8;
+/// Weight of the shapes' cross entropy beside the mean loss of a quantity.
+const SHAPE_WEIGHT: f64 = 0.1;
+/// Bounds of the logarithm of the spread, in standard deviations of a quantity.
+const SPREADS: std::ops::RangeInclusive<f64> = -5.0..=2.0;
+/// Half width of the 90 % range of a Laplace distribution of unit scale.
+const NINETY: f64 = std::f64::consts::LN_10;
+
+/// [`Trunk`], then a linear layer: mean and logarithm of the spread of each quantity, scores of the shapes.
+struct Encoder {
+    trunk: Trunk,
+    last: Linear,
+}
+
+impl CandleNetwork for Encoder {
+    const REVISION: u32 = 1;
+    const EPOCHS: usize = 40;
+    const RATE: f64 = 3e-3;
+    const WEIGHT_DECAY: f64 = 0.02;
+    const NOISE: f32 = 0.05;
+
+    fn new(inputs: usize, outputs: usize, variables: &VarBuilder<'_>) -> Result<Self> {
+        Ok(Self {
+            trunk: Trunk::new(inputs, variables)?,
+            last: candle_nn::linear(DENSE, outputs, variables.pp("last"))?,
+        })
+    }
+
+    fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor> {
+        self.last.forward(&self.trunk.forward(x, 0.1, pass)?)
+    }
+}
+
+/// Outputs of the network for some views of a grasp.
+struct Outputs {
+    /// Values before the last layer, `[views][DENSE]`.
+    inner: Vec<Vec<f32>>,
+    /// Outputs, `[views][2 * MEASURES + shapes]`.
+    outer: Vec<Vec<f32>>,
+}
+
+impl GeometryEncoder {
+    /// Fits an encoder to grasps of objects of known geometry. `channels` names the readings, `shapes` the approximate shapes.
+    pub fn fit(
+        channels: &[String],
+        shapes: &[String],
+        touches: &[Touch],
+        fitting: &Fitting<'_>,
+    ) -> std::result::Result<Self, LearnError> {
+        if touches.is_empty() {
+            return Err(LearnError::NoData);
+        }
+        let preparation = preparation_of(channels, touches);
+        let scales = (0..MEASURES).map(|k| scale_of(k, touches)).collect();
+        let width = preparation.width();
+        let of_inputs = |own: Vec<usize>| -> Vec<usize> {
+            (0..width).map(|input| input / channels.len() * channels.len() + own[input % channels.len()]).collect()
+        };
+        let mut objects: Vec<usize> = touches.iter().map(|touch| touch.object).collect();
+        objects.sort_unstable();
+        objects.dedup();
+        let learned = Learned {
+            channels: channels.to_vec(),
+            shapes: shapes.to_vec(),
+            preparation,
+            mirror: mirror(channels).map(of_inputs),
+            revision: Encoder::REVISION,
+            scales,
+            spreads: vec![vec![NINETY; MEASURES]; STEPS / STAGE],
+            trained_on: [touches.len(), objects.len()],
+        };
+        let is_held_out = |touch: &Touch| touch.object % HELD_OUT == HELD_OUT - 1;
+        let of = |held_out: bool| -> Vec<usize> {
+            (0..touches.len()).filter(|k| is_held_out(&touches[*k]) == held_out).collect()
+        };
+        let network = learned.train(touches, &of(false), fitting).map_err(LearnError::failed)?;
+        fitting.check()?;
+        let mut encoder = Self { learned, network };
+        let held_out: Vec<&Touch> = of(true).into_iter().map(|k| &touches[k]).collect();
+        encoder.learned.spreads = encoder.measured_spreads(&held_out).map_err(LearnError::failed)?;
+        Ok(encoder)
+    }
+
+    /// Restores an encoder from its settings and arrays.
+    pub fn load(settings: &serde_json::Value, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+        let learned: Learned = serde_json::from_value(settings.clone())
+            .map_err(|error| LoadError::Settings { cause: error.to_string() })?;
+        learned.check()?;
+        let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
+        let outputs = 2 * MEASURES + learned.shapes.len();
+        let mut random = ChaCha8Rng::seed_from_u64(0);
+        let network = Variables::new(learned.preparation.width() + 1, outputs, &mut random).map_err(failed)?;
+        network.read(arrays)?;
+        arrays.require_same_form(&network.arrays())?;
+        Ok(Self { learned, network })
+    }
+
+    /// Decodes a file of [`GeometryEncoder::to_bytes`]. `name` is the file name in errors.
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> std::result::Result<Self, ModelError> {
+        let malformed = |cause: String| ModelError::Malformed { name: name.to_owned(), cause };
+        let file = TensorFile::decode(bytes).map_err(malformed)?;
+        let settings = serde_json::from_str(&file.card).map_err(|error| malformed(format!("invalid card: {error}")))?;
+        let arrays = file.arrays().map_err(LoadError::from);
+        let loaded = arrays.and_then(|arrays| Self::load(&settings, &arrays));
+        loaded.map_err(|cause| ModelError::Invalid { name: name.to_owned(), cause })
+    }
+
+    /// Encodes the encoder as a safetensors file.
+    pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, ModelError> {
+        let malformed = |cause: String| ModelError::Malformed { name: SHIPPED_NAME.to_owned(), cause };
+        tensor_file::encode(self.settings().to_string(), &self.arrays()).map_err(malformed)
+    }
+
+    /// Settings for [`GeometryEncoder::load`].
+    pub fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(&self.learned).unwrap_or_default()
+    }
+
+    /// Learned parameters.
+    pub fn arrays(&self) -> Arrays {
+        self.network.arrays()
+    }
+
+    /// Channels that it reads.
+    pub fn channels(&self) -> &[String] {
+        &self.learned.channels
+    }
+
+    /// Approximate shapes that it distinguishes.
+    pub fn shapes(&self) -> &[String] {
+        &self.learned.shapes
+    }
+
+    /// Estimates the geometry from the readings so far; `None` before the first contact.
+    pub fn measure(&self, grasp: &Sequence) -> Option<Measured> {
+        let (views, felt) = self.learned.views(grasp);
+        if felt < LEAST_FELT || !self.has_touched(grasp) {
+            return None;
+        }
+        // Shapes were checked when the network was made, so that no grasp should make it fail.
+        let outputs = self.outputs(&views).ok()?;
+        let (means, shapes) = (mean_of(&outputs.outer), 2 * MEASURES);
+        let stage = stage_of(felt);
+        let estimate = |k: usize, measure: Measure| {
+            let [centre, deviation] = self.learned.scales[k];
+            let spread = f64::from(means[MEASURES + k]).clamp(*SPREADS.start(), *SPREADS.end()).exp();
+            let half = self.learned.spreads[stage][k] * spread * deviation;
+            let x = centre + deviation * f64::from(means[k]);
+            let least = if measure.is_logarithmic() { f64::NEG_INFINITY } else { 0.0 };
+            let at = |x: f64| measure.from_scale(x.max(least));
+            Estimate { measure, value: at(x), range: [at(x - half), at(x + half)] }
+        };
+        let estimates = Measure::ALL.iter().enumerate().map(|(k, measure)| estimate(k, *measure)).collect();
+        let shape = Pmf::from_scores(means[shapes..].iter().map(|score| f64::from(*score)));
+        Some(Measured { estimates, shape })
+    }
+
+    /// True once a pad has felt more than the least force of a contact.
+    fn has_touched(&self, grasp: &Sequence) -> bool {
+        let onset = |channel: &String| Levels::of(channel, f32::INFINITY).onsets.first().copied();
+        let onsets: Vec<f32> = self.learned.channels.iter().map(|c| onset(c).unwrap_or(f32::INFINITY)).collect();
+        grasp.rows().any(|(_, row)| row.iter().zip(&onsets).any(|(x, onset)| x > onset))
+    }
+
+    /// Judges the estimates on grasps, of which the first seconds are read.
+    pub fn judge(&self, touches: &[Touch], seconds: f32) -> GeometryScores {
+        let measured: Vec<(Measured, &Geometry)> = touches
+            .iter()
+            .filter_map(|touch| Some((self.measure(&touch.grasp.until(seconds))?, &touch.geometry)))
+            .collect();
+        let count = measured.len().max(1) as f64;
+        let of_measure = |k: usize| {
+            let estimates = || measured.iter().map(|(own, truth)| (&own.estimates[k], truth.values[k]));
+            let mut errors: Vec<f64> = estimates().map(|(own, truth)| (own.value - truth).abs()).collect();
+            errors.sort_by(f64::total_cmp);
+            let inside = estimates().filter(|(own, truth)| (own.range[0]..=own.range[1]).contains(truth)).count();
+            MeasureScore {
+                measure: Measure::ALL[k],
+                median_error: errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN),
+                inside: inside as f64 / count,
+            }
+        };
+        let with_shape: Vec<bool> =
+            measured.iter().filter_map(|(own, truth)| Some(own.shape.top().0 == truth.shape?)).collect();
+        GeometryScores {
+            measures: (0..MEASURES).map(of_measure).collect(),
+            shape: with_shape.iter().filter(|right| **right).count() as f64 / with_shape.len().max(1) as f64,
+            grasps: measured.len(),
+        }
+    }
+
+    /// Number of features.
+    pub(crate) fn width(&self) -> usize {
+        DENSE + 2 * MEASURES + self.learned.shapes.len()
+    }
+
+    /// Features of the readings so far: values before the last layer and all outputs, mean of the grasp and its mirror image.
+    pub(crate) fn features(&self, grasp: &Sequence) -> Vec<f32> {
+        let (views, _) = self.learned.views(grasp);
+        let zeros = || vec![0.0; self.width()];
+        self.outputs(&views).map_or_else(
+            |_failed| zeros(),
+            |outputs| mean_of(&outputs.inner).into_iter().chain(mean_of(&outputs.outer)).collect(),
+        )
+    }
+
+    fn outputs(&self, views: &[Vec<f32>]) -> Result<Outputs> {
+        let x: Vec<f32> = views.iter().flatten().copied().collect();
+        let x = Tensor::from_vec(x, (views.len(), self.learned.preparation.width() + 1, STEPS), &Device::Cpu)?;
+        let inner = self.network.network.trunk.forward(&x, 0.0, &mut Pass::answering())?;
+        let outer = self.network.network.last.forward(&inner)?;
+        Ok(Outputs { inner: inner.to_vec2()?, outer: outer.to_vec2()? })
+    }
+
+    /// Half widths that hold nine in ten of the held-out grasps, for each stage of a grasp and each quantity.
+    fn measured_spreads(&self, held_out: &[&Touch]) -> Result<Vec<Vec<f64>>> {
+        let mut spreads = self.learned.spreads.clone();
+        for (stage, of_stage) in spreads.iter_mut().enumerate() {
+            let felt = ((stage + 1) * STAGE).max(LEAST_FELT);
+            let mut off = vec![Vec::new(); MEASURES];
+            for touch in held_out {
+                let (mut views, whole) = self.learned.views(&touch.grasp);
+                views.iter_mut().for_each(|view| forget_after(view, felt.min(whole)));
+                let means = mean_of(&self.outputs(&views)?.outer);
+                for (k, off) in off.iter_mut().enumerate() {
+                    let spread = f64::from(means[MEASURES + k]).clamp(*SPREADS.start(), *SPREADS.end()).exp();
+                    off.push((f64::from(means[k]) - self.learned.target(k, touch)).abs() / spread);
+                }
+            }
+            for (spread, mut off) in of_stage.iter_mut().zip(off) {
+                off.sort_by(f64::total_cmp);
+                // One more than nine tenths, as a finite sample wants it.
+                let at = ((off.len() + 1) as f64 * 0.9).ceil() as usize;
+                *spread = off.get(at.saturating_sub(1)).or(off.last()).copied().unwrap_or(NINETY);
+            }
+        }
+        Ok(spreads)
+    }
+}
+
+impl Learned {
+    fn check(&self) -> std::result::Result<(), LoadError> {
+        let width = self.preparation.width();
+        let part = |part: &'static str| Err(LoadError::Card { part });
+        let all_finite = |rows: &[Vec<f64>]| rows.iter().flatten().all(|x| x.is_finite());
+        if self.revision != Encoder::REVISION {
+            part("the version of the encoder")
+        } else if !self.preparation.is_sound(self.channels.len()) {
+            part("the input scaling")
+        } else if !self.mirror.as_ref().is_none_or(|m| m.len() == width && m.iter().all(|to| *to < width)) {
+            part("the mirror image")
+        } else if self.scales.len() != MEASURES || !self.scales.iter().flatten().all(|x| x.is_finite()) {
+            part("the scaling of quantities")
+        } else if self.spreads.len() != STEPS / STAGE
+            || self.spreads.iter().any(|of_stage| of_stage.len() != MEASURES)
+            || !all_finite(&self.spreads)
+        {
+            part("the spread of quantities")
+        } else if self.shapes.is_empty() || self.shapes.len() > 64 {
+            part("the list of shapes")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Inputs of the grasp and of its mirror image, `[width + 1][STEPS]`, and the number of steps felt. Steps that have not
+    /// been felt are zero; the last input is 1 for those that have.
+    fn views(&self, grasp: &Sequence) -> (Vec<Vec<f32>>, usize) {
+        let width = self.preparation.width();
+        let rows = self.preparation.inputs(&gaps::filled(grasp));
+        let felt = (rows.len() / width.max(1)).min(STEPS);
+        let at = |step: usize, input: usize| if step < felt { rows[step * width + input] } else { 0.0 };
+        let own: Vec<f32> = (0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect();
+        let mask = (0..STEPS).map(|step| f32::from(u8::from(step < felt)));
+        let mut views = vec![own];
+        views.extend(self.mirror.as_ref().map(|mirror| mirrored(mirror, &views[0])));
+        views.iter_mut().for_each(|view| view.extend(mask.clone()));
+        (views, felt)
+    }
+
+    /// Value of a quantity that the network should give.
+    fn target(&self, measure: usize, touch: &Touch) -> f64 {
+        let [centre, deviation] = self.scales[measure];
+        (Measure::ALL[measure].to_scale(touch.geometry.values[measure]) - centre) / deviation
+    }
+
+    fn train(&self, touches: &[Touch], used: &[usize], fitting: &Fitting<'_>) -> Result<Variables<Encoder>> {
+        let width = self.preparation.width();
+        let views: Vec<(Vec<Vec<f32>>, usize)> = touches.iter().map(|touch| self.views(&touch.grasp)).collect();
+        let batch = |group: &[usize], random: &mut ChaCha8Rng| {
+            let mut x = Vec::with_capacity(group.len() * (width + 1) * STEPS);
+            for k in group {
+                let (views, felt) = &views[*k];
+                let mut view = views[random.random_range(0..views.len())].clone();
+                add_noise::<Encoder>(&mut view[..width * STEPS], random);
+                let ends_early = random.random::<bool>() && *felt > LEAST_FELT;
+                let felt = if ends_early { random.random_range(LEAST_FELT..*felt) } else { *felt };
+                forget_after(&mut view, felt);
+                x.extend(view);
+            }
+            x
+        };
+        let shapes = self.shapes.len();
+        let loss = |outputs: &Tensor, group: &[usize]| {
+            let y: Vec<f32> = group
+                .iter()
+                .flat_map(|k| (0..MEASURES).map(move |measure| self.target(measure, &touches[*k]) as f32))
+                .collect();
+            let y = Tensor::from_vec(y, (group.len(), MEASURES), &Device::Cpu)?;
+            let mean = outputs.narrow(1, 0, MEASURES)?;
+            let spread = outputs.narrow(1, MEASURES, MEASURES)?.clamp(*SPREADS.start(), *SPREADS.end())?;
+            // Negative log-likelihood of a Laplace distribution.
+            let off = (mean - y)?.abs()?.mul(&spread.neg()?.exp()?)?;
+            let loss = (off + spread)?.mean_all()?;
+            let known: Vec<(u32, u32)> =
+                (0_u32..).zip(group).filter_map(|(row, k)| Some((row, touches[*k].geometry.shape? as u32))).collect();
+            if known.is_empty() {
+                return Ok(loss);
+            }
+            let count = known.len();
+            let (rows, shape): (Vec<u32>, Vec<u32>) = known.into_iter().unzip();
+            let scores = outputs.narrow(1, 2 * MEASURES, shapes)?.contiguous()?;
+            let scores = scores.index_select(&Tensor::from_vec(rows, count, &Device::Cpu)?, 0)?;
+            let shape = Tensor::from_vec(shape, count, &Device::Cpu)?;
+            loss + (SHAPE_WEIGHT * candle_nn::loss::cross_entropy(&scores, &shape)?)?
+        };
+        let epochs = if fitting.quick { 4 } else { Encoder::EPOCHS };
+        let outputs = 2 * MEASURES + shapes;
+        Variables::trained((width + 1, outputs), used, epochs, fitting, (&batch, &loss, fitting.progress))
+    }
+}
+
+/// Scaling of the readings.
+fn preparation_of(channels: &[String], touches: &[Touch]) -> Preparation {
+    let examples = touches.iter().map(|touch| Example { grasp: Arc::clone(&touch.grasp), ..Example::default() });
+    let data = Dataset { channels: channels.to_vec(), examples: examples.collect(), ..Dataset::default() };
+    let duration_s = data.median_duration_s().max(0.05);
+    Preparation::fit(&data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0))
+}
+
+/// Mean and standard deviation of a quantity on its scale.
+fn scale_of(measure: usize, touches: &[Touch]) -> [f64; 2] {
+    let values = || touches.iter().map(|touch| Measure::ALL[measure].to_scale(touch.geometry.values[measure]));
+    let count = touches.len() as f64;
+    let mean = values().sum::<f64>() / count;
+    let deviation = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
+    [mean, deviation.max(1e-6)]
+}
+
+/// Stage of a grasp of which some steps have been felt.
+fn stage_of(felt: usize) -> usize {
+    (felt.max(1) - 1) / STAGE
+}
+
+/// Zeroes all inputs of a view after some steps.
+fn forget_after(view: &mut [f32], felt: usize) {
+    view.chunks_exact_mut(STEPS).for_each(|input| input[felt.min(STEPS)..].fill(0.0));
+}
+
+fn mean_of(rows: &[Vec<f32>]) -> Vec<f32> {
+    let share = 1.0 / rows.len().max(1) as f32;
+    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
+    for row in rows {
+        mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += share * x);
+    }
+    mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance_tests::quick;
+
+    /// The force grows faster the wider the object is, which noise hides at first; its shape shows in the other channel.
+    fn touches(count: usize) -> Vec<Touch> {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let touch = |object: usize| {
+            let width = random.random_range(0.01..0.08);
+            let shape = object % 2;
+            let t_s: Vec<f32> = (1..=200).map(|k| k as f32 * 0.02).collect();
+            let mut noise = || 0.2 * random.random::<f32>();
+            let row = |t: &f32| {
+                let force = 0.05 + 5.0 * width as f32 * (t - 0.6) + noise();
+                let bend = t.min(2.0) * (1.0 + shape as f32) + noise();
+                [if *t > 0.6 { force } else { 0.0 }, bend]
+            };
+            let values = t_s.iter().flat_map(row).collect();
+            let mut values_of = [0.02; MEASURES];
+            values_of[3] = width;
+            let geometry = Geometry { values: values_of, shape: Some(shape) };
+            Touch { grasp: Arc::new(Sequence { t_s, values }), geometry, object }
+        };
+        (0..count).map(touch).collect()
+    }
+
+    fn names(list: &[&str]) -> Vec<String> {
+        list.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    fn fitted(touches: &[Touch]) -> GeometryEncoder {
+        let (channels, shapes) = (names(&["force_left", "bend"]), names(&["round", "flat"]));
+        GeometryEncoder::fit(&channels, &shapes, touches, &quick(1)).expect("fits")
+    }
+
+    #[test]
+    fn widths_are_measured_with_honest_spread_from_the_beginning_on() {
+        let all = touches(600);
+        let encoder = fitted(&all[..400]);
+        let judge = |until: f32| {
+            let (mut off, mut inside, mut right) = (0.0, 0, 0);
+            for touch in &all[400..] {
+                let measured = encoder.measure(&touch.grasp.until(until)).expect("has felt enough");
+                let width = measured.of(Measure::Width).expect("is measured");
+                let truth = touch.geometry.values[3];
+                off += (width.value - truth).abs() / 200.0;
+                inside += u32::from((width.range[0]..=width.range[1]).contains(&truth));
+                right += u32::from(Some(measured.shape.top().0) == touch.geometry.shape);
+            }
+            (off, inside, right)
+        };
+        let (whole, early) = (judge(4.0), judge(0.9));
+        assert!(whole.0 < 0.006 && whole.2 > 190, "{whole:?}");
+        assert!(early.0 > 2.0 * whole.0, "the beginning tells less: {early:?}, {whole:?}");
+        assert!((155..=200).contains(&whole.1) && (155..=200).contains(&early.1), "{whole:?}, {early:?}");
+        assert!(encoder.measure(&all[0].grasp.until(0.59)).is_none(), "nothing is known before contact");
+    }
+
+    #[test]
+    fn an_encoder_comes_back_from_its_arrays() {
+        let all = touches(60);
+        let encoder = fitted(&all);
+        let again = GeometryEncoder::load(&encoder.settings(), &encoder.arrays()).expect("loads");
+        assert_eq!(encoder.measure(&all[7].grasp), again.measure(&all[7].grasp));
+        assert_eq!(encoder.features(&all[7].grasp), again.features(&all[7].grasp));
+        assert_eq!(encoder.features(&all[7].grasp).len(), encoder.width());
+        let mut settings = encoder.settings();
+        settings["spreads"] = serde_json::json!([]);
+        assert!(GeometryEncoder::load(&settings, &encoder.arrays()).is_err());
+        assert!(GeometryEncoder::load(&encoder.settings(), &Arrays::default()).is_err());
+        assert!(encoder.features(&Sequence::default()).iter().all(|x| x.is_finite()));
+    }
+}
