@@ -81,6 +81,17 @@ pub enum LearnError {
         /// Title of the method.
         method: &'static str,
     },
+    /// Other readings than those of the geometry encoder.
+    #[error(
+        "the geometry encoder reads {needs}, but these grasps have {found}; read them through layout C1, or train \
+         extra-trees, which needs no encoder"
+    )]
+    Encoder {
+        /// Channels that it reads.
+        needs: String,
+        /// Channels of the grasps.
+        found: String,
+    },
     /// Grasps for stage two with other channels or labels.
     #[error("the grasps for stage two have other channels or labels than those for stage one")]
     SecondDiffers,

@@ -173,7 +173,7 @@ impl Method {
 }
 
 /// All methods: the paper's networks first, then its baselines, then further ones.
-pub const METHODS: [Method; 24] = [
+pub const METHODS: [Method; 25] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
@@ -287,6 +287,13 @@ pub const METHODS: [Method; 24] = [
         Further,
         "250 extremely randomised trees on windowed means, sums and differences of both fingers, and events",
         ExtraTrees
+    ),
+    tabular!(
+        "geometry-trees",
+        "Geometry trees",
+        Further,
+        "Extra-trees on the same features and those of the geometry encoder, which has learned from random shapes",
+        GeometryTrees
     ),
     baseline!(
         "dtw-knn",

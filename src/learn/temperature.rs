@@ -59,18 +59,21 @@ pub(crate) struct Calibration {
 }
 
 impl Calibration {
-    /// Fits to PMFs, each with its true class; returns also the mean negative log-likelihood (nat).
-    pub(crate) fn fit(answers: &[(Pmf, usize)], tried: &Temperatures) -> (Self, f64) {
+    /// Fits to PMFs, each with its true class and the weight of that class; returns also the mean negative log-likelihood
+    /// (nat).
+    pub(crate) fn fit(answers: &[(Pmf, usize)], weight: impl Fn(usize) -> f64, tried: &Temperatures) -> (Self, f64) {
         let mut best = (Self { temperature: 1.0, doubt: 0.0 }, f64::INFINITY);
         if answers.is_empty() {
             return best;
         }
+        let total: f64 = answers.iter().map(|(_, truth)| weight(*truth)).sum();
         for temperature in tried.candidates() {
             let sharpened = |(pmf, truth): &(Pmf, usize)| pmf.at_temperature(temperature).probabilities()[*truth];
             let probabilities: Vec<f64> = answers.iter().map(sharpened).collect();
             for doubt in DOUBTS {
-                let of = |(p, (pmf, _)): (&f64, &(Pmf, usize))| -mixed(*p, doubt, pmf.classes()).ln();
-                let loss = probabilities.iter().zip(answers).map(of).sum::<f64>() / answers.len() as f64;
+                let of =
+                    |(p, (pmf, truth)): (&f64, &(Pmf, usize))| -mixed(*p, doubt, pmf.classes()).ln() * weight(*truth);
+                let loss = probabilities.iter().zip(answers).map(of).sum::<f64>() / total;
                 if loss < best.1 {
                     best = (Self { temperature: temperature as f32, doubt: doubt as f32 }, loss);
                 }
@@ -131,11 +134,11 @@ mod tests {
                 (pmf, usize::from(if sure { k % 40 == 0 } else { wrong }))
             })
             .collect();
-        let (found, loss) = Calibration::fit(&answers, &tried);
+        let (found, loss) = Calibration::fit(&answers, |_| 1.0, &tried);
         assert!((0.75..1.3).contains(&found.temperature) && (0.04..0.25).contains(&found.doubt), "{found:?}");
         assert!(loss < 0.75 && found.is_sound(&tried), "{loss}");
         let sure = found.apply(&Pmf::from_weights([1.0, 0.0]));
         assert!((sure.probabilities()[1] - f64::from(found.doubt) / 2.0).abs() < 1e-6, "{sure:?}");
-        assert_eq!(Calibration::fit(&[], &tried).0, Calibration { temperature: 1.0, doubt: 0.0 });
+        assert_eq!(Calibration::fit(&[], |_| 1.0, &tried).0, Calibration { temperature: 1.0, doubt: 0.0 });
     }
 }

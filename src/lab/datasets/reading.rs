@@ -3,8 +3,8 @@
 use super::card::card;
 use super::origin::TrialOrigin;
 use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
-use palpate_learn::{Dataset, Example, Sequence};
-use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_learn::{Dataset, Example, OTHER, Sequence};
+use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
 use palpate_store::labels::Flag;
 use palpate_store::{Library, Store, TrialRow};
 use palpate_tactile::trial::TrialId;
@@ -146,7 +146,7 @@ impl DatasetQuery {
                 Entry::Occupied(_) => *left_out.entry(COPIES.to_owned()).or_default() += 1,
                 Entry::Vacant(free) => {
                     free.insert(row.id);
-                    named.entry(row.object.clone()).or_insert_with(|| known_properties(row));
+                    named.entry(class_of(row).to_owned()).or_insert_with(|| known_properties(row));
                     read.push((*row, grasp, before.of_trial(row, &origin)));
                     origins.push(origin);
                 }
@@ -169,7 +169,7 @@ impl DatasetQuery {
             let content = content_of(row, &grasp);
             Some(Example {
                 id: row.id,
-                class: labels.class(&row.object)?,
+                class: labels.class(class_of(row))?,
                 grasp: Arc::new(grasp),
                 content,
                 after,
@@ -224,6 +224,11 @@ impl Predecessors {
             None => self.last.get(&row.id).copied().filter(|_| origin.stayed || row.follows),
         }
     }
+}
+
+/// Class of a trial: the name of its object, or "other" for random shapes.
+fn class_of(row: &TrialRow) -> &str {
+    if RandomShape::seed_of(&row.object).is_some() { OTHER } else { &row.object }
 }
 
 fn known_properties(row: &TrialRow) -> Option<(String, String)> {

@@ -11,6 +11,8 @@ pub(super) struct Rows {
     pub(super) columns: usize,
     /// Class of each row.
     pub(super) labels: Vec<usize>,
+    /// Weight of each row; none where all are equal. Nearest neighbours and support vector machines do without.
+    pub(super) weights: Option<Vec<f64>>,
     /// Number of classes.
     pub(super) classes: usize,
 }

@@ -3,6 +3,7 @@
 //! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests
 //! and boosted trees order the classes well, but are far too unsure or too sure of them.
 
+use super::geometry::{self, GeometryEncoder, shipped_encoder};
 use super::neighbours::Neighbours;
 use super::row_model::{RowModel, Rows};
 use super::svm::Svm;
@@ -20,6 +21,7 @@ use crate::recogniser::{Recogniser, Verdict};
 use crate::temperature::{Calibration, Temperatures};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
+use std::sync::Arc;
 
 /// Kind of features and classifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +31,7 @@ pub(crate) enum TabularKind {
     RandomForest,
     BaggedTrees,
     ExtraTrees,
+    GeometryTrees,
     GradientBoosting,
     RusBoostM2,
     RusBoostSamme,
@@ -39,16 +42,49 @@ pub(crate) enum TabularKind {
 }
 
 /// Features and a classifier of them.
-#[derive(Debug)]
 pub(crate) struct Tabular {
     learned: Learned,
+    rows: RowMaker,
     model: Box<dyn RowModel>,
+    /// The class "other".
+    other: Option<usize>,
 }
+
+/// Features of a grasp, with those of the geometry encoder for classifiers that read them.
+#[derive(Clone)]
+struct RowMaker {
+    features: Features,
+    encoder: Option<Arc<GeometryEncoder>>,
+}
+
+impl RowMaker {
+    fn width(&self) -> usize {
+        self.features.width() + self.encoder.as_ref().map_or(0, |encoder| encoder.width())
+    }
+
+    /// Features of a grasp, and of its mirror image where it can be mirrored.
+    fn views(&self, grasp: &Sequence) -> (Vec<f32>, Option<Vec<f32>>) {
+        let (mut own, mut mirrored) = (self.features.row(grasp), self.features.mirrored(grasp));
+        if let Some(encoder) = &self.encoder {
+            // They are means over both views.
+            let encoded = encoder.features(grasp);
+            own.extend_from_slice(&encoded);
+            mirrored.iter_mut().for_each(|row| row.extend_from_slice(&encoded));
+        }
+        (own, mirrored)
+    }
+}
+
+/// Beginning of the names of the encoder's arrays in a model file.
+const ENCODER: &str = "encoder.";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Learned {
     kind: TabularKind,
     features: Features,
+    /// Settings of the geometry encoder whose features are read too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    encoder: Option<serde_json::Value>,
     /// Mean and one over the standard deviation of each feature; empty for models that need no scaling.
     scaling: Vec<(f32, f32)>,
     /// Settings of the classifier, for people.
@@ -91,7 +127,7 @@ impl TabularKind {
     fn features(self) -> FeatureKind {
         match self {
             Self::MeasuresSvm | Self::MeasuresForest => FeatureKind::Measures,
-            Self::ExtraTrees => FeatureKind::ExtendedCourse,
+            Self::ExtraTrees | Self::GeometryTrees => FeatureKind::ExtendedCourse,
             Self::DecisionTree
             | Self::RandomForest
             | Self::BaggedTrees
@@ -103,6 +139,10 @@ impl TabularKind {
         }
     }
 
+    fn reads_geometry(self) -> bool {
+        self == Self::GeometryTrees
+    }
+
     fn wants_scaling(self) -> bool {
         matches!(self, Self::Neighbours | Self::Svm | Self::MeasuresSvm)
     }
@@ -112,7 +152,9 @@ impl TabularKind {
         const ROWS: Mirroring = Mirroring { rows: true, views: false };
         match self {
             // The fingers of a real gripper differ, and then a mirrored grasp is no example.
-            Self::ExtraTrees => &[Mirroring { rows: true, views: true }, Mirroring { rows: false, views: false }],
+            Self::ExtraTrees | Self::GeometryTrees => {
+                &[Mirroring { rows: true, views: true }, Mirroring { rows: false, views: false }]
+            }
             _ => &[ROWS],
         }
     }
@@ -136,7 +178,7 @@ impl TabularKind {
             Self::DecisionTree => Classifier::Forest(ForestSettings::decision_tree()),
             Self::RandomForest | Self::MeasuresForest => Classifier::Forest(ForestSettings::random_forest()),
             Self::BaggedTrees => Classifier::Forest(ForestSettings::bagged_trees()),
-            Self::ExtraTrees => Classifier::Forest(ForestSettings::extra_trees()),
+            Self::ExtraTrees | Self::GeometryTrees => Classifier::Forest(ForestSettings::extra_trees()),
             Self::GradientBoosting => {
                 let base = GradientBoostingSettings::default();
                 let tree = TreeSettings { min_leaf: 10, features: FeatureSampling::Sqrt, ..base.tree };
@@ -156,13 +198,17 @@ impl TabularKind {
             Classifier::Svm => Svm::decided_by(),
             trees => format!("{trees:?}, revision {}", forest::REVISION),
         };
-        serde_json::json!({
+        let mut decided_by = serde_json::json!({
             "features": self.features(),
             "revisions": [REVISION, features::REVISION],
             "parts": self.parts(),
             "mirroring": format!("{:?}", self.mirrorings()),
             "classifier": classifier,
-        })
+        });
+        if self.reads_geometry() {
+            decided_by["encoder"] = geometry::shipped_content().into();
+        }
+        decided_by
     }
 }
 
@@ -185,7 +231,8 @@ impl Classifier {
     /// Fits to rows; returns also a description of the settings.
     fn fit(&self, rows: &Rows, fitting: &Fitting<'_>) -> Result<(Box<dyn RowModel>, String), LearnError> {
         let table = Table { values: &rows.values, columns: rows.columns };
-        let examples = Examples { table, labels: &rows.labels, classes: rows.classes, weights: None };
+        let weights = rows.weights.as_deref();
+        let examples = Examples { table, labels: &rows.labels, classes: rows.classes, weights };
         Ok(match self {
             Self::Forest(settings) => (Box::new(Forest::fit(&examples, settings)?), format!("{settings:?}")),
             Self::GradientBoosting(settings) => {
@@ -214,7 +261,7 @@ struct FeatureRows<'a> {
 impl FeatureRows<'_> {
     fn rows(&self, grasps: impl Iterator<Item = usize>, mirroring: Mirroring) -> Rows {
         let classes = self.data.labels.classes.len();
-        let mut rows = Rows { values: Vec::new(), columns: self.columns, labels: Vec::new(), classes };
+        let mut rows = Rows { values: Vec::new(), columns: self.columns, labels: Vec::new(), weights: None, classes };
         for k in grasps {
             let mirrored = self.mirrored.as_ref().filter(|_| mirroring.rows).map(|rows| &rows[k]);
             for row in [Some(&self.own[k]), mirrored].into_iter().flatten() {
@@ -222,6 +269,9 @@ impl FeatureRows<'_> {
                 rows.labels.push(self.data.examples[k].class);
             }
         }
+        rows.weights = other_weight(self.data, &rows.labels).map(|(other, weight)| {
+            rows.labels.iter().map(|class| if *class == other { weight } else { 1.0 }).collect()
+        });
         rows
     }
 
@@ -257,8 +307,27 @@ impl FeatureRows<'_> {
             }
             progress((part + 1) as f64 / parts as f64);
         }
-        Ok(Calibration::fit(&answers, &TEMPERATURES))
+        let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();
+        let other = other_weight(self.data, &truths);
+        let weight = |class: usize| other.filter(|(other, _)| *other == class).map_or(1.0, |(_, weight)| weight);
+        Ok(Calibration::fit(&answers, weight, &TEMPERATURES))
     }
+}
+
+/// The class "other" and the weight that gives its rows, among those of these classes, half of the prior.
+fn other_weight(data: &Dataset, classes: &[usize]) -> Option<(usize, f64)> {
+    let other = data.labels.other()?;
+    let own = classes.iter().filter(|class| **class == other).count();
+    let rest = classes.len() - own;
+    (own > 0 && rest > 0).then(|| (other, rest as f64 / own as f64))
+}
+
+/// Combines the answers to two grasps. The prior of the class "other" counts once.
+fn combined(before: &Pmf, now: &Pmf, other: Option<usize>) -> Pmf {
+    let Some(other) = other else { return before.times(now) };
+    let rest = now.classes().saturating_sub(1).max(1) as f64;
+    let weights = now.probabilities().iter().enumerate();
+    before.times(&Pmf::from_weights(weights.map(|(class, p)| if class == other { p / rest } else { *p })))
 }
 
 fn answer(model: &dyn RowModel, row: &[f32], mirrored: Option<&[f32]>) -> Pmf {
@@ -276,12 +345,11 @@ impl Tabular {
         check_enough(data, 2)?;
         fitting.refuse_settings()?;
         let features = Features::fit(kind.features(), data);
-        let own = data.examples.iter().map(|e| features.row(&e.grasp)).collect();
-        let mirrored = features.has_mirror().then(|| {
-            let rows = data.examples.iter().filter_map(|e| features.mirrored(&e.grasp));
-            rows.collect()
-        });
-        let mut grasps = FeatureRows { data, columns: features.width(), own, mirrored };
+        let encoder = kind.reads_geometry().then(|| encoder_of(&data.channels)).transpose()?;
+        let rows = RowMaker { features, encoder };
+        let (own, mirrored): (Vec<_>, Vec<_>) = data.examples.iter().map(|e| rows.views(&e.grasp)).unzip();
+        let mirrored = mirrored.into_iter().collect();
+        let mut grasps = FeatureRows { data, columns: rows.width(), own, mirrored };
         let all = || 0..data.examples.len();
         let with_both = Mirroring { rows: true, views: true };
         let scaling = if kind.wants_scaling() { scaling(&grasps.rows(all(), with_both)) } else { Vec::new() };
@@ -309,16 +377,27 @@ impl Tabular {
         };
         let (model, description) = classifier.fit(&grasps.rows(all(), mirroring), &last)?;
         (fitting.progress)(1.0);
-        let both_views = mirroring.views && features.has_mirror();
-        let calibration = Some(calibration);
-        let learned = Learned { kind, features, scaling, model: description, calibration, both_views };
-        Ok(Self { learned, model })
+        let learned = Learned {
+            kind,
+            features: rows.features.clone(),
+            encoder: rows.encoder.as_ref().map(|encoder| encoder.settings()),
+            scaling,
+            model: description,
+            calibration: Some(calibration),
+            both_views: mirroring.views && rows.features.has_mirror(),
+        };
+        Ok(Self { learned, rows, model, other: data.labels.other() })
     }
 
     /// Restores a recogniser from a model file.
     pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
         let learned: Learned = card.settings_as()?;
-        let (columns, classes) = (learned.features.width(), card.labels.classes.len());
+        let encoder = learned.encoder.as_ref().map(|settings| load_encoder(settings, &card.channels, arrays));
+        let rows = RowMaker { features: learned.features.clone(), encoder: encoder.transpose()? };
+        if rows.encoder.is_some() != learned.kind.reads_geometry() {
+            return Err(LoadError::Card { part: "the geometry encoder" });
+        }
+        let (columns, classes) = (rows.width(), card.labels.classes.len());
         let scaled = !learned.kind.wants_scaling() || learned.scaling.len() == columns;
         if !learned.features.is_sound(card.channels.len()) || !scaled {
             return Err(LoadError::Card { part: "the feature definition" });
@@ -333,7 +412,31 @@ impl Tabular {
             Classifier::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
             Classifier::Svm => Box::new(Svm::load(arrays, columns, classes)?),
         };
-        Ok(Self { learned, model })
+        Ok(Self { learned, rows, model, other: card.labels.other() })
+    }
+}
+
+/// The shipped geometry encoder, for readings of these channels.
+fn encoder_of(channels: &[String]) -> Result<Arc<GeometryEncoder>, LearnError> {
+    let encoder = shipped_encoder().map_err(LearnError::failed)?;
+    if encoder.channels() == channels {
+        return Ok(encoder);
+    }
+    Err(LearnError::Encoder { needs: encoder.channels().join(", "), found: channels.join(", ") })
+}
+
+/// Restores the geometry encoder of a model file.
+fn load_encoder(
+    settings: &serde_json::Value,
+    channels: &[String],
+    arrays: &Arrays,
+) -> Result<Arc<GeometryEncoder>, LoadError> {
+    let own = arrays.0.iter().filter_map(|(name, array)| Some((name.strip_prefix(ENCODER)?.to_owned(), array.clone())));
+    let encoder = GeometryEncoder::load(settings, &Arrays(own.collect()))?;
+    if encoder.channels() == channels {
+        Ok(Arc::new(encoder))
+    } else {
+        Err(LoadError::Card { part: "the geometry encoder" })
     }
 }
 
@@ -383,16 +486,21 @@ impl Recogniser for Tabular {
             scale(&mut row, &self.learned.scaling);
             row
         };
-        let own = scaled(self.learned.features.row(grasp));
-        let mirrored = if self.learned.both_views { self.learned.features.mirrored(grasp).map(scaled) } else { None };
+        let (own, mirrored) = self.rows.views(grasp);
+        let own = scaled(own);
+        let mirrored = mirrored.filter(|_| self.learned.both_views).map(scaled);
         let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
         let pmf = self.learned.calibration.map_or_else(|| pmf.clone(), |own| own.apply(&pmf));
-        Verdict { pmf: before.map_or_else(|| pmf.clone(), |before| before.times(&pmf)), properties: None }
+        let pmf = before.map_or_else(|| pmf.clone(), |before| combined(before, &pmf, self.other));
+        Verdict { pmf, properties: None }
     }
 
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
         self.model.save(&mut arrays);
+        if let Some(encoder) = &self.rows.encoder {
+            arrays.0.extend(encoder.arrays().0.into_iter().map(|(name, array)| (format!("{ENCODER}{name}"), array)));
+        }
         arrays
     }
 
@@ -402,5 +510,43 @@ impl Recogniser for Tabular {
 
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(&self.learned).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance_tests::quick;
+    use crate::data::{Class, Example, Labels, OTHER};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn other_has_half_of_the_prior_once() {
+        // Readings that tell nothing, many more of them of other objects.
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut grasp = || {
+            let t_s: Vec<f32> = (0..40).map(|k| k as f32 * 0.1).collect();
+            Arc::new(Sequence { values: t_s.iter().map(|_| random.random()).collect(), t_s })
+        };
+        let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+        let classes = ["ball", "cube", OTHER].map(class).to_vec();
+        let example = |k: i64| Example { id: k, class: (k as usize).min(100) / 50, ..Example::default() };
+        let data = Dataset {
+            channels: vec!["grip".to_owned()],
+            labels: Labels { classes, ..Labels::default() },
+            examples: (0..500).map(|k| Example { grasp: grasp(), ..example(k) }).collect(),
+            ..Dataset::default()
+        };
+        let model = Tabular::fit(&data, TabularKind::ExtraTrees, &quick(1)).expect("fits");
+        let answers: Vec<Pmf> = (0..100).map(|_| model.recognise(&grasp(), None).pmf).collect();
+        let mean = Pmf::mean(&answers).expect("has answers");
+        let mean = mean.probabilities();
+        // Calibration mixes in some of a uniform PMF; by their number alone they would have 0.8.
+        assert!((0.36..0.54).contains(&mean[2]) && (mean[0] - mean[1]).abs() < 0.08, "{mean:?}");
+        // What tells nothing leaves a belief as it was, however often it comes.
+        let prior = Pmf::from_weights([0.25, 0.25, 0.5]);
+        let belief = combined(&combined(&prior, &prior, Some(2)), &prior, Some(2));
+        assert!(belief.probabilities().iter().zip(prior.probabilities()).all(|(a, b)| (a - b).abs() < 1e-9));
     }
 }
