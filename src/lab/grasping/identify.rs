@@ -1,9 +1,11 @@
 //! Identification of an object by successive grasps: live verdict, belief after each grasp, and the decision to stop.
 //! Shared by window, commands and both grippers.
 
+use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use palpate_learn::{
-    Belief, Labels, LiveRecogniser, Model, ModelError, Pmf, Sequence, Signatures, StopReason, StopRule, Verdict,
+    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, Pmf, Sequence, Signatures, StopReason, StopRule,
+    Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
@@ -84,6 +86,7 @@ pub struct Identification {
     last: Option<Arc<RecognisedGrasp>>,
     /// The newest verdict on the running grasp.
     verdict: Option<Verdict>,
+    geometry: FeltGeometry,
     /// The hold has ended; later rows are ignored.
     closed: bool,
     decision: Option<StopReason>,
@@ -106,6 +109,10 @@ pub struct IdentificationView {
     pub rule: StopRule,
     /// The newest verdict on the running or last grasp; none before the first readings.
     pub verdict: Option<Verdict>,
+    /// Whether the readings serve to estimate the object's geometry.
+    pub measures_geometry: bool,
+    /// The newest estimate of it; none before the first contact.
+    pub measured: Option<Arc<Measured>>,
     /// True while the fingers close and hold, and the answer still changes.
     pub listening: bool,
     /// Belief after each finished grasp.
@@ -147,6 +154,7 @@ impl Identification {
             last: None,
             belief: Belief::default(),
             verdict: None,
+            geometry: FeltGeometry::default(),
             closed: true,
             decision: None,
         }
@@ -162,6 +170,7 @@ impl Identification {
         self.belief = Belief::default();
         self.last = None;
         self.verdict = None;
+        self.geometry.forget();
         self.decision = None;
         self.closed = true;
     }
@@ -210,6 +219,7 @@ impl Identification {
         self.readings = Sequence::default();
         self.hold_s = None;
         self.verdict = None;
+        self.geometry.begin(&named);
         self.closed = false;
         if let Some(live) = &mut self.live {
             live.begin(self.belief.now());
@@ -240,7 +250,8 @@ impl Identification {
         let answer = self.live.as_mut().and_then(|live| live.push(t as f32, &self.columned));
         let new = answer.is_some();
         self.verdict = answer.or_else(|| self.verdict.take());
-        new
+        let measured = self.geometry.push(t, row);
+        new || measured
     }
 
     /// Ends the grasp and adds its verdict to the belief; no effect on a grasp that has ended.
@@ -257,6 +268,7 @@ impl Identification {
         };
         self.belief.add(verdict.pmf.clone(), alone);
         self.verdict = Some(verdict);
+        self.geometry.measure();
         self.last = Some(Arc::new(RecognisedGrasp {
             model: Arc::clone(&self.model),
             grasp: self.readings.clone(),
@@ -288,6 +300,8 @@ impl Identification {
             has_stage_one: self.model.recogniser.has_stage_one(),
             rule: self.rule,
             verdict: self.verdict.clone(),
+            measures_geometry: self.geometry.serves(),
+            measured: self.geometry.newest(),
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,

@@ -5,7 +5,9 @@ mod agreement;
 mod collect;
 mod controller;
 mod error_band;
+mod felt_geometry;
 mod identify;
+mod known_geometry;
 mod row;
 mod run;
 mod shuffled_objects;
@@ -19,6 +21,7 @@ pub use collect::{CollectionError, CollectionPlan, CollectionProgress, Collectio
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
+pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

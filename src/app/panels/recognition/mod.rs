@@ -1,9 +1,10 @@
-//! Recognition: the answer and its reason, size and shape, a bar for each class with the threshold across them, and the
-//! grasps so far.
+//! Recognition: the answer and its reason, size and shape, the measured dimensions, a bar for each class with the threshold
+//! across them, and the grasps so far.
 
 mod classes;
 mod properties;
 mod strip;
+mod touch;
 mod words;
 
 use crate::app::actions::Actions;
@@ -72,19 +73,27 @@ const THRESHOLD_LINE: f32 = 24.0;
 const LEAST_CLASSES: usize = 4;
 
 impl Measures {
+    /// True in a small window.
+    fn is_tight(&self) -> bool {
+        self.class <= TIGHT.class
+    }
+
     fn fitting(room: egui::Vec2) -> &'static Self {
         if room.x < 250.0 || room.y < 560.0 { &TIGHT } else { &ROOMY }
     }
 
     /// Number of lines for classes, and the height of each.
-    fn lines(&self, height: f32, classes: usize, has_stage_one: bool) -> (usize, f32) {
+    fn lines(&self, height: f32, classes: usize, has_stage_one: bool, has_touch: bool) -> (usize, f32) {
         let properties = if has_stage_one { 2.0 * self.properties + self.gap } else { 0.0 };
+        let touch = if has_touch { touch::height(self, has_stage_one) } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
-        let room = height - parts - properties - 7.0 * self.gap;
+        let room = height - parts - properties - touch - 7.0 * self.gap;
         // All of them, if necessary in lines of a small window.
         let line = (room / classes.max(1) as f32).floor().clamp(TIGHT.class, self.class);
         let lines = (room / line).floor().max(0.0) as usize;
-        (lines.clamp(LEAST_CLASSES + 1, classes.max(LEAST_CLASSES + 1)), line)
+        // A small window has room for the measured touch or for one more class.
+        let least = LEAST_CLASSES + usize::from(!has_touch);
+        (lines.clamp(least, classes.max(least)), line)
     }
 }
 
@@ -111,7 +120,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                     part.truth_ui(ui, truth);
                 }
                 properties::ui(ui, &part);
-                let lines = measures.lines(room.y, view.labels.classes.len(), view.has_stage_one);
+                let has_touch = touch::ui(ui, &part);
+                let lines = measures.lines(room.y, view.labels.classes.len(), view.has_stage_one, has_touch);
                 classes::ui(ui, &mut part, lines);
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);

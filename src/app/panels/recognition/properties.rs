@@ -27,7 +27,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     property_ui(ui, part, "shape", &labels.shapes, properties.map(|p| &p.shape));
 }
 
-fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String], pmf: Option<&Pmf>) {
+pub(super) fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String], pmf: Option<&Pmf>) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), part.measures.properties), Sense::hover());
     let named = if rect.width() < NARROW { 0.0 } else { NAME };
     if named > 0.0 {

@@ -3,7 +3,7 @@
 use crate::app::shown::Recognised;
 use palpate_lab::grasping::IdentificationView;
 pub(super) use palpate_lab::why::percent;
-use palpate_learn::{Labels, Pmf, StopReason};
+use palpate_learn::{Labels, OTHER, Pmf, StopReason};
 use palpate_sim::objects::object_title;
 
 /// Least probability at which a running first grasp names its leader.
@@ -82,10 +82,10 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
     }
 }
 
-/// True where the decision is right; none before it. "Unknown" is right for an object that is no class.
+/// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class.
 pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
     let decided = view.decided()?;
-    let named = view.decision != Some(StopReason::Unknown);
+    let named = view.decision != Some(StopReason::Unknown) && decided != OTHER;
     Some(if named { decided == truth } else { view.labels.class(truth).is_none() })
 }
 
@@ -138,6 +138,8 @@ mod tests {
             has_stage_one: true,
             rule: StopRule { threshold: 0.9, most_grasps: 4 },
             verdict: now.map(|p| Verdict { pmf: pmf(p), properties: None }),
+            measures_geometry: false,
+            measured: None,
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
