@@ -3,7 +3,7 @@
 use super::accuracy::{accuracy_tables, stored_accuracy};
 use super::effect_audit::{AuditReport, audit_table, stored_effects};
 use super::stored_study::{GeneratedSection, StoredStudy};
-use super::{paper, peer_costs, recognition_scores, stability};
+use super::{paper, peer_costs, stability};
 use palpate_learn::METHODS;
 
 /// All generated sections; a test checks that the documents hold them, and
@@ -26,7 +26,6 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
     Ok([
         vec![accuracy, effects, shipped, deviations],
         stability::sections()?,
-        recognition_scores::sections()?,
         paper::sections()?,
         peer_costs::sections()?,
     ]

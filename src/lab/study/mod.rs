@@ -12,7 +12,6 @@ mod network_cost;
 pub mod paper;
 mod peer_costs;
 mod physics_cost;
-mod recognition_scores;
 mod result_file;
 mod search;
 pub mod stability;
@@ -39,7 +38,6 @@ pub use labelled_training::{
 };
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
-pub use recognition_scores::{ControlScores, RecognitionScores, ScoreError, ScoreReport, measure_scores};
 pub use result_file::{ResultFile, ResultFileError, program};
 pub use search::{SearchError, SearchRow, search};
 pub use stored_study::{GeneratedSection, StoredStudy, markdown_table};

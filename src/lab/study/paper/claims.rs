@@ -1,7 +1,7 @@
 //! The paper's claims beside our numbers, from the stored results of its studies.
 
 use super::report::{Finding, StudyReport};
-use super::{PAPER_STUDIES, PaperStudy};
+use super::{PAPER_STUDIES, PaperStudy, in_short};
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 
 /// Results of full runs by the key of their study: files of `assets/studies/paper`.
@@ -10,6 +10,8 @@ const STORED: &[(&str, &str)] = &[
     ("layouts", include_str!("../../../../assets/studies/paper/layouts.json")),
     ("modality", include_str!("../../../../assets/studies/paper/modality.json")),
     ("stages", include_str!("../../../../assets/studies/paper/stages.json")),
+    ("drift", include_str!("../../../../assets/studies/paper/drift.json")),
+    ("shaking", include_str!("../../../../assets/studies/paper/shaking.json")),
 ];
 
 /// Descriptions of grasps below the claims of a study: the others differ in layout or signals.
@@ -44,7 +46,7 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
     }
     let claims = GeneratedSection { document: "assets/help/paper.md", name: "claims", text: parts.join("\n\n") };
     let studies = GeneratedSection { document: "assets/help/studies.md", name: "studies", text: overview() };
-    Ok(vec![claims, studies])
+    Ok([vec![claims, studies], in_short::sections()?].concat())
 }
 
 /// Table of the studies and of what they cost.

@@ -26,7 +26,7 @@ const CARD: StudyCard = StudyCard {
     title: "Drift of sensors",
     about: "recognition with gains and zeros that have drifted since the training, re-zeroed or not, and with hysteresis",
     paper: "section VI, future work",
-    budget: "about 10 CPU minutes",
+    budget: "about 30 CPU minutes",
 };
 
 /// Methods: trees on features of the whole grasp, and the paper's network.

@@ -43,10 +43,10 @@ const STEADY: usize = 4;
 const NO_CHANGE: f64 = 0.01;
 
 /// Names of the ways to place the object, and to combine grasps.
-const ANEW: &str = "put down anew";
+pub(super) const ANEW: &str = "put down anew";
 const LEFT: &str = "left as released";
 const FEEDBACK: &str = "feedback";
-const PRODUCT: &str = "product of experts";
+pub(super) const PRODUCT: &str = "product of experts";
 
 pub(super) struct Case {
     sensors: SensorModel,

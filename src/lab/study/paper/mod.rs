@@ -14,6 +14,7 @@ mod drawing;
 mod drift;
 mod folder;
 mod grasps;
+mod in_short;
 mod layouts;
 mod modality;
 mod models;

@@ -23,7 +23,7 @@ const CARD: StudyCard = StudyCard {
     title: "Shaking",
     about: "what inertia adds to recognition: held still, lifted, shaken; the objects, and objects that differ in mass alone",
     paper: "section VII, future work",
-    budget: "about 30 CPU minutes",
+    budget: "about 50 CPU minutes",
 };
 
 /// A hand's motion.

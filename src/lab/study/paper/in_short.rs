@@ -1,0 +1,88 @@
+//! Sections of the manual and the README on recognition in short, from the stored results of the studies.
+
+use super::{PaperStudy, StudyTable, grasps, models, stored_report};
+use crate::study::stored_study::{GeneratedSection, markdown_table};
+use palpate_learn::METHODS;
+
+/// Kinds of grasps of the comparison of methods, and of the study of successive grasps.
+const CLEAN: &str = "virtual, balanced";
+const NOISY: &str = "physical-like, balanced";
+/// Grasps after which the paper's figure shows no change.
+const SUCCESSIVE: [f64; 2] = [3.0, 5.0];
+
+/// A table of the stored report of a study with the line on its origin; none where it has not been run in full.
+fn stored_table(study: &dyn PaperStudy) -> Result<Option<(StudyTable, String)>, serde_json::Error> {
+    let Some(stored) = stored_report(study)? else { return Ok(None) };
+    let table = stored.result.table(study.card().key).map(|(_, table)| table.clone());
+    Ok(table.map(|table| (table, stored.origin())))
+}
+
+/// The sections.
+pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
+    let (methods, grasps) = (stored_table(&models::Models)?, stored_table(&grasps::Grasps)?);
+    let none = "Not measured in full with this version.".to_owned();
+    let (text, short) = match (&methods, &grasps) {
+        (Some(methods), Some(grasps)) => (scores(methods, grasps), best_in_short(&methods.0, &grasps.0)),
+        _ => (none.clone(), none),
+    };
+    Ok(vec![
+        GeneratedSection { document: "assets/help/recognition.md", name: "scores", text },
+        GeneratedSection { document: "README.md", name: "recognition in short", text: short },
+    ])
+}
+
+/// F1 after one grasp, or after several put down anew, in percent.
+fn shown(table: &StudyTable, row: Option<&usize>, column: &str) -> String {
+    let unit = table.columns.iter().find(|own| own.name == column).map_or("", |own| own.unit.as_str());
+    row.map_or_else(|| "-".to_owned(), |row| table.cell(*row, column).shown(unit))
+}
+
+fn scores(methods: &(StudyTable, String), grasps: &(StudyTable, String)) -> String {
+    let table = &methods.0;
+    let row = |kind: &str, key: &str| table.rows_with(&[("grasps", kind), ("model", key)]).first().copied();
+    let lines = table.texts("model").into_iter().map(|key| {
+        let [clean, noisy] = [CLEAN, NOISY].map(|kind| row(kind, key));
+        let of_clean = |column: &str| shown(table, clean.as_ref(), column);
+        let noisy = shown(table, noisy.as_ref(), "F1");
+        vec![format!("`{key}`"), of_clean("F1"), noisy, of_clean("ECE"), of_clean("training"), of_clean("whole grasp")]
+    });
+    let header = ["method", "virtual", "physical-like", "ECE (virtual)", "training (CPU s)", "answer (ms)"];
+    let by_method = markdown_table(&header, &lines.collect::<Vec<_>>());
+    let (successive, origin) = grasps;
+    let lines = successive.texts("sensors").into_iter().flat_map(|sensors| {
+        successive.texts("model").into_iter().map(move |key| {
+            let after = |count: f64| shown(successive, after(successive, sensors, key, count).as_ref(), "F1");
+            [vec![sensors.to_owned(), format!("`{key}`"), after(1.0)], SUCCESSIVE.map(after).to_vec()].concat()
+        })
+    });
+    let header = ["sensors", "method", "one grasp", "after three", "after five"];
+    let by_grasps = markdown_table(&header, &lines.collect::<Vec<_>>());
+    format!(
+        "{by_method}\n\n{}.\n\nGrasps of an object that is put down anew, by product of experts:\n\n{by_grasps}\n\n{origin}.",
+        methods.1
+    )
+}
+
+/// Row of a method after some grasps of an object that is put down anew.
+fn after(table: &StudyTable, sensors: &str, key: &str, count: f64) -> Option<usize> {
+    let kind = [("sensors", sensors), ("model", key), ("object", grasps::ANEW), ("combined by", grasps::PRODUCT)];
+    table.rows_with(&kind).into_iter().find(|row| table.cell(*row, "grasps").value() == Some(count))
+}
+
+fn best_in_short(methods: &StudyTable, successive: &StudyTable) -> String {
+    let rows = methods.rows_with(&[("grasps", CLEAN)]);
+    let f1 = |row: &usize| methods.cell(*row, "F1").value().unwrap_or(0.0);
+    let Some(best) = rows.iter().max_by(|a, b| f1(a).total_cmp(&f1(b))) else { return String::new() };
+    let key = methods.text(*best, "model");
+    let three = after(successive, "virtual", key, SUCCESSIVE[0]);
+    let three = three.map(|row| format!(", {} % after three", shown(successive, Some(&row), "F1")));
+    let noisy = methods.rows_with(&[("grasps", NOISY), ("model", key)]);
+    format!(
+        "Of {} methods, each trained on 50 grasps per object (preset B, objects free, C1), `{key}` is best after one grasp: \
+         F1 {} % with perfect sensors{}, {} % with sensors such as a real gripper has. `palpate help paper` has all studies.",
+        rows.len().min(METHODS.len()),
+        shown(methods, Some(best), "F1"),
+        three.unwrap_or_default(),
+        shown(methods, noisy.first(), "F1"),
+    )
+}
