@@ -33,7 +33,7 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
 }
 
 /// Scores of the shipped model, as the command that trained it measured and wrote them.
-fn shipped_text() -> String {
+pub(super) fn shipped_text() -> String {
     let Ok(model) = palpate_learn::shipped_model() else { return "The shipped model cannot be read.".to_owned() };
     let (data, metrics) = (&model.card.data, &model.card.metrics);
     let percent = |value: &serde_json::Value| value.as_f64().map_or("-".to_owned(), |f1| format!("{:.1}", 100.0 * f1));

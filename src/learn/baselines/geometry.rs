@@ -68,11 +68,11 @@ impl Measure {
         !matches!(self, Self::Aside | Self::Across | Self::Below)
     }
 
-    fn to_scale(self, x: f64) -> f64 {
+    fn on_scale(self, x: f64) -> f64 {
         if self.is_logarithmic() { x.max(1e-6).ln() } else { x }
     }
 
-    fn from_scale(self, x: f64) -> f64 {
+    fn off_scale(self, x: f64) -> f64 {
         if self.is_logarithmic() { x.exp() } else { x }
     }
 }
@@ -338,7 +338,7 @@ impl GeometryEncoder {
             let half = self.learned.spreads[stage][k] * spread * deviation;
             let x = centre + deviation * f64::from(means[k]);
             let least = if measure.is_logarithmic() { f64::NEG_INFINITY } else { 0.0 };
-            let at = |x: f64| measure.from_scale(x.max(least));
+            let at = |x: f64| measure.off_scale(x.max(least));
             Estimate { measure, value: at(x), range: [at(x - half), at(x + half)] }
         };
         let estimates = Measure::ALL.iter().enumerate().map(|(k, measure)| estimate(k, *measure)).collect();
@@ -472,7 +472,7 @@ impl Learned {
     /// Value of a quantity that the network should give.
     fn target(&self, measure: usize, touch: &Touch) -> f64 {
         let [centre, deviation] = self.scales[measure];
-        (Measure::ALL[measure].to_scale(touch.geometry.values[measure]) - centre) / deviation
+        (Measure::ALL[measure].on_scale(touch.geometry.values[measure]) - centre) / deviation
     }
 
     fn train(&self, touches: &[Touch], used: &[usize], fitting: &Fitting<'_>) -> Result<Variables<Encoder>> {
@@ -531,7 +531,7 @@ fn preparation_of(channels: &[String], touches: &[Touch]) -> Preparation {
 
 /// Mean and standard deviation of a quantity on its scale.
 fn scale_of(measure: usize, touches: &[Touch]) -> [f64; 2] {
-    let values = || touches.iter().map(|touch| Measure::ALL[measure].to_scale(touch.geometry.values[measure]));
+    let values = || touches.iter().map(|touch| Measure::ALL[measure].on_scale(touch.geometry.values[measure]));
     let count = touches.len() as f64;
     let mean = values().sum::<f64>() / count;
     let deviation = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();

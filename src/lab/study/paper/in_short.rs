@@ -1,6 +1,7 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
 use super::{PaperStudy, StudyTable, grasps, models, stored_report};
+use crate::study::generated::shipped_text;
 use crate::study::stored_study::{GeneratedSection, markdown_table};
 use palpate_learn::METHODS;
 
@@ -23,7 +24,7 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
     let none = "Not measured in full with this version.".to_owned();
     let (text, short) = match (&methods, &grasps) {
         (Some(methods), Some(grasps)) => (scores(methods, grasps), best_in_short(&methods.0, &grasps.0)),
-        _ => (none.clone(), none),
+        _ => (none, shipped_text()),
     };
     Ok(vec![
         GeneratedSection { document: "assets/help/recognition.md", name: "scores", text },
