@@ -371,6 +371,7 @@ const SAVED: &[(&str, &[u8])] = &[
     ("measures-svm", include_bytes!("saved_models/measures-svm.safetensors")),
     ("measures-forest", include_bytes!("saved_models/measures-forest.safetensors")),
     ("extra-trees", include_bytes!("saved_models/extra-trees.safetensors")),
+    ("geometry-trees", include_bytes!("saved_models/geometry-trees.safetensors")),
     ("dtw-knn", include_bytes!("saved_models/dtw-knn.safetensors")),
     ("convolution", include_bytes!("saved_models/convolution.safetensors")),
 ];

@@ -14,6 +14,7 @@ mod peer_costs;
 mod physics_cost;
 mod result_file;
 mod search;
+mod shipped;
 pub mod stability;
 mod stored_study;
 mod timed_grasp;

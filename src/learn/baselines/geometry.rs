@@ -99,7 +99,7 @@ pub struct Touch {
 
 /// Estimate of one quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct MeasureEstimate {
     /// The quantity.
     pub measure: Measure,
     /// Median (m or kg).
@@ -112,14 +112,14 @@ pub struct Estimate {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// Estimate of each of [`Measure::ALL`].
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<MeasureEstimate>,
     /// Probability of each of the encoder's shapes.
     pub shape: Pmf,
 }
 
 impl Measured {
     /// The estimate of a quantity.
-    pub fn of(&self, measure: Measure) -> Option<&Estimate> {
+    pub fn of(&self, measure: Measure) -> Option<&MeasureEstimate> {
         self.estimates.iter().find(|estimate| estimate.measure == measure)
     }
 }
@@ -339,7 +339,7 @@ impl GeometryEncoder {
             let x = centre + deviation * f64::from(means[k]);
             let least = if measure.is_logarithmic() { f64::NEG_INFINITY } else { 0.0 };
             let at = |x: f64| measure.off_scale(x.max(least));
-            Estimate { measure, value: at(x), range: [at(x - half), at(x + half)] }
+            MeasureEstimate { measure, value: at(x), range: [at(x - half), at(x + half)] }
         };
         let estimates = Measure::ALL.iter().enumerate().map(|(k, measure)| estimate(k, *measure)).collect();
         let shape = Pmf::from_scores(means[shapes..].iter().map(|score| f64::from(*score)));

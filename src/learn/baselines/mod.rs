@@ -15,7 +15,7 @@ mod warping;
 pub(super) use candle_network::Candle;
 pub(super) use convolution::Convolution;
 pub use geometry::{
-    Estimate, Geometry, GeometryEncoder, GeometryScores, Measure, MeasureScore, Measured, Touch, shipped_encoder,
+    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch, shipped_encoder,
 };
 pub(super) use tabular::{Tabular, TabularKind};
 pub(super) use warping::Warping;

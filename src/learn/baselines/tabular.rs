@@ -51,15 +51,46 @@ pub(crate) struct Tabular {
 }
 
 /// Features of a grasp, with those of the geometry encoder for classifiers that read them.
-#[derive(Clone)]
 struct RowMaker {
     features: Features,
-    encoder: Option<Arc<GeometryEncoder>>,
+    encoder: Option<ReadEncoder>,
+}
+
+/// The geometry encoder with the columns of its channels.
+struct ReadEncoder {
+    encoder: Arc<GeometryEncoder>,
+    /// Column of each channel, and the factor to its unit.
+    columns: Vec<(usize, f32)>,
+}
+
+/// Sensing area of a pad (m²): force and pressure of one pad are two units of one reading.
+const PAD_AREA: f32 = 1.697e-4;
+
+impl ReadEncoder {
+    /// The encoder on readings of these channels; none where they lack one of its own.
+    fn on(encoder: Arc<GeometryEncoder>, channels: &[String]) -> Option<Self> {
+        let at = |name: &str| channels.iter().position(|own| own == name);
+        let column = |channel: &String| {
+            let as_force = || {
+                let column = at(&format!("force_{}", channel.strip_prefix("pressure_")?))?;
+                Some((column, 1.0 / PAD_AREA))
+            };
+            at(channel).map(|column| (column, 1.0)).or_else(as_force)
+        };
+        let columns = encoder.channels().iter().map(column).collect::<Option<_>>()?;
+        Some(Self { encoder, columns })
+    }
+
+    fn features(&self, grasp: &Sequence) -> Vec<f32> {
+        let values =
+            grasp.rows().flat_map(|(_, row)| self.columns.iter().map(|(column, factor)| row[*column] * factor));
+        self.encoder.features(&Sequence { t_s: grasp.t_s.clone(), values: values.collect() })
+    }
 }
 
 impl RowMaker {
     fn width(&self) -> usize {
-        self.features.width() + self.encoder.as_ref().map_or(0, |encoder| encoder.width())
+        self.features.width() + self.encoder.as_ref().map_or(0, |own| own.encoder.width())
     }
 
     /// Features of a grasp, and of its mirror image where it can be mirrored.
@@ -380,7 +411,7 @@ impl Tabular {
         let learned = Learned {
             kind,
             features: rows.features.clone(),
-            encoder: rows.encoder.as_ref().map(|encoder| encoder.settings()),
+            encoder: rows.encoder.as_ref().map(|own| own.encoder.settings()),
             scaling,
             model: description,
             calibration: Some(calibration),
@@ -417,27 +448,17 @@ impl Tabular {
 }
 
 /// The shipped geometry encoder, for readings of these channels.
-fn encoder_of(channels: &[String]) -> Result<Arc<GeometryEncoder>, LearnError> {
+fn encoder_of(channels: &[String]) -> Result<ReadEncoder, LearnError> {
     let encoder = shipped_encoder().map_err(LearnError::failed)?;
-    if encoder.channels() == channels {
-        return Ok(encoder);
-    }
-    Err(LearnError::Encoder { needs: encoder.channels().join(", "), found: channels.join(", ") })
+    let needs = encoder.channels().join(", ");
+    ReadEncoder::on(encoder, channels).ok_or_else(|| LearnError::Encoder { needs, found: channels.join(", ") })
 }
 
 /// Restores the geometry encoder of a model file.
-fn load_encoder(
-    settings: &serde_json::Value,
-    channels: &[String],
-    arrays: &Arrays,
-) -> Result<Arc<GeometryEncoder>, LoadError> {
+fn load_encoder(settings: &serde_json::Value, channels: &[String], arrays: &Arrays) -> Result<ReadEncoder, LoadError> {
     let own = arrays.0.iter().filter_map(|(name, array)| Some((name.strip_prefix(ENCODER)?.to_owned(), array.clone())));
-    let encoder = GeometryEncoder::load(settings, &Arrays(own.collect()))?;
-    if encoder.channels() == channels {
-        Ok(Arc::new(encoder))
-    } else {
-        Err(LoadError::Card { part: "the geometry encoder" })
-    }
+    let encoder = Arc::new(GeometryEncoder::load(settings, &Arrays(own.collect()))?);
+    ReadEncoder::on(encoder, channels).ok_or(LoadError::Card { part: "the geometry encoder" })
 }
 
 /// The tree ensembles offer the methods of [`RowModel`] themselves, so that `forest` need not know this trait.
@@ -498,7 +519,7 @@ impl Recogniser for Tabular {
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
         self.model.save(&mut arrays);
-        if let Some(encoder) = &self.rows.encoder {
+        if let Some(ReadEncoder { encoder, .. }) = &self.rows.encoder {
             arrays.0.extend(encoder.arrays().0.into_iter().map(|(name, array)| (format!("{ENCODER}{name}"), array)));
         }
         arrays

@@ -6,7 +6,7 @@ use super::{Measures, Part, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::grasping::SHAPES;
-use palpate_learn::{Estimate, Measure};
+use palpate_learn::{Measure, MeasureEstimate};
 
 /// Longest length on the scale (mm).
 const LONGEST: f64 = 110.0;
@@ -64,7 +64,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 }
 
 /// Text of an estimate for people who point at it, and for screen readers.
-fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&Estimate>) {
+fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
     let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " mm"));
     let spoken = format!("{name} {text}");
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
@@ -73,12 +73,12 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&
 }
 
 /// An estimate in words: `34 mm (30 .. 38)`.
-fn words(estimate: &Estimate, unit: &str) -> String {
+fn words(estimate: &MeasureEstimate, unit: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
     format!("{value:.0}{unit} ({from:.0} .. {to:.0})")
 }
 
-fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&Estimate>) {
+fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
     let (colours, height) = (part.colours(), part.measures.class);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
     let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " mm"));

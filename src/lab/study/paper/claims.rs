@@ -1,7 +1,7 @@
 //! The paper's claims beside our numbers, from the stored results of its studies.
 
 use super::report::{Finding, StudyReport};
-use super::{PAPER_STUDIES, PaperStudy, in_short};
+use super::{PAPER_STUDIES, PaperStudy};
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 
 /// Results of full runs by the key of their study: files of `assets/studies/paper`.
@@ -47,7 +47,7 @@ pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::
     }
     let claims = GeneratedSection { document: "assets/help/paper.md", name: "claims", text: parts.join("\n\n") };
     let studies = GeneratedSection { document: "assets/help/studies.md", name: "studies", text: overview() };
-    Ok([vec![claims, studies], in_short::sections()?].concat())
+    Ok(vec![claims, studies])
 }
 
 /// Table of the studies and of what they cost.

@@ -1,7 +1,9 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
-use super::{PaperStudy, StudyTable, grasps, models, stored_report};
-use crate::study::generated::shipped_text;
+use super::claims::stored_report;
+use super::report::StudyTable;
+use super::{PaperStudy, grasps, models};
+use crate::study::shipped::shipped_text;
 use crate::study::stored_study::{GeneratedSection, markdown_table};
 use palpate_learn::METHODS;
 
@@ -19,7 +21,7 @@ fn stored_table(study: &dyn PaperStudy) -> Result<Option<(StudyTable, String)>, 
 }
 
 /// The sections.
-pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
+pub(in crate::study) fn sections_in_short() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let (methods, grasps) = (stored_table(&models::Models)?, stored_table(&grasps::Grasps)?);
     let none = "Not measured in full with this version.".to_owned();
     let (text, short) = match (&methods, &grasps) {

@@ -31,6 +31,7 @@ pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
 pub(in crate::study) use claims::sections;
 pub use claims::stored_report;
 pub use folder::StudyFolder;
+pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub use report::{
     Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow,
