@@ -125,10 +125,11 @@ impl<N: CandleNetwork> Variables<N> {
         Ok(Self { network, by_name })
     }
 
-    /// Sets the variables to the arrays of a model file.
-    pub(super) fn read(&self, arrays: &Arrays) -> std::result::Result<(), LoadError> {
+    /// Sets the variables to the arrays of a model file, whose names begin with a prefix.
+    pub(super) fn read(&self, arrays: &Arrays, prefix: &str) -> std::result::Result<(), LoadError> {
         for (name, var) in &self.by_name {
-            let values = Tensor::from_slice(arrays.f32s(name, var.dims())?, var.dims(), &Device::Cpu);
+            let values = arrays.f32s(&format!("{prefix}{name}"), var.dims())?;
+            let values = Tensor::from_slice(values, var.dims(), &Device::Cpu);
             let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
             values.and_then(|values| var.set(&values)).map_err(failed)?;
         }
@@ -216,7 +217,7 @@ impl<N: CandleNetwork> Candle<N> {
         let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
         let (classes, mut random) = (card.labels.classes.len(), ChaCha8Rng::seed_from_u64(0));
         let network = Variables::<N>::new(width, classes, &mut random).map_err(failed)?;
-        network.read(arrays)?;
+        network.read(arrays, "")?;
         Ok(Self { learned, classes, network })
     }
 }

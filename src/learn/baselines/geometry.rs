@@ -274,6 +274,17 @@ impl GeometryEncoder {
 
     /// Restores an encoder from its settings and arrays.
     pub fn load(settings: &serde_json::Value, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+        let encoder = Self::load_from(settings, arrays, "")?;
+        arrays.require_same_form(&encoder.arrays())?;
+        Ok(encoder)
+    }
+
+    /// Restores an encoder from those of these arrays whose names begin with a prefix.
+    pub(super) fn load_from(
+        settings: &serde_json::Value,
+        arrays: &Arrays,
+        prefix: &str,
+    ) -> std::result::Result<Self, LoadError> {
         let learned: Learned = serde_json::from_value(settings.clone())
             .map_err(|error| LoadError::Settings { cause: error.to_string() })?;
         learned.check()?;
@@ -281,8 +292,7 @@ impl GeometryEncoder {
         let outputs = 2 * MEASURES + learned.shapes.len();
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let network = Variables::new(learned.preparation.width() + 1, outputs, &mut random).map_err(failed)?;
-        network.read(arrays)?;
-        arrays.require_same_form(&network.arrays())?;
+        network.read(arrays, prefix)?;
         Ok(Self { learned, network })
     }
 

@@ -456,8 +456,7 @@ fn encoder_of(channels: &[String]) -> Result<ReadEncoder, LearnError> {
 
 /// Restores the geometry encoder of a model file.
 fn load_encoder(settings: &serde_json::Value, channels: &[String], arrays: &Arrays) -> Result<ReadEncoder, LoadError> {
-    let own = arrays.0.iter().filter_map(|(name, array)| Some((name.strip_prefix(ENCODER)?.to_owned(), array.clone())));
-    let encoder = Arc::new(GeometryEncoder::load(settings, &Arrays(own.collect()))?);
+    let encoder = Arc::new(GeometryEncoder::load_from(settings, arrays, ENCODER)?);
     ReadEncoder::on(encoder, channels).ok_or(LoadError::Card { part: "the geometry encoder" })
 }
 
