@@ -34,7 +34,7 @@ use crate::manual::TOPICS;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate_learn::Model;
-use palpate_sim::objects::{EMPTY, anchored, catalogue};
+use palpate_sim::objects::{EMPTY, RandomShape, anchored, catalogue};
 use palpate_sim::scene::Scene;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -144,7 +144,9 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Refuses a misspelt command or object, with the nearest of those there are.
 fn refuse_unknown_word(object: &str) {
-    let known = object == EMPTY || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
+    let is_random = RandomShape::seed_of(object).is_some();
+    let known =
+        object == EMPTY || is_random || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
     if !known && Path::new(object).extension().is_none() {
         let program = Arguments::command();
         let commands = program.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
