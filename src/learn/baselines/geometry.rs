@@ -4,14 +4,14 @@
 //! It answers from the beginning of a grasp too: half of the training grasps end early, and one input says which steps have
 //! been felt.
 
-use super::candle_network::{CandleNetwork, Pass, STEPS, Variables, add_noise, mirrored};
+use super::candle_network::{CandleNetwork, Pass, STEPS, Variables, add_noise, mirror_of_inputs, mirrored};
 use super::convolution::{DENSE, Trunk};
+use super::measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Example, Sequence, fnv_1a};
 use crate::features::Levels;
 use crate::fitting::{Fitting, LearnError};
 use crate::gaps;
-use crate::mirror::mirror;
 use crate::model::{LoadError, ModelError};
 use crate::network::Preparation;
 use crate::pmf::Pmf;
@@ -22,129 +22,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
-
-/// Quantity that the encoder estimates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Measure {
-    /// Shortest side of the box around the object (m).
-    Short,
-    /// Its middle side (m).
-    Middle,
-    /// Its longest side (m).
-    Long,
-    /// Extent between the fingers, along the way on which they close (m).
-    Width,
-    /// Extent across the fingers (m).
-    Depth,
-    /// Extent along the gripper's axis (m).
-    Height,
-    /// Distance of its middle from the middle between the fingers (m).
-    Aside,
-    /// Distance of its middle from the plane in which the fingers bend (m).
-    Across,
-    /// Distance of its middle from the palm (m).
-    Below,
-    /// Mass (kg).
-    Mass,
-}
-
-impl Measure {
-    /// All, in the order of the network's outputs.
-    pub const ALL: [Self; 10] = [
-        Self::Short,
-        Self::Middle,
-        Self::Long,
-        Self::Width,
-        Self::Depth,
-        Self::Height,
-        Self::Aside,
-        Self::Across,
-        Self::Below,
-        Self::Mass,
-    ];
-
-    /// True for quantities that are estimated on a logarithmic scale.
-    fn is_logarithmic(self) -> bool {
-        !matches!(self, Self::Aside | Self::Across | Self::Below)
-    }
-
-    fn on_scale(self, x: f64) -> f64 {
-        if self.is_logarithmic() { x.max(1e-6).ln() } else { x }
-    }
-
-    fn off_scale(self, x: f64) -> f64 {
-        if self.is_logarithmic() { x.exp() } else { x }
-    }
-}
-
-/// True geometry of a grasped object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Geometry {
-    /// Value of each of [`Measure::ALL`].
-    pub values: [f64; Measure::ALL.len()],
-    /// Approximate shape, an index into the encoder's shapes; `None` if unknown.
-    pub shape: Option<usize>,
-}
-
-/// Grasp of an object of known geometry.
-#[derive(Clone, Debug)]
-pub struct Touch {
-    /// Readings.
-    pub grasp: Arc<Sequence>,
-    /// The object.
-    pub geometry: Geometry,
-    /// Number of the object: grasps of one object are held out together.
-    pub object: usize,
-}
-
-/// Estimate of one quantity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasureEstimate {
-    /// The quantity.
-    pub measure: Measure,
-    /// Median (m or kg).
-    pub value: f64,
-    /// Ends of the range that holds the true value with 90 % probability (m or kg).
-    pub range: [f64; 2],
-}
-
-/// What one grasp tells about the geometry of the object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
-    /// Estimate of each of [`Measure::ALL`].
-    pub estimates: Vec<MeasureEstimate>,
-    /// Probability of each of the encoder's shapes.
-    pub shape: Pmf,
-}
-
-impl Measured {
-    /// The estimate of a quantity.
-    pub fn of(&self, measure: Measure) -> Option<&MeasureEstimate> {
-        self.estimates.iter().find(|estimate| estimate.measure == measure)
-    }
-}
-
-/// How far estimates of a quantity are off.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MeasureScore {
-    /// The quantity.
-    pub measure: Measure,
-    /// Median distance from the true value (m or kg).
-    pub median_error: f64,
-    /// Share of grasps whose 90 % range holds it.
-    pub inside: f64,
-}
-
-/// How far the estimates on some grasps are off.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GeometryScores {
-    /// Each of [`Measure::ALL`].
-    pub measures: Vec<MeasureScore>,
-    /// Share of grasps whose shape is recognised.
-    pub shape: f64,
-    /// Number of grasps.
-    pub grasps: usize,
-}
 
 /// Fitted geometry encoder.
 pub struct GeometryEncoder {
@@ -243,18 +120,14 @@ impl GeometryEncoder {
         }
         let preparation = preparation_of(channels, touches);
         let scales = (0..MEASURES).map(|k| scale_of(k, touches)).collect();
-        let width = preparation.width();
-        let of_inputs = |own: Vec<usize>| -> Vec<usize> {
-            (0..width).map(|input| input / channels.len() * channels.len() + own[input % channels.len()]).collect()
-        };
         let mut objects: Vec<usize> = touches.iter().map(|touch| touch.object).collect();
         objects.sort_unstable();
         objects.dedup();
         let learned = Learned {
             channels: channels.to_vec(),
             shapes: shapes.to_vec(),
+            mirror: mirror_of_inputs(channels, &preparation),
             preparation,
-            mirror: mirror(channels).map(of_inputs),
             revision: Encoder::REVISION,
             scales,
             spreads: vec![vec![NINETY; MEASURES]; STEPS / STAGE],

@@ -6,6 +6,7 @@ mod convolution;
 mod geometry;
 #[cfg(test)]
 mod guide_network;
+mod measures;
 mod neighbours;
 mod row_model;
 mod svm;
@@ -14,8 +15,7 @@ mod warping;
 
 pub(super) use candle_network::Candle;
 pub(super) use convolution::Convolution;
-pub use geometry::{
-    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch, shipped_encoder,
-};
+pub use geometry::{GeometryEncoder, shipped_encoder};
+pub use measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
 pub(super) use tabular::{Tabular, TabularKind};
 pub(super) use warping::Warping;

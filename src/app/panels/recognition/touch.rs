@@ -15,7 +15,7 @@ const NAME: f32 = 44.0;
 const VALUE: f32 = 84.0;
 /// Size of letters (points).
 const LETTERS: f32 = 11.5;
-/// What is said before the first contact.
+/// Text before the first contact.
 const UNKNOWN: &str = "no contact yet";
 /// Share of a line that its bar takes.
 const BAR: f32 = 0.4;

@@ -1,0 +1,129 @@
+//! What the geometry encoder measures: the quantities, true values and estimates of them, and how far estimates are off.
+
+use crate::data::Sequence;
+use crate::pmf::Pmf;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Quantity that the encoder estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Measure {
+    /// Shortest side of the box around the object (m).
+    Short,
+    /// Its middle side (m).
+    Middle,
+    /// Its longest side (m).
+    Long,
+    /// Extent between the fingers, along the way on which they close (m).
+    Width,
+    /// Extent across the fingers (m).
+    Depth,
+    /// Extent along the gripper's axis (m).
+    Height,
+    /// Distance of its middle from the middle between the fingers (m).
+    Aside,
+    /// Distance of its middle from the plane in which the fingers bend (m).
+    Across,
+    /// Distance of its middle from the palm (m).
+    Below,
+    /// Mass (kg).
+    Mass,
+}
+
+impl Measure {
+    /// All, in the order of the network's outputs.
+    pub const ALL: [Self; 10] = [
+        Self::Short,
+        Self::Middle,
+        Self::Long,
+        Self::Width,
+        Self::Depth,
+        Self::Height,
+        Self::Aside,
+        Self::Across,
+        Self::Below,
+        Self::Mass,
+    ];
+
+    /// True for quantities that are estimated on a logarithmic scale.
+    pub(super) fn is_logarithmic(self) -> bool {
+        !matches!(self, Self::Aside | Self::Across | Self::Below)
+    }
+
+    pub(super) fn on_scale(self, x: f64) -> f64 {
+        if self.is_logarithmic() { x.max(1e-6).ln() } else { x }
+    }
+
+    pub(super) fn off_scale(self, x: f64) -> f64 {
+        if self.is_logarithmic() { x.exp() } else { x }
+    }
+}
+
+/// True geometry of a grasped object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Geometry {
+    /// Value of each of [`Measure::ALL`].
+    pub values: [f64; Measure::ALL.len()],
+    /// Approximate shape, an index into the encoder's shapes; `None` if unknown.
+    pub shape: Option<usize>,
+}
+
+/// Grasp of an object of known geometry.
+#[derive(Clone, Debug)]
+pub struct Touch {
+    /// Readings.
+    pub grasp: Arc<Sequence>,
+    /// The object.
+    pub geometry: Geometry,
+    /// Number of the object: grasps of one object are held out together.
+    pub object: usize,
+}
+
+/// Estimate of one quantity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasureEstimate {
+    /// The quantity.
+    pub measure: Measure,
+    /// Median (m or kg).
+    pub value: f64,
+    /// Ends of the range that holds the true value with 90 % probability (m or kg).
+    pub range: [f64; 2],
+}
+
+/// What one grasp tells about the geometry of the object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// Estimate of each of [`Measure::ALL`].
+    pub estimates: Vec<MeasureEstimate>,
+    /// Probability of each of the encoder's shapes.
+    pub shape: Pmf,
+}
+
+impl Measured {
+    /// The estimate of a quantity.
+    pub fn of(&self, measure: Measure) -> Option<&MeasureEstimate> {
+        self.estimates.iter().find(|estimate| estimate.measure == measure)
+    }
+}
+
+/// How far estimates of a quantity are off.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasureScore {
+    /// The quantity.
+    pub measure: Measure,
+    /// Median distance from the true value (m or kg).
+    pub median_error: f64,
+    /// Share of grasps whose 90 % range holds it.
+    pub inside: f64,
+}
+
+/// How far the estimates on some grasps are off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GeometryScores {
+    /// Each of [`Measure::ALL`].
+    pub measures: Vec<MeasureScore>,
+    /// Share of grasps whose shape is recognised.
+    pub shape: f64,
+    /// Number of grasps.
+    pub grasps: usize,
+}
