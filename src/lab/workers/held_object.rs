@@ -1,7 +1,7 @@
 //! The held object: loaded model, and its description for display.
 
 use super::messages::ObjectCard;
-use palpate_sim::objects::{LoadOptions, ObjectModel, catalogue};
+use palpate_sim::objects::{LoadOptions, ObjectModel, object_title};
 use palpate_sim::scene::Scene;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -23,10 +23,9 @@ pub(super) fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
 
 /// Description of an object in a scene.
 pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
-    let built_in = catalogue().iter().find(|b| b.name == model.name);
     ObjectCard {
         name: model.name.clone(),
-        title: built_in.map_or_else(|| model.name.clone(), |b| b.title.clone()),
+        title: object_title(&model.name),
         class: model.class,
         mass: model.mass.mass,
         friction: scene.object.friction.value().unwrap_or(model.friction),
