@@ -42,6 +42,9 @@ pub(super) struct DataArguments {
     /// gripper, another one for each grasp).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
+    /// With --sensors drawn: number of grippers that read each grasp for training.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    draws: u32,
     /// Read the readings at this rate (Hz; default: as they were sampled).
     #[arg(long, value_name = "HZ", value_parser = within(1.0..=10_000.0))]
     rate: Option<f64>,
@@ -84,7 +87,7 @@ impl QueryArguments {
 
 impl DataArguments {
     pub(super) fn view(&self) -> SensorView {
-        SensorView { sensors: self.sensors, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
+        SensorView { sensors: self.sensors, draws: self.draws, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
     }
 
     /// Reads the grasps from the store.

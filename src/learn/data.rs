@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -109,6 +110,8 @@ pub struct Example {
     pub after: Option<i64>,
     /// Group of similar poses, to leave poses out of the training.
     pub pose: u32,
+    /// Readings of the same grasp by other sensors, which models learn too and nobody is tested on.
+    pub further: Vec<Arc<Sequence>>,
 }
 
 /// Origin of a data set.
@@ -126,6 +129,9 @@ pub struct DataCard {
     pub layout: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
+    /// Number of grippers with drawn sensors that read each simulated grasp, where it is not one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draws: Option<u32>,
     /// Definition of the signals of simulated grasps: `parts`, as on a real gripper, or `contact` or `hull`, which only
     /// simulations have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -166,7 +172,10 @@ impl DataCard {
         } else {
             format!("object {}", self.object)
         });
-        parts.extend(self.sensors.as_ref().map(|sensors| format!("{sensors} sensors")));
+        parts.extend(self.sensors.as_ref().map(|sensors| match self.draws {
+            Some(draws) => format!("{draws} times {sensors} sensors"),
+            None => format!("{sensors} sensors"),
+        }));
         parts.extend(self.layout.clone());
         parts.extend(self.signals.as_ref().filter(|own| *own != "parts").map(|own| format!("{own} pressure")));
         parts.extend(self.rate_hz.map(|rate_hz| format!("{rate_hz} Hz")));
@@ -234,6 +243,20 @@ impl Dataset {
         let mut shuffled = self.clone();
         shuffled.examples.iter_mut().zip(truth).for_each(|(example, class)| example.class = class);
         shuffled
+    }
+
+    /// The data set with an example for each further reading. It follows the first of its grasp, so that no split parts them.
+    pub(crate) fn with_further(&self) -> Cow<'_, Self> {
+        if self.examples.iter().all(|example| example.further.is_empty()) {
+            return Cow::Borrowed(self);
+        }
+        let all_of = |example: &Example| {
+            let first = Example { further: Vec::new(), ..example.clone() };
+            let read = |grasp| Example { grasp: Arc::clone(grasp), after: Some(example.id), ..first.clone() };
+            let further = example.further.iter().map(read);
+            std::iter::once(first.clone()).chain(further).collect::<Vec<_>>()
+        };
+        Cow::Owned(Self { examples: self.examples.iter().flat_map(all_of).collect(), ..self.clone() })
     }
 
     /// Median duration of the grasps (s); 1 without grasps.

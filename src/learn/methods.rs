@@ -115,9 +115,11 @@ macro_rules! candle {
 impl Method {
     /// Fits a model to data, fills in its card and adds the class signatures. Runs on one thread, whose CPU time is recorded.
     pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, LearnError> {
+        let (readings, second) = (data.with_further(), fitting.second.map(Dataset::with_further));
+        let fitting_all = Fitting { second: second.as_deref(), settings: fitting.settings.clone(), ..*fitting };
         let timed = || {
             let start = cpu_time::ThreadTime::now();
-            (self.fit)(data, fitting).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
+            (self.fit)(&readings, &fitting_all).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
         };
         // candle and smartcore would spread over all cores, which is slower for models this small. A caller with a thread of
         // its own counts the CPU time of the fit there.

@@ -18,8 +18,10 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct SensorView {
     /// Name of the sensor layout: `C1`.
     pub layout: String,
-    /// Sensor model: ideal, or like those of the real gripper.
+    /// Sensor model: ideal, like those of the real gripper, or like those of any.
     pub sensors: SensorModel,
+    /// Number of grippers, each with drawn sensors of its own, that read each grasp for training; the others read it once.
+    pub draws: u32,
     /// Definition of the signals.
     pub signals: SignalDefinition,
     /// Rate at which readings of all sources are read (Hz); as they were sampled if `None`.
@@ -31,7 +33,7 @@ pub struct SensorView {
 impl Default for SensorView {
     fn default() -> Self {
         let (sensors, signals) = (SensorModel::Virtual, SignalDefinition::Parts);
-        Self { layout: "C1".to_owned(), sensors, signals, rate_hz: None, cut: Cut::default() }
+        Self { layout: "C1".to_owned(), sensors, draws: 1, signals, rate_hz: None, cut: Cut::default() }
     }
 }
 
@@ -41,6 +43,7 @@ impl Default for SensorView {
 struct StoredView {
     layout: String,
     sensors: SensorModel,
+    draws: Option<u32>,
     signals: Option<SignalDefinition>,
     area: Option<String>,
     rate_hz: Option<f64>,
@@ -53,7 +56,8 @@ impl From<StoredView> for SensorView {
         let by_hull = stored.area.is_some_and(|area| area == "hull");
         let earlier = if by_hull { SignalDefinition::Hull } else { SignalDefinition::Parts };
         let StoredView { layout, sensors, rate_hz, cut, .. } = stored;
-        Self { layout, sensors, signals: earlier, rate_hz, cut }.with_signals(stored.signals.unwrap_or(earlier))
+        let draws = stored.draws.unwrap_or(1);
+        Self { layout, sensors, draws, signals: earlier, rate_hz, cut }.with_signals(stored.signals.unwrap_or(earlier))
     }
 }
 
@@ -304,6 +308,8 @@ impl DatasetQuery {
 pub struct TrialSignals {
     /// Signals from the start of the closing to the end of the hold.
     pub signals: Signals,
+    /// The same grasp as other drawn grippers read it.
+    pub further: Vec<Signals>,
     /// Start of the hold, on the clock of the signals (s), where known.
     pub hold_s: Option<f64>,
 }
@@ -339,13 +345,14 @@ pub(super) fn signals_of(
         TrialData::Simulated(data) => SimulatedTrial { header, data },
         TrialData::Imported(signals) => {
             let signals = resampled(signals.until(view.cut.end(f64::INFINITY)), view.rate_hz);
-            return Ok((TrialSignals { signals, hold_s: None }, TrialOrigin::default()));
+            return Ok((TrialSignals { signals, further: Vec::new(), hold_s: None }, TrialOrigin::default()));
         }
         TrialData::Recorded(_) => return of_board(),
     };
-    let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
+    let mut readings = view.readings(&trial).map_err(|cause| DatasetError::Layout { cause })?.into_iter();
+    let signals = readings.next().unwrap_or_default();
     let hold_s = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
-    Ok((TrialSignals { signals, hold_s }, TrialOrigin::simulated(&trial.header)))
+    Ok((TrialSignals { signals, further: readings.collect(), hold_s }, TrialOrigin::simulated(&trial.header)))
 }
 
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
@@ -375,7 +382,8 @@ fn board_signals(
         why: read.derived.warnings.join("; "),
     })?;
     let hold_s = read.hold_s.map(|hold_s| hold_s - read.closing_s.unwrap_or(0.0));
-    Ok((TrialSignals { signals: resampled(signals, view.rate_hz), hold_s }, read.serving.ids))
+    let signals = resampled(signals, view.rate_hz);
+    Ok((TrialSignals { signals, further: Vec::new(), hold_s }, read.serving.ids))
 }
 
 impl SensorView {
@@ -388,6 +396,7 @@ impl SensorView {
         Self {
             layout: data.layout.clone().unwrap_or_else(|| if forces { "C1+F" } else { "C1" }.to_owned()),
             sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
+            draws: 1,
             signals: data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default(),
             rate_hz: data.rate_hz,
             cut: data.cut.as_deref().and_then(|cut| cut.parse().ok()).unwrap_or_default(),
@@ -430,15 +439,29 @@ impl SensorView {
 
     /// Computes the signals of a simulated trial from its start to the end that the view has.
     pub fn signals(&self, trial: &SimulatedTrial) -> Result<Signals, LayoutError> {
+        let once = Self { draws: 1, ..self.clone() };
+        Ok(once.readings(trial)?.swap_remove(0))
+    }
+
+    /// The same as each of the drawn grippers reads it; one at least.
+    pub fn readings(&self, trial: &SimulatedTrial) -> Result<Vec<Signals>, LayoutError> {
         self.check_parts()?;
         let layout = SensorLayout::named(&self.layout)?;
         let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.signals)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        let signals = self.sensors.apply(&clean, noise_seed(&trial.header)).until(self.cut.end(end));
-        Ok(resampled(signals, self.rate_hz))
+        let seed = noise_seed(&trial.header);
+        let draws = if self.sensors == SensorModel::Drawn { self.draws.max(1) } else { 1 };
+        let read = |draw: u32| {
+            let seed = seed.wrapping_add(u64::from(draw).wrapping_mul(NEXT_DRAW));
+            resampled(self.sensors.apply(&clean, seed).until(self.cut.end(end)), self.rate_hz)
+        };
+        Ok((0..draws).map(read).collect())
     }
 }
+
+/// Difference between the seeds of two draws: odd and large, so that no two grasps share one.
+const NEXT_DRAW: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Seed of the sensors' noise in a trial. Poses of different objects may share a seed; their noise must not. FNV-1a of the
 /// name: changing it would change every data set with noisy sensors.

@@ -114,7 +114,7 @@ impl DatasetQuery {
         let (mut uncalibrated, mut missing) = (0, String::new());
         for (k, row) in rows.iter().enumerate() {
             progress(k, rows.len());
-            let (TrialSignals { signals, .. }, origin) =
+            let (TrialSignals { signals, further, .. }, origin) =
                 match signals_of(store, row.id, row.source, view, &self.calibrations) {
                     // Skip boards without a calibration, unless it is the only trial.
                     Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
@@ -147,7 +147,8 @@ impl DatasetQuery {
                 Entry::Vacant(free) => {
                     free.insert(row.id);
                     named.entry(class_of(row).to_owned()).or_insert_with(|| known_properties(row));
-                    read.push((*row, grasp, before.of_trial(row, &origin)));
+                    let further: Vec<_> = further.iter().map(|signals| Arc::new(sequence_of(signals))).collect();
+                    read.push((*row, (grasp, further), before.of_trial(row, &origin)));
                     origins.push(origin);
                 }
             }
@@ -165,7 +166,8 @@ impl DatasetQuery {
         let used: Vec<&TrialRow> = read.iter().map(|(row, ..)| *row).collect();
         let about = card(self, &self.described(store), &used, &origins, view, left_out);
         let poses: Vec<u32> = origins.iter().map(|origin| origin.pose).collect();
-        let example = |((row, grasp, after), pose): ((&TrialRow, Sequence, Option<TrialId>), u32)| {
+        type Read<'r> = (&'r TrialRow, (Sequence, Vec<Arc<Sequence>>), Option<TrialId>);
+        let example = |((row, (grasp, further), after), pose): (Read<'_>, u32)| {
             let content = content_of(row, &grasp);
             Some(Example {
                 id: row.id,
@@ -174,6 +176,7 @@ impl DatasetQuery {
                 content,
                 after,
                 pose,
+                further,
             })
         };
         let examples = read.into_iter().zip(poses).filter_map(example).collect();

@@ -86,8 +86,11 @@ impl KnownGrasps {
                 drawn.object.fixed = fixed;
                 let trial = grasp_soundly(&drawn, Some(&object), seed, Recompute::Unsettled);
                 if let Some(geometry) = geometry_of(&trial, &object).filter(|_| trial.data.quality.is_sound()) {
-                    let grasp = Arc::new(sequence_of(&self.view.signals(&trial)?));
-                    touches.push(Touch { grasp, geometry, object: number });
+                    let readings = self.view.readings(&trial)?;
+                    touches.extend(readings.iter().map(|signals| {
+                        let grasp = Arc::new(sequence_of(signals));
+                        Touch { grasp, geometry: geometry.clone(), object: number }
+                    }));
                 }
             }
         }

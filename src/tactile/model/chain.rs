@@ -24,8 +24,7 @@ impl PhysicalLike {
                 let at = |trace: Trace<'_>| {
                     if self.stepping { stepped(trace, instants[0].t, instant.taken) } else { trace.at(instant.taken) }
                 };
-                let of_bending = bend.map_or(0.0, |trace| part.sensor.of_bending(at(trace)));
-                let reading = part.sensor.read(at(trace) * part.scale + of_bending);
+                let reading = part.sensor.read(at(trace) * part.scale, bend.map_or(0.0, at));
                 for (column, unit) in &part.into {
                     row[*column] = finite(reading / unit);
                 }
@@ -107,18 +106,11 @@ enum Sensor {
 }
 
 impl Sensor {
-    /// What it shows because its finger is bent to a curvature (1/m).
-    fn of_bending(&self, kappa: f64) -> f64 {
-        match self {
-            Self::Pad(pad) => pad.of_bending(kappa),
-            Self::Strip(_) | Self::None => 0.0,
-        }
-    }
-
-    fn read(&mut self, stimulus: f64) -> f64 {
+    /// Reading of a stimulus on a finger of this curvature (1/m).
+    fn read(&mut self, stimulus: f64, kappa: f64) -> f64 {
         match self {
             Self::Strip(strip) => strip.read(stimulus),
-            Self::Pad(pad) => pad.read(stimulus),
+            Self::Pad(pad) => pad.read(stimulus, kappa),
             Self::None => stimulus,
         }
     }

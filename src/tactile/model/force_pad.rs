@@ -28,6 +28,9 @@ const ANY_THRESHOLD: [f64; 2] = [0.6, 1.6];
 const ANY_FULL: [f64; 2] = [0.2, 1.0];
 const ANY_BENDING: [f64; 2] = [0.005, 0.02];
 
+/// Curvature at the end of an empty close (1/m): that of the simulated finger at 1 bar.
+const CLOSED_EMPTY: f64 = 14.3;
+
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;
 
@@ -45,8 +48,10 @@ pub(super) struct ReadPad {
     /// Counts conductances in the one at saturation.
     divider: Divider,
     input: Input,
-    /// Force that it shows over the curvature of its finger (N m).
+    /// Load that it shows over the curvature of its finger (N m).
     bending: f64,
+    /// An empty close has shown what bending does to it.
+    closed_empty: bool,
 }
 
 impl ReadPad {
@@ -77,18 +82,39 @@ impl ReadPad {
         pad.ceiling = settings.saturation.then_some(1.0);
         let gain = if settings.saturation { 1.0 / FULL_SHARE } else { 1.0 };
         let divider = Divider { gain, ..Divider::of_pad(FULL_RATIO) };
-        Self { pad, divider, input: Input::new(settings, streams), bending }
+        let (input, closed_empty) = (Input::new(settings, streams), settings.closed_empty);
+        Self { pad, divider, input, bending, closed_empty }
     }
 
-    /// Force that it shows because its finger is bent to a curvature (1/m), in N.
-    pub(super) fn of_bending(&self, kappa: f64) -> f64 {
-        self.bending * kappa.max(0.0)
+    /// The force (N) that is reported of a true one at the next sample, on a finger of this curvature (1/m). A pull counts
+    /// as no force.
+    pub(super) fn read(&mut self, force: f64, kappa: f64) -> f64 {
+        let conductance = self.pad.conductance(force.max(0.0) + self.bending * kappa.max(0.0));
+        let conductance = self.convert(conductance);
+        let read = self.force(conductance);
+        if self.closed_empty { (read - self.of_bending(kappa)).max(0.0) } else { read }
     }
 
-    /// The force (N) that is reported of a true one at the next sample. A pull counts as no force.
-    pub(super) fn read(&mut self, force: f64) -> f64 {
-        let conductance = self.pad.conductance(force);
-        self.pad.part.full * self.convert(conductance).powf(1.0 / PadPart::NOMINAL_EXPONENT)
+    /// Force by the nominal law, of a conductance as a share of the one at saturation.
+    fn force(&self, conductance: f64) -> f64 {
+        self.pad.part.full * conductance.powf(1.0 / PadPart::NOMINAL_EXPONENT)
+    }
+
+    /// What bending alone shows at a curvature, as a user knows it from an empty close (N). Where nothing shows yet it
+    /// rises straight to where it first does, as in [`crate::calibration::BendingZero`].
+    fn of_bending(&self, kappa: f64) -> f64 {
+        let shown = |kappa: f64| {
+            let mut still = ForcePad::new(self.pad.part, SAMPLE_HZ);
+            still.ceiling = self.pad.ceiling;
+            self.force(still.conductance(self.bending * kappa))
+        };
+        let kappa = kappa.clamp(0.0, CLOSED_EMPTY);
+        let first = self.pad.part.threshold.map_or(0.0, |least| least / self.bending);
+        match () {
+            () if self.bending <= 0.0 || first > CLOSED_EMPTY => 0.0,
+            () if kappa < first => shown(first) * kappa / first,
+            () => shown(kappa),
+        }
     }
 
     /// A conductance through divider, amplifier and converter and back, both as shares of the one at saturation.
@@ -116,7 +142,7 @@ mod tests {
         let still = PhysicalLike { noise: false, hysteresis: false, drift: false, ..PhysicalLike::default() };
         for side in 0..2 {
             let mut pad = pad(&still, side);
-            let reads: Vec<f64> = (0..300).map(|i| pad.read(0.01 * f64::from(i) * FULL)).collect();
+            let reads: Vec<f64> = (0..300).map(|i| pad.read(0.01 * f64::from(i) * FULL, 0.0)).collect();
             assert!(reads.windows(2).all(|w| w[0] <= w[1]));
             let least = (100.0 * LEAST_FORCE[side] / FULL).ceil() as usize;
             assert!(reads[..least].iter().all(|&r| r == 0.0) && reads[least + 1] > 0.02 * FULL);
@@ -131,46 +157,57 @@ mod tests {
     fn an_ideal_pad_is_exact() {
         let mut ideal = pad(&PhysicalLike::OFF, 1);
         for load in [0.0, 1e-3, 0.2, 1.0, 30.0] {
-            assert!((ideal.read(load * FULL) - load * FULL).abs() <= 1e-12 * FULL * load);
+            assert!((ideal.read(load * FULL, 0.0) - load * FULL).abs() <= 1e-12 * FULL * load);
         }
-        assert_eq!(ideal.read(-1.0), 0.0);
+        assert_eq!(ideal.read(-1.0, 0.0), 0.0);
     }
 
     #[test]
-    fn pads_of_any_gripper_fire_when_bent_and_differ() {
-        let pads: Vec<ReadPad> = (0..40)
-            .map(|gripper| {
-                let streams = Streams { gripper, trial: 1, channel: "force_left" };
-                ReadPad::new(&PhysicalLike::any(gripper), 0, streams)
-            })
-            .collect();
-        assert!(pads.iter().all(|pad| (0.05..=0.2).contains(&pad.of_bending(10.0)) && pad.of_bending(-10.0) == 0.0));
-        let thresholds: Vec<f64> = pads.iter().filter_map(|pad| pad.pad.part.threshold).collect();
+    fn pads_of_any_gripper_differ_and_fire_when_bent_until_an_empty_close_is_known() {
+        let pads = |closed_empty: bool| -> Vec<ReadPad> {
+            let of = |gripper| {
+                let settings = PhysicalLike { noise: false, counts: false, closed_empty, ..PhysicalLike::any(gripper) };
+                ReadPad::new(&settings, 0, Streams { gripper, trial: 1, channel: "force_left" })
+            };
+            (0..40).map(of).collect()
+        };
+        let thresholds: Vec<f64> = pads(true).iter().filter_map(|pad| pad.pad.part.threshold).collect();
         assert!(thresholds.iter().any(|t| *t < 0.12) && thresholds.iter().any(|t| *t > 0.2));
-        assert!(pads.iter().all(|pad| (0.2..=1.0).contains(&pad.pad.part.full)));
-        assert_eq!(pad(&PhysicalLike::default(), 0).of_bending(10.0), 0.0);
+        assert!(pads(true).iter().all(|pad| (0.2..=1.0).contains(&pad.pad.part.full)));
+        let fired = |closed_empty| {
+            let reads = pads(closed_empty).into_iter().map(|mut pad| pad.read(0.0, 14.0));
+            reads.filter(|read| *read > 0.01).count()
+        };
+        assert!(fired(false) > 10 && fired(true) == 0, "{} {}", fired(false), fired(true));
+        assert_eq!(pad(&PhysicalLike::default(), 0).read(0.0, 14.0), 0.0);
+        // Bending loads the pad below its threshold too, so that a light touch shows earlier, and less of it is known.
+        let errors = |closed_empty| {
+            let off = |mut pad: ReadPad| (pad.read(0.15, 14.0) - 0.15 * pad.pad.part.reaching).abs();
+            pads(closed_empty).into_iter().map(off).sum::<f64>() / 40.0
+        };
+        assert!(errors(true) < 0.7 * errors(false), "{} {}", errors(true), errors(false));
     }
 
     #[test]
     fn unloading_reads_up_to_5_per_cent_more() {
         let mut pad = pad(&PhysicalLike { hysteresis: true, ..PhysicalLike::OFF }, 0);
         for load in [0.1, 0.2, 0.4] {
-            assert!((pad.read(load) - load).abs() < 1e-12);
+            assert!((pad.read(load, 0.0) - load).abs() < 1e-12);
         }
-        assert!((pad.read(0.39) - 0.40).abs() < 1e-12, "not yet");
-        assert!((pad.read(0.2) - 0.21).abs() < 1e-12);
-        assert_eq!(pad.read(0.0), 0.0);
+        assert!((pad.read(0.39, 0.0) - 0.40).abs() < 1e-12, "not yet");
+        assert!((pad.read(0.2, 0.0) - 0.21).abs() < 1e-12);
+        assert_eq!(pad.read(0.0, 0.0), 0.0);
     }
 
     #[test]
     fn a_held_load_creeps_up_by_1_per_cent_a_decade_until_released() {
         let mut pad = pad(&PhysicalLike { drift: true, ..PhysicalLike::OFF }, 0);
-        let held: Vec<f64> = (0..=45).map(|_| pad.read(0.5)).collect();
+        let held: Vec<f64> = (0..=45).map(|_| pad.read(0.5, 0.0)).collect();
         assert!((held[0] - 0.5).abs() < 1e-12);
         // 45 samples are 0.9 s: 1 + 0.9 / 0.1 is one decade.
         let grown = 1.01_f64.powf(1.0 / PadPart::NOMINAL_EXPONENT);
         assert!((held[45] / 0.5 - grown).abs() < 1e-9);
-        pad.read(0.0);
-        assert!((pad.read(0.5) - 0.5).abs() < 1e-12);
+        pad.read(0.0, 0.0);
+        assert!((pad.read(0.5, 0.0) - 0.5).abs() < 1e-12);
     }
 }

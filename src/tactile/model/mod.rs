@@ -51,8 +51,8 @@ pub enum SensorModel {
     Virtual,
     /// Such as the real gripper has: [`PhysicalLike`] with everything on.
     PhysicalLike,
-    /// Such as any real gripper may have: parts and their mounting are drawn anew for each grasp, and the strips' gains are
-    /// known from an empty close. For training recognisers for grippers without labelled grasps.
+    /// Such as any real gripper may have: parts and their mounting are drawn anew for each grasp, and one empty close is
+    /// known. For training recognisers for grippers without labelled grasps.
     Drawn,
 }
 

@@ -38,7 +38,7 @@ pub struct PhysicalLike {
     /// the load at which pads saturate and how much pads fire when bent are drawn for the gripper, instead of
     /// `asymmetry`, `full_force` and the thresholds of the real one.
     pub drawn: bool,
-    /// The gains of the strips are known from one empty close of the hand.
+    /// The gains of the strips, and what bending does to the pads, are known from one empty close of the hand.
     pub closed_empty: bool,
     /// Force at which the nominal pad saturates (N). Assumed: 0.3 N. Real recordings have nearly three levels only,
     /// idle, touched and saturated; simulated grips press with 0.2 to 0.7 N, and must saturate soon after a touch as
