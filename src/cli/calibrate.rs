@@ -148,7 +148,7 @@ fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, fi
     let mut input = Input::on(&board, sensor);
     input.divider.fixed_ohm = arguments.resistor.unwrap_or(input.divider.fixed_ohm);
     let points = read_points_csv(file, kind)?;
-    Ok(Record { part: part.to_owned(), kind, input, points, bending: None, note: String::new() })
+    Ok(Record { part: part.to_owned(), kind, input, points, bending: None, assumed: false, note: String::new() })
 }
 
 /// Stores a calibration, and mounts its part where it was calibrated.

@@ -163,6 +163,11 @@ pub struct DataCard {
 }
 
 impl DataCard {
+    /// True for simulated grasps read through perfect sensors.
+    pub fn from_perfect_sensors(&self) -> bool {
+        self.sensors.as_deref() == Some("virtual")
+    }
+
     /// One-line summary: `preset B, object free, virtual sensors, C1`.
     pub fn described(&self) -> String {
         let mut parts = Vec::new();

@@ -87,7 +87,7 @@ mod tensor_file;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use baselines::{
-    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch, shipped_encoder,
+    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, ShippedEncoder, Touch,
 };
 pub use belief::{Belief, Rejection, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};

@@ -138,7 +138,7 @@ impl ModelCard {
 
     /// True where it learned from simulated grasps through perfect sensors: on a real gripper most of its answers are wrong.
     pub fn learned_from_perfect_sensors(&self) -> bool {
-        self.data.sensors.as_deref() == Some("virtual")
+        self.data.from_perfect_sensors()
     }
 
     /// True where it reads channels that only simulations have.

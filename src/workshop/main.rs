@@ -5,7 +5,7 @@
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
-//! | `cargo run --release -p palpate-workshop -- encoder` | the geometry encoder below `models` |
+//! | `cargo run --release -p palpate-workshop -- encoder [--any-gripper]` | a geometry encoder below `models` |
 //! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
 //! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
@@ -26,6 +26,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::generated_sections;
+use palpate_learn::ShippedEncoder;
 use palpate_render::figure_svg;
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
@@ -100,8 +101,11 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
-    /// Grasp random shapes, and train the shipped geometry encoder on them.
+    /// Grasp random shapes, and train a shipped geometry encoder on them.
     Encoder {
+        /// The one for real sensors on any gripper, instead of the one for perfect sensors.
+        #[arg(long)]
+        any_gripper: bool,
         /// Output folder.
         #[arg(long, default_value = "models")]
         out: PathBuf,
@@ -140,7 +144,10 @@ fn main() -> Result<(), Failure> {
         }
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
-        Command::Encoder { out, shapes, poses } => encoder::make(&out, shapes, poses)?,
+        Command::Encoder { any_gripper, out, shapes, poses } => {
+            let which = if any_gripper { ShippedEncoder::AnyGripper } else { ShippedEncoder::PerfectSensors };
+            encoder::make(which, &out, shapes, poses)?;
+        }
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
     }

@@ -1,7 +1,7 @@
 //! The geometry of whatever is grasped, felt row by row.
 
 use super::row::Row;
-use palpate_learn::{GeometryEncoder, Measured, Sequence, shipped_encoder};
+use palpate_learn::{GeometryEncoder, Measured, Sequence, ShippedEncoder};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ impl FeltGeometry {
         let places = |encoder: &GeometryEncoder| -> Option<Vec<usize>> {
             encoder.channels().iter().map(|channel| columns.get(channel).copied()).collect()
         };
-        let found = shipped_encoder().ok().and_then(|encoder| Some((places(&encoder)?, encoder)));
+        let found = ShippedEncoder::PerfectSensors.load().ok().and_then(|encoder| Some((places(&encoder)?, encoder)));
         let (columns, encoder) = found.unzip();
         *self = Self { encoder, columns: columns.unwrap_or_default(), ..Self::default() };
     }

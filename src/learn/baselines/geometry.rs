@@ -8,7 +8,7 @@ use super::candle_network::{CandleNetwork, Pass, STEPS, Variables, add_noise, mi
 use super::convolution::{DENSE, Trunk};
 use super::measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
 use crate::arrays::Arrays;
-use crate::data::{Dataset, Example, Sequence, fnv_1a};
+use crate::data::{DataCard, Dataset, Example, Sequence, fnv_1a};
 use crate::features::Levels;
 use crate::fitting::{Fitting, LearnError};
 use crate::gaps;
@@ -44,19 +44,51 @@ struct Learned {
     trained_on: [usize; 2],
 }
 
-/// Name of the shipped encoder.
-const SHIPPED_NAME: &str = "models/geometry.safetensors";
-static SHIPPED: &[u8] = include_bytes!("../../../models/geometry.safetensors");
-
-/// The encoder that ships with the program.
-pub fn shipped_encoder() -> std::result::Result<Arc<GeometryEncoder>, ModelError> {
-    static ENCODER: OnceLock<std::result::Result<Arc<GeometryEncoder>, ModelError>> = OnceLock::new();
-    ENCODER.get_or_init(|| GeometryEncoder::from_bytes(SHIPPED_NAME, SHIPPED).map(Arc::new)).clone()
+/// A geometry encoder that ships with the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShippedEncoder {
+    /// For perfect sensors on the gripper of the default scene.
+    PerfectSensors,
+    /// For real sensors on any gripper, after an empty close.
+    AnyGripper,
 }
 
-/// Hash of the shipped encoder, part of the fingerprint of methods that read its features.
-pub(super) fn shipped_content() -> u64 {
-    fnv_1a(SHIPPED.iter().copied())
+impl ShippedEncoder {
+    /// All.
+    pub const ALL: [Self; 2] = [Self::PerfectSensors, Self::AnyGripper];
+
+    /// Name of its file.
+    pub fn file_name(self) -> &'static str {
+        match self {
+            Self::PerfectSensors => "geometry.safetensors",
+            Self::AnyGripper => "geometry-any-gripper.safetensors",
+        }
+    }
+
+    /// The encoder for grasps such as these.
+    pub fn of(data: &DataCard) -> Self {
+        if data.from_perfect_sensors() { Self::PerfectSensors } else { Self::AnyGripper }
+    }
+
+    fn bytes(self) -> &'static [u8] {
+        match self {
+            Self::PerfectSensors => include_bytes!("../../../models/geometry.safetensors"),
+            Self::AnyGripper => include_bytes!("../../../models/geometry-any-gripper.safetensors"),
+        }
+    }
+
+    /// Decodes it, once.
+    pub fn load(self) -> std::result::Result<Arc<GeometryEncoder>, ModelError> {
+        type Decoded = OnceLock<std::result::Result<Arc<GeometryEncoder>, ModelError>>;
+        static ENCODERS: [Decoded; ShippedEncoder::ALL.len()] = [const { OnceLock::new() }; ShippedEncoder::ALL.len()];
+        let decode = || GeometryEncoder::from_bytes(self.file_name(), self.bytes()).map(Arc::new);
+        ENCODERS[self as usize].get_or_init(decode).clone()
+    }
+
+    /// Hash of all, part of the fingerprint of methods that read their features.
+    pub(super) fn contents() -> u64 {
+        fnv_1a(Self::ALL.iter().flat_map(|own| own.bytes().iter().copied()))
+    }
 }
 
 /// Number of quantities.
@@ -181,7 +213,7 @@ impl GeometryEncoder {
 
     /// Encodes the encoder as a safetensors file.
     pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, ModelError> {
-        let malformed = |cause: String| ModelError::Malformed { name: SHIPPED_NAME.to_owned(), cause };
+        let malformed = |cause: String| ModelError::Malformed { name: "a geometry encoder".to_owned(), cause };
         tensor_file::encode(self.settings().to_string(), &self.arrays()).map_err(malformed)
     }
 

@@ -15,7 +15,7 @@ mod warping;
 
 pub(super) use candle_network::Candle;
 pub(super) use convolution::Convolution;
-pub use geometry::{GeometryEncoder, shipped_encoder};
+pub use geometry::{GeometryEncoder, ShippedEncoder};
 pub use measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
 pub(super) use tabular::{Tabular, TabularKind};
 pub(super) use warping::Warping;

@@ -3,7 +3,7 @@
 //! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests
 //! and boosted trees order the classes well, but are far too unsure or too sure of them.
 
-use super::geometry::{self, GeometryEncoder, shipped_encoder};
+use super::geometry::{GeometryEncoder, ShippedEncoder};
 use super::neighbours::Neighbours;
 use super::row_model::{RowModel, Rows};
 use super::svm::Svm;
@@ -237,7 +237,7 @@ impl TabularKind {
             "classifier": classifier,
         });
         if self.reads_geometry() {
-            decided_by["encoder"] = geometry::shipped_content().into();
+            decided_by["encoder"] = ShippedEncoder::contents().into();
         }
         decided_by
     }
@@ -376,7 +376,7 @@ impl Tabular {
         check_enough(data, 2)?;
         fitting.refuse_settings()?;
         let features = Features::fit(kind.features(), data);
-        let encoder = kind.reads_geometry().then(|| encoder_of(&data.channels)).transpose()?;
+        let encoder = kind.reads_geometry().then(|| encoder_of(data)).transpose()?;
         let rows = RowMaker { features, encoder };
         let (own, mirrored): (Vec<_>, Vec<_>) = data.examples.iter().map(|e| rows.views(&e.grasp)).unzip();
         let mirrored = mirrored.into_iter().collect();
@@ -447,11 +447,12 @@ impl Tabular {
     }
 }
 
-/// The shipped geometry encoder, for readings of these channels.
-fn encoder_of(channels: &[String]) -> Result<ReadEncoder, LearnError> {
-    let encoder = shipped_encoder().map_err(LearnError::failed)?;
+/// The shipped geometry encoder for such grasps.
+fn encoder_of(data: &Dataset) -> Result<ReadEncoder, LearnError> {
+    let encoder = ShippedEncoder::of(&data.about).load().map_err(LearnError::failed)?;
     let needs = encoder.channels().join(", ");
-    ReadEncoder::on(encoder, channels).ok_or_else(|| LearnError::Encoder { needs, found: channels.join(", ") })
+    let found = || data.channels.join(", ");
+    ReadEncoder::on(encoder, &data.channels).ok_or_else(|| LearnError::Encoder { needs, found: found() })
 }
 
 /// Restores the geometry encoder of a model file.

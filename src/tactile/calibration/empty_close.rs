@@ -103,7 +103,7 @@ mod tests {
         };
         let points = points.iter().map(point).collect();
         let part = sensor.channel().to_owned();
-        let record = Record { part, kind, input, points, bending: None, note: String::new() };
+        let record = Record { part, kind, input, points, bending: None, assumed: false, note: String::new() };
         Calibration::fit(record).expect("is such a part")
     }
 

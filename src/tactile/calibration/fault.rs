@@ -57,6 +57,25 @@ pub enum CalibrationFault {
         /// Curvature that they span (1/m).
         span: f64,
     },
+    /// Strip that hardly bends in an empty close.
+    #[error(
+        "the {strip} went from {rest:.0} to {bent:.0} counts only: the hand did not close, or the strip is loose, broken or on \
+         another channel; `palpate doctor` looks at the signals"
+    )]
+    NotBent {
+        /// The strip.
+        strip: &'static str,
+        /// Reading at rest (counts).
+        rest: f64,
+        /// Reading of the closed hand (counts).
+        bent: f64,
+    },
+    /// Sensor without a channel, or with too few readings.
+    #[error("the {sensor} has no channel on the board, or too few readings there")]
+    NoReadings {
+        /// The sensor.
+        sensor: &'static str,
+    },
     /// Part without a name.
     #[error(
         "the part needs a name, such as the number written on it: calibrations belong to parts, and parts get swapped"

@@ -35,6 +35,9 @@ const APART: f64 = 5.0 / 90.0 * FRAC_PI_2;
 /// setting them makes two at 90.
 const LEAST_SPAN: f64 = 0.5 * FRAC_PI_2;
 
+/// The same where the angles are those of the modelled finger, whose readings are not extrapolated (rad): 15 degrees.
+const LEAST_ASSUMED_SPAN: f64 = LEAST_SPAN / 3.0;
+
 /// A point this far off is mentioned (rad): 3 degrees, three times what a calibration should reach.
 const WORTH_A_WORD: f64 = 3.0 / 90.0 * FRAC_PI_2;
 
@@ -56,7 +59,7 @@ pub struct FlexCurve {
 
 impl FlexCurve {
     /// Fits a strip; two points at least, a right angle apart if possible. Also returns remarks.
-    pub(super) fn fit(points: &[Point], input: &Input) -> Result<(Self, Vec<String>), CalibrationFault> {
+    pub(super) fn fit(points: &[Point], input: &Input, assumed: bool) -> Result<(Self, Vec<String>), CalibrationFault> {
         check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
@@ -67,7 +70,7 @@ impl FlexCurve {
             )));
         }
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
-        if most - least < LEAST_SPAN {
+        if most - least < if assumed { LEAST_ASSUMED_SPAN } else { LEAST_SPAN } {
             let [from, to] = [least, most].map(|angle| SensorKind::Flex.with_unit(angle));
             return Err(CalibrationFault::TooFew(format!(
                 "the flex strip has points from {from} to {to} only: angles at least 45 degrees apart are needed, best 0 \
@@ -202,17 +205,17 @@ mod tests {
     }
 
     fn fault(points: &[Point]) -> String {
-        FlexCurve::fit(points, &input()).expect_err("refused").to_string()
+        FlexCurve::fit(points, &input(), false).expect_err("refused").to_string()
     }
 
     #[test]
     fn a_straight_strip_is_found_exactly() -> Result<(), CalibrationFault> {
         for degrees in [&[0.0, 90.0][..], &[0.0, 30.0, 60.0, 90.0], &[10.0, 75.0]] {
-            let (curve, _) = FlexCurve::fit(&points(22e3, 2.2, degrees, &input()), &input())?;
+            let (curve, _) = FlexCurve::fit(&points(22e3, 2.2, degrees, &input()), &input(), false)?;
             assert!((curve.flat_ohm - 22e3).abs() < 1e-6 && (curve.bent_over_flat() - 2.2).abs() < 1e-9);
             assert!((curve.angle(curve.ohm(0.7)) - 0.7).abs() < 1e-12);
         }
-        let two = FlexCurve::fit(&points(22e3, 2.2, &[0.0, 90.0], &input()), &input())?;
+        let two = FlexCurve::fit(&points(22e3, 2.2, &[0.0, 90.0], &input()), &input(), false)?;
         assert!(two.0.angle_interval(1.0).is_none() && two.1[0].contains("two points"));
         Ok(())
     }
@@ -236,7 +239,7 @@ mod tests {
                 let ohm = 25e3 * (1.0 + 1.3 * (point.stimulus.to_degrees() + wrong()) / 90.0);
                 point.counts = input().counts(ohm);
             }
-            let (curve, _) = FlexCurve::fit(&points, &input())?;
+            let (curve, _) = FlexCurve::fit(&points, &input(), false)?;
             let read = curve.angle(25e3 * (1.0 + 1.3 * 0.5));
             let half = curve.angle_interval(read).expect("five points");
             held += u32::from((read.to_degrees() - 45.0).abs() <= half.to_degrees());
@@ -290,7 +293,7 @@ mod tests {
             points
         };
         assert!(fault(&slipped(25.0)).contains("take it again"));
-        let (_, words) = FlexCurve::fit(&slipped(8.0), &input()).expect("still a calibration");
+        let (_, words) = FlexCurve::fit(&slipped(8.0), &input(), false).expect("still a calibration");
         assert!(words.len() == 1 && words[0].contains("60.0 degrees"), "{words:?}");
     }
 }

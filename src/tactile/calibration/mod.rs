@@ -13,6 +13,7 @@
 //! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of
 //! these kinds from data sheets is used to refuse calibrations that cannot be; see [`CalibrationFault`].
 
+mod adapt;
 mod empty_close;
 mod fault;
 mod flex_curve;
@@ -29,6 +30,7 @@ mod record;
 mod straight_line;
 mod zero;
 
+pub use adapt::{EmptyHand, KnownWeight};
 pub use empty_close::EmptyClose;
 pub use fault::CalibrationFault;
 pub use flex_curve::FlexCurve;

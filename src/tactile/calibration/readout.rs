@@ -355,7 +355,7 @@ impl Wired {
 
 /// Number of readings before the closing: until the line pressure rises, or the first 0.3 s
 /// where it is not known.
-fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
+pub(super) fn rest_window(readings: &[Reading], closing_s: Option<f64>) -> usize {
     if let Some(closing_s) = closing_s {
         return readings.partition_point(|reading| reading.t_s < closing_s);
     }

@@ -25,6 +25,9 @@ pub struct Record {
     /// Bending zero of a pad, where an empty close was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bending: Option<BendingZero>,
+    /// True where the angles or forces were not set but assumed; see [`super::EmptyHand`].
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub assumed: bool,
     /// Whatever should be known besides.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
@@ -60,7 +63,7 @@ impl Calibration {
         }
         let (curve, warnings) = match record.kind {
             SensorKind::Flex => {
-                let (curve, warnings) = FlexCurve::fit(&record.points, &record.input)?;
+                let (curve, warnings) = FlexCurve::fit(&record.points, &record.input, record.assumed)?;
                 (Curve::Flex(curve), warnings)
             }
             SensorKind::Pad => {

@@ -1,0 +1,193 @@
+//! Calibration of a gripper of which no angle or weight is known, from one close of its empty hand.
+//!
+//! What is assumed stands for what is not known: the fingers bend like the modelled one, and the pads are nominal parts. A
+//! strip is flat at rest, and at the end of the closing it bends as the modelled finger does; so its reading is that of the
+//! modelled finger, whatever share of the bend reaches it. Of a pad, what it shows in the empty hand is what bending does
+//! to it.
+
+use super::CalibrationFault;
+use super::input::Input;
+use super::pad_curve::BendingZero;
+use super::point::{Point, SensorKind};
+use super::readout::{Readout, rest_window};
+use super::record::{Calibration, Record};
+use crate::board::{Board, Reading, Sensor};
+use crate::electronics::{PadPart, StripPart};
+use palpate_geometry::units::STANDARD_GRAVITY;
+use palpate_sim::gripper::Side;
+
+/// Loads of a nominal pad's points (kg).
+const LOADS_KG: [f64; 6] = [0.03, 0.06, 0.1, 0.2, 0.35, 0.5];
+/// Fewest readings of a sensor at rest, and of one that is bent.
+const LEAST_READINGS: usize = 3;
+/// Share of the way to the farthest reading that counts as bent.
+const BENT: f64 = 0.95;
+/// Least change of a strip's reading, as a share of that at rest.
+const LEAST_CHANGE: f64 = 0.05;
+
+/// One close of an empty hand.
+#[derive(Clone, Copy, Debug)]
+pub struct EmptyHand<'a> {
+    /// The board.
+    pub board: &'a Board,
+    /// Its readings, from rest on.
+    pub readings: &'a [Reading],
+    /// Start of the closing on the clock of the readings (s), where known.
+    pub closing_s: Option<f64>,
+    /// Curvature at the end of the closing, as the modelled finger has it (1/m).
+    pub modelled: f64,
+}
+
+/// A weight on a pad, and what it reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownWeight {
+    /// Its force (N).
+    pub force: f64,
+    /// Mean of the readings (counts).
+    pub counts: f64,
+}
+
+impl EmptyHand<'_> {
+    /// Calibration of a strip, of the part with this name.
+    pub fn strip(&self, side: Side, part: &str) -> Result<Calibration, CalibrationFault> {
+        let sensor = SensorKind::Flex.on(side);
+        let rest = self.rest(sensor)?;
+        let mut moved: Vec<f64> = self.counts(sensor, self.readings).map(|counts| counts - rest).collect();
+        moved.sort_by(f64::total_cmp);
+        // One reading in fifty may be a fault of the line.
+        let farthest = *moved.get(moved.len() * 49 / 50).ok_or(CalibrationFault::NoReadings { sensor: sensor.label() })?;
+        let bent: Vec<f64> =
+            moved.iter().copied().filter(|own| *own >= BENT * farthest && *own <= farthest / BENT).collect();
+        let bent_counts = rest + bent.get(bent.len() / 2).copied().unwrap_or_default();
+        if farthest < LEAST_CHANGE * rest || bent.len() < LEAST_READINGS {
+            return Err(CalibrationFault::NotBent { strip: sensor.label(), rest, bent: rest + farthest });
+        }
+        let point = |stimulus: f64, counts: f64| Point { stimulus, counts, spread: 0.0, readings: 1 };
+        let angle = self.modelled * StripPart::ACTIVE_LENGTH;
+        self.fit(sensor, part, vec![point(0.0, rest), point(angle, bent_counts)], None)
+    }
+
+    /// Calibration of a pad: a nominal part, or the one that reads so under a known weight. `strip` is the calibration of
+    /// the strip on its finger, which tells the bending.
+    pub fn pad(
+        &self,
+        side: Side,
+        part: &str,
+        strip: &Calibration,
+        known: Option<KnownWeight>,
+    ) -> Result<Calibration, CalibrationFault> {
+        let sensor = SensorKind::Pad.on(side);
+        let (input, rest) = (Input::on(self.board, sensor), self.rest(sensor)?);
+        let idle = input.siemens(rest);
+        let nominal = |force: f64| PadPart::NOMINAL_SIEMENS * force.powf(PadPart::NOMINAL_EXPONENT);
+        let gain = known.map_or(1.0, |known| (input.siemens(known.counts) - idle) / nominal(known.force));
+        let points = [0.0].iter().chain(&LOADS_KG).map(|kg| {
+            let force = kg * STANDARD_GRAVITY;
+            let counts = if *kg > 0.0 { input.counts(1.0 / (idle + gain * nominal(force))) } else { rest };
+            Point { stimulus: force, counts, spread: 0.0, readings: 1 }
+        });
+        let unbent = self.fit(sensor, part, points.collect(), None)?;
+        let bent = Readout::new(self.board, &[(SensorKind::Flex.on(side), strip.clone()), (sensor, unbent.clone())])?;
+        let bending = BendingZero::from_empty_close(&bent.bending(side, self.readings))?;
+        self.fit(sensor, part, unbent.record.points, Some(bending))
+    }
+
+    fn fit(
+        &self,
+        sensor: Sensor,
+        part: &str,
+        points: Vec<Point>,
+        bending: Option<BendingZero>,
+    ) -> Result<Calibration, CalibrationFault> {
+        let (kind, input) = (SensorKind::of(sensor), Input::on(self.board, sensor));
+        let note = "from an empty close".to_owned();
+        Calibration::fit(Record { part: part.to_owned(), kind, input, points, bending, assumed: true, note })
+    }
+
+    /// Median reading before the closing (counts).
+    fn rest(&self, sensor: Sensor) -> Result<f64, CalibrationFault> {
+        let window = rest_window(self.readings, self.closing_s);
+        let mut counts: Vec<f64> = self.counts(sensor, &self.readings[..window]).collect();
+        counts.sort_by(f64::total_cmp);
+        let middle = counts.get(counts.len() / 2).copied().filter(|_| counts.len() >= LEAST_READINGS);
+        middle.ok_or(CalibrationFault::NoReadings { sensor: sensor.label() })
+    }
+
+    fn counts<'r>(&self, sensor: Sensor, readings: &'r [Reading]) -> impl Iterator<Item = f64> + use<'r> {
+        let column = self.board.channel_of(sensor);
+        let count = move |reading: &Reading| reading.counts.get(column?).copied().flatten().map(f64::from);
+        readings.iter().filter_map(count).filter(|counts| counts.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::Curve;
+    use super::*;
+    use crate::electronics::{FlexStrip, ForcePad};
+
+    /// Readings of fingers that rest, close and hold, with a pad that fires when bent.
+    fn readings(board: &Board, strip: StripPart, pad: PadPart, bending: f64) -> Vec<Reading> {
+        let (mut strip, mut pad) = (FlexStrip::new(strip, 50.0), ForcePad::new(pad, 50.0));
+        let input = |sensor| Input::on(board, sensor);
+        let reading = |k: u32| {
+            let t_s = 0.02 * f64::from(k);
+            let kappa = 14.3 * ((t_s - 0.5) / 2.0).clamp(0.0, 1.0);
+            let strip = input(Sensor::FlexLeft).counts(strip.ohm(kappa)).floor() as f32;
+            let pad = input(Sensor::PadLeft).counts(1.0 / pad.conductance(bending * kappa)).floor() as f32;
+            let counts = vec![Some(strip), Some(1420.0), Some(pad), Some(0.0)];
+            Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
+        };
+        (0..200).map(reading).collect()
+    }
+
+    fn parts() -> (StripPart, PadPart) {
+        let strip = StripPart { flat_ohm: 21e3, rise_per_rad: StripPart::rise(2.4), reaching: 0.7, rest: 0.0 };
+        let pad = PadPart {
+            full: 1.0,
+            gain: 1.04 * PadPart::NOMINAL_SIEMENS,
+            exponent: 0.86,
+            threshold: Some(0.14),
+            reaching: 1.0,
+        };
+        (strip, pad)
+    }
+
+    #[test]
+    fn a_loose_strip_reads_as_the_modelled_finger_bends() -> Result<(), CalibrationFault> {
+        let board = Board::default();
+        let (part, pad) = parts();
+        let readings = readings(&board, part, pad, 0.018);
+        let hand = EmptyHand { board: &board, readings: &readings, closing_s: None, modelled: 14.3 };
+        let calibration = hand.strip(Side::Left, "A1")?;
+        assert!(calibration.record.assumed);
+        let readout = Readout::new(&board, &[(Sensor::FlexLeft, calibration)])?;
+        let curvature = |k: usize| readout.estimate(&readings[k]).curvature[0].unwrap_or(f64::NAN);
+        assert!(curvature(5).abs() < 0.1 && (curvature(199) - 14.3).abs() < 0.15, "{} {}", curvature(5), curvature(199));
+        // Resistance is linear in the bend, so that half of it reads as half.
+        assert!((curvature(75) - 7.15).abs() < 0.2, "{}", curvature(75));
+        let still = hand.strip(Side::Right, "A2");
+        assert!(matches!(still, Err(CalibrationFault::NotBent { strip: "right flex strip", .. })), "{still:?}");
+        let nothing = EmptyHand { readings: &[], ..hand };
+        assert!(matches!(nothing.strip(Side::Left, "A1"), Err(CalibrationFault::NoReadings { .. })));
+        Ok(())
+    }
+
+    #[test]
+    fn a_pad_shows_nothing_in_the_empty_hand_and_a_known_weight_as_it_is() -> Result<(), CalibrationFault> {
+        let board = Board::default();
+        let (part, pad) = parts();
+        let readings = readings(&board, part, pad, 0.018);
+        let hand = EmptyHand { board: &board, readings: &readings, closing_s: None, modelled: 14.3 };
+        let strip = hand.strip(Side::Left, "A1")?;
+        let nominal = hand.pad(Side::Left, "P1", &strip, None)?;
+        let readout = Readout::new(&board, &[(Sensor::FlexLeft, strip.clone()), (Sensor::PadLeft, nominal)])?;
+        let shown = readings.iter().filter_map(|reading| readout.estimate(reading).force[0]).fold(0.0, f64::max);
+        assert!(shown < 0.03, "{shown}");
+        let counts = Input::on(&board, Sensor::PadLeft).counts(1.0 / ForcePad::new(pad, 50.0).conductance(1.0));
+        let known = hand.pad(Side::Left, "P1", &strip, Some(KnownWeight { force: 1.0, counts }))?;
+        let Curve::Pad(curve) = &known.curve else { return Err(CalibrationFault::NoBending) };
+        assert!((1.0 / curve.gain - 6e3 / 1.04).abs() < 10.0, "{}", 1.0 / curve.gain);
+        Ok(())
+    }
+}
