@@ -38,7 +38,7 @@ use palpate_lab::workers::{
     Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
     Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
-use palpate_learn::{Model, ModelError, shipped_model};
+use palpate_learn::{Model, ModelError, Shipped};
 use palpate_render::describe_adapter;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
@@ -54,8 +54,8 @@ pub struct WorkbenchSetup<'a> {
     pub store: PathBuf,
     /// View state of the last run.
     pub view: ViewState,
-    /// Recognition model, or why there is none; everything else works without.
-    pub model: Result<Arc<Model>, ModelError>,
+    /// Recognition models for the simulation and for the real gripper, or why there is none; everything else works without.
+    pub models: [Result<Arc<Model>, ModelError>; 2],
     /// Measures cost and influence of effects.
     pub explain: Explain,
     /// Opens the port of a real gripper.
@@ -73,14 +73,14 @@ pub struct WorkbenchSetup<'a> {
 }
 
 impl WorkbenchSetup<'_> {
-    /// The parts of the program: the shipped model, real ports, the folder of models. The first grasp starts at once; there is
+    /// The parts of the program: the shipped models, real ports, the folder of models. The first grasp starts at once; there is
     /// no 3-D view.
     pub fn new(scene: Scene, store: PathBuf, view: ViewState, wake: Wake) -> Self {
         Self {
             scene,
             store,
             view,
-            model: shipped_model().map(Arc::new),
+            models: Shipped::ALL.map(|shipped| shipped.model().map(Arc::new)),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
             tools: GripperToolsSetup {
@@ -140,7 +140,8 @@ impl Workbench {
     /// Starts all threads and prepares the graphics.
     pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, ThreadError> {
         let WorkbenchSetup { scene, store, mut view, explain, listen, playing, wake, .. } = setup;
-        let model = setup.model.as_ref().ok();
+        let models = setup.models.each_ref().map(|model| model.as_ref().ok().cloned());
+        let [model, gripper_model] = models.clone();
         // Before the other threads, so that it opens the store first and can report what an update did to the file.
         let labeller =
             start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
@@ -153,7 +154,7 @@ impl Workbench {
             store: store.clone(),
             recording: true,
             grasps: GRASPS,
-            model: model.cloned(),
+            model,
             playing,
             wake: Arc::clone(&wake),
         });
@@ -166,7 +167,7 @@ impl Workbench {
         let gripper = GripperWorker::start(GripperSetup {
             scene: scene.clone(),
             store: store.clone(),
-            model: model.cloned(),
+            model: gripper_model,
             grasps: GRASPS,
             listen,
             wake: Arc::clone(&wake),
@@ -174,7 +175,7 @@ impl Workbench {
         .map_err(ThreadError::of("the gripper's thread"))?;
         let inspector = Inspector::start(store.clone(), Arc::clone(&wake))
             .map_err(ThreadError::of("the thread that opens trials"))?;
-        let inspect = InspectFeature::new(inspector, model.cloned(), GRASPS);
+        let inspect = InspectFeature::new(inspector, models.clone(), GRASPS);
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
         let studies = Studies::start(&store, &wake)?;
@@ -190,7 +191,7 @@ impl Workbench {
         view.apply(ctx, ViewAction::SetScale(view.scale), None);
         let mut notices = Notices::default();
         let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
-        let recognition = RecognitionFeature::new(model.cloned(), explainer, &mut tools, &mut view, &mut notices);
+        let recognition = RecognitionFeature::new(models, explainer, &mut tools, &mut view, &mut notices);
         let thumbnails =
             Thumbnails::start(ctx, Arc::clone(&wake)).map_err(ThreadError::of("the pictures of objects"))?;
         let mut workbench = Self {
@@ -215,7 +216,7 @@ impl Workbench {
         if workbench.view.ghost {
             workbench.act(ctx, SimulationAction::SetGhost(true));
         }
-        if let Err(cause) = setup.model {
+        if let Some(cause) = setup.models.into_iter().find_map(Result::err) {
             workbench.notices.error(format!("Recognition is off: {cause}"));
         }
         Ok(workbench)

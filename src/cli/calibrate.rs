@@ -13,6 +13,8 @@ use palpate_tactile::calibration::{Calibration, Input, Record, SensorKind};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
+pub(super) use guided::weigh;
+
 /// Arguments of `palpate calibrate`.
 #[derive(Debug, clap::Args)]
 #[command(

@@ -1,5 +1,7 @@
 //! `palpate demo`: grasps an object in random poses until it is recognised, describes each grasp, and writes a picture of
-//! it. Needs no display.
+//! it. Needs no display. With a port, the same with the real gripper.
+
+mod real;
 
 use super::Failure;
 use super::output::make_folder;
@@ -12,7 +14,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
-use palpate_learn::{StopReason, StopRule};
+use palpate_learn::{Measure, StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
@@ -33,11 +35,19 @@ use std::sync::Arc;
 #[command(after_help = "Examples:
   palpate demo
   palpate demo --object tomato --out pictures/
-  palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json")]
+  palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json
+  palpate demo --port /dev/ttyACM0              after palpate adapt
+  palpate demo --port /dev/ttyACM0 --object lemon
+
+See also: palpate help gripper")]
 pub(super) struct DemoArguments {
-    /// Built-in name, or a URDF, OBJ or STL file (default: a random one of the sixteen).
+    /// Built-in name, or a URDF, OBJ or STL file (default: a random one of the sixteen). With --port: what is in the hand, to
+    /// check the answer.
     #[arg(long, value_name = "NAME|FILE")]
     object: Option<String>,
+    /// Grasp with the real gripper on this port, whose trials are stored; needs calibrations, such as `palpate adapt` makes.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["as_released", "no_pictures", "no_store", "seed"])]
+    port: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArguments,
     /// Random seed of object and poses; the same seed repeats the run.
@@ -49,7 +59,7 @@ pub(super) struct DemoArguments {
     /// Probability at which to stop; 1 grasps up to the limit.
     #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = within(0.0..=1.0))]
     threshold: f64,
-    /// Recognition model (default: the shipped one).
+    /// Recognition model (default: the shipped one; with --port, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Leave the object as released between grasps instead of placing it anew.
@@ -94,6 +104,8 @@ struct GraspReport {
     picture: Option<PathBuf>,
     trial_id: Option<TrialId>,
     stage_one: Option<StageOne>,
+    /// Estimated size of what was touched.
+    touch: Option<Touched>,
     /// Belief after this grasp and those before it.
     pmf: BTreeMap<String, f64>,
     #[serde(flatten)]
@@ -104,6 +116,9 @@ struct GraspReport {
 const SIZE: [u32; 2] = [1280, 800];
 
 pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if let Some(port) = &arguments.port {
+        return real::run(arguments, port, store);
+    }
     let seed = arguments.seed.unwrap_or_else(|| RandomState::new().hash_one(0) % 1_000_000);
     let random = (arguments.object.is_none() && arguments.scene.scene.is_none()).then(|| random_object(seed));
     let mut nominal = arguments.scene.scene(arguments.object.as_deref().or(random.as_deref()))?;
@@ -138,6 +153,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         identification.end_grasp();
         let report = GraspReport {
             stage_one: identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)),
+            touch: Touched::of(&identification),
             pmf: identification.belief().now().map(|pmf| named(&model, pmf)).unwrap_or_default(),
             ..motion_report(&trial, &scene, pose_seed)
         };
@@ -196,6 +212,7 @@ fn motion_report(trial: &SimulatedTrial, scene: &Scene, seed: u64) -> GraspRepor
         picture: None,
         trial_id: None,
         stage_one: None,
+        touch: None,
         pmf: BTreeMap::new(),
         summary: GraspSummary::new(trial, scene),
     }
@@ -250,15 +267,47 @@ fn print_grasp(number: usize, report: &GraspReport, known: &[String]) -> Result<
         let percent = [stage.size_probability, stage.shape_probability].map(|p| format!("{:.0} %", 100.0 * p));
         say(format!("  Stage one: {} ({}), {} ({}).", stage.size, percent[0], stage.shape, percent[1]))?;
     }
-    let mut likely: Vec<(&String, &f64)> = report.pmf.iter().collect();
+    if let Some(touch) = &report.touch {
+        say(format!("  Felt: {touch}."))?;
+    }
+    say(format!("  Most likely: {}.", likely(&report.pmf)))
+}
+
+/// The most likely classes with their probabilities.
+fn likely(pmf: &BTreeMap<String, f64>) -> String {
+    let mut likely: Vec<(&String, &f64)> = pmf.iter().collect();
     likely.sort_by(|a, b| b.1.total_cmp(a.1));
-    let first: Vec<String> = likely
-        .iter()
-        .take(3)
-        .filter(|(_, p)| **p >= 0.005)
-        .map(|(name, p)| format!("{} {:.0} %", titled(name), 100.0 * **p))
-        .collect();
-    say(format!("  Most likely: {}.", first.join(", ")))
+    let shown = likely.iter().take(3).filter(|(_, p)| **p >= 0.005);
+    shown.map(|(name, p)| format!("{} {:.0} %", titled(name), 100.0 * **p)).collect::<Vec<_>>().join(", ")
+}
+
+/// Estimated size and place of the object, with the ranges that hold the true values in nine of ten grasps.
+#[derive(Clone, Debug, Serialize)]
+struct Touched {
+    /// Extent between the fingers (mm): estimate, and ends of its range.
+    width_mm: [f64; 3],
+    /// Extent along the gripper's axis (mm).
+    height_mm: [f64; 3],
+}
+
+impl Touched {
+    /// The newest estimate; none before the first contact.
+    fn of(identification: &Identification) -> Option<Self> {
+        let measured = identification.view().measured?;
+        let of = |measure: Measure| {
+            let estimate = measured.of(measure)?;
+            let tenths = |metres: f64| (mm(metres) * 10.0).round() * 0.1;
+            Some([estimate.value, estimate.range[0], estimate.range[1]].map(tenths))
+        };
+        Some(Self { width_mm: of(Measure::Width)?, height_mm: of(Measure::Height)? })
+    }
+}
+
+impl std::fmt::Display for Touched {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = |[value, low, high]: [f64; 3]| format!("{value:.0} mm ({low:.0} to {high:.0})");
+        write!(f, "{} wide, {} high", of(self.width_mm), of(self.height_mm))
+    }
 }
 
 fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {

@@ -1,5 +1,6 @@
 //! The command line: parses arguments, opens the window or runs a command. Exit codes: 0 done, 1 failed, 2 wrong use.
 
+mod adapt;
 mod bench;
 mod calibrate;
 mod collect;
@@ -93,6 +94,8 @@ enum Command {
     Plan(plan::PlanArguments),
     /// List, show, label, export, import, merge, delete and restore trials; undo and redo.
     Trials(trials::TrialsArguments),
+    /// Adapt to a real gripper without labels, by one close of its empty hand.
+    Adapt(adapt::AdaptArguments),
     /// Calibrate the strips and pads of the real gripper, and manage calibrations.
     Calibrate(calibrate::CalibrateArguments),
     /// Fit the simulated finger to recorded grasps of the real one.
@@ -222,6 +225,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Scene(scene)) => scene::run(scene)?,
         Some(Command::Plan(plan)) => plan::run(plan, store)?,
         Some(Command::Trials(trials)) => trials::run(trials, store)?,
+        Some(Command::Adapt(adapt)) => adapt::run(adapt, store)?,
         Some(Command::Calibrate(calibrate)) => calibrate::run(calibrate, store)?,
         Some(Command::Fit(fit)) => fit::run(fit, store)?,
         Some(Command::Doctor(doctor)) => return doctor::run(doctor),

@@ -6,7 +6,7 @@ use super::Failure;
 use super::setup::read_store;
 use super::terminal::{say, say_json, table, warn};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_learn::{Belief, Labels, Model, Pmf, Verdict, shipped_model};
+use palpate_learn::{Belief, Labels, Model, Pmf, Shipped, Verdict};
 use palpate_store::labels::shown_title;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
@@ -95,7 +95,15 @@ struct Together {
 pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
     Ok(match path {
         Some(path) => Model::load(path)?,
-        None => shipped_model()?,
+        None => Shipped::PerfectSensors.model()?,
+    })
+}
+
+/// Loads the named model, or the shipped one for any gripper.
+pub(super) fn load_model_for_grippers(path: Option<&Path>) -> Result<Model, Failure> {
+    Ok(match path {
+        Some(path) => Model::load(path)?,
+        None => Shipped::AnyGripper.model()?,
     })
 }
 

@@ -4,7 +4,7 @@ use crate::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, round
 use crate::metrics::{Bootstrap, Confusion};
 use crate::{
     ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
-    ModelCard, ModelError, Numbers, Pmf, Sequence, Signatures, StopRule, method, shipped_model,
+    ModelCard, ModelError, Numbers, Pmf, Sequence, Signatures, StopRule, method, Shipped,
 };
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -341,7 +341,7 @@ fn truncated_or_altered_models_are_refused() {
 
 #[test]
 fn the_shipped_model_is_live_and_rejects_unknown_objects() {
-    let model = shipped_model().expect("valid");
+    let model = Shipped::PerfectSensors.model().expect("valid");
     assert!(model.recogniser.live().is_some() && model.card.rejection.is_some());
     assert!(!model.card.quick, "a quick model must not ship");
 }

@@ -87,7 +87,7 @@ mod tensor_file;
 
 pub use arrays::{Array, ArrayError, Arrays, Numbers};
 pub use baselines::{
-    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, ShippedEncoder, Touch,
+    Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Shipped, Touch,
 };
 pub use belief::{Belief, Rejection, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
@@ -95,7 +95,6 @@ pub use fitting::{Fitting, LearnError};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use model::{LoadError, Model, ModelCard, ModelError};
-pub use model_file::shipped_model;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};

@@ -1,7 +1,7 @@
 //! Table of recognition methods. To add one, add a line to [`METHODS`].
 
 use crate::arrays::Arrays;
-use crate::baselines::{Candle, Convolution, Tabular, TabularKind, Warping};
+use crate::baselines::{Candle, Convolution, GeometryNetwork, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
 use crate::data::{Dataset, fnv_1a};
 use crate::fitting::{Fitting, LearnError};
@@ -175,7 +175,7 @@ impl Method {
 }
 
 /// All methods: the paper's networks first, then its baselines, then further ones.
-pub const METHODS: [Method; 25] = [
+pub const METHODS: [Method; 26] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
@@ -296,6 +296,15 @@ pub const METHODS: [Method; 25] = [
         Further,
         "Extra-trees on the same features and those of the geometry encoder, which has learned from random shapes",
         GeometryTrees
+    ),
+    baseline!(
+        "geometry-network",
+        "Geometry network",
+        Further,
+        "The geometry encoder, fine-tuned to the classes; answers from the beginning of a grasp on",
+        GeometryNetwork::fit,
+        GeometryNetwork,
+        GeometryNetwork::decided_by
     ),
     baseline!(
         "dtw-knn",

@@ -1,6 +1,7 @@
 //! Models on disk: a safetensors file with the card in its header. A copy of the card is written beside it as JSON for
 //! people.
 
+use crate::baselines::Shipped;
 use crate::data::{Class, Labels};
 use crate::methods::method;
 use crate::model::{LoadError, Model, ModelCard, ModelError};
@@ -12,11 +13,19 @@ use std::sync::Arc;
 /// Largest file that is read (bytes).
 const LARGEST_FILE: u64 = 1 << 30;
 
-static SHIPPED: &[u8] = include_bytes!("../../models/live.safetensors");
-
-/// Loads the model that ships with the program: the sixteen objects and the empty hand.
-pub fn shipped_model() -> Result<Model, ModelError> {
-    Model::from_bytes("models/live.safetensors", SHIPPED)
+impl Shipped {
+    /// The model of the sixteen objects and the empty hand.
+    pub fn model(self) -> Result<Model, ModelError> {
+        match self {
+            Self::PerfectSensors => {
+                Model::from_bytes("models/live.safetensors", include_bytes!("../../models/live.safetensors"))
+            }
+            Self::AnyGripper => {
+                let bytes = include_bytes!("../../models/any-gripper.safetensors");
+                Model::from_bytes("models/any-gripper.safetensors", bytes)
+            }
+        }
+    }
 }
 
 fn malformed(name: &str, cause: impl std::fmt::Display) -> ModelError {

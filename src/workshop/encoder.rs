@@ -4,7 +4,7 @@ use super::{Failure, report};
 use palpate_geometry::units::three_digits;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::{KnownGrasps, SHAPES, random_shapes};
-use palpate_learn::{Fitting, GeometryEncoder, GeometryScores, Measure, ShippedEncoder};
+use palpate_learn::{Fitting, GeometryEncoder, GeometryScores, Measure, Shipped};
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_tactile::model::SensorModel;
@@ -21,10 +21,10 @@ const SEEDS: [u64; 2] = [1, 2];
 const DRAWS: u32 = 4;
 
 /// Grasps of objects that an encoder is for.
-fn grasps(which: ShippedEncoder, objects: Vec<String>, poses: u64, fixed: &[bool]) -> Result<KnownGrasps, Failure> {
+fn grasps(which: Shipped, objects: Vec<String>, poses: u64, fixed: &[bool]) -> Result<KnownGrasps, Failure> {
     let mut pose = PosePreset::named(PRESET).ok_or("the preset is gone")?.poses();
     let mut view = SensorView::default();
-    if which == ShippedEncoder::AnyGripper {
+    if which == Shipped::AnyGripper {
         (pose.build, view.sensors) = (1.0, SensorModel::Drawn);
     }
     let scene = Scene { pose, ..Scene::default() };
@@ -32,7 +32,7 @@ fn grasps(which: ShippedEncoder, objects: Vec<String>, poses: u64, fixed: &[bool
 }
 
 /// Trains an encoder on this many shapes, and writes it.
-pub(crate) fn make(which: ShippedEncoder, out: &Path, shapes: u64, poses: u64) -> Result<(), Failure> {
+pub(crate) fn make(which: Shipped, out: &Path, shapes: u64, poses: u64) -> Result<(), Failure> {
     std::fs::create_dir_all(out)?;
     let stop = AtomicBool::new(false);
     let mut plan = grasps(which, random_shapes(0..shapes), poses, &[false, true])?;
@@ -45,7 +45,7 @@ pub(crate) fn make(which: ShippedEncoder, out: &Path, shapes: u64, poses: u64) -
     let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &progress, stop: &stop };
     let encoder = GeometryEncoder::fit(&channels, &names, &touches, &fitting)?;
     let bytes = encoder.to_bytes()?;
-    let path = out.join(which.file_name());
+    let path = out.join(which.encoder_file());
     std::fs::write(&path, &bytes)?;
     report(format_args!("saved as {}, {} bytes", path.display(), bytes.len()));
     let sixteen: Vec<String> = catalogue().iter().map(|object| object.name.clone()).collect();

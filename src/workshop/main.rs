@@ -26,7 +26,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::generated_sections;
-use palpate_learn::ShippedEncoder;
+use palpate_learn::Shipped;
 use palpate_render::figure_svg;
 use palpate_sim::objects::{ShapeClass, SizeClass};
 use palpate_store::Store;
@@ -145,7 +145,7 @@ fn main() -> Result<(), Failure> {
         Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Encoder { any_gripper, out, shapes, poses } => {
-            let which = if any_gripper { ShippedEncoder::AnyGripper } else { ShippedEncoder::PerfectSensors };
+            let which = if any_gripper { Shipped::AnyGripper } else { Shipped::PerfectSensors };
             encoder::make(which, &out, shapes, poses)?;
         }
         Command::Tables => write_tables()?,

@@ -94,7 +94,7 @@ impl Bench {
                     scene: scene.clone(),
                     store: path.clone(),
                     view: ViewState { theme, ..ViewState::default() },
-                    model: model.clone(),
+                    models: [model.clone(), model.clone()],
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
                     tools: GripperToolsSetup {

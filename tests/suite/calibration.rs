@@ -391,7 +391,7 @@ pub(crate) fn stored(
 
 /// File of the shipped model as one of contact pressure, which only simulations have, in a folder.
 pub(crate) fn model_of_contact(at: &Path) -> String {
-    let mut model = palpate_learn::shipped_model().unwrap();
+    let mut model = palpate_learn::Shipped::PerfectSensors.model().unwrap();
     model.card.data.signals = Some("contact".to_owned());
     for channel in &mut model.card.channels {
         *channel = channel.replace("pressure_", "contact_pressure_");
@@ -402,7 +402,7 @@ pub(crate) fn model_of_contact(at: &Path) -> String {
 
 /// File of the shipped model as one that was trained on trials of a board, in a folder: any answer will do.
 pub(crate) fn model_of_pads(at: &Path) -> String {
-    let mut model = palpate_learn::shipped_model().unwrap();
+    let mut model = palpate_learn::Shipped::PerfectSensors.model().unwrap();
     let data = &mut model.card.data;
     (data.signals, data.sensors, data.layout) = (None, None, None);
     model.save(&at.join("pads.safetensors")).unwrap();

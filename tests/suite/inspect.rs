@@ -22,7 +22,7 @@ fn a_stored_grasp_opens_as_it_was_live() {
     let store = folder.path().join("trials.sqlite");
     let mut scene = Scene::default();
     "lemon".clone_into(&mut scene.object.source);
-    let mut model = palpate_learn::shipped_model().unwrap();
+    let mut model = palpate_learn::Shipped::PerfectSensors.model().unwrap();
     // Three grasps, so that answers build on those before.
     model.card.stop.threshold = 1.0;
     let model = Arc::new(model);

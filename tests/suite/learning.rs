@@ -4,7 +4,7 @@ use crate::allocations::allocations_in;
 use crate::program::{json, refused, run};
 use palpate_lab::datasets::DatasetQuery;
 use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
-use palpate_learn::shipped_model;
+use palpate_learn::Shipped;
 use palpate_render::Picture;
 use palpate_sim::objects::catalogue;
 use palpate_store::Store;
@@ -254,7 +254,7 @@ fn the_demo_names_objects_as_the_window_does() {
 fn no_folder_is_made_that_nobody_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let model = shipped_model().unwrap();
+    let model = Shipped::PerfectSensors.model().unwrap();
     let picture = Picture { width: 1, height: 1, rgba: vec![0; 4] };
     let below = |name: &str| at.join("not/there").join(name);
     let refusals = [

@@ -7,6 +7,7 @@
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
+//! - `adapting`: a gripper recognises without labels, after one close of its empty hand.
 //! - `emulator`: the emulated gripper, with every fault, recorded and diagnosed.
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
 //! - `store`: kills and second programs.
@@ -36,6 +37,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on stops where it stands")]
 
+mod adapting;
 mod allocations;
 mod architecture;
 mod architecture_app;

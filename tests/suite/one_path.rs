@@ -12,7 +12,7 @@ use palpate_lab::grasping::{FrameReader, Identification, grasp};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
 use palpate_lab::recording::{Replay, TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
-use palpate_learn::{StopRule, Verdict, shipped_model};
+use palpate_learn::{StopRule, Verdict, Shipped};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -195,7 +195,7 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     let mut scene = Scene::default();
     scene.object.source = "lemon".to_owned();
     let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
-    let model = Arc::new(shipped_model().unwrap());
+    let model = Arc::new(Shipped::PerfectSensors.model().unwrap());
     let mut live = Identification::new(Arc::clone(&model), StopRule::default());
     let more = live.channels_on(&scene.gripper).unwrap();
     let reader =
@@ -235,7 +235,7 @@ fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
     capture(&parts, "rest=2.5; close empty bar=0.8; rest=3", "", 12.0, &bytes);
     json(at, &["record", "--port", "grasp.bytes", "--speed", "0", "--json"]);
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
-    let model = Arc::new(shipped_model().unwrap());
+    let model = Arc::new(Shipped::PerfectSensors.model().unwrap());
     let options = LinkOptions { path: Some(bytes), replay_speed: f64::INFINITY, ..LinkOptions::default() };
     let gripper = SerialGripper::new(Box::new(SerialLink::open(&options).unwrap()));
     let from_bytes = played(Replay::of_capture(gripper, Some(&store), Some(Arc::clone(&model))).unwrap());

@@ -41,7 +41,7 @@ fn calibrate(store: &mut Store) {
         let points = plan(kind).into_iter().map(point).collect();
         let part = sensor.channel().to_owned();
         let input = Input::on(&Board::default(), sensor);
-        let record = Record { part, kind, input, points, bending: None, note: String::new() };
+        let record = Record { part, kind, input, points, bending: None, assumed: false, note: String::new() };
         store.calibrations().add(&record).unwrap();
         store.calibrations().mount(sensor, &record.part).unwrap();
     }

@@ -10,7 +10,7 @@ use palpate::app::{ALL_PANELS, Mode, PanelKind, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::workers::Command;
-use palpate_learn::{Model, shipped_model};
+use palpate_learn::{Model, Shipped};
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 
@@ -55,14 +55,14 @@ fn the_command_says_why_and_names_the_nearest_trials() {
     assert!(!alone.contains("Nearest") && alone.contains("How measured"), "{alone}");
     assert_eq!(run(at, &["recognise", "1", "--nearest", "2"]).code, Some(2), "--nearest needs --why");
     // An older model is recognised.
-    shipped_model().unwrap().with_signatures(None).save(&at.join("old.safetensors")).unwrap();
+    Shipped::PerfectSensors.model().unwrap().with_signatures(None).save(&at.join("old.safetensors")).unwrap();
     assert_eq!(run(at, &["recognise", "1", "--model", "old.safetensors"]).code, Some(0));
     refused(at, &["recognise", "1", "--why", "--model", "old.safetensors"], &["no class signatures", "palpate train"]);
 }
 
 #[test]
 fn the_shipped_model_has_signatures_of_all_its_classes() {
-    let model = shipped_model().unwrap();
+    let model = Shipped::PerfectSensors.model().unwrap();
     let signatures = model.signatures.clone().expect("made by `palpate-workshop signatures`");
     assert_eq!(signatures.channels(), model.card.channels);
     assert!(signatures.grasps().iter().all(|grasps| *grasps >= 290), "{:?}", signatures.grasps());

@@ -125,7 +125,7 @@ pub(in crate::app) struct InspectFeature {
 }
 
 impl InspectFeature {
-    pub(in crate::app) fn new(inspector: Inspector, model: Option<Arc<Model>>, grasps: u32) -> Self {
+    pub(in crate::app) fn new(inspector: Inspector, models: [Option<Arc<Model>>; 2], grasps: u32) -> Self {
         let options = OpenOptions { grasps: Some(grasps), ..OpenOptions::default() };
         Self {
             inspector,
@@ -141,7 +141,7 @@ impl InspectFeature {
             spread: false,
             stored: Playback::default(),
             live: Playback::default(),
-            models: [model.clone(), model],
+            models,
             options,
             before: ViewSource::default(),
             grasp: 0,

@@ -32,8 +32,8 @@ pub enum RecognitionAction {
 
 /// State of the recognition in the window.
 pub(in crate::app) struct RecognitionFeature {
-    /// Model that comes with the program.
-    shipped: Option<Arc<Model>>,
+    /// Models that come with the program, for the simulation and for the real gripper.
+    shipped: [Option<Arc<Model>>; 2],
     /// Models to be loaded, and for which gripper; the first one is being loaded.
     loading: VecDeque<(PathBuf, ViewSource)>,
     explainer: Explainer,
@@ -52,7 +52,7 @@ pub(in crate::app) struct Recognisers<'a> {
 impl RecognitionFeature {
     /// Loads the model of the last run, which is remembered again once it is loaded.
     pub(in crate::app) fn new(
-        shipped: Option<Arc<Model>>,
+        shipped: [Option<Arc<Model>>; 2],
         explainer: Explainer,
         tools: &mut GripperTools,
         view: &mut ViewState,
@@ -104,16 +104,18 @@ impl RecognitionFeature {
             RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools, notices),
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
-                on.inspect.set_model(ViewSource::Gripper, self.shipped.clone());
-                on.gripper.worker().command(GripperCommand::SetModel(self.shipped.clone()));
+                let [_, shipped] = self.shipped.clone();
+                on.inspect.set_model(ViewSource::Gripper, shipped.clone());
+                on.gripper.worker().command(GripperCommand::SetModel(shipped));
             }
             RecognitionAction::UseSimulationModel(Some(path)) => {
                 self.load(path, ViewSource::Simulation, on.tools, notices);
             }
             RecognitionAction::UseSimulationModel(None) => {
                 view.simulation_model = None;
-                on.inspect.set_model(ViewSource::Simulation, self.shipped.clone());
-                on.simulation.send(Command::SetModel(self.shipped.clone()), notices);
+                let [shipped, _] = self.shipped.clone();
+                on.inspect.set_model(ViewSource::Simulation, shipped.clone());
+                on.simulation.send(Command::SetModel(shipped), notices);
             }
         }
     }

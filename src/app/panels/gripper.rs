@@ -83,6 +83,17 @@ fn connected_ui(
         {
             actions.push(GripperCommand::Tare);
         }
+        if ui
+            .add_enabled(gripper.trial.is_none() && context.view.control != Control::Free, Button::new("Adapt"))
+            .on_hover_text(
+                "Close the empty hand once and calibrate the sensors by it, so that objects are recognised without labels. \
+                 Sensors that were calibrated by hand stay so",
+            )
+            .on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand")
+            .clicked()
+        {
+            actions.push(GripperCommand::Adapt(context.view.control));
+        }
         if ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)").clicked() {
             actions.push(GripperCommand::Disconnect);
         }

@@ -10,7 +10,7 @@ use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Procedure, Record, SensorKind, Unsettled};
+use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Point, Procedure, Record, SensorKind, Unsettled};
 use std::collections::VecDeque;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -101,6 +101,24 @@ pub(super) fn record(
         Some(seconds) => with_empty_close(&mut bench, record, sensor, store, live.auto, seconds),
         None => Ok(record),
     }
+}
+
+/// Reads a pad under a known weight (kg): on Enter, or as soon as it has settled.
+pub(in crate::cli) fn weigh(port: Option<&Path>, sensor: Sensor, kg: f64, auto: bool) -> Result<Point, Failure> {
+    let mut bench = Bench::open(port, auto)?;
+    let board = bench.board()?;
+    let force = SensorKind::Pad.stimulus(kg);
+    let procedure = Procedure::new(&board, sensor, "weighed", None);
+    let mut procedure = procedure
+        .ok_or_else(|| format!("the board has no channel \"{}\"", sensor.channel()))?
+        .with_plan(&[force]);
+    if !auto {
+        note(&format!("Press Enter once the weight lies on the {}.", sensor.label()));
+    }
+    while procedure.next().is_some() {
+        bench.one_point(&mut procedure, auto)?;
+    }
+    Ok(*procedure.record().points.last().ok_or("no weight was measured")?)
 }
 
 /// Adds an empty close to a pad whose points come from a file.

@@ -481,7 +481,7 @@ mod tests {
 
     #[test]
     fn the_shipped_model_knows_all_objects_and_the_empty_hand() {
-        let model = palpate_learn::shipped_model().expect("valid");
+        let model = palpate_learn::Shipped::PerfectSensors.model().expect("valid");
         assert_eq!(model.card.labels, labels_of_catalogue());
     }
 

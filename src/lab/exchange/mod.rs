@@ -194,7 +194,7 @@ mod tests {
         };
         store.insert_imported("mine", &[imported])?;
         let path = folder.path().join("out.mcap");
-        let model = Arc::new(palpate_learn::shipped_model()?);
+        let model = Arc::new(palpate_learn::Shipped::PerfectSensors.model()?);
         let options = OpenOptions { model: Some(model), ..OpenOptions::default() };
         let mut steps = Vec::new();
         write_trials(&store, &[1, 2, 3], &options, &path, &mut |done, all| {

@@ -1,7 +1,7 @@
 //! The geometry of whatever is grasped, felt row by row.
 
 use super::row::Row;
-use palpate_learn::{GeometryEncoder, Measured, Sequence, ShippedEncoder};
+use palpate_learn::{GeometryEncoder, Measured, Sequence, Shipped};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -22,13 +22,13 @@ pub(super) struct FeltGeometry {
 }
 
 impl FeltGeometry {
-    /// Begins a grasp whose rows have these channels in these columns.
-    pub(super) fn begin(&mut self, columns: &BTreeMap<String, usize>) {
+    /// Begins a grasp whose rows have these channels in these columns, for the shipped encoder.
+    pub(super) fn begin(&mut self, shipped: Shipped, columns: &BTreeMap<String, usize>) {
         // A damaged encoder fails a test; without one, nothing is measured.
         let places = |encoder: &GeometryEncoder| -> Option<Vec<usize>> {
             encoder.channels().iter().map(|channel| columns.get(channel).copied()).collect()
         };
-        let found = ShippedEncoder::PerfectSensors.load().ok().and_then(|encoder| Some((places(&encoder)?, encoder)));
+        let found = shipped.encoder().ok().and_then(|encoder| Some((places(&encoder)?, encoder)));
         let (columns, encoder) = found.unzip();
         *self = Self { encoder, columns: columns.unwrap_or_default(), ..Self::default() };
     }

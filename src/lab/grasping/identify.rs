@@ -4,8 +4,8 @@
 use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use palpate_learn::{
-    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, Pmf, Sequence, Signatures, StopReason, StopRule,
-    Verdict,
+    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, Pmf, Sequence, Shipped, Signatures, StopReason,
+    StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
@@ -219,7 +219,8 @@ impl Identification {
         self.readings = Sequence::default();
         self.hold_s = None;
         self.verdict = None;
-        self.geometry.begin(&named);
+        // Readings that suit the model suit the encoder for such sensors.
+        self.geometry.begin(Shipped::of(&self.model.card.data), &named);
         self.closed = false;
         if let Some(live) = &mut self.live {
             live.begin(self.belief.now());

@@ -495,7 +495,7 @@ mod tests {
     #[test]
     fn a_simulated_trial_opens_as_it_was() -> Result<(), Box<dyn std::error::Error>> {
         let (_folder, store, id) = stored("lemon");
-        let model = Arc::new(palpate_learn::shipped_model()?);
+        let model = Arc::new(palpate_learn::Shipped::PerfectSensors.model()?);
         let options = OpenOptions { model: Some(model), keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options)?;
         let trial = store.load(id)?;

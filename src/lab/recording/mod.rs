@@ -1,6 +1,7 @@
 //! Recording: one recorder thread for all trials, and the recording of a real grasp that the command line and the window
-//! share.
+//! share. Adapting to a gripper by a recorded close of its empty hand.
 
+mod adaptation;
 mod board_trial;
 mod board_writer;
 mod recent;
@@ -10,6 +11,7 @@ mod replay;
 #[cfg(test)]
 mod tests;
 
+pub use adaptation::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
 pub use board_trial::{BoardTrialRecording, TrialRequest};
 pub use board_writer::{BoardTrialPlan, RecordedTrial};
 pub use recent::RecentEvents;

@@ -134,7 +134,7 @@ impl TrialIndex {
 mod tests {
     use super::*;
     use crate::grasping::grasp;
-    use palpate_learn::{Dataset, Example, shipped_model};
+    use palpate_learn::{Dataset, Example, Shipped};
     use palpate_sim::scene::Scene;
 
     static NEVER: AtomicBool = AtomicBool::new(false);
@@ -149,7 +149,7 @@ mod tests {
     fn the_nearest_of_a_copy_is_itself_and_other_objects_are_farther() {
         let folder = tempfile::tempdir().unwrap();
         let mut store = Store::open(&folder.path().join("s.sqlite")).unwrap();
-        let model = shipped_model().unwrap();
+        let model = Shipped::PerfectSensors.model().unwrap();
         let view = SensorView::of_model(&model.card);
         let mut grasps = Vec::new();
         // With seeds of their own: the store keeps one trial of each grasp.

@@ -229,7 +229,7 @@ fn a_model_that_reads_other_channels_says_so_once_for_each_scene() {
 #[test]
 fn the_model_that_comes_with_the_program_answers_while_the_first_grasp_goes_on() {
     let folder = folder();
-    let watched = watch(palpate_learn::shipped_model().ok(), &folder, 1);
+    let watched = watch(palpate_learn::Shipped::PerfectSensors.model().ok(), &folder, 1);
     watched.send(Command::Pause);
     watched.until(|s| !s.status.playing);
     watched.send(Command::SetSpeed(1.0));

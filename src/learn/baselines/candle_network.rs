@@ -284,27 +284,49 @@ impl Work<'_> {
         };
         let progress = |share: f64| (fitting.progress)(start + 0.5 * share);
         let classes = data.labels.classes.len();
-        Variables::trained((width, classes), grasps, learned.epochs, fitting, (&batch, &loss, &progress))
+        let size = (width, classes);
+        let training = Training {
+            size,
+            sequences: grasps,
+            epochs: learned.epochs,
+            start: None,
+            batch: &batch,
+            loss: &loss,
+            progress: &progress,
+        };
+        Variables::trained(&training, fitting)
     }
 }
 
-/// Inputs of some sequences, `[batch][inputs][STEPS]`.
-type Batch<'a> = &'a dyn Fn(&[usize], &mut ChaCha8Rng) -> Vec<f32>;
-/// Loss of the outputs for the same sequences.
-type Loss<'a> = &'a dyn Fn(&Tensor, &[usize]) -> Result<Tensor>;
+/// What a network is trained on, and how.
+pub(super) struct Training<'a> {
+    /// Numbers of inputs and of outputs.
+    pub(super) size: (usize, usize),
+    /// Indices of the sequences.
+    pub(super) sequences: &'a [usize],
+    /// Passes over them.
+    pub(super) epochs: usize,
+    /// Variables to start from, where name and form are the same.
+    pub(super) start: Option<&'a Arrays>,
+    /// Draws inputs for some sequences, `[batch][inputs][STEPS]`.
+    pub(super) batch: &'a dyn Fn(&[usize], &mut ChaCha8Rng) -> Vec<f32>,
+    /// Computes the loss of the outputs for the same sequences.
+    pub(super) loss: &'a dyn Fn(&Tensor, &[usize]) -> Result<Tensor>,
+    /// Called with the share of work done, 0 to 1.
+    pub(super) progress: &'a dyn Fn(f64),
+}
 
 impl<N: CandleNetwork> Variables<N> {
-    /// Trains a new network of some inputs and outputs on sequences, given by their indices. Ends early, with what it has
-    /// learned so far, if the fit is stopped.
-    pub(super) fn trained(
-        (inputs, outputs): (usize, usize),
-        sequences: &[usize],
-        epochs: usize,
-        fitting: &Fitting<'_>,
-        (batch, loss, progress): (Batch<'_>, Loss<'_>, &dyn Fn(f64)),
-    ) -> Result<Self> {
+    /// Trains a new network. Ends early, with what it has learned so far, if the fit is stopped.
+    pub(super) fn trained(training: &Training<'_>, fitting: &Fitting<'_>) -> Result<Self> {
+        let &Training { size: (inputs, outputs), sequences, epochs, start, batch, loss, progress } = training;
         let mut random = ChaCha8Rng::seed_from_u64(fitting.seed);
         let network = Self::new(inputs, outputs, &mut random)?;
+        for (name, var) in &network.by_name {
+            if let Some(Ok(values)) = start.map(|start| start.f32s(name, var.dims())) {
+                var.set(&Tensor::from_slice(values, var.dims(), &Device::Cpu)?)?;
+            }
+        }
         let settings = ParamsAdamW { lr: N::RATE, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
         let mut optimiser = AdamW::new(network.by_name.values().cloned().collect(), settings)?;
         let mut order = sequences.to_vec();

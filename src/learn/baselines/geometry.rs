@@ -4,21 +4,20 @@
 //! It answers from the beginning of a grasp too: half of the training grasps end early, and one input says which steps have
 //! been felt.
 
-use super::candle_network::{CandleNetwork, Pass, STEPS, Variables, add_noise, mirror_of_inputs, mirrored};
+use super::candle_network::{CandleNetwork, Pass, STEPS, Training, Variables};
 use super::convolution::{DENSE, Trunk};
+use super::felt_steps::{FeltSteps, LEAST_FELT, STAGES, Views, end_of_stage, stage_of};
 use super::measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
 use crate::arrays::Arrays;
 use crate::data::{DataCard, Dataset, Example, Sequence, fnv_1a};
 use crate::features::Levels;
 use crate::fitting::{Fitting, LearnError};
-use crate::gaps;
 use crate::model::{LoadError, ModelError};
-use crate::network::Preparation;
 use crate::pmf::Pmf;
 use crate::tensor_file::{self, TensorFile};
 use candle_core::{Device, Result, Tensor};
 use candle_nn::{Linear, Module as _, VarBuilder};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
@@ -31,72 +30,67 @@ pub struct GeometryEncoder {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Learned {
-    channels: Vec<String>,
+    #[serde(flatten)]
+    steps: FeltSteps,
     shapes: Vec<String>,
-    preparation: Preparation,
-    mirror: Option<Vec<usize>>,
     revision: u32,
     /// Mean and standard deviation of each quantity on its scale.
     scales: Vec<[f64; 2]>,
-    /// Half width of the 90 % range in units of the network's own spread, for each [`STAGE`] of a grasp and each quantity.
+    /// Half width of the 90 % range in units of the network's own spread, for each stage of a grasp and each quantity.
     spreads: Vec<Vec<f64>>,
     /// Numbers of training grasps and of objects.
     trained_on: [usize; 2],
 }
 
-/// A geometry encoder that ships with the program.
+/// What ships with the program: a geometry encoder and a model each for two kinds of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShippedEncoder {
+pub enum Shipped {
     /// For perfect sensors on the gripper of the default scene.
     PerfectSensors,
     /// For real sensors on any gripper, after an empty close.
     AnyGripper,
 }
 
-impl ShippedEncoder {
+impl Shipped {
     /// All.
     pub const ALL: [Self; 2] = [Self::PerfectSensors, Self::AnyGripper];
 
-    /// Name of its file.
-    pub fn file_name(self) -> &'static str {
+    /// Name of the encoder's file.
+    pub fn encoder_file(self) -> &'static str {
         match self {
             Self::PerfectSensors => "geometry.safetensors",
             Self::AnyGripper => "geometry-any-gripper.safetensors",
         }
     }
 
-    /// The encoder for grasps such as these.
+    /// The kind of sensors of such grasps.
     pub fn of(data: &DataCard) -> Self {
         if data.from_perfect_sensors() { Self::PerfectSensors } else { Self::AnyGripper }
     }
 
-    fn bytes(self) -> &'static [u8] {
+    fn encoder_bytes(self) -> &'static [u8] {
         match self {
             Self::PerfectSensors => include_bytes!("../../../models/geometry.safetensors"),
             Self::AnyGripper => include_bytes!("../../../models/geometry-any-gripper.safetensors"),
         }
     }
 
-    /// Decodes it, once.
-    pub fn load(self) -> std::result::Result<Arc<GeometryEncoder>, ModelError> {
+    /// The geometry encoder, decoded once.
+    pub fn encoder(self) -> std::result::Result<Arc<GeometryEncoder>, ModelError> {
         type Decoded = OnceLock<std::result::Result<Arc<GeometryEncoder>, ModelError>>;
-        static ENCODERS: [Decoded; ShippedEncoder::ALL.len()] = [const { OnceLock::new() }; ShippedEncoder::ALL.len()];
-        let decode = || GeometryEncoder::from_bytes(self.file_name(), self.bytes()).map(Arc::new);
+        static ENCODERS: [Decoded; Shipped::ALL.len()] = [const { OnceLock::new() }; Shipped::ALL.len()];
+        let decode = || GeometryEncoder::from_bytes(self.encoder_file(), self.encoder_bytes()).map(Arc::new);
         ENCODERS[self as usize].get_or_init(decode).clone()
     }
 
-    /// Hash of all, part of the fingerprint of methods that read their features.
-    pub(super) fn contents() -> u64 {
-        fnv_1a(Self::ALL.iter().flat_map(|own| own.bytes().iter().copied()))
+    /// Hash of all encoders, part of the fingerprint of methods that read their features.
+    pub(super) fn encoders() -> u64 {
+        fnv_1a(Self::ALL.iter().flat_map(|own| own.encoder_bytes().iter().copied()))
     }
 }
 
 /// Number of quantities.
 const MEASURES: usize = Measure::ALL.len();
-/// Steps of a grasp for which the 90 % range is measured together.
-const STAGE: usize = 3;
-/// Fewest steps that are read; the fingers touch nothing before.
-const LEAST_FELT: usize = 3;
 /// One in this many objects is held out, to measure how far the estimates are off.
 const HELD_OUT: usize = 8;
 /// Weight of the shapes' cross entropy beside the mean loss of a quantity.
@@ -150,19 +144,16 @@ impl GeometryEncoder {
         if touches.is_empty() {
             return Err(LearnError::NoData);
         }
-        let preparation = preparation_of(channels, touches);
         let scales = (0..MEASURES).map(|k| scale_of(k, touches)).collect();
         let mut objects: Vec<usize> = touches.iter().map(|touch| touch.object).collect();
         objects.sort_unstable();
         objects.dedup();
         let learned = Learned {
-            channels: channels.to_vec(),
+            steps: steps_of(channels, touches),
             shapes: shapes.to_vec(),
-            mirror: mirror_of_inputs(channels, &preparation),
-            preparation,
             revision: Encoder::REVISION,
             scales,
-            spreads: vec![vec![NINETY; MEASURES]; STEPS / STAGE],
+            spreads: vec![vec![NINETY; MEASURES]; STAGES],
             trained_on: [touches.len(), objects.len()],
         };
         let is_held_out = |touch: &Touch| touch.object % HELD_OUT == HELD_OUT - 1;
@@ -196,7 +187,7 @@ impl GeometryEncoder {
         let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
         let outputs = 2 * MEASURES + learned.shapes.len();
         let mut random = ChaCha8Rng::seed_from_u64(0);
-        let network = Variables::new(learned.preparation.width() + 1, outputs, &mut random).map_err(failed)?;
+        let network = Variables::new(learned.steps.inputs(), outputs, &mut random).map_err(failed)?;
         network.read(arrays, prefix)?;
         Ok(Self { learned, network })
     }
@@ -229,7 +220,7 @@ impl GeometryEncoder {
 
     /// Channels that it reads.
     pub fn channels(&self) -> &[String] {
-        &self.learned.channels
+        &self.learned.steps.channels
     }
 
     /// Approximate shapes that it distinguishes.
@@ -239,14 +230,14 @@ impl GeometryEncoder {
 
     /// Estimates the geometry from the readings so far; `None` before the first contact.
     pub fn measure(&self, grasp: &Sequence) -> Option<Measured> {
-        let (views, felt) = self.learned.views(grasp);
-        if felt < LEAST_FELT || !self.has_touched(grasp) {
+        let views = self.learned.steps.views(grasp);
+        if views.felt < LEAST_FELT || !self.has_touched(grasp) {
             return None;
         }
         // Shapes were checked when the network was made, so that no grasp should make it fail.
         let outputs = self.outputs(&views).ok()?;
         let (means, shapes) = (mean_of(&outputs.outer), 2 * MEASURES);
-        let stage = stage_of(felt);
+        let stage = stage_of(views.felt);
         let estimate = |k: usize, measure: Measure| {
             let [centre, deviation] = self.learned.scales[k];
             let spread = f64::from(means[MEASURES + k]).clamp(*SPREADS.start(), *SPREADS.end()).exp();
@@ -264,7 +255,7 @@ impl GeometryEncoder {
     /// True once a pad has felt more than the least force of a contact.
     fn has_touched(&self, grasp: &Sequence) -> bool {
         let onset = |channel: &String| Levels::of(channel, f32::INFINITY).onsets.first().copied();
-        let onsets: Vec<f32> = self.learned.channels.iter().map(|c| onset(c).unwrap_or(f32::INFINITY)).collect();
+        let onsets: Vec<f32> = self.learned.steps.channels.iter().map(|c| onset(c).unwrap_or(f32::INFINITY)).collect();
         grasp.rows().any(|(_, row)| row.iter().zip(&onsets).any(|(x, onset)| x > onset))
     }
 
@@ -302,7 +293,7 @@ impl GeometryEncoder {
 
     /// Features of the readings so far: values before the last layer and all outputs, mean of the grasp and its mirror image.
     pub(crate) fn features(&self, grasp: &Sequence) -> Vec<f32> {
-        let (views, _) = self.learned.views(grasp);
+        let views = self.learned.steps.views(grasp);
         let zeros = || vec![0.0; self.width()];
         self.outputs(&views).map_or_else(
             |_failed| zeros(),
@@ -310,9 +301,14 @@ impl GeometryEncoder {
         )
     }
 
-    fn outputs(&self, views: &[Vec<f32>]) -> Result<Outputs> {
-        let x: Vec<f32> = views.iter().flatten().copied().collect();
-        let x = Tensor::from_vec(x, (views.len(), self.learned.preparation.width() + 1, STEPS), &Device::Cpu)?;
+    /// Number and scaling of its inputs, for networks that start from it.
+    pub(super) fn steps(&self) -> &FeltSteps {
+        &self.learned.steps
+    }
+
+    fn outputs(&self, views: &Views) -> Result<Outputs> {
+        let x: Vec<f32> = views.inputs.iter().flatten().copied().collect();
+        let x = Tensor::from_vec(x, (views.inputs.len(), self.learned.steps.inputs(), STEPS), &Device::Cpu)?;
         let inner = self.network.network.trunk.forward(&x, 0.0, &mut Pass::answering())?;
         let outer = self.network.network.last.forward(&inner)?;
         Ok(Outputs { inner: inner.to_vec2()?, outer: outer.to_vec2()? })
@@ -322,11 +318,9 @@ impl GeometryEncoder {
     fn measured_spreads(&self, held_out: &[&Touch]) -> Result<Vec<Vec<f64>>> {
         let mut spreads = self.learned.spreads.clone();
         for (stage, of_stage) in spreads.iter_mut().enumerate() {
-            let felt = ((stage + 1) * STAGE).max(LEAST_FELT);
             let mut off = vec![Vec::new(); MEASURES];
             for touch in held_out {
-                let (mut views, whole) = self.learned.views(&touch.grasp);
-                views.iter_mut().for_each(|view| forget_after(view, felt.min(whole)));
+                let views = self.learned.steps.views(&touch.grasp).until(end_of_stage(stage));
                 let means = mean_of(&self.outputs(&views)?.outer);
                 for (k, off) in off.iter_mut().enumerate() {
                     let spread = f64::from(means[MEASURES + k]).clamp(*SPREADS.start(), *SPREADS.end()).exp();
@@ -346,18 +340,15 @@ impl GeometryEncoder {
 
 impl Learned {
     fn check(&self) -> std::result::Result<(), LoadError> {
-        let width = self.preparation.width();
         let part = |part: &'static str| Err(LoadError::Card { part });
         let all_finite = |rows: &[Vec<f64>]| rows.iter().flatten().all(|x| x.is_finite());
         if self.revision != Encoder::REVISION {
             part("the version of the encoder")
-        } else if !self.preparation.is_sound(self.channels.len()) {
-            part("the input scaling")
-        } else if !self.mirror.as_ref().is_none_or(|m| m.len() == width && m.iter().all(|to| *to < width)) {
-            part("the mirror image")
+        } else if let Some(fault) = self.steps.fault() {
+            part(fault)
         } else if self.scales.len() != MEASURES || !self.scales.iter().flatten().all(|x| x.is_finite()) {
             part("the scaling of quantities")
-        } else if self.spreads.len() != STEPS / STAGE
+        } else if self.spreads.len() != STAGES
             || self.spreads.iter().any(|of_stage| of_stage.len() != MEASURES)
             || !all_finite(&self.spreads)
         {
@@ -369,21 +360,6 @@ impl Learned {
         }
     }
 
-    /// Inputs of the grasp and of its mirror image, `[width + 1][STEPS]`, and the number of steps felt. Steps that have not
-    /// been felt are zero; the last input is 1 for those that have.
-    fn views(&self, grasp: &Sequence) -> (Vec<Vec<f32>>, usize) {
-        let width = self.preparation.width();
-        let rows = self.preparation.inputs(&gaps::filled(grasp));
-        let felt = (rows.len() / width.max(1)).min(STEPS);
-        let at = |step: usize, input: usize| if step < felt { rows[step * width + input] } else { 0.0 };
-        let own: Vec<f32> = (0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect();
-        let mask = (0..STEPS).map(|step| f32::from(u8::from(step < felt)));
-        let mut views = vec![own];
-        views.extend(self.mirror.as_ref().map(|mirror| mirrored(mirror, &views[0])));
-        views.iter_mut().for_each(|view| view.extend(mask.clone()));
-        (views, felt)
-    }
-
     /// Value of a quantity that the network should give.
     fn target(&self, measure: usize, touch: &Touch) -> f64 {
         let [centre, deviation] = self.scales[measure];
@@ -391,20 +367,9 @@ impl Learned {
     }
 
     fn train(&self, touches: &[Touch], used: &[usize], fitting: &Fitting<'_>) -> Result<Variables<Encoder>> {
-        let width = self.preparation.width();
-        let views: Vec<(Vec<Vec<f32>>, usize)> = touches.iter().map(|touch| self.views(&touch.grasp)).collect();
+        let views: Vec<Views> = touches.iter().map(|touch| self.steps.views(&touch.grasp)).collect();
         let batch = |group: &[usize], random: &mut ChaCha8Rng| {
-            let mut x = Vec::with_capacity(group.len() * (width + 1) * STEPS);
-            for k in group {
-                let (views, felt) = &views[*k];
-                let mut view = views[random.random_range(0..views.len())].clone();
-                add_noise::<Encoder>(&mut view[..width * STEPS], random);
-                let ends_early = random.random::<bool>() && *felt > LEAST_FELT;
-                let felt = if ends_early { random.random_range(LEAST_FELT..*felt) } else { *felt };
-                forget_after(&mut view, felt);
-                x.extend(view);
-            }
-            x
+            group.iter().flat_map(|k| views[*k].drawn(Encoder::NOISE, random)).collect()
         };
         let shapes = self.shapes.len();
         let loss = |outputs: &Tensor, group: &[usize]| {
@@ -431,17 +396,17 @@ impl Learned {
             loss + (SHAPE_WEIGHT * candle_nn::loss::cross_entropy(&scores, &shape)?)?
         };
         let epochs = if fitting.quick { 4 } else { Encoder::EPOCHS };
-        let outputs = 2 * MEASURES + shapes;
-        Variables::trained((width + 1, outputs), used, epochs, fitting, (&batch, &loss, fitting.progress))
+        let size = (self.steps.inputs(), 2 * MEASURES + shapes);
+        let training =
+            Training { size, sequences: used, epochs, start: None, batch: &batch, loss: &loss, progress: fitting.progress };
+        Variables::trained(&training, fitting)
     }
 }
 
-/// Scaling of the readings.
-fn preparation_of(channels: &[String], touches: &[Touch]) -> Preparation {
+/// Inputs for such grasps.
+fn steps_of(channels: &[String], touches: &[Touch]) -> FeltSteps {
     let examples = touches.iter().map(|touch| Example { grasp: Arc::clone(&touch.grasp), ..Example::default() });
-    let data = Dataset { channels: channels.to_vec(), examples: examples.collect(), ..Dataset::default() };
-    let duration_s = data.median_duration_s().max(0.05);
-    Preparation::fit(&data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0))
+    FeltSteps::fit(&Dataset { channels: channels.to_vec(), examples: examples.collect(), ..Dataset::default() })
 }
 
 /// Mean and standard deviation of a quantity on its scale.
@@ -451,16 +416,6 @@ fn scale_of(measure: usize, touches: &[Touch]) -> [f64; 2] {
     let mean = values().sum::<f64>() / count;
     let deviation = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
     [mean, deviation.max(1e-6)]
-}
-
-/// Stage of a grasp of which some steps have been felt.
-fn stage_of(felt: usize) -> usize {
-    (felt.max(1) - 1) / STAGE
-}
-
-/// Zeroes all inputs of a view after some steps.
-fn forget_after(view: &mut [f32], felt: usize) {
-    view.chunks_exact_mut(STEPS).for_each(|input| input[felt.min(STEPS)..].fill(0.0));
 }
 
 fn mean_of(rows: &[Vec<f32>]) -> Vec<f32> {
@@ -475,6 +430,7 @@ fn mean_of(rows: &[Vec<f32>]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::RngExt;
     use crate::conformance_tests::quick;
 
     /// The force grows faster the wider the object is, which noise hides at first; its shape shows in the other channel.

@@ -3,8 +3,10 @@
 //! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests
 //! and boosted trees order the classes well, but are far too unsure or too sure of them.
 
-use super::geometry::{GeometryEncoder, ShippedEncoder};
+use super::felt_steps::Columns;
+use super::geometry::{GeometryEncoder, Shipped};
 use super::neighbours::Neighbours;
+use super::other::{combined, other_weight};
 use super::row_model::{RowModel, Rows};
 use super::svm::Svm;
 use crate::arrays::Arrays;
@@ -59,32 +61,18 @@ struct RowMaker {
 /// The geometry encoder with the columns of its channels.
 struct ReadEncoder {
     encoder: Arc<GeometryEncoder>,
-    /// Column of each channel, and the factor to its unit.
-    columns: Vec<(usize, f32)>,
+    columns: Columns,
 }
-
-/// Sensing area of a pad (m²): force and pressure of one pad are two units of one reading.
-const PAD_AREA: f32 = 1.697e-4;
 
 impl ReadEncoder {
     /// The encoder on readings of these channels; none where they lack one of its own.
     fn on(encoder: Arc<GeometryEncoder>, channels: &[String]) -> Option<Self> {
-        let at = |name: &str| channels.iter().position(|own| own == name);
-        let column = |channel: &String| {
-            let as_force = || {
-                let column = at(&format!("force_{}", channel.strip_prefix("pressure_")?))?;
-                Some((column, 1.0 / PAD_AREA))
-            };
-            at(channel).map(|column| (column, 1.0)).or_else(as_force)
-        };
-        let columns = encoder.channels().iter().map(column).collect::<Option<_>>()?;
+        let columns = Columns::of(encoder.channels(), channels)?;
         Some(Self { encoder, columns })
     }
 
     fn features(&self, grasp: &Sequence) -> Vec<f32> {
-        let values =
-            grasp.rows().flat_map(|(_, row)| self.columns.iter().map(|(column, factor)| row[*column] * factor));
-        self.encoder.features(&Sequence { t_s: grasp.t_s.clone(), values: values.collect() })
+        self.encoder.features(&self.columns.pick(grasp))
     }
 }
 
@@ -237,7 +225,7 @@ impl TabularKind {
             "classifier": classifier,
         });
         if self.reads_geometry() {
-            decided_by["encoder"] = ShippedEncoder::contents().into();
+            decided_by["encoder"] = Shipped::encoders().into();
         }
         decided_by
     }
@@ -345,22 +333,6 @@ impl FeatureRows<'_> {
     }
 }
 
-/// The class "other" and the weight that gives its rows, among those of these classes, half of the prior.
-fn other_weight(data: &Dataset, classes: &[usize]) -> Option<(usize, f64)> {
-    let other = data.labels.other()?;
-    let own = classes.iter().filter(|class| **class == other).count();
-    let rest = classes.len() - own;
-    (own > 0 && rest > 0).then(|| (other, rest as f64 / own as f64))
-}
-
-/// Combines the answers to two grasps. The prior of the class "other" counts once.
-fn combined(before: &Pmf, now: &Pmf, other: Option<usize>) -> Pmf {
-    let Some(other) = other else { return before.times(now) };
-    let rest = now.classes().saturating_sub(1).max(1) as f64;
-    let weights = now.probabilities().iter().enumerate();
-    before.times(&Pmf::from_weights(weights.map(|(class, p)| if class == other { p / rest } else { *p })))
-}
-
 fn answer(model: &dyn RowModel, row: &[f32], mirrored: Option<&[f32]>) -> Pmf {
     let own = Pmf::from_weights(model.predict(row));
     let other = mirrored.map(|row| Pmf::from_weights(model.predict(row)));
@@ -449,7 +421,7 @@ impl Tabular {
 
 /// The shipped geometry encoder for such grasps.
 fn encoder_of(data: &Dataset) -> Result<ReadEncoder, LearnError> {
-    let encoder = ShippedEncoder::of(&data.about).load().map_err(LearnError::failed)?;
+    let encoder = Shipped::of(&data.about).encoder().map_err(LearnError::failed)?;
     let needs = encoder.channels().join(", ");
     let found = || data.channels.join(", ");
     ReadEncoder::on(encoder, &data.channels).ok_or_else(|| LearnError::Encoder { needs, found: found() })

@@ -13,7 +13,7 @@ use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::calibration::{Drift, SensorEstimate};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{Control, TrialId};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -56,6 +56,8 @@ pub enum GripperCommand {
     AnotherObject,
     /// Begin a trial.
     Begin(TrialRequest),
+    /// Record a close of the empty hand and calibrate the sensors by it, but not those that were calibrated by hand.
+    Adapt(Control),
     /// Begin and end trials automatically when the fingers move; none turns this off.
     Watch(Option<TrialRequest>),
     /// End the running trial and keep it.

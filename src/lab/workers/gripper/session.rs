@@ -1,5 +1,6 @@
 //! Session of the gripper thread: owns the link, distributes its readings and handles commands.
 
+mod adapting;
 mod recognising;
 mod sensors;
 mod trials;
@@ -96,6 +97,8 @@ pub(super) struct GripperSession {
     recording_id: Option<TrialId>,
     /// Requests of trials whose end the recorder has not reported yet; whether they were discarded.
     ending: VecDeque<(TrialRequest, bool)>,
+    /// The trial that is recorded is a close of the empty hand, to adapt to.
+    adapting: bool,
     /// Number of trials begun so far.
     begun: u64,
     watching: Option<TrialRequest>,
@@ -146,6 +149,7 @@ impl GripperSession {
             recording: None,
             recording_id: None,
             ending: VecDeque::new(),
+            adapting: false,
             begun: 0,
             watching: None,
             ended: None,
@@ -230,6 +234,7 @@ impl GripperSession {
             }
             GripperCommand::AnotherObject => self.start_over(),
             GripperCommand::Begin(request) => self.begin(request, None),
+            GripperCommand::Adapt(control) => self.adapt(control),
             GripperCommand::Watch(request) => self.set_watching(request),
             GripperCommand::End => self.end(false, None),
             GripperCommand::Discard => self.end(true, None),

@@ -153,6 +153,7 @@ impl GripperSession {
                     if !discarded {
                         self.outlets.notify(Notice::Stored(trial.id));
                     }
+                    self.adapt_to(trial.id, discarded);
                     let cadence = cadence_line(&trial.about.course.cadence);
                     let warnings = trial.warnings;
                     self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
@@ -175,6 +176,7 @@ impl GripperSession {
         if let Some(Err(error)) = vented {
             self.outlets.notify(Notice::Failed(format!("{error}; the board vents within a second")));
         }
+        self.adapting = false;
         self.start_over();
         self.begin_stretch(0.0);
         self.outlets.notify(Notice::Failed(format!("recording stopped; readings so far are stored: {cause}")));

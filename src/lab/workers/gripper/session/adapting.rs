@@ -1,0 +1,61 @@
+//! Adapting to the gripper by a close of its empty hand: a trial is recorded, and its readings become calibrations.
+
+use super::{GripperSession, open};
+use crate::recording::{AdaptError, Adaptation, AdaptedSensor, TrialRequest, mount_unnamed};
+use crate::workers::Notice;
+use palpate_sim::objects::EMPTY;
+use palpate_store::Store;
+use palpate_tactile::board::Sensor;
+use palpate_tactile::trial::{Control, TrialId};
+
+impl GripperSession {
+    /// Records a close of the empty hand.
+    pub(super) fn adapt(&mut self, control: Control) {
+        let mounted = open(&mut self.store, &self.path).and_then(|store| mount_unnamed(store));
+        if let Err(cause) = mounted {
+            return self.outlets.notify(Notice::Failed(format!("not adapted: {cause}")));
+        }
+        let begun = self.begun;
+        self.begin(TrialRequest { object: Some(EMPTY.to_owned()), control, length_s: None, adds: false }, None);
+        self.adapting = self.begun > begun;
+    }
+
+    /// Makes calibrations of the recorded close, if that is what it was for.
+    pub(super) fn adapt_to(&mut self, id: TrialId, discarded: bool) {
+        if !std::mem::take(&mut self.adapting) || discarded {
+            return;
+        }
+        let scene = self.scene.clone();
+        let adapted = open(&mut self.store, &self.path).map_err(AdaptError::from).and_then(|store: &mut Store| {
+            let adaptation = Adaptation::from_trial(store, id, &scene, [None; 2], false)?;
+            adaptation.keep(store)?;
+            Ok(adaptation)
+        });
+        match adapted {
+            Ok(adaptation) => {
+                self.read_calibrations();
+                adaptation.warnings.iter().for_each(|text| self.outlets.notify(Notice::Warning(text.clone())));
+                self.outlets.notify(told(&adaptation));
+            }
+            Err(cause) => self.outlets.notify(Notice::Failed(format!("not adapted: {cause}"))),
+        }
+    }
+}
+
+/// What was found and assumed, in a sentence.
+fn told(adaptation: &Adaptation) -> Notice {
+    let sensors = || Sensor::ALL.into_iter().zip(&adaptation.sensors);
+    let failed = sensors().find_map(|(sensor, adapted)| match adapted {
+        AdaptedSensor::Failed(fault) => Some(format!("The {} is not calibrated: {fault}", sensor.label())),
+        AdaptedSensor::Kept(_) | AdaptedSensor::Adapted(_) => None,
+    });
+    let kept = sensors().filter(|(_, adapted)| matches!(adapted, AdaptedSensor::Kept(_))).count();
+    let (bar, modelled) = (adaptation.bar, adaptation.modelled);
+    let assumed = format!("assumed: nominal pads, and fingers that bend to {modelled:.1} 1/m at {bar:.2} bar");
+    match (failed, kept) {
+        (Some(failed), _) => Notice::Failed(failed),
+        (None, 0) => Notice::Info(format!("Adapted; {assumed}.")),
+        (None, 4) => Notice::Info("Nothing to adapt: all four sensors are calibrated by hand.".to_owned()),
+        (None, kept) => Notice::Info(format!("Adapted, {kept} sensors calibrated by hand kept; {assumed}.")),
+    }
+}
