@@ -14,7 +14,7 @@ use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
-use palpate_learn::{Measure, StopReason, StopRule};
+use palpate_learn::{Measure, Shipped, StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
@@ -126,7 +126,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         nominal.pose.between = Between::AsReleased;
     }
     let object = nominal.load_object()?;
-    let model = Arc::new(load_model(arguments.model.as_deref())?);
+    let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::PerfectSensors)?);
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(&model), rule);
     let mut painter = if arguments.no_pictures { None } else { Painter::find() };

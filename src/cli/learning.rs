@@ -38,8 +38,8 @@ pub(super) struct DataArguments {
     pub(super) trials: QueryArguments,
     #[command(flatten)]
     pub(super) signals: SignalArguments,
-    /// Sensor model for simulated trials: virtual (perfect), physical-like (as on the real gripper), or drawn (as on any
-    /// gripper, another one for each grasp).
+    /// Sensor model for simulated trials: virtual (perfect), physical-like (as on the real gripper), adapted (the same after
+    /// `palpate adapt`), or drawn (as on any gripper after it, another one for each grasp).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
     /// With --sensors drawn: number of grippers that read each grasp for training.
@@ -61,7 +61,7 @@ pub(super) struct DataArguments {
 
 /// Parser of a sensor model's name.
 pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
-    SensorModel::named(text).ok_or_else(|| "choose virtual, physical-like or drawn".to_owned())
+    SensorModel::named(text).ok_or_else(|| "choose virtual, physical-like, adapted or drawn".to_owned())
 }
 
 impl QueryArguments {
@@ -87,7 +87,13 @@ impl QueryArguments {
 
 impl DataArguments {
     pub(super) fn view(&self) -> SensorView {
-        SensorView { sensors: self.sensors, draws: self.draws, rate_hz: self.rate, cut: self.cut, ..self.signals.view() }
+        SensorView {
+            sensors: self.sensors,
+            draws: self.draws,
+            rate_hz: self.rate,
+            cut: self.cut,
+            ..self.signals.view()
+        }
     }
 
     /// Reads the grasps from the store.

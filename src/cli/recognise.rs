@@ -8,7 +8,8 @@ use super::terminal::{say, say_json, table, warn};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Shipped, Verdict};
 use palpate_store::labels::shown_title;
-use palpate_tactile::trial::TrialId;
+use palpate_store::{Store, TrialRow};
+use palpate_tactile::trial::{TrialId, TrialSource};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -25,7 +26,7 @@ pub(super) struct RecogniseArguments {
     /// Trial numbers.
     #[arg(required = true)]
     trials: Vec<TrialId>,
-    /// Recognition model (default: the shipped one).
+    /// Recognition model (default: the shipped one; for trials of a real gripper, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Treat the trials as grasps of one object, and also combine them.
@@ -91,28 +92,26 @@ struct Together {
     pmf: BTreeMap<String, f64>,
 }
 
-/// Loads the named model, or the shipped one.
-pub(super) fn load_model(path: Option<&Path>) -> Result<Model, Failure> {
+/// Loads the named model, or the shipped one for a kind of sensors.
+pub(super) fn load_model(path: Option<&Path>, shipped: Shipped) -> Result<Model, Failure> {
     Ok(match path {
         Some(path) => Model::load(path)?,
-        None => Shipped::PerfectSensors.model()?,
+        None => shipped.model()?,
     })
 }
 
-/// Loads the named model, or the shipped one for any gripper.
-pub(super) fn load_model_for_grippers(path: Option<&Path>) -> Result<Model, Failure> {
-    Ok(match path {
-        Some(path) => Model::load(path)?,
-        None => Shipped::AnyGripper.model()?,
-    })
+/// The shipped model that reads stored trials: the one for any gripper where one of them is of a real gripper.
+pub(super) fn shipped_for(store: &Store, trials: &[TrialId]) -> Result<Shipped, Failure> {
+    let is_real = |row: &TrialRow| row.source == TrialSource::Recorded && trials.contains(&row.id);
+    Ok(if store.list(false)?.iter().any(is_real) { Shipped::AnyGripper } else { Shipped::PerfectSensors })
 }
 
 /// Warns about a model from perfect sensors that answers readings of a real gripper.
 pub(super) fn warn_of_perfect_sensors(model: &Model) {
     if model.card.learned_from_perfect_sensors() {
         warn(
-            "the model knows perfect sensors only, so most of its answers to trials of a real gripper are wrong; train one on \
-             your trials: palpate train --source serial",
+            "the model knows perfect sensors only, so most of its answers to trials of a real gripper are wrong; after `palpate \
+             adapt` leave --model out, or train one on your trials: palpate train --source serial",
         );
     }
 }
@@ -123,8 +122,8 @@ pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
 }
 
 pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let model = load_model(arguments.model.as_deref())?;
     let store = read_store(store)?;
+    let model = load_model(arguments.model.as_deref(), shipped_for(&store, &arguments.trials)?)?;
     let labels = &model.card.labels;
     let mut belief = Belief::default();
     let mut trials = Vec::new();

@@ -1,13 +1,14 @@
 //! `palpate replay`: plays a stored trial or captured bytes as the live gripper: rows and recognition.
 
 use super::Failure;
-use super::recognise::{StageOne, load_model, named, warn_of_perfect_sensors};
+use super::recognise::{StageOne, load_model, named, shipped_for, warn_of_perfect_sensors};
 use super::setup::{existing_store, read_store};
 use super::terminal::{note, say, say_json};
 use palpate_device::serial::{LinkOptions, SerialLink};
 use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::Replay;
+use palpate_learn::Shipped;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -26,7 +27,7 @@ pub(super) struct ReplayArguments {
     /// Number of a stored trial, or file of captured bytes.
     #[arg(value_name = "TRIAL|FILE")]
     source: PathBuf,
-    /// Recognition model (default: the shipped one).
+    /// Recognition model (default: the shipped one; for a real gripper, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Speed, as a multiple of the original; 0: as fast as possible.
@@ -61,9 +62,12 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let model = Arc::new(load_model(arguments.model.as_deref())?);
+    let model = |shipped| Ok::<_, Failure>(Some(Arc::new(load_model(arguments.model.as_deref(), shipped)?)));
     let mut replay = match arguments.source.to_str().and_then(|text| text.parse().ok()) {
-        Some(id) => Replay::of_trial(&read_store(store)?, id, Some(model))?,
+        Some(id) => {
+            let store = read_store(store)?;
+            Replay::of_trial(&store, id, model(shipped_for(&store, &[id])?)?)?
+        }
         None => {
             let replay_speed = f64::INFINITY;
             let options = LinkOptions { path: Some(arguments.source.clone()), replay_speed, ..LinkOptions::default() };
@@ -72,7 +76,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
                 return Err(format!("\"{name}\" is neither the number of a trial nor a file of captured bytes").into());
             }
             let gripper = SerialGripper::new(Box::new(SerialLink::open(&options)?));
-            Replay::of_capture(gripper, existing_store(store)?.as_ref(), Some(model))?
+            Replay::of_capture(gripper, existing_store(store)?.as_ref(), model(Shipped::AnyGripper)?)?
         }
     };
     let (mut rows, mut header, mut pace) = (Vec::new(), Vec::new(), None);

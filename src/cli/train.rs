@@ -131,7 +131,9 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
             [evaluation.f1_macro, evaluation.ci95[0], evaluation.ci95[1]].map(|x| format!("{:.1}", 100.0 * x));
         say(format!("F1          {f1} percent ({low} to {high}): {test}"))?;
     }
-    if model.card.rejection.is_none() {
+    if model.card.labels.other().is_some() {
+        say("unknown     class \"other\", learned from random shapes")?;
+    } else if model.card.rejection.is_none() {
         say("unknown     not supported: every grasp is assigned to one of these objects")?;
     }
     say(format!("saved       {}", out.display()))

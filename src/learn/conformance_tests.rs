@@ -4,7 +4,7 @@ use crate::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, round
 use crate::metrics::{Bootstrap, Confusion};
 use crate::{
     ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
-    ModelCard, ModelError, Numbers, Pmf, Sequence, Signatures, StopRule, method, Shipped,
+    ModelCard, ModelError, Numbers, Pmf, Sequence, Shipped, Signatures, StopRule, method,
 };
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -372,6 +372,7 @@ const SAVED: &[(&str, &[u8])] = &[
     ("measures-forest", include_bytes!("saved_models/measures-forest.safetensors")),
     ("extra-trees", include_bytes!("saved_models/extra-trees.safetensors")),
     ("geometry-trees", include_bytes!("saved_models/geometry-trees.safetensors")),
+    ("geometry-network", include_bytes!("saved_models/geometry-network.safetensors")),
     ("dtw-knn", include_bytes!("saved_models/dtw-knn.safetensors")),
     ("convolution", include_bytes!("saved_models/convolution.safetensors")),
 ];

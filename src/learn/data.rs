@@ -241,6 +241,16 @@ impl Dataset {
         Some(other)
     }
 
+    /// These grasps and, as one more class, those of a data set with one class.
+    pub fn with_class_of(&self, other: &Self) -> Self {
+        let mut both = self.clone();
+        let class = both.labels.classes.len();
+        both.labels.classes.extend(other.labels.classes.first().cloned());
+        both.examples.extend(other.examples.iter().map(|example| Example { class, ..example.clone() }));
+        both.about.grasps = both.examples.len();
+        both
+    }
+
     /// Shuffles the labels among the grasps, as a control.
     pub fn with_shuffled_labels(&self, seed: u64) -> Self {
         let mut truth = self.truth();

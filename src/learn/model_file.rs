@@ -14,17 +14,21 @@ use std::sync::Arc;
 const LARGEST_FILE: u64 = 1 << 30;
 
 impl Shipped {
+    /// Name of the model's file.
+    pub fn model_file(self) -> &'static str {
+        match self {
+            Self::PerfectSensors => "live.safetensors",
+            Self::AnyGripper => "any-gripper.safetensors",
+        }
+    }
+
     /// The model of the sixteen objects and the empty hand.
     pub fn model(self) -> Result<Model, ModelError> {
-        match self {
-            Self::PerfectSensors => {
-                Model::from_bytes("models/live.safetensors", include_bytes!("../../models/live.safetensors"))
-            }
-            Self::AnyGripper => {
-                let bytes = include_bytes!("../../models/any-gripper.safetensors");
-                Model::from_bytes("models/any-gripper.safetensors", bytes)
-            }
-        }
+        let bytes: &[u8] = match self {
+            Self::PerfectSensors => include_bytes!("../../models/live.safetensors"),
+            Self::AnyGripper => include_bytes!("../../models/any-gripper.safetensors"),
+        };
+        Model::from_bytes(&format!("models/{}", self.model_file()), bytes)
     }
 }
 

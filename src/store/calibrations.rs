@@ -283,7 +283,15 @@ pub(super) mod tests {
             readings: 50,
         };
         let points = [0.0, 45.0, 90.0].map(point).to_vec();
-        Record { part: part.to_owned(), kind: SensorKind::Flex, input, points, bending: None, assumed: false, note: String::new() }
+        Record {
+            part: part.to_owned(),
+            kind: SensorKind::Flex,
+            input,
+            points,
+            bending: None,
+            assumed: false,
+            note: String::new(),
+        }
     }
 
     fn store(folder: &tempfile::TempDir, name: &str) -> Store {

@@ -1,46 +1,92 @@
-//! The shipped recognition model: collects its grasps, trains it, evaluates it on grasps of another seed, and writes it
-//! with its card.
+//! The shipped recognition models: collects their grasps, trains them, evaluates them on grasps of another seed, and writes
+//! them with their cards.
 
 use super::{Failure, report};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_lab::grasping::{CollectionPlan, collect};
+use palpate_lab::grasping::{CollectionPlan, collect, random_shapes};
 use palpate_lab::study::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
-use palpate_learn::{Dataset, Fitting, Model, Signatures, StopRule, method};
+use palpate_learn::{Dataset, Fitting, Model, Shipped, Signatures, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
-use std::ops::ControlFlow;
+use palpate_tactile::model::SensorModel;
+use std::ops::{ControlFlow, Range};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Name of the file.
-const FILE: &str = "live.safetensors";
-/// The method, and what differs from its own settings: many grasps need fewer rounds through them.
-const METHOD: &str = "ids-lstm-cross";
-const EPOCHS: usize = 60;
-/// Grasps of each object to learn from, and to judge by.
-const TRIALS: [u32; 2] = [300, 100];
+/// How a shipped model is made.
+struct Recipe {
+    which: Shipped,
+    method: &'static str,
+    /// Passes over the grasps, where they differ from the method's own.
+    epochs: Option<usize>,
+    /// Grasps of each object to learn from, and to judge by.
+    trials: [u32; 2],
+    /// Seeds of random shapes, each grasped once, of the class "other".
+    others: Range<u64>,
+    view: SensorView,
+    /// How much the build of the gripper varies.
+    build: f64,
+}
+
 const SEEDS: [u64; 2] = [1, 2];
 /// The pose preset: any face the object rests on, any turn.
 const PRESET: &str = "B";
 
-/// Grasps to learn from (0) or to judge by (1).
-fn collected(set: usize, store: &mut Store) -> Result<Dataset, Failure> {
-    let preset = PosePreset::named(PRESET).ok_or("the preset is gone")?;
-    let scene = Scene { pose: preset.poses(), ..Scene::default() };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let plan = CollectionPlan::of_all_objects(scene, TRIALS[set], SEEDS[set]);
-    let report = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?;
-    let source = DatasetQuery { collection: Some(report.collection), ..DatasetQuery::default() };
-    Ok(source.read(store, &SensorView::default(), &mut |_, _| ())?)
+impl Recipe {
+    fn of(which: Shipped) -> Self {
+        let virtual_view = SensorView::default();
+        match which {
+            Shipped::PerfectSensors => Self {
+                which,
+                method: "ids-lstm-cross",
+                epochs: Some(60),
+                trials: [300, 100],
+                others: 0..0,
+                view: virtual_view,
+                build: 0.0,
+            },
+            // Its random shapes are not those that the encoder has learned from.
+            Shipped::AnyGripper => Self {
+                which,
+                method: "geometry-network",
+                epochs: None,
+                trials: [150, 50],
+                others: 5000..5600,
+                view: SensorView { sensors: SensorModel::Drawn, draws: 6, ..virtual_view },
+                build: 1.0,
+            },
+        }
+    }
+
+    /// Grasps to learn from (0) or to judge by (1).
+    fn collected(&self, set: usize, store: &mut Store) -> Result<Dataset, Failure> {
+        let mut pose = PosePreset::named(PRESET).ok_or("the preset is gone")?.poses();
+        pose.build = self.build;
+        let scene = Scene { pose, ..Scene::default() };
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let mut plan = CollectionPlan::of_all_objects(scene, self.trials[set], SEEDS[set]);
+        let mut collected = |plan: &CollectionPlan| -> Result<Dataset, Failure> {
+            let report = collect(plan, store, threads, &mut |_| ControlFlow::Continue(()))?;
+            let source = DatasetQuery { collection: Some(report.collection), ..DatasetQuery::default() };
+            Ok(source.read(store, &self.view, &mut |_, _| ())?)
+        };
+        let known = collected(&plan)?;
+        if set == 1 || self.others.is_empty() {
+            return Ok(known);
+        }
+        (plan.objects, plan.trials) = (random_shapes(self.others.clone()), 1);
+        Ok(known.with_class_of(&collected(&plan)?))
+    }
 }
 
 /// Stores the class signatures of the training grasps in the shipped model, whose weights stay.
 pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failure> {
-    let path = out.join(FILE);
+    let recipe = Recipe::of(Shipped::PerfectSensors);
+    let path = out.join(recipe.which.model_file());
     let model = Model::load(&path)?;
     let before = model.recogniser.arrays();
-    let grasps = collected(0, store)?;
+    let grasps = recipe.collected(0, store)?;
     model.check_channels(&grasps.channels)?;
     let signatures = grasps.relabelled(&model.card.labels).as_ref().and_then(Signatures::of);
     let model = model.with_signatures(Some(signatures.ok_or("the model lacks a class of the training grasps")?));
@@ -60,19 +106,21 @@ pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failur
     Ok(())
 }
 
-pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
+/// Collects, trains and writes a model.
+pub(crate) fn make(which: Shipped, out: &Path, store: &mut Store) -> Result<(), Failure> {
+    let recipe = Recipe::of(which);
     // Training takes minutes: what cannot be written fails before it.
     std::fs::create_dir_all(out)?;
-    let [train, test] = [collected(0, store)?, collected(1, store)?];
-    let method = method(METHOD).ok_or("the method is gone")?;
-    let settings = serde_json::json!({ "epochs": EPOCHS }).as_object().cloned().unwrap_or_default();
+    let [train, test] = [recipe.collected(0, store)?, recipe.collected(1, store)?];
+    let method = method(recipe.method).ok_or("the method is gone")?;
+    let settings = recipe.epochs.map(|epochs| ("epochs".to_owned(), epochs.into())).into_iter().collect();
     let interrupted = AtomicBool::new(false);
     let progress = |_share: f64| ();
     let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &progress, stop: &interrupted };
     let mut model = method.train(&train, &fitting)?;
     let objects: Vec<usize> =
         (0..test.examples.len()).filter(|k| test.labels.classes[test.examples[*k].class].size.is_some()).collect();
-    let objects = test.part(&objects);
+    let objects = test.part(&objects).relabelled(&train.labels).ok_or("an object was not learned")?;
     let stop = StopRule::default();
     let comparison = Comparison {
         train: &train,
@@ -83,7 +131,7 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
         stop,
         interrupted: &interrupted,
     };
-    let row = comparison.of_fitted(METHOD, &model)?;
+    let row = comparison.of_fitted(recipe.method, &model)?;
     let halfway = prefix_calibration(model.recogniser.as_ref(), &objects, 0.5);
     let test =
         format!("{} further grasps of the sixteen: {}", objects.examples.len(), objects.about.lines().join("; "));
@@ -91,7 +139,7 @@ pub(crate) fn make(out: &Path, store: &mut Store) -> Result<(), Failure> {
     model.card.metrics["ece_halfway"] = serde_json::json!(halfway);
     // How long it took depends on the machine, and the file should not.
     model.card.train_cpu_s = 0.0;
-    let path = out.join(FILE);
+    let path = out.join(recipe.which.model_file());
     model.save(&path)?;
     let e = &row.evaluation;
     report(format_args!(

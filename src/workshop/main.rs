@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `cargo run -p palpate-workshop -- objects` | the sixteen objects below `assets/objects`, byte for byte the same |
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
-//! | `cargo run --release -p palpate-workshop -- model --store FILE` | the recognition model below `models`, with its card |
+//! | `cargo run --release -p palpate-workshop -- model [--any-gripper] --store FILE` | a recognition model below `models`, with its card |
 //! | `cargo run --release -p palpate-workshop -- encoder [--any-gripper]` | a geometry encoder below `models` |
 //! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
@@ -83,8 +83,11 @@ enum Command {
         #[arg(long, default_value = "assets/objects")]
         out: PathBuf,
     },
-    /// Collect grasps and train the shipped recognition model.
+    /// Collect grasps and train a shipped recognition model.
     Model {
+        /// The one for any gripper, instead of the one for perfect sensors.
+        #[arg(long)]
+        any_gripper: bool,
         /// Output folder.
         #[arg(long, default_value = "models")]
         out: PathBuf,
@@ -142,11 +145,12 @@ fn main() -> Result<(), Failure> {
             let count = thumbnails::draw_all(&out)?;
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
-        Command::Model { out, store } => live_model::make(&out, &mut Store::open(&store)?)?,
+        Command::Model { any_gripper, out, store } => {
+            live_model::make(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
+        }
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Encoder { any_gripper, out, shapes, poses } => {
-            let which = if any_gripper { Shipped::AnyGripper } else { Shipped::PerfectSensors };
-            encoder::make(which, &out, shapes, poses)?;
+            encoder::make(shipped(any_gripper), &out, shapes, poses)?;
         }
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
@@ -156,6 +160,10 @@ fn main() -> Result<(), Failure> {
 
 /// Size of the stored picture, as `palpate study accuracy` draws it (points).
 const FIGURE_SIZE: [u32; 2] = [960, 860];
+
+fn shipped(any_gripper: bool) -> Shipped {
+    if any_gripper { Shipped::AnyGripper } else { Shipped::PerfectSensors }
+}
 
 fn write_tables() -> Result<(), Failure> {
     for section in generated_sections()? {

@@ -94,7 +94,7 @@ impl Bench {
                     scene: scene.clone(),
                     store: path.clone(),
                     view: ViewState { theme, ..ViewState::default() },
-                    models: [model.clone(), model.clone()],
+                    models: [model.clone().map(|own| scripted::of_perfect_sensors(&own)), model.clone()],
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
                     tools: GripperToolsSetup {

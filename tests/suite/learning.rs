@@ -3,8 +3,8 @@
 use crate::allocations::allocations_in;
 use crate::program::{json, refused, run};
 use palpate_lab::datasets::DatasetQuery;
-use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
 use palpate_learn::Shipped;
+use palpate_learn::network::{LiveMacroLayer, MacroLayer, MacroShape};
 use palpate_render::Picture;
 use palpate_sim::objects::catalogue;
 use palpate_store::Store;

@@ -12,7 +12,7 @@ use palpate_lab::grasping::{FrameReader, Identification, grasp};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
 use palpate_lab::recording::{Replay, TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
-use palpate_learn::{StopRule, Verdict, Shipped};
+use palpate_learn::{Shipped, StopRule, Verdict};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;

@@ -91,7 +91,7 @@ fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
             assert!(table.csv().lines().count() == table.rows.len() + 1, "{}", table.name);
         }
         assert!(report.tables.iter().any(|table| table.rows.iter().any(|row| !row.trials.is_empty())), "{}", card.key);
-        assert!(!report.findings.is_empty(), "{} has findings", card.key);
+        assert!(report.findings.is_empty() != card.is_of_the_paper(), "{} has findings", card.key);
         for finding in &report.findings {
             assert!(finding.section.starts_with('V') && !finding.why.is_empty(), "{finding:?}");
         }

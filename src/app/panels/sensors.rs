@@ -71,6 +71,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 let hint = match model {
                     SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
                     SensorModel::PhysicalLike => "Strips, pads and clock of a real gripper, with their noise and drift",
+                    SensorModel::Adapted => "The same, calibrated by one close of the empty hand",
                     SensorModel::Drawn => {
                         "Those of another gripper for each grasp, whose strips an empty close has calibrated"
                     }

@@ -10,7 +10,9 @@ use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{BendingZero, Calibration, EmptyClose, Point, Procedure, Record, SensorKind, Unsettled};
+use palpate_tactile::calibration::{
+    BendingZero, Calibration, EmptyClose, Point, Procedure, Record, SensorKind, Unsettled,
+};
 use std::collections::VecDeque;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -109,9 +111,8 @@ pub(in crate::cli) fn weigh(port: Option<&Path>, sensor: Sensor, kg: f64, auto: 
     let board = bench.board()?;
     let force = SensorKind::Pad.stimulus(kg);
     let procedure = Procedure::new(&board, sensor, "weighed", None);
-    let mut procedure = procedure
-        .ok_or_else(|| format!("the board has no channel \"{}\"", sensor.channel()))?
-        .with_plan(&[force]);
+    let mut procedure =
+        procedure.ok_or_else(|| format!("the board has no channel \"{}\"", sensor.channel()))?.with_plan(&[force]);
     if !auto {
         note(&format!("Press Enter once the weight lies on the {}.", sensor.label()));
     }

@@ -3,7 +3,7 @@
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
 use super::super::link;
-use super::super::recognise::{load_model_for_grippers, named, warn_of_perfect_sensors};
+use super::super::recognise::{load_model, named, warn_of_perfect_sensors};
 use super::super::setup::open_store;
 use super::super::terminal::{note, say, say_json, typed_lines, warn};
 use super::{DemoArguments, Touched, likely};
@@ -12,7 +12,7 @@ use palpate_lab::datasets::{SensorView, trial_signals};
 use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
-use palpate_learn::{OTHER, StopReason, StopRule};
+use palpate_learn::{OTHER, Shipped, StopReason, StopRule};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{class_of, titled};
 use palpate_store::Store;
@@ -55,7 +55,7 @@ struct GraspReport {
 pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) -> Result<(), Failure> {
     let scene = arguments.scene.scene(None)?;
     let truth = arguments.object.as_deref().map(|name| class_name(class_of(name))).transpose()?;
-    let model = Arc::new(load_model_for_grippers(arguments.model.as_deref())?);
+    let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::AnyGripper)?);
     warn_of_perfect_sensors(&model);
     let store = open_store(store)?;
     refuse_uncalibrated(&store, port)?;
@@ -113,7 +113,8 @@ fn refuse_uncalibrated(store: &Store, port: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let (missing, port) = (missing.join(", "), port.display());
-    Err(format!("not calibrated: {missing}. `palpate adapt --port {port}` does it by one close of the empty hand").into())
+    Err(format!("not calibrated: {missing}. `palpate adapt --port {port}` does it by one close of the empty hand")
+        .into())
 }
 
 fn wait_for_enter(keys: &std::sync::mpsc::Receiver<String>, stop: &AtomicBool) -> Result<(), Failure> {

@@ -8,6 +8,7 @@ use super::super::terminal::say;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::{ExchangeFormat, read_mcap};
 use palpate_lab::inspection::OpenOptions;
+use palpate_learn::Shipped;
 use palpate_store::{Import, Store, read_trials_csv};
 use palpate_tactile::trial::TrialId;
 use std::path::Path;
@@ -22,8 +23,9 @@ pub(super) fn export(
     sensors: SensorView,
 ) -> Result<(), Failure> {
     check_folder(out)?;
-    let model = Some(Arc::new(load_model(model)?));
-    let options = OpenOptions { sensors, model, ..OpenOptions::default() };
+    let [simulated, real] = Shipped::ALL.map(|shipped| load_model(model, shipped));
+    let (model, board_model) = (Some(Arc::new(simulated?)), Some(Arc::new(real?)));
+    let options = OpenOptions { sensors, model, board_model, ..OpenOptions::default() };
     let stop = stop_flag()?;
     format.write(store, ids, &options, out, &mut |_, _| !stop.load(Ordering::Relaxed))?;
     say(out.display())

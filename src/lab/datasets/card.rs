@@ -83,13 +83,14 @@ pub(super) fn card(
         (1, false) => "free",
         _ => "free and fixed",
     };
+    let built = if origins.iter().any(|origin| origin.built) { ", any build of the gripper" } else { "" };
     let only =
         |set: &BTreeSet<Option<&str>>| set.first().copied().flatten().filter(|_| set.len() == 1).map(str::to_owned);
     let seen = !simulated.is_empty();
     DataCard {
         collections: distinct.into_iter().flatten().cloned().collect(),
         preset: only(&presets),
-        object: object.to_owned(),
+        object: format!("{object}{built}"),
         grasps: rows.len(),
         layout: seen.then(|| view.layout.to_ascii_uppercase()),
         sensors: seen.then(|| view.sensors.name().to_owned()),

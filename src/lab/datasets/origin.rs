@@ -11,6 +11,8 @@ pub(super) struct TrialOrigin {
     pub(super) simulated: Option<(Option<&'static str>, bool)>,
     /// Calibrations of a recorded one.
     pub(super) calibrations: Vec<CalibrationId>,
+    /// The build of the gripper was drawn.
+    pub(super) built: bool,
     /// Group of similar poses.
     pub(super) pose: u32,
     /// Identity of the grasp before, if the object has stayed as that one released it.
@@ -23,7 +25,7 @@ impl TrialOrigin {
     /// Origin of a simulated trial.
     pub(super) fn simulated(header: &TrialHeader) -> Self {
         let scene = &header.scene;
-        let drawn_as = PoseSpread { between: Between::default(), ..scene.pose.clone() };
+        let drawn_as = PoseSpread { between: Between::default(), build: 0.0, ..scene.pose.clone() };
         let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
         // Early versions stored no predecessor; a random pose never shifts the object itself.
         let stayed = header.origin.is_none()
@@ -32,6 +34,7 @@ impl TrialOrigin {
             && scene.object.shift != [0.0; 2];
         Self {
             simulated: Some((preset, scene.holds_object())),
+            built: scene.pose.build > 0.0,
             pose: pose_group(scene),
             after: header.origin.as_ref().and_then(|origin| origin.after.clone()),
             stayed,

@@ -1,6 +1,7 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, and
-//! identification of an object by successive grasps.
+//! identification of an object by successive grasps. Adapting to a real gripper by one close of its empty hand.
 
+mod adaptation;
 mod agreement;
 mod collect;
 mod controller;
@@ -13,6 +14,7 @@ mod run;
 mod shuffled_objects;
 mod summary;
 
+pub use adaptation::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
 pub use agreement::{
     Agreed, EndState, Recompute, ends_alike, grasp_soundly, grasp_until_agreement, has_lost_object, until_agreement,
 };

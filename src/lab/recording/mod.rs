@@ -1,7 +1,6 @@
 //! Recording: one recorder thread for all trials, and the recording of a real grasp that the command line and the window
-//! share. Adapting to a gripper by a recorded close of its empty hand.
+//! share.
 
-mod adaptation;
 mod board_trial;
 mod board_writer;
 mod recent;
@@ -11,7 +10,6 @@ mod replay;
 #[cfg(test)]
 mod tests;
 
-pub use adaptation::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
 pub use board_trial::{BoardTrialRecording, TrialRequest};
 pub use board_writer::{BoardTrialPlan, RecordedTrial};
 pub use recent::RecentEvents;

@@ -2,7 +2,9 @@
 
 /// Scores of the shipped model, as the command that trained it measured and wrote them.
 pub(super) fn shipped_text() -> String {
-    let Ok(model) = palpate_learn::Shipped::PerfectSensors.model() else { return "The shipped model cannot be read.".to_owned() };
+    let Ok(model) = palpate_learn::Shipped::PerfectSensors.model() else {
+        return "The shipped model cannot be read.".to_owned();
+    };
     let (data, metrics) = (&model.card.data, &model.card.metrics);
     let percent = |value: &serde_json::Value| value.as_f64().map_or("-".to_owned(), |f1| format!("{:.1}", 100.0 * f1));
     format!(

@@ -397,8 +397,15 @@ impl Learned {
         };
         let epochs = if fitting.quick { 4 } else { Encoder::EPOCHS };
         let size = (self.steps.inputs(), 2 * MEASURES + shapes);
-        let training =
-            Training { size, sequences: used, epochs, start: None, batch: &batch, loss: &loss, progress: fitting.progress };
+        let training = Training {
+            size,
+            sequences: used,
+            epochs,
+            start: None,
+            batch: &batch,
+            loss: &loss,
+            progress: fitting.progress,
+        };
         Variables::trained(&training, fitting)
     }
 }
@@ -430,8 +437,8 @@ fn mean_of(rows: &[Vec<f32>]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::RngExt;
     use crate::conformance_tests::quick;
+    use rand::RngExt;
 
     /// The force grows faster the wider the object is, which noise hides at first; its shape shows in the other channel.
     fn touches(count: usize) -> Vec<Touch> {

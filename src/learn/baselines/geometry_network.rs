@@ -99,8 +99,12 @@ impl GeometryNetwork {
         let first = work.train(&of(false), 0.0).map_err(LearnError::failed)?;
         fitting.check()?;
         let calibrations = (0..STAGES).map(|stage| work.calibration(&first, &of(true), stage)).collect::<Result<_>>();
-        let learned =
-            Learned { steps, revision: Head::REVISION, epochs, calibrations: calibrations.map_err(LearnError::failed)? };
+        let learned = Learned {
+            steps,
+            revision: Head::REVISION,
+            epochs,
+            calibrations: calibrations.map_err(LearnError::failed)?,
+        };
         let all: Vec<usize> = (0..data.examples.len()).collect();
         let network = work.train(&all, 0.5).map_err(LearnError::failed)?;
         fitting.check()?;
@@ -183,7 +187,8 @@ impl Work<'_> {
         };
         let loss = |scores: &Tensor, group: &[usize]| {
             let y: Vec<u32> = group.iter().map(|k| class(k) as u32).collect();
-            let weight = |k: &usize| other.filter(|(other, _)| *other == class(k)).map_or(1.0, |(_, weight)| weight as f32);
+            let weight =
+                |k: &usize| other.filter(|(other, _)| *other == class(k)).map_or(1.0, |(_, weight)| weight as f32);
             let weights: Vec<f32> = group.iter().map(weight).collect();
             let total: f32 = weights.iter().sum();
             let y = Tensor::from_vec(y, (group.len(), 1), &Device::Cpu)?;
@@ -260,7 +265,8 @@ impl LiveRecogniser for Live {
         self.readings.t_s.push(t);
         self.readings.values.extend_from_slice(row);
         let felt = self.model.learned.steps.felt_at(t);
-        (felt > std::mem::replace(&mut self.felt, felt)).then(|| self.model.answer(&self.readings, self.before.as_ref()))
+        (felt > std::mem::replace(&mut self.felt, felt))
+            .then(|| self.model.answer(&self.readings, self.before.as_ref()))
     }
 
     fn finish(&mut self) -> Option<Verdict> {

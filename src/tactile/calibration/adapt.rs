@@ -55,7 +55,8 @@ impl EmptyHand<'_> {
         let mut moved: Vec<f64> = self.counts(sensor, self.readings).map(|counts| counts - rest).collect();
         moved.sort_by(f64::total_cmp);
         // One reading in fifty may be a fault of the line.
-        let farthest = *moved.get(moved.len() * 49 / 50).ok_or(CalibrationFault::NoReadings { sensor: sensor.label() })?;
+        let farthest =
+            *moved.get(moved.len() * 49 / 50).ok_or(CalibrationFault::NoReadings { sensor: sensor.label() })?;
         let bent: Vec<f64> =
             moved.iter().copied().filter(|own| *own >= BENT * farthest && *own <= farthest / BENT).collect();
         let bent_counts = rest + bent.get(bent.len() / 2).copied().unwrap_or_default();
@@ -163,7 +164,12 @@ mod tests {
         assert!(calibration.record.assumed);
         let readout = Readout::new(&board, &[(Sensor::FlexLeft, calibration)])?;
         let curvature = |k: usize| readout.estimate(&readings[k]).curvature[0].unwrap_or(f64::NAN);
-        assert!(curvature(5).abs() < 0.1 && (curvature(199) - 14.3).abs() < 0.15, "{} {}", curvature(5), curvature(199));
+        assert!(
+            curvature(5).abs() < 0.1 && (curvature(199) - 14.3).abs() < 0.15,
+            "{} {}",
+            curvature(5),
+            curvature(199)
+        );
         // Resistance is linear in the bend, so that half of it reads as half.
         assert!((curvature(75) - 7.15).abs() < 0.2, "{}", curvature(75));
         let still = hand.strip(Side::Right, "A2");

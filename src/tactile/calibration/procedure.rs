@@ -92,7 +92,15 @@ impl Procedure {
         Some(Self {
             sensor,
             column: board.channel_of(sensor)?,
-            record: Record { part, kind, input, points: Vec::new(), bending: None, assumed: false, note: String::new() },
+            record: Record {
+                part,
+                kind,
+                input,
+                points: Vec::new(),
+                bending: None,
+                assumed: false,
+                note: String::new(),
+            },
             left: plan(kind).into(),
             window: VecDeque::new(),
             silent: 0,

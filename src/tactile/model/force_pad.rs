@@ -29,7 +29,7 @@ const ANY_FULL: [f64; 2] = [0.2, 1.0];
 const ANY_BENDING: [f64; 2] = [0.005, 0.02];
 
 /// Curvature at the end of an empty close (1/m): that of the simulated finger at 1 bar.
-const CLOSED_EMPTY: f64 = 14.3;
+const CLOSED_EMPTY: f64 = 11.8;
 
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;

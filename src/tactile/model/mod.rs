@@ -51,6 +51,8 @@ pub enum SensorModel {
     Virtual,
     /// Such as the real gripper has: [`PhysicalLike`] with everything on.
     PhysicalLike,
+    /// The same after one close of the empty hand, by which [`crate::calibration::EmptyHand`] calibrates them.
+    Adapted,
     /// Such as any real gripper may have: parts and their mounting are drawn anew for each grasp, and one empty close is
     /// known. For training recognisers for grippers without labelled grasps.
     Drawn,
@@ -58,7 +60,7 @@ pub enum SensorModel {
 
 impl SensorModel {
     /// All.
-    pub const ALL: [Self; 3] = [Self::Virtual, Self::PhysicalLike, Self::Drawn];
+    pub const ALL: [Self; 4] = [Self::Virtual, Self::PhysicalLike, Self::Adapted, Self::Drawn];
     /// Those of one gripper, the clean one first.
     pub const BOTH: [Self; 2] = [Self::Virtual, Self::PhysicalLike];
 
@@ -67,6 +69,7 @@ impl SensorModel {
         match self {
             Self::Virtual => "virtual",
             Self::PhysicalLike => "physical-like",
+            Self::Adapted => "adapted",
             Self::Drawn => "drawn",
         }
     }
@@ -82,6 +85,7 @@ impl SensorModel {
         match self {
             Self::Virtual => clean.clone(),
             Self::PhysicalLike => PhysicalLike::default().apply(clean, seed),
+            Self::Adapted => PhysicalLike { closed_empty: true, ..PhysicalLike::default() }.apply(clean, seed),
             Self::Drawn => PhysicalLike::any(seed).apply(clean, seed),
         }
     }

@@ -1,5 +1,6 @@
 //! Sensors such as a real gripper has, each of their faults a switch.
 
+use super::streams::Stream;
 use serde::{Deserialize, Serialize};
 
 /// Default gripper whose parts are drawn: the first whose two whole-finger strips rise within
@@ -86,8 +87,10 @@ impl PhysicalLike {
         full_force: 0.3,
     };
 
-    /// Any gripper, with everything on: its parts and their mounting are drawn, and it has closed empty once.
+    /// Any gripper, with everything on: its parts and their mounting are drawn, and it has closed empty once. Every other
+    /// one closes in steps.
     pub fn any(gripper: u64) -> Self {
-        Self { gripper, drawn: true, closed_empty: true, ..Self::default() }
+        let stepping = Stream::new(gripper, "hand", "stepping").within(0.0, 1.0) < 0.5;
+        Self { gripper, stepping, drawn: true, closed_empty: true, ..Self::default() }
     }
 }

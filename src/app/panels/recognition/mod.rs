@@ -180,13 +180,15 @@ impl Part<'_, '_> {
         self.context.view.theme.colours()
     }
 
-    /// Picture of a class, or an empty frame.
+    /// Picture of a class, or a frame with a question mark.
     fn thumbnail(&self, ui: &Ui, class: &str, place: Rect) {
         match self.context.thumbnails.get(class) {
             Some(texture) => egui::Image::new(texture).corner_radius(3.0).paint_at(ui, place),
             None => {
                 let stroke = egui::Stroke::new(1.5, colour(self.colours().border));
                 ui.painter().rect_stroke(place.shrink(1.0), 3.0, stroke, egui::StrokeKind::Inside);
+                let (font, ink) = (FontId::proportional(0.7 * place.height()), colour(self.colours().quiet_text));
+                ui.painter().text(place.center(), Align2::CENTER_CENTER, "?", font, ink);
             }
         }
     }

@@ -64,7 +64,9 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
     let p = now.top().1;
     let certain = p >= view.rule.threshold;
     let grasp = format!("grasp {} of at most {most}", view.beliefs.len() + 1);
+    let is_other = view.labels.other() == Some(now.top().0);
     match view.decision {
+        Some(StopReason::Sure) if is_other => "none of the known objects: name it in the panel Label".to_owned(),
         Some(StopReason::Sure) if certain => format!("{} reaches the threshold of {threshold}", percent(p)),
         Some(StopReason::Sure) => format!("{} reached the former threshold", percent(p)),
         Some(StopReason::GraspLimit) => format!("grasp limit reached ({}): best guess", view.beliefs.len()),
@@ -91,7 +93,10 @@ pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
 
 /// Title of a class.
 pub(super) fn title(labels: &Labels, class: usize) -> String {
-    labels.classes.get(class).map_or_else(String::new, |class| object_title(&class.name))
+    labels.classes.get(class).map_or_else(String::new, |class| match class.name.as_str() {
+        OTHER => "Other object".to_owned(),
+        name => object_title(name),
+    })
 }
 
 /// Percentage without decimals.

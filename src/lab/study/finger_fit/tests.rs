@@ -108,7 +108,8 @@ impl Box4 {
         let points = plan(kind).into_iter().map(&mut point).collect();
         let input = Input::on(&Board::default(), sensor);
         let part = sensor.channel().to_owned();
-        Calibration::fit(Record { part, kind, input, points, bending: None, assumed: false, note: String::new() }).expect("sound")
+        Calibration::fit(Record { part, kind, input, points, bending: None, assumed: false, note: String::new() })
+            .expect("sound")
     }
 
     /// Clean signals through a board's converter and its calibrations.

@@ -173,7 +173,7 @@ pub(super) struct Pool {
 }
 
 /// Resamples of an interval: its ends vary between seeds by 2 % of its width.
-const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 1000, seed: 0 };
+pub(super) const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 1000, seed: 0 };
 
 /// One kind of model against another on the same trials.
 #[derive(Clone, Copy, Debug, PartialEq)]

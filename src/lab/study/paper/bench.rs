@@ -86,8 +86,6 @@ pub struct StudyBench<'a> {
     read: Mutex<Vec<(DataWanted, Arc<Dataset>)>>,
 }
 
-/// Seed of the poses of collected grasps: not one that settings were chosen with.
-const POSES: u64 = 7;
 /// Data sets kept in memory: as many as are in use at a time.
 const KEPT: usize = 4;
 
@@ -155,11 +153,11 @@ impl<'a> StudyBench<'a> {
         let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", wanted.preset)))?;
         let mut scene = Scene { pose: preset.poses(), ..wanted.scene.clone() };
         scene.object.fixed = wanted.fixed;
-        scene.pose.between = wanted.between;
+        (scene.pose.between, scene.pose.build) = (wanted.between, wanted.build);
         let objects = if wanted.objects.is_empty() { self.plan.objects() } else { wanted.objects.clone() };
         let plan = CollectionPlan {
             objects: objects.clone(),
-            ..CollectionPlan::of_all_objects(scene, wanted.grasps as u32, POSES)
+            ..CollectionPlan::of_all_objects(scene, wanted.grasps as u32, wanted.poses)
         };
         let report = collect(&plan, store, self.work.threads, &mut |made| {
             let (done, of) = (made.done as usize, made.of as usize);

@@ -27,7 +27,7 @@ pub fn stored_report(study: &dyn PaperStudy) -> Result<Option<StoredStudy<StudyR
 /// Sections of the manual that are written from the stored reports.
 pub(in crate::study) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let (mut parts, mut missing) = (Vec::new(), Vec::new());
-    for study in PAPER_STUDIES {
+    for study in PAPER_STUDIES.iter().filter(|study| study.card().is_of_the_paper()) {
         let card = study.card();
         match stored_report(*study)? {
             Some(stored) => {

@@ -1,4 +1,5 @@
-//! The paper's studies: each figure of its section V, and two of its future work, from one command each.
+//! The paper's studies: each figure of its section V, and two of its future work, from one command each; and what
+//! recognition reaches beyond the paper.
 //!
 //! A [`PaperStudy`] divides its work into units. A unit takes a data set from the [`StudyBench`] and returns a
 //! [`UnitResult`]; finished units are kept, so that a study that was stopped goes on where it stopped. From all units it
@@ -12,6 +13,7 @@ mod cases;
 mod claims;
 mod drawing;
 mod drift;
+mod emulated_grasps;
 mod folder;
 mod grasps;
 mod in_short;
@@ -20,6 +22,7 @@ mod modality;
 mod models;
 mod plan;
 mod pools;
+mod recognition;
 mod report;
 mod run;
 mod shaking;
@@ -55,6 +58,7 @@ pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
     &grasps::Grasps,
     &drift::Drift,
     &shaking::Shaken,
+    &recognition::Recognition,
 ];
 
 /// Finds a study by its key.
@@ -76,6 +80,16 @@ pub struct StudyCard {
     /// CPU time of the full form, without collecting grasps.
     pub budget: &'static str,
 }
+
+impl StudyCard {
+    /// True for a study that the paper has, or calls future work.
+    pub fn is_of_the_paper(&self) -> bool {
+        self.paper != OWN
+    }
+}
+
+/// Section of the paper of a study of our own methods.
+const OWN: &str = "none: our own methods";
 
 /// A unit of work of a study: the part of it that is computed at once and kept.
 #[derive(Clone, Debug)]

@@ -39,6 +39,10 @@ pub struct DataWanted {
     pub between: Between,
     /// Grasps of each object.
     pub grasps: usize,
+    /// Seed of the poses.
+    pub poses: u64,
+    /// How much the build of the gripper varies.
+    pub build: f64,
     /// Sensors.
     pub view: SensorView,
 }
@@ -67,6 +71,9 @@ pub struct StudyPlan {
     /// Seed of fits, splits and draws.
     pub seed: u64,
 }
+
+/// Seed of the poses of collected grasps: not one that settings were chosen with.
+pub(super) const POSES: u64 = 7;
 
 /// Preset of all studies: objects that lie on any of their faces.
 pub const STUDY_PRESET: &str = "B";
@@ -122,6 +129,8 @@ impl StudyPlan {
             fixed: false,
             between: Between::Reposed,
             grasps,
+            poses: POSES,
+            build: 0.0,
             view: SensorView { sensors, ..SensorView::default() },
         }
     }

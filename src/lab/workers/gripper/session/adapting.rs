@@ -1,7 +1,8 @@
 //! Adapting to the gripper by a close of its empty hand: a trial is recorded, and its readings become calibrations.
 
 use super::{GripperSession, open};
-use crate::recording::{AdaptError, Adaptation, AdaptedSensor, TrialRequest, mount_unnamed};
+use crate::grasping::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
+use crate::recording::TrialRequest;
 use crate::workers::Notice;
 use palpate_sim::objects::EMPTY;
 use palpate_store::Store;
