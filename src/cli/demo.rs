@@ -36,7 +36,7 @@ use std::sync::Arc;
   palpate demo
   palpate demo --object tomato --out pictures/
   palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json
-  palpate demo --port /dev/ttyACM0              after palpate adapt
+  palpate demo --port /dev/ttyACM0
   palpate demo --port /dev/ttyACM0 --object lemon
 
 See also: palpate help gripper")]
@@ -45,7 +45,7 @@ pub(super) struct DemoArguments {
     /// check the answer.
     #[arg(long, value_name = "NAME|FILE")]
     object: Option<String>,
-    /// Grasp with the real gripper on this port, whose trials are stored; needs calibrations, such as `palpate adapt` makes.
+    /// Grasp with the real gripper on this port, after `palpate adapt`; trials are stored.
     #[arg(long, value_name = "PORT", conflicts_with_all = ["as_released", "no_pictures", "no_store", "seed"])]
     port: Option<PathBuf>,
     #[command(flatten)]

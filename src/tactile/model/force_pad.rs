@@ -175,14 +175,14 @@ mod tests {
         assert!(thresholds.iter().any(|t| *t < 0.12) && thresholds.iter().any(|t| *t > 0.2));
         assert!(pads(true).iter().all(|pad| (0.2..=1.0).contains(&pad.pad.part.full)));
         let fired = |closed_empty| {
-            let reads = pads(closed_empty).into_iter().map(|mut pad| pad.read(0.0, 14.0));
+            let reads = pads(closed_empty).into_iter().map(|mut pad| pad.read(0.0, 11.0));
             reads.filter(|read| *read > 0.01).count()
         };
         assert!(fired(false) > 10 && fired(true) == 0, "{} {}", fired(false), fired(true));
-        assert_eq!(pad(&PhysicalLike::default(), 0).read(0.0, 14.0), 0.0);
+        assert_eq!(pad(&PhysicalLike::default(), 0).read(0.0, 11.0), 0.0);
         // Bending loads the pad below its threshold too, so that a light touch shows earlier, and less of it is known.
         let errors = |closed_empty| {
-            let off = |mut pad: ReadPad| (pad.read(0.15, 14.0) - 0.15 * pad.pad.part.reaching).abs();
+            let off = |mut pad: ReadPad| (pad.read(0.15, 11.0) - 0.15 * pad.pad.part.reaching).abs();
             pads(closed_empty).into_iter().map(off).sum::<f64>() / 40.0
         };
         assert!(errors(true) < 0.7 * errors(false), "{} {}", errors(true), errors(false));
