@@ -53,7 +53,7 @@ pub(crate) fn fnv_1a(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, mix)
 }
 
-/// Class of objects that are none of the other classes. Trees give it half of the prior, however many grasps it has.
+/// Class of objects that are none of the other classes. Methods that know it give it the prior of one class, however many grasps it has.
 pub const OTHER: &str = "other";
 
 /// Object class, with its size and shape class for stage one.

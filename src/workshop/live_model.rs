@@ -66,17 +66,14 @@ impl Recipe {
         let scene = Scene { pose, ..Scene::default() };
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let mut plan = CollectionPlan::of_all_objects(scene, self.trials[set], SEEDS[set]);
-        let mut collected = |plan: &CollectionPlan| -> Result<Dataset, Failure> {
-            let report = collect(plan, store, threads, &mut |_| ControlFlow::Continue(()))?;
-            let source = DatasetQuery { collection: Some(report.collection), ..DatasetQuery::default() };
-            Ok(source.read(store, &self.view, &mut |_, _| ())?)
-        };
-        let known = collected(&plan)?;
-        if set == 1 || self.others.is_empty() {
-            return Ok(known);
+        let mut collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
+        if set == 0 && !self.others.is_empty() {
+            // Plans that differ in objects alone make one collection.
+            (plan.objects, plan.trials) = (random_shapes(self.others.clone()), 1);
+            collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
         }
-        (plan.objects, plan.trials) = (random_shapes(self.others.clone()), 1);
-        Ok(known.with_class_of(&collected(&plan)?))
+        let source = DatasetQuery { collection: Some(collection), ..DatasetQuery::default() };
+        Ok(source.read(store, &self.view, &mut |_, _| ())?)
     }
 }
 

@@ -451,7 +451,11 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     assert_eq!(twin.gripper.finger.bending_stiffness, stiffness);
     let found = run(at, &["recognise", "1", "2", "--model", &model]);
     assert!(found.code == Some(0) && found.out.contains("bigball") && found.err.is_empty(), "{found:?}");
+    // The shipped model for any gripper, and the one for perfect sensors.
     let found = run(at, &["recognise", "1"]);
+    assert!(found.code == Some(0) && found.err.is_empty(), "{found:?}");
+    let perfect = concat!(env!("CARGO_MANIFEST_DIR"), "/models/live.safetensors");
+    let found = run(at, &["recognise", "1", "--model", perfect]);
     assert!(found.code == Some(0) && found.err.contains("knows perfect sensors only"), "{found:?}");
     // Every calibration of a trial must be named: one of four is not enough, and the reason says so.
     let one = ["train", "knn", "--calibration", "1", "--include-flagged", "--out", "m.safetensors"];

@@ -99,13 +99,12 @@ fn until_open(bench: &mut Bench) -> i64 {
 #[test]
 fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     let mut bench = bench(Theme::Dark, [1600.0, 1800.0], |_| ());
-    bench.until_shown(true, "no figures yet");
-    bench.until_shown(true, "not run");
+    bench.until_shown(true, "not run here; result of the program");
     bench.tell(request(false));
     bench.until_shown(true, "measuring, ");
     bench.harness.get_by_label("Stop study").click();
     bench.until_told("Study stopped: ");
-    bench.until_shown(true, "stopped, can be resumed");
+    bench.until_shown(true, "result of the program, another stopped");
     bench.tell(request(false));
     bench.until_told("Study finished: ");
     bench.until_shown(true, "A short form: do not quote its numbers.");

@@ -1,13 +1,13 @@
 //! A classifier that starts from the geometry encoder: what was learned of random shapes is fine-tuned to the classes. It
 //! answers from the beginning of a grasp on, like the encoder.
 //!
-//! The class "other" has half of the prior, as with trees.
+//! The class "other" has half of the prior while training, as with trees.
 
 use super::candle_network::{CandleNetwork, Pass, STEPS, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{Columns, FeltSteps, STAGES, Views, end_of_stage, stage_of};
 use super::geometry::{GeometryEncoder, Shipped};
-use super::other::{combined, other_weight};
+use super::other::{as_one_of_many, other_weight};
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
@@ -152,8 +152,8 @@ impl Fitted {
         let views = self.learned.steps.views(&self.columns.pick(grasp));
         // Shapes were checked when the network was made, so that no grasp should make it fail.
         let pmf = uncalibrated(&self.network, &views).unwrap_or_else(|_failed| Pmf::uniform(self.classes));
-        let pmf = self.learned.calibrations[stage_of(views.felt)].apply(&pmf);
-        let pmf = before.map_or_else(|| pmf.clone(), |before| combined(before, &pmf, self.other));
+        let pmf = as_one_of_many(&self.learned.calibrations[stage_of(views.felt)].apply(&pmf), self.other);
+        let pmf = before.map_or_else(|| pmf.clone(), |before| before.times(&pmf));
         Verdict { pmf, properties: None }
     }
 }

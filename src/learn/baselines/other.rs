@@ -1,4 +1,4 @@
-//! The class "other": half of the prior, however many grasps it has, and once over several grasps of one object.
+//! The class "other": half of the prior while training, however many grasps it has, and that of one class in answers.
 
 use crate::data::Dataset;
 use crate::pmf::Pmf;
@@ -11,10 +11,11 @@ pub(super) fn other_weight(data: &Dataset, classes: &[usize]) -> Option<(usize, 
     (own > 0 && rest > 0).then(|| (other, rest as f64 / own as f64))
 }
 
-/// Combines the answers to two grasps. The prior of the class "other" counts once.
-pub(super) fn combined(before: &Pmf, now: &Pmf, other: Option<usize>) -> Pmf {
-    let Some(other) = other else { return before.times(now) };
-    let rest = now.classes().saturating_sub(1).max(1) as f64;
-    let weights = now.probabilities().iter().enumerate();
-    before.times(&Pmf::from_weights(weights.map(|(class, p)| if class == other { p / rest } else { *p })))
+/// An answer with the prior of training, in which "other" has as much as all known classes together, as one in which it has
+/// as much as each of them: few people put mostly unknown objects into the hand. Grasps are then combined as usual.
+pub(super) fn as_one_of_many(pmf: &Pmf, other: Option<usize>) -> Pmf {
+    let Some(other) = other else { return pmf.clone() };
+    let rest = pmf.classes().saturating_sub(1).max(1) as f64;
+    let weights = pmf.probabilities().iter().enumerate();
+    Pmf::from_weights(weights.map(|(class, p)| if class == other { p / rest } else { *p }))
 }

@@ -28,7 +28,7 @@ const CARD: StudyCard = StudyCard {
     title: "Comparison of methods",
     about: "all methods on the same grasps: macro F1 and accuracy, paired differences, cost of training and answers",
     paper: "Fig. 7",
-    budget: "about 80 CPU minutes",
+    budget: "about 100 CPU minutes",
 };
 
 /// A unit: a method fitted to one kind of data and judged on one part.
