@@ -111,19 +111,19 @@ impl Adaptation {
         let parts = store.calibrations().mounted()?;
         let serving = store.calibrations().serving(None, &[])?;
         let measured = serving.calibrations.into_iter().filter(|(_, own)| !own.record.assumed && !replace);
-        Ok(Self::new(&log, scene, &parts, measured.collect(), weights))
+        Ok(Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights))
     }
 
     /// The same by readings that are not stored, of parts without names.
     pub fn of_log(log: &BoardLog, scene: &Scene) -> Self {
-        Self::new(log, scene, &[const { None }; 4], Vec::new(), [None; 2])
+        Self::new(log, scene, &[const { None }; 4], &[], [None; 2])
     }
 
     fn new(
         log: &BoardLog,
         scene: &Scene,
         parts: &[Option<String>; 4],
-        measured: Vec<(Sensor, Calibration)>,
+        measured: &[(Sensor, Calibration)],
         weights: [Option<KnownWeight>; 2],
     ) -> Self {
         let mut scene = scene.clone();
