@@ -536,7 +536,7 @@ mod tests {
         let answers: Vec<Pmf> = (0..100).map(|_| model.recognise(&grasp(), None).pmf).collect();
         let mean = Pmf::mean(&answers).expect("has answers");
         let mean = mean.probabilities();
-        // By their number alone they would have 0.8.
-        assert!(mean.iter().all(|p| (p - 1.0 / 3.0).abs() < 0.09), "{mean:?}");
+        // A third each, less the doubt that calibration mixes in; by their number alone the others would have 0.8.
+        assert!((0.2..0.4).contains(&mean[2]) && (mean[0] - mean[1]).abs() < 0.08, "{mean:?}");
     }
 }
