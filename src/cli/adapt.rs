@@ -8,7 +8,7 @@ use super::setup::{open_store, within};
 use super::terminal::{note, say, say_json, table, warn};
 use palpate_device::serial::LinkOptions;
 use palpate_geometry::units::three_digits;
-use palpate_lab::grasping::{Adaptation, AdaptedSensor, mount_unnamed};
+use palpate_lab::grasping::{Adaptation, AdaptedSensor};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
 use palpate_sim::objects::EMPTY;
@@ -88,7 +88,6 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
         None => Scene::default(),
     };
     let store = open_store(store)?;
-    mount_unnamed(&store)?;
     let mut weights = [None; 2];
     if let Some(kg) = arguments.weight {
         for (weight, sensor) in weights.iter_mut().zip([Sensor::PadLeft, Sensor::PadRight]) {
@@ -142,11 +141,9 @@ fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Path) -> Resul
 
 /// A calibration in a few words.
 fn about(sensor: &AdaptedSensor) -> String {
-    let Some(calibration) = sensor.calibration() else {
-        return match sensor {
-            AdaptedSensor::Failed(fault) => fault.to_string(),
-            AdaptedSensor::Kept(_) | AdaptedSensor::Adapted(_) => String::new(),
-        };
+    let calibration = match sensor {
+        AdaptedSensor::Failed(fault) => return fault.to_string(),
+        AdaptedSensor::Kept(calibration) | AdaptedSensor::Adapted(calibration) => calibration,
     };
     match &calibration.curve {
         Curve::Flex(curve) => {

@@ -310,9 +310,14 @@ impl std::fmt::Display for Touched {
     }
 }
 
+/// `1 grasp`, `2 grasps`.
+fn grasps_in_words(count: usize) -> String {
+    if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") }
+}
+
 fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
     let count = report.grasps.len();
-    let grasps = if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") };
+    let grasps = grasps_in_words(count);
     let right = if report.decided == report.truth { "Correct" } else { "Wrong" };
     let [decided, true_object] = [&report.decided, &report.truth].map(|name| titled(name));
     say("")?;

@@ -43,7 +43,7 @@ pub(super) struct DataArguments {
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
     /// With --sensors drawn: number of grippers that read each grasp for training.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64), requires = "sensors")]
     draws: u32,
     /// Read the readings at this rate (Hz; default: as they were sampled).
     #[arg(long, value_name = "HZ", value_parser = within(1.0..=10_000.0))]

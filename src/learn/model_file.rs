@@ -2,7 +2,7 @@
 //! people.
 
 use crate::baselines::Shipped;
-use crate::data::{Class, Labels};
+use crate::data::{Class, Labels, fnv_1a};
 use crate::methods::method;
 use crate::model::{LoadError, Model, ModelCard, ModelError};
 use crate::signatures::Signatures;
@@ -24,11 +24,19 @@ impl Shipped {
 
     /// The model of the sixteen objects and the empty hand.
     pub fn model(self) -> Result<Model, ModelError> {
-        let bytes: &[u8] = match self {
+        Model::from_bytes(&format!("models/{}", self.model_file()), self.model_bytes())
+    }
+
+    /// Hash of the model's file, by which results of another one are told apart.
+    pub fn model_content(self) -> u64 {
+        fnv_1a(self.model_bytes().iter().copied())
+    }
+
+    fn model_bytes(self) -> &'static [u8] {
+        match self {
             Self::PerfectSensors => include_bytes!("../../models/live.safetensors"),
             Self::AnyGripper => include_bytes!("../../models/any-gripper.safetensors"),
-        };
-        Model::from_bytes(&format!("models/{}", self.model_file()), bytes)
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use super::super::link;
 use super::super::recognise::{load_model, named, warn_of_perfect_sensors};
 use super::super::setup::open_store;
 use super::super::terminal::{note, say, say_json, typed_lines, warn};
-use super::{DemoArguments, Touched, likely};
+use super::{DemoArguments, Touched, grasps_in_words, likely};
 use palpate_device::serial::LinkOptions;
 use palpate_lab::datasets::{SensorView, trial_signals};
 use palpate_lab::grasping::{Identification, Row};
@@ -27,6 +27,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+/// Answer to Ctrl+C.
+const STOPPED: &str = "stopped; the trials so far are stored";
 /// Time between two looks at the keyboard.
 const POLL: Duration = Duration::from_millis(50);
 
@@ -79,7 +81,7 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
         let request = TrialRequest { object: truth.clone(), control: Control::Driven, length_s: None, adds };
         let recording = record(&mut gripper, &scene, request, store.path().to_owned(), &stop, &mut |_progress| ())?;
         if stop.load(Ordering::Relaxed) {
-            return Err("stopped; the trials so far are stored".into());
+            return Err(STOPPED.into());
         }
         if let Some(cause) = recording.aborted {
             return Err(format!("the hand did not close: {cause}").into());
@@ -124,7 +126,7 @@ fn wait_for_enter(keys: &std::sync::mpsc::Receiver<String>, stop: &AtomicBool) -
             Ok(_line) => return Ok(()),
             Err(RecvTimeoutError::Timeout) if !stop.load(Ordering::Relaxed) => {}
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
-                return Err("stopped; the trials so far are stored".into());
+                return Err(STOPPED.into());
             }
         }
     }
@@ -155,7 +157,7 @@ fn print_grasp(number: usize, report: &GraspReport) -> Result<(), Failure> {
 
 fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
     let count = report.grasps.len();
-    let grasps = if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") };
+    let grasps = grasps_in_words(count);
     let decided = titled(&report.decided);
     let found = match stopped {
         _ if report.decided == OTHER => format!("None of the known objects, after {grasps}."),

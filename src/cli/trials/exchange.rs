@@ -23,8 +23,9 @@ pub(super) fn export(
     sensors: SensorView,
 ) -> Result<(), Failure> {
     check_folder(out)?;
-    let [simulated, real] = Shipped::ALL.map(|shipped| load_model(model, shipped));
-    let (model, board_model) = (Some(Arc::new(simulated?)), Some(Arc::new(real?)));
+    let own = Arc::new(load_model(model, Shipped::PerfectSensors)?);
+    let board_model = if model.is_some() { Arc::clone(&own) } else { Arc::new(Shipped::AnyGripper.model()?) };
+    let (model, board_model) = (Some(own), Some(board_model));
     let options = OpenOptions { sensors, model, board_model, ..OpenOptions::default() };
     let stop = stop_flag()?;
     format.write(store, ids, &options, out, &mut |_, _| !stop.load(Ordering::Relaxed))?;

@@ -94,7 +94,7 @@ pub(super) fn card(
         grasps: rows.len(),
         layout: seen.then(|| view.layout.to_ascii_uppercase()),
         sensors: seen.then(|| view.sensors.name().to_owned()),
-        draws: (seen && view.draws > 1).then_some(view.draws),
+        draws: (seen && view.readers() > 1).then(|| view.readers()),
         signals: seen.then(|| view.signals.name().to_owned()),
         rate_hz: view.rate_hz,
         cut: (view.cut != Cut::default()).then(|| view.cut.to_string()),

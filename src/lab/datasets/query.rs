@@ -416,6 +416,11 @@ impl SensorView {
         Self { signals, ..self }
     }
 
+    /// Number of grippers that read each grasp: one, unless they are drawn.
+    pub fn readers(&self) -> u32 {
+        if self.sensors == SensorModel::Drawn { self.draws.max(1) } else { 1 }
+    }
+
     /// True for sensors such as a real gripper has.
     pub fn is_physical(&self) -> bool {
         self.sensors != SensorModel::Virtual
@@ -451,12 +456,11 @@ impl SensorView {
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         let seed = noise_seed(&trial.header);
-        let draws = if self.sensors == SensorModel::Drawn { self.draws.max(1) } else { 1 };
         let read = |draw: u32| {
             let seed = seed.wrapping_add(u64::from(draw).wrapping_mul(NEXT_DRAW));
             resampled(self.sensors.apply(&clean, seed).until(self.cut.end(end)), self.rate_hz)
         };
-        Ok((0..draws).map(read).collect())
+        Ok((0..self.readers()).map(read).collect())
     }
 }
 

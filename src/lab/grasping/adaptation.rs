@@ -1,5 +1,4 @@
-//! Adapting to a real gripper without labels: what one close of its empty hand tells of its sensors, kept as calibrations of
-//! its parts. Afterwards its readings are those that a recogniser for any gripper has learned.
+//! Adapting to a real gripper without labels: calibrations of its parts from one close of its empty hand. Afterwards its readings are those that a recogniser for any gripper has learned.
 
 use super::run::grasp;
 use palpate_sim::gripper::Side;
@@ -37,7 +36,7 @@ impl AdaptedSensor {
     }
 }
 
-/// What an empty close told of a gripper.
+/// Calibrations of a gripper from a close of its empty hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adaptation {
     /// Each sensor, in the order of [`Sensor::ALL`].
@@ -75,17 +74,6 @@ pub enum AdaptError {
 /// Name of a part that nobody has named.
 fn unnamed(sensor: Sensor) -> String {
     format!("unnamed {}", sensor.label())
-}
-
-/// Mounts a part in each place that has none, so that trials know what they were recorded with.
-pub fn mount_unnamed(store: &Store) -> Result<(), StoreError> {
-    let mounted = store.calibrations().mounted()?;
-    for (sensor, part) in Sensor::ALL.into_iter().zip(mounted) {
-        if part.is_none() {
-            store.calibrations().mount(sensor, &unnamed(sensor))?;
-        }
-    }
-    Ok(())
 }
 
 impl Adaptation {

@@ -14,7 +14,7 @@ mod run;
 mod shuffled_objects;
 mod summary;
 
-pub use adaptation::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
+pub use adaptation::{AdaptError, Adaptation, AdaptedSensor};
 pub use agreement::{
     Agreed, EndState, Recompute, ends_alike, grasp_soundly, grasp_until_agreement, has_lost_object, until_agreement,
 };

@@ -275,7 +275,7 @@ impl Work<'_> {
                     None => x.extend_from_slice(&sequences[*k]),
                 }
             }
-            add_noise::<N>(&mut x, random);
+            add_noise(&mut x, N::NOISE, random);
             x
         };
         let loss = |scores: &Tensor, group: &[usize]| {
@@ -351,9 +351,9 @@ impl<N: CandleNetwork> Variables<N> {
     }
 }
 
-/// Adds the noise of training. Uniform noise of unit deviation reaches to the root of three.
-pub(super) fn add_noise<N: CandleNetwork>(x: &mut [f32], random: &mut ChaCha8Rng) {
-    x.iter_mut().for_each(|x| *x += N::NOISE * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0));
+/// Adds noise of a deviation. Uniform noise of unit deviation reaches to the root of three.
+pub(super) fn add_noise(x: &mut [f32], deviation: f32, random: &mut ChaCha8Rng) {
+    x.iter_mut().for_each(|x| *x += deviation * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0));
 }
 
 /// Number of sequences per optimiser step, for steps of nearly equal size. No step has one sequence alone, which

@@ -1,9 +1,10 @@
 //! Inputs of networks that answer from the beginning of a grasp on: time steps of which only the first have been felt.
 
-use super::candle_network::{STEPS, mirror_of_inputs, mirrored};
+use super::candle_network::{STEPS, add_noise, mirror_of_inputs, mirrored};
 use crate::data::{Dataset, Sequence};
 use crate::gaps;
 use crate::network::Preparation;
+use candle_core::{Device, Result, Tensor};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,7 @@ pub(super) struct FeltSteps {
 
 /// A grasp as inputs: `[inputs][STEPS]` for the grasp and, where there is one, its mirror image. Steps that have not been
 /// felt are zero; the last input is 1 for those that have.
+#[derive(Clone)]
 pub(super) struct Views {
     pub(super) inputs: Vec<Vec<f32>>,
     /// Number of steps felt.
@@ -86,13 +88,17 @@ impl Views {
         self
     }
 
+    /// All views, `[views][inputs][STEPS]`.
+    pub(super) fn tensor(&self) -> Result<Tensor> {
+        let inputs = self.inputs.first().map_or(0, Vec::len) / STEPS;
+        Tensor::from_vec(self.inputs.concat(), (self.inputs.len(), inputs, STEPS), &Device::Cpu)
+    }
+
     /// One view for training, with noise of some deviation: of the grasp or its mirror image; one in two ends early.
     pub(super) fn drawn(&self, noise: f32, random: &mut ChaCha8Rng) -> Vec<f32> {
         let mut view = self.inputs[random.random_range(0..self.inputs.len())].clone();
         let readings = view.len() - STEPS;
-        // Uniform noise of unit deviation reaches to the root of three.
-        let mut draw = || noise * 3.0_f32.sqrt() * (2.0 * random.random::<f32>() - 1.0);
-        view[..readings].iter_mut().for_each(|x| *x += draw());
+        add_noise(&mut view[..readings], noise, random);
         let ends_early = random.random::<bool>() && self.felt > LEAST_FELT;
         let felt = if ends_early { random.random_range(LEAST_FELT..self.felt) } else { self.felt };
         forget_after(&mut view, felt);

@@ -4,7 +4,7 @@
 //! It answers from the beginning of a grasp too: half of the training grasps end early, and one input says which steps have
 //! been felt.
 
-use super::candle_network::{CandleNetwork, Pass, STEPS, Training, Variables};
+use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{FeltSteps, LEAST_FELT, STAGES, Views, end_of_stage, stage_of};
 use super::measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
@@ -307,9 +307,7 @@ impl GeometryEncoder {
     }
 
     fn outputs(&self, views: &Views) -> Result<Outputs> {
-        let x: Vec<f32> = views.inputs.iter().flatten().copied().collect();
-        let x = Tensor::from_vec(x, (views.inputs.len(), self.learned.steps.inputs(), STEPS), &Device::Cpu)?;
-        let inner = self.network.network.trunk.forward(&x, 0.0, &mut Pass::answering())?;
+        let inner = self.network.network.trunk.forward(&views.tensor()?, 0.0, &mut Pass::answering())?;
         let outer = self.network.network.last.forward(&inner)?;
         Ok(Outputs { inner: inner.to_vec2()?, outer: outer.to_vec2()? })
     }

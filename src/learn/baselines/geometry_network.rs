@@ -3,7 +3,7 @@
 //!
 //! The class "other" has half of the prior while training, as with trees.
 
-use super::candle_network::{CandleNetwork, Pass, STEPS, Training, Variables};
+use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{Columns, FeltSteps, STAGES, Views, end_of_stage, stage_of};
 use super::geometry::{GeometryEncoder, Shipped};
@@ -160,10 +160,7 @@ impl Fitted {
 
 /// Mean of the logarithms of the probabilities over a grasp and its mirror image.
 fn uncalibrated(network: &Variables<Head>, views: &Views) -> Result<Pmf> {
-    let inputs = views.inputs.first().map_or(0, Vec::len) / STEPS;
-    let x: Vec<f32> = views.inputs.iter().flatten().copied().collect();
-    let x = Tensor::from_vec(x, (views.inputs.len(), inputs, STEPS), &Device::Cpu)?;
-    let scores = network.network.scores(&x, &mut Pass::answering())?;
+    let scores = network.network.scores(&views.tensor()?, &mut Pass::answering())?;
     let logarithms = candle_nn::ops::log_softmax(&scores, D::Minus1)?.mean(0)?.to_vec1::<f32>()?;
     Ok(Pmf::from_scores(logarithms.into_iter().map(f64::from)))
 }
@@ -213,8 +210,10 @@ impl Work<'_> {
     /// Calibration at a stage of a grasp, on held-out grasps.
     fn calibration(&self, network: &Variables<Head>, held_out: &[usize], stage: usize) -> Result<Calibration> {
         let answer = |k: &usize| {
-            let views = Views { inputs: self.views[*k].inputs.clone(), felt: self.views[*k].felt };
-            Ok((uncalibrated(network, &views.until(end_of_stage(stage)))?, self.data.examples[*k].class))
+            Ok((
+                uncalibrated(network, &self.views[*k].clone().until(end_of_stage(stage)))?,
+                self.data.examples[*k].class,
+            ))
         };
         let answers: Vec<(Pmf, usize)> = held_out.iter().map(answer).collect::<Result<_>>()?;
         let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();

@@ -180,6 +180,11 @@ impl Part<'_, '_> {
         self.context.view.theme.colours()
     }
 
+    /// True for a model from perfect sensors on a real gripper.
+    fn is_foreign(&self) -> bool {
+        self.view.from_perfect_sensors && self.context.shown().board().is_some()
+    }
+
     /// Picture of a class, or a frame with a question mark.
     fn thumbnail(&self, ui: &Ui, class: &str, place: Rect) {
         match self.context.thumbnails.get(class) {
@@ -220,7 +225,7 @@ impl Part<'_, '_> {
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
-        let is_foreign = self.view.from_perfect_sensors && self.context.shown().board().is_some();
+        let is_foreign = self.is_foreign();
         let why = if is_foreign { FOREIGN.to_owned() } else { reason(self.view, self.recognised) };
         let ink = colour(if is_foreign { colours.warning } else { colours.quiet_text });
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);

@@ -2,7 +2,7 @@
 
 use super::bench::{StudyBench, StudyError};
 use super::plan::{DataWanted, StudyPlan};
-use palpate_learn::evaluation::answer;
+use palpate_learn::evaluation::{Answers, answer};
 use palpate_learn::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, McNemar};
 use palpate_learn::{Dataset, Method, Model, SplitError, SplitPlan};
 use palpate_tactile::model::SensorModel;
@@ -125,8 +125,11 @@ fn file_size(model: &Model) -> usize {
 
 /// A model's answers to test grasps.
 pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
-    let recogniser = model.recogniser.as_ref();
-    let answers = answer(recogniser, test);
+    judge_answers(model, test, &answer(model.recogniser.as_ref(), test))
+}
+
+/// The same from the answers.
+pub(super) fn judge_answers(model: &Model, test: &Dataset, answers: &Answers) -> ModelAnswers {
     let samples: usize = test.examples.iter().map(|example| example.grasp.len()).sum();
     let probabilities: Vec<Vec<f64>> = answers.verdicts.iter().map(|v| v.pmf.probabilities().to_vec()).collect();
     let forecasts = Forecasts::new(&answers.truth, &probabilities);
@@ -143,7 +146,7 @@ pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
             bytes: file_size(model),
             parameters: model.card.parameters,
         },
-        truth: answers.truth,
+        truth: answers.truth.clone(),
     }
 }
 

@@ -160,9 +160,12 @@ fn zeroed(data: &Dataset) -> Dataset {
     })
 }
 
-/// Readings of the same simulated grasps by real sensors, with or without hysteresis; none where one is not simulated.
-fn read_again(bench: &StudyBench<'_>, data: &Dataset, hysteresis: bool) -> Result<Option<Dataset>, StudyError> {
-    let settings = PhysicalLike { hysteresis, ..PhysicalLike::default() };
+/// Readings of the same simulated grasps by real sensors with these faults; none where one is not simulated.
+pub(super) fn read_again(
+    bench: &StudyBench<'_>,
+    data: &Dataset,
+    settings: &PhysicalLike,
+) -> Result<Option<Dataset>, StudyError> {
     let mut read = Vec::new();
     for example in &data.examples {
         let Some(trial) = bench.simulated(example.id)? else { return Ok(None) };
@@ -223,7 +226,9 @@ impl CaseStudy for Drift {
             }
             Case::Hysteresis { method, part } => {
                 let Some(data) = bench.data(&usual_grasps(plan, SensorModel::PhysicalLike))? else { return Ok(None) };
-                let read = [read_again(bench, &data, false)?, read_again(bench, &data, true)?];
+                let read =
+                    |hysteresis| read_again(bench, &data, &PhysicalLike { hysteresis, ..PhysicalLike::default() });
+                let read = [read(false)?, read(true)?];
                 let [Some(without), Some(with)] = read else {
                     return Err(StudyError::Missing("simulated grasps".to_owned()));
                 };

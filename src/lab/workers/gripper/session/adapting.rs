@@ -1,7 +1,7 @@
 //! Adapting to the gripper by a close of its empty hand: a trial is recorded, and its readings become calibrations.
 
 use super::{GripperSession, open};
-use crate::grasping::{AdaptError, Adaptation, AdaptedSensor, mount_unnamed};
+use crate::grasping::{AdaptError, Adaptation, AdaptedSensor};
 use crate::recording::TrialRequest;
 use crate::workers::Notice;
 use palpate_sim::objects::EMPTY;
@@ -12,10 +12,6 @@ use palpate_tactile::trial::{Control, TrialId};
 impl GripperSession {
     /// Records a close of the empty hand.
     pub(super) fn adapt(&mut self, control: Control) {
-        let mounted = open(&mut self.store, &self.path).and_then(|store| mount_unnamed(store));
-        if let Err(cause) = mounted {
-            return self.outlets.notify(Notice::Failed(format!("not adapted: {cause}")));
-        }
         let begun = self.begun;
         self.begin(TrialRequest { object: Some(EMPTY.to_owned()), control, length_s: None, adds: false }, None);
         self.adapting = self.begun > begun;
@@ -36,7 +32,7 @@ impl GripperSession {
             Ok(adaptation) => {
                 self.read_calibrations();
                 adaptation.warnings.iter().for_each(|text| self.outlets.notify(Notice::Warning(text.clone())));
-                self.outlets.notify(told(&adaptation));
+                self.outlets.notify(notice_of(&adaptation));
             }
             Err(cause) => self.outlets.notify(Notice::Failed(format!("not adapted: {cause}"))),
         }
@@ -44,7 +40,7 @@ impl GripperSession {
 }
 
 /// What was found and assumed, in a sentence.
-fn told(adaptation: &Adaptation) -> Notice {
+fn notice_of(adaptation: &Adaptation) -> Notice {
     let sensors = || Sensor::ALL.into_iter().zip(&adaptation.sensors);
     let failed = sensors().find_map(|(sensor, adapted)| match adapted {
         AdaptedSensor::Failed(fault) => Some(format!("The {} is not calibrated: {fault}", sensor.label())),

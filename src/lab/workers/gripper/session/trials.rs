@@ -168,6 +168,7 @@ impl GripperSession {
 
     /// The trial cannot be recorded any further. Driven fingers are not left under pressure.
     fn stop_recording(&mut self, cause: &str) {
+        self.adapting = false;
         if self.ending.pop_front().is_some() {
             return self.outlets.notify(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
         }
@@ -176,7 +177,6 @@ impl GripperSession {
         if let Some(Err(error)) = vented {
             self.outlets.notify(Notice::Failed(format!("{error}; the board vents within a second")));
         }
-        self.adapting = false;
         self.start_over();
         self.begin_stretch(0.0);
         self.outlets.notify(Notice::Failed(format!("recording stopped; readings so far are stored: {cause}")));

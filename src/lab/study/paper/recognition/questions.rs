@@ -1,0 +1,204 @@
+//! What is asked: grasps, sensors, models and targets of each row.
+
+use super::super::plan::{DataWanted, StudyPlan};
+use palpate_learn::Shipped;
+use palpate_tactile::SignalDefinition;
+use palpate_tactile::model::SensorModel;
+
+/// Seed of the poses of grasps that judge.
+pub(super) const JUDGED: u64 = 8;
+/// Grasps of each object that judge.
+pub(super) const TESTED: usize = 100;
+/// Training draws.
+const DRAWS: usize = 5;
+
+/// What a model learns from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::study::paper) enum Learns {
+    /// So many grasps of each object like those that it is judged on.
+    Like { of_each: usize, draws: usize },
+    /// The same with labels in random order, a control.
+    Shuffled { of_each: usize },
+    /// It comes with the program.
+    Shipped(Shipped),
+}
+
+/// How the grasps that judge are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::study::paper) enum Reads {
+    /// Through sensors of a gripper of this build: 0 that of the scene, 1 any.
+    Sensors { sensors: SensorModel, build: f64 },
+    /// Through the contact pressure, which only simulations have.
+    Contact,
+    /// Through sensors that only slip, drift and are noisy.
+    MildNoise,
+    /// By emulated grippers.
+    Emulated,
+}
+
+/// A row of the table.
+pub(in crate::study::paper) struct Question {
+    pub(super) name: &'static str,
+    pub(super) preset: &'static str,
+    pub(super) fixed: bool,
+    pub(super) learns: Learns,
+    pub(super) reads: Reads,
+    /// Methods; that of the shipped model where it is judged.
+    pub(super) methods: &'static [&'static str],
+    /// F1 to reach after one grasp and after three, and beyond that.
+    pub(super) targets: [[Option<f64>; 2]; 2],
+}
+
+const TREES: &[&str] = &["extra-trees", "geometry-trees"];
+const ALL: &[&str] = &["extra-trees", "geometry-trees", "geometry-network"];
+const VIRTUAL: Reads = Reads::Sensors { sensors: SensorModel::Virtual, build: 0.0 };
+const PHYSICAL: Reads = Reads::Sensors { sensors: SensorModel::PhysicalLike, build: 0.0 };
+const ADAPTED: Reads = Reads::Sensors { sensors: SensorModel::Adapted, build: 0.0 };
+const UNKNOWN: Reads = Reads::Sensors { sensors: SensorModel::Drawn, build: 1.0 };
+const FIFTY: Learns = Learns::Like { of_each: 50, draws: DRAWS };
+
+/// All rows.
+pub(super) const QUESTIONS: [Question; 13] = [
+    Question {
+        name: "B free, 50 of each",
+        preset: "B",
+        fixed: false,
+        learns: FIFTY,
+        reads: VIRTUAL,
+        methods: ALL,
+        targets: [[Some(0.84), Some(0.97)], [Some(0.87), Some(0.98)]],
+    },
+    Question {
+        name: "B fixed, 50 of each",
+        preset: "B",
+        fixed: true,
+        learns: FIFTY,
+        reads: VIRTUAL,
+        methods: ALL,
+        targets: [[Some(0.58), Some(0.83)], [Some(0.60), Some(0.85)]],
+    },
+    Question {
+        name: "B fixed, 400 of each",
+        preset: "B",
+        fixed: true,
+        learns: Learns::Like { of_each: 400, draws: 1 },
+        reads: VIRTUAL,
+        methods: &["geometry-trees", "geometry-network"],
+        targets: [[Some(0.72), Some(0.94)], [Some(0.76), None]],
+    },
+    Question {
+        name: "A free, physical-like, 50 of each",
+        preset: "A",
+        fixed: false,
+        learns: FIFTY,
+        reads: PHYSICAL,
+        methods: TREES,
+        targets: [[Some(0.95), None], [Some(0.96), None]],
+    },
+    Question {
+        name: "A fixed, physical-like, 50 of each",
+        preset: "A",
+        fixed: true,
+        learns: FIFTY,
+        reads: PHYSICAL,
+        methods: TREES,
+        targets: [[Some(0.85), None], [Some(0.88), None]],
+    },
+    Question {
+        name: "shipped model, B free",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::PerfectSensors),
+        reads: VIRTUAL,
+        methods: &["ids-lstm-cross"],
+        targets: [[Some(0.95), Some(0.995)], [Some(0.97), None]],
+    },
+    Question {
+        name: "shipped model, B free, mild noise",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::PerfectSensors),
+        reads: Reads::MildNoise,
+        methods: &["ids-lstm-cross"],
+        targets: [[Some(0.90), None], [Some(0.93), None]],
+    },
+    Question {
+        name: "no labels, physical-like B",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::AnyGripper),
+        reads: ADAPTED,
+        methods: &["geometry-network"],
+        targets: [[Some(0.68), Some(0.90)], [Some(0.72), Some(0.93)]],
+    },
+    Question {
+        name: "no labels, physical-like A",
+        preset: "A",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::AnyGripper),
+        reads: ADAPTED,
+        methods: &["geometry-network"],
+        targets: [[Some(0.90), None], [Some(0.93), None]],
+    },
+    Question {
+        name: "no labels, unknown mechanics too, B",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::AnyGripper),
+        reads: UNKNOWN,
+        methods: &["geometry-network"],
+        targets: [[Some(0.60), Some(0.85)], [Some(0.68), Some(0.90)]],
+    },
+    Question {
+        name: "no labels, emulated gripper, B",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shipped(Shipped::AnyGripper),
+        reads: Reads::Emulated,
+        methods: &["geometry-network"],
+        targets: [[Some(0.70), Some(0.93)], [Some(0.75), Some(0.95)]],
+    },
+    Question {
+        name: "control: shuffled labels, B free",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Shuffled { of_each: 50 },
+        reads: VIRTUAL,
+        methods: &["geometry-trees"],
+        targets: [[None; 2]; 2],
+    },
+    Question {
+        name: "contact pressure, B free, 50 of each",
+        preset: "B",
+        fixed: false,
+        learns: FIFTY,
+        reads: Reads::Contact,
+        methods: &["extra-trees"],
+        targets: [[None; 2]; 2],
+    },
+];
+
+impl Question {
+    /// Training grasps of each object that one draw takes, and number of draws.
+    pub(super) fn draws(&self, plan: &StudyPlan) -> (usize, usize) {
+        match self.learns {
+            Learns::Like { of_each, draws } => (plan.grasps(of_each, 20), plan.pick(draws, 1, 1)),
+            Learns::Shuffled { of_each } => (plan.grasps(of_each, 20), 1),
+            Learns::Shipped(_) => (0, 1),
+        }
+    }
+
+    /// Grasps that judge, or a draw of those that a model learns from.
+    pub(super) fn wanted(&self, plan: &StudyPlan, grasps: usize, poses: u64) -> DataWanted {
+        let (sensors, build) = match self.reads {
+            Reads::Sensors { sensors, build } => (sensors, build),
+            Reads::Contact | Reads::MildNoise | Reads::Emulated => (SensorModel::Virtual, 0.0),
+        };
+        let usual = plan.wanted(grasps, sensors);
+        let mut view = usual.view.clone();
+        if self.reads == Reads::Contact {
+            view = view.with_signals(SignalDefinition::Contact);
+        }
+        DataWanted { preset: self.preset.to_owned(), fixed: self.fixed, build, poses, view, ..usual }
+    }
+}
