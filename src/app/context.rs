@@ -16,6 +16,7 @@ use palpate_lab::workers::{
     EffectsWorker, ExplainRequest, ExplainedGrasp, GripperView, LabelDraft, LabelView, LibraryView, MeasuredAccuracy,
     SceneAccuracyJob, Snapshot,
 };
+use palpate_learn::Model;
 use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialSource;
@@ -46,6 +47,8 @@ pub struct PanelContext<'a> {
     pub tools: &'a GripperTools,
     /// Studies of the paper.
     pub studies: &'a Studies,
+    /// Model that the real gripper uses.
+    pub gripper_model: Option<&'a Model>,
     /// Newest explanation of an answer.
     pub explained: Option<&'a ExplainedGrasp>,
     /// Labels, plan and journal; absent until the store has been read.

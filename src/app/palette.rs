@@ -186,6 +186,7 @@ fn commands(context: &PanelContext<'_>) -> Vec<(String, Action)> {
         (text("Measure what accuracy costs in the scene"), SimulationAction::MeasureAccuracy.into()),
         (text("Compute the last grasp again"), Command::ComputeAgain.into()),
         (text("Use the shipped model for the real gripper"), RecognitionAction::UseModel(None).into()),
+        (text("Teach the model the object file in the hand"), RecognitionAction::TeachObject.into()),
         (text("Detect trials automatically, or by key"), GripperAction::ToggleWatch.into()),
         (text("Next actuation: manual, board or untimed"), GripperAction::NextControl.into()),
         (text("List serial ports"), GripperCommand::ListPorts.into()),

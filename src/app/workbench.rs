@@ -331,6 +331,7 @@ impl Workbench {
             gripper,
             tools: &self.tools,
             studies: &self.studies,
+            gripper_model: self.recognition.gripper_model(),
             explained: explained.as_deref(),
             labels,
             draft: self.labelling.session().draft(),

@@ -12,9 +12,9 @@ use glam::Vec2;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, grasp_soundly};
+use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, SHAPES, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
-use palpate_learn::{Measure, Shipped, StopReason, StopRule};
+use palpate_learn::{Measure, OTHER, Shipped, StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
@@ -281,13 +281,16 @@ fn likely(pmf: &BTreeMap<String, f64>) -> String {
     shown.map(|(name, p)| format!("{} {:.0} %", titled(name), 100.0 * **p)).collect::<Vec<_>>().join(", ")
 }
 
-/// Estimated size and place of the object, with the ranges that hold the true values in nine of ten grasps.
+/// Estimated size and shape of the object, with the ranges that hold the true values in nine of ten grasps.
 #[derive(Clone, Debug, Serialize)]
 struct Touched {
     /// Extent between the fingers (mm): estimate, and ends of its range.
     width_mm: [f64; 3],
     /// Extent along the gripper's axis (mm).
     height_mm: [f64; 3],
+    /// Likeliest shape.
+    shape: &'static str,
+    shape_probability: f64,
 }
 
 impl Touched {
@@ -299,14 +302,17 @@ impl Touched {
             let tenths = |metres: f64| (mm(metres) * 10.0).round() * 0.1;
             Some([estimate.value, estimate.range[0], estimate.range[1]].map(tenths))
         };
-        Some(Self { width_mm: of(Measure::Width)?, height_mm: of(Measure::Height)? })
+        let (shape, shape_probability) = measured.shape.top();
+        let shape = SHAPES.get(shape)?.name();
+        Some(Self { width_mm: of(Measure::Width)?, height_mm: of(Measure::Height)?, shape, shape_probability })
     }
 }
 
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let of = |[value, low, high]: [f64; 3]| format!("{value:.0} mm ({low:.0} to {high:.0})");
-        write!(f, "{} wide, {} high", of(self.width_mm), of(self.height_mm))
+        let (width, height, shape) = (of(self.width_mm), of(self.height_mm), self.shape);
+        write!(f, "{width} wide, {height} high, {shape} ({:.0} %)", 100.0 * self.shape_probability)
     }
 }
 
@@ -318,10 +324,15 @@ fn grasps_in_words(count: usize) -> String {
 fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
     let count = report.grasps.len();
     let grasps = grasps_in_words(count);
-    let right = if report.decided == report.truth { "Correct" } else { "Wrong" };
+    let known = report.grasps.last().is_some_and(|grasp| grasp.pmf.contains_key(&report.truth));
+    let is_right = if report.decided == OTHER { !known } else { report.decided == report.truth };
+    let right = if is_right { "Correct" } else { "Wrong" };
     let [decided, true_object] = [&report.decided, &report.truth].map(|name| titled(name));
     say("")?;
     match stopped {
+        StopReason::Sure if report.decided == OTHER => {
+            say(format!("None of the known objects, after {grasps}. {right} (true object: {true_object})."))?;
+        }
         StopReason::Sure => {
             say(format!("Recognised after {grasps}: {decided}. {right} (true object: {true_object})."))?;
         }
@@ -331,7 +342,6 @@ fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure>
             ))?;
         }
         StopReason::Unknown => {
-            let known = report.grasps.last().is_some_and(|g| g.pmf.contains_key(&report.truth));
             let right = if known { "Wrong" } else { "Correct: the model does not know this object" };
             say(format!("Unknown object after {grasps}. {right} (true object: {true_object})."))?;
             say("The grasps match none of the objects the model knows.")?;

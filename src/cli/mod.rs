@@ -26,6 +26,7 @@ mod scene;
 mod setup;
 mod snapshot;
 mod study;
+mod teach;
 mod terminal;
 mod train;
 mod trials;
@@ -74,6 +75,8 @@ enum Command {
     Collect(collect::CollectArguments),
     /// Train a recogniser on stored trials and save it.
     Train(train::TrainArguments),
+    /// Teach a model new objects in seconds, from their files or from recorded grasps.
+    Teach(teach::TeachArguments),
     /// Evaluate recognisers on held-back trials: F1, calibration, successive grasps, cost.
     Evaluate(evaluate::EvaluateArguments),
     /// Recognise the objects of stored trials.
@@ -215,6 +218,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Demo(demo)) => demo::run(demo, store)?,
         Some(Command::Collect(collect)) => collect::run(collect, store)?,
         Some(Command::Train(train)) => train::run(train, store)?,
+        Some(Command::Teach(teach)) => teach::run(teach, store)?,
         Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
         Some(Command::Record(record)) => record::run(record, store)?,

@@ -14,15 +14,18 @@ pub enum Numbers {
     F64(Vec<f64>),
     /// Counts and indices.
     I64(Vec<i64>),
+    /// Readings on a scale of their own, to save space.
+    I16(Vec<i16>),
 }
 
 impl Numbers {
-    /// Type name: `f32`, `f64` or `i64`.
+    /// Type name: `f32`, `f64`, `i64` or `i16`.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::F32(_) => "f32",
             Self::F64(_) => "f64",
             Self::I64(_) => "i64",
+            Self::I16(_) => "i16",
         }
     }
 
@@ -32,6 +35,7 @@ impl Numbers {
             Self::F32(values) => values.len(),
             Self::F64(values) => values.len(),
             Self::I64(values) => values.len(),
+            Self::I16(values) => values.len(),
         }
     }
 
@@ -45,7 +49,7 @@ impl Numbers {
         match self {
             Self::F32(values) => values.iter().position(|x| !x.is_finite()),
             Self::F64(values) => values.iter().position(|x| !x.is_finite()),
-            Self::I64(_) => None,
+            Self::I64(_) | Self::I16(_) => None,
         }
     }
 }
@@ -154,6 +158,22 @@ impl Arrays {
         self.0.insert(name.into(), Array { shape: vec![values.len()], numbers: Numbers::I64(values) });
     }
 
+    /// Adds small integers of a shape.
+    pub fn put_small(&mut self, name: impl Into<String>, shape: &[usize], values: Vec<i16>) {
+        assert_eq!(shape.iter().product::<usize>(), values.len(), "elements of shape {shape:?}");
+        self.0.insert(name.into(), Array { shape: shape.to_vec(), numbers: Numbers::I16(values) });
+    }
+
+    /// Gives an array of single-precision numbers more rows, of zeros.
+    pub(crate) fn extend_rows(&mut self, name: &str, rows: usize) {
+        if let Some(Array { shape, numbers: Numbers::F32(values) }) = self.0.get_mut(name)
+            && let [own, rest @ ..] = &mut shape[..]
+        {
+            *own = rows.max(*own);
+            values.resize(*own * rest.iter().product::<usize>(), 0.0);
+        }
+    }
+
     /// Number of elements of all arrays.
     pub fn elements(&self) -> usize {
         self.0.values().map(|array| array.numbers.len()).sum()
@@ -191,6 +211,14 @@ impl Arrays {
         match &self.of_shape(name, &[self.array(name)?.numbers.len()])?.numbers {
             Numbers::I64(values) => Ok(values),
             other => Err(wrong_kind(name, other, "i64")),
+        }
+    }
+
+    /// Small integers of a shape.
+    pub fn small(&self, name: &str, shape: &[usize]) -> Result<&[i16], ArrayError> {
+        match &self.of_shape(name, shape)?.numbers {
+            Numbers::I16(values) => Ok(values),
+            other => Err(wrong_kind(name, other, "i16")),
         }
     }
 

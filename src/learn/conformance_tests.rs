@@ -471,6 +471,7 @@ fn damaged_arrays_are_refused_by_name_and_shape() {
                     Numbers::F32(values) => values.extend_from_within(..row),
                     Numbers::F64(values) => values.extend_from_within(..row),
                     Numbers::I64(values) => values.extend_from_within(..row),
+                    Numbers::I16(values) => values.extend_from_within(..row),
                 }
             });
             refused(name, "without its last element or row", &|array| {
@@ -480,6 +481,7 @@ fn damaged_arrays_are_refused_by_name_and_shape() {
                     Numbers::F32(values) => values.truncate(values.len() - row),
                     Numbers::F64(values) => values.truncate(values.len() - row),
                     Numbers::I64(values) => values.truncate(values.len() - row),
+                    Numbers::I16(values) => values.truncate(values.len() - row),
                 }
             });
             refused(name, "of another type", &|array| {
@@ -487,14 +489,18 @@ fn damaged_arrays_are_refused_by_name_and_shape() {
                     Numbers::F32(values) => Numbers::I64(vec![0; values.len()]),
                     Numbers::F64(values) => Numbers::F32(vec![0.0; values.len()]),
                     Numbers::I64(values) => Numbers::F64(vec![0.0; values.len()]),
+                    Numbers::I16(values) => Numbers::F32(vec![0.0; values.len()]),
                 };
             });
-            for number in [f64::NAN, f64::INFINITY] {
+            let is_small = Model::from_bytes(key, bytes).expect("valid").recogniser.arrays().0[name].numbers.kind() == "i16";
+            for number in [f64::NAN, f64::INFINITY].into_iter().filter(|_| !is_small) {
                 let change = |array: &mut crate::Array| match &mut array.numbers {
                     Numbers::F32(values) => values[0] = number as f32,
                     Numbers::F64(values) => values[0] = number,
                     // Integers are always finite; a huge one is out of range.
                     Numbers::I64(values) => values[0] = i64::MAX,
+                    // Every small integer is in range.
+                    Numbers::I16(_) => {}
                 };
                 let error = refused(name, "with a number that is not finite", &change);
                 let is_value = matches!(error, ArrayError::NotFinite { .. } | ArrayError::Value { .. });

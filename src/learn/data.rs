@@ -89,6 +89,24 @@ impl Labels {
         self.class(OTHER)
     }
 
+    /// These classes, and after them those of others that are not among them.
+    pub fn with(&self, others: &Self) -> Self {
+        let mut both = self.clone();
+        let place = |names: &mut Vec<String>, name: &String| {
+            let at = names.iter().position(|own| own == name);
+            at.unwrap_or_else(|| {
+                names.push(name.clone());
+                names.len() - 1
+            })
+        };
+        for class in others.classes.iter().filter(|class| self.class(&class.name).is_none()) {
+            let size = class.size.and_then(|k| others.sizes.get(k)).map(|name| place(&mut both.sizes, name));
+            let shape = class.shape.and_then(|k| others.shapes.get(k)).map(|name| place(&mut both.shapes, name));
+            both.classes.push(Class { name: class.name.clone(), size, shape });
+        }
+        both
+    }
+
     /// True if at least one class has a size and one a shape, as stage one requires.
     pub fn have_properties(&self) -> bool {
         self.classes.iter().any(|class| class.size.is_some()) && self.classes.iter().any(|class| class.shape.is_some())
@@ -241,14 +259,28 @@ impl Dataset {
         Some(other)
     }
 
-    /// These grasps and, as one more class, those of a data set with one class.
-    pub fn with_class_of(&self, other: &Self) -> Self {
-        let mut both = self.clone();
-        let class = both.labels.classes.len();
-        both.labels.classes.extend(other.labels.classes.first().cloned());
-        both.examples.extend(other.examples.iter().map(|example| Example { class, ..example.clone() }));
-        both.about.grasps = both.examples.len();
-        both
+    /// The same without classes that have no grasps.
+    pub fn without_empty_classes(&self) -> Self {
+        let by_class = self.by_class();
+        let mut labels = self.labels.clone();
+        let mut number = 0;
+        labels.classes.retain(|_| {
+            number += 1;
+            !by_class[number - 1].is_empty()
+        });
+        // All remaining examples belong to remaining classes.
+        self.relabelled(&labels).unwrap_or_else(|| self.clone())
+    }
+
+    /// These grasps and those of another data set, whose further classes come after these; `None` where that has other channels.
+    pub fn with(&self, other: &Self) -> Option<Self> {
+        let labels = self.labels.with(&other.labels);
+        let (mut both, other) = (self.relabelled(&labels)?, other.relabelled(&labels)?);
+        (both.channels == other.channels).then(|| {
+            both.examples.extend(other.examples);
+            both.about.grasps = both.examples.len();
+            both
+        })
     }
 
     /// Shuffles the labels among the grasps, as a control.

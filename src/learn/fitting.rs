@@ -92,6 +92,15 @@ pub enum LearnError {
         /// Channels of the grasps.
         found: String,
     },
+    /// A model that cannot learn new objects without its training grasps.
+    #[error(
+        "this model ({method}) cannot learn new objects by itself; use one of the method geometry-network, such as those that \
+         come with Palpate, or train again with grasps of all objects"
+    )]
+    LearnsNothingNew {
+        /// Title of the method.
+        method: String,
+    },
     /// Grasps for stage two with other channels or labels.
     #[error("the grasps for stage two have other channels or labels than those for stage one")]
     SecondDiffers,

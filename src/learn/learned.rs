@@ -15,6 +15,11 @@ impl LearnedGrasps {
         Self(data.examples.iter().map(|example| short(example.content)).collect())
     }
 
+    /// Adds all grasps of a data set.
+    pub(crate) fn extend(&mut self, data: &Dataset) {
+        self.0.extend(data.examples.iter().map(|example| short(example.content)));
+    }
+
     /// True for a grasp of the set.
     pub fn contains(&self, example: &Example) -> bool {
         self.0.contains(&short(example.content))

@@ -96,6 +96,6 @@ pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use model::{LoadError, Model, ModelCard, ModelError};
 pub use pmf::Pmf;
-pub use recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
+pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};
 pub use split::{Split, SplitError, SplitPlan, check_apart};

@@ -3,13 +3,13 @@
 use crate::arrays::Arrays;
 use crate::baselines::{Candle, Convolution, GeometryNetwork, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
-use crate::data::{Dataset, fnv_1a};
+use crate::data::{Class, Dataset, fnv_1a};
 use crate::fitting::{Fitting, LearnError};
 use crate::gaps;
 use crate::learned::LearnedGrasps;
 use crate::model::{LoadError, Model, ModelCard};
 use crate::network::{self, Recipe};
-use crate::recogniser::Recogniser;
+use crate::recogniser::{Pupil, Recogniser};
 use crate::signatures::Signatures;
 use std::sync::Arc;
 
@@ -117,18 +117,7 @@ impl Method {
     pub fn train(&self, data: &Dataset, fitting: &Fitting<'_>) -> Result<Model, LearnError> {
         let (readings, second) = (data.with_further(), fitting.second.map(Dataset::with_further));
         let fitting_all = Fitting { second: second.as_deref(), settings: fitting.settings.clone(), ..*fitting };
-        let timed = || {
-            let start = cpu_time::ThreadTime::now();
-            (self.fit)(&readings, &fitting_all).map(|recogniser| (recogniser, start.elapsed().as_secs_f64()))
-        };
-        // candle and smartcore would spread over all cores, which is slower for models this small. A caller with a thread of
-        // its own counts the CPU time of the fit there.
-        let has_own_thread = rayon::current_thread_index().is_some() && rayon::current_num_threads() == 1;
-        let (recogniser, train_cpu_s) = if has_own_thread {
-            timed()
-        } else {
-            rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?.install(timed)
-        }?;
+        let (recogniser, train_cpu_s) = on_one_thread(|| (self.fit)(&readings, &fitting_all))?;
         let data = fitting.joined(data)?;
         let deviations = self.recipe.map(|recipe| recipe().deviations_with(&fitting.settings)).transpose()?;
         let card = ModelCard {
@@ -148,6 +137,7 @@ impl Method {
             train_cpu_s,
             metrics: serde_json::Value::Null,
             signature_grasps: None,
+            taught: Vec::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };
@@ -171,6 +161,66 @@ impl Method {
     /// methods that the paper does not define.
     pub fn deviations(&self) -> Vec<String> {
         self.recipe.map(|recipe| recipe().deviations()).unwrap_or_default()
+    }
+}
+
+impl Model {
+    /// True if it can be taught new objects.
+    pub fn learns_new_objects(&self) -> bool {
+        self.recogniser.as_pupil().is_some()
+    }
+
+    /// Refuses a model that cannot be taught new objects.
+    pub fn check_learns_new_objects(&self) -> Result<(), LearnError> {
+        self.pupil().map(|_pupil| ())
+    }
+
+    fn pupil(&self) -> Result<&dyn Pupil, LearnError> {
+        self.recogniser.as_pupil().ok_or_else(|| {
+            let title = method(&self.card.method).map_or(self.card.method.as_str(), |method| method.title);
+            LearnError::LearnsNothingNew { method: title.to_owned() }
+        })
+    }
+
+    /// Learns grasps of new objects, besides what it knows: a class for each that it does not know yet, and more grasps of
+    /// those that it knows. Results on its card were measured before and are left out. Runs on one thread.
+    pub fn taught(&self, grasps: &Dataset, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
+        let known = &self.card.labels;
+        let labels = known.with(&grasps.labels);
+        let lessons = grasps.relabelled(&labels).ok_or(LearnError::NoData)?;
+        let pupil = self.pupil()?;
+        let (recogniser, train_cpu_s) = on_one_thread(|| pupil.taught(&lessons.with_further(), fitting))?;
+        let signatures =
+            self.signatures.as_ref().map(|own| own.with_new_classes(&gaps::filled_data(&lessons)));
+        let mut card = self.card.clone();
+        let is_new = |class: &Class| known.class(&class.name).is_none();
+        card.taught.extend(labels.classes.iter().filter(|class| is_new(class)).map(|class| class.name.clone()));
+        card.data.grasps += lessons.examples.len();
+        card.learned.extend(&lessons);
+        card.labels = labels;
+        card.settings = recogniser.settings();
+        card.parameters = recogniser.parameters();
+        card.train_cpu_s += train_cpu_s;
+        card.metrics = serde_json::Value::Null;
+        Ok(Self { card, recogniser: Arc::from(recogniser), signatures: None }.with_signatures(signatures))
+    }
+}
+
+/// What a fit makes, and its CPU time (s).
+fn on_one_thread<T: Send>(
+    fit: impl FnOnce() -> Result<T, LearnError> + Send,
+) -> Result<(T, f64), LearnError> {
+    let timed = || {
+        let start = cpu_time::ThreadTime::now();
+        fit().map(|made| (made, start.elapsed().as_secs_f64()))
+    };
+    // candle and smartcore would spread over all cores, which is slower for models this small. A caller with a thread of
+    // its own counts the CPU time of the fit there.
+    let has_own_thread = rayon::current_thread_index().is_some() && rayon::current_num_threads() == 1;
+    if has_own_thread {
+        timed()
+    } else {
+        rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(LearnError::failed)?.install(timed)
     }
 }
 

@@ -29,6 +29,9 @@ pub struct ModelCard {
     /// Grasps that it learned from.
     #[serde(default, skip_serializing_if = "LearnedGrasps::is_empty")]
     pub learned: LearnedGrasps,
+    /// Classes that it learned after the others, by [`Model::taught`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub taught: Vec<String>,
     /// Settings chosen or found while fitting.
     pub settings: serde_json::Value,
     /// Fingerprint of the method that made it, [`crate::Method::fingerprint`]; absent in files of older versions.

@@ -133,6 +133,7 @@ impl ModelCard {
             format!("{} classes", self.labels.classes.len()),
             format!("{} grasps", self.data.grasps),
         ];
+        parts.extend((!self.taught.is_empty()).then(|| format!("taught {}", self.taught.join(", "))));
         parts.extend(self.metrics["f1_macro"].as_f64().map(|f1| format!("macro F1 {f1:.2}")));
         parts.extend(self.only_simulated().then(|| "contact pressure: simulation only".to_owned()));
         parts.join(", ")

@@ -2,7 +2,8 @@
 
 use crate::arrays::Arrays;
 use crate::belief::Rejection;
-use crate::data::Sequence;
+use crate::data::{Dataset, Sequence};
+use crate::fitting::{Fitting, LearnError};
 use crate::pmf::Pmf;
 
 /// Result of stage one: probabilities of size and shape (paper, section III).
@@ -33,6 +34,11 @@ pub trait Recogniser: Send + Sync {
         None
     }
 
+    /// The recogniser as one that learns new objects; `None` for methods that need all their training grasps again.
+    fn as_pupil(&self) -> Option<&dyn Pupil> {
+        None
+    }
+
     /// Returns the learned parameters under the names used in model files.
     fn arrays(&self) -> Arrays;
 
@@ -51,6 +57,12 @@ pub trait Recogniser: Send + Sync {
     fn rejection(&self) -> Option<&Rejection> {
         None
     }
+}
+
+/// Recogniser that learns new objects without the grasps that it was trained on.
+pub trait Pupil: Sync {
+    /// Learns these grasps besides what it knows. Their labels begin with its own.
+    fn taught(&self, grasps: &Dataset, fitting: &Fitting<'_>) -> Result<Box<dyn Recogniser>, LearnError>;
 }
 
 /// Recogniser that takes one sample at a time.

@@ -51,7 +51,20 @@ impl PartialEq for Signatures {
 impl Signatures {
     /// Computes the signatures of all classes; `None` without readings.
     pub fn of(data: &Dataset) -> Option<Self> {
-        let t_s = common_times(data)?;
+        Some(Self::at(common_times(data)?, data))
+    }
+
+    /// These signatures, and those of further classes of a data set, whose labels begin with these classes.
+    pub(crate) fn with_new_classes(&self, data: &Dataset) -> Self {
+        let mut all = Self::at(self.t_s.clone(), data);
+        all.grasps[..self.grasps.len()].copy_from_slice(&self.grasps);
+        all.mean[..self.mean.len()].copy_from_slice(&self.mean);
+        all.spread[..self.spread.len()].copy_from_slice(&self.spread);
+        Self::with(all.channels, all.grasps, all.t_s, all.mean, all.spread)
+    }
+
+    /// Computes the signatures of all classes at these times.
+    fn at(t_s: Vec<f32>, data: &Dataset) -> Self {
         let (classes, channels, times) = (data.labels.classes.len(), data.channels.len(), t_s.len());
         let mut grasps = vec![0; classes];
         // Count, sum and sum of squares, in double precision: the spread is a small difference of large sums.
@@ -82,7 +95,7 @@ impl Signatures {
                 spread.push(s);
             }
         }
-        Some(Self::with(data.channels.clone(), grasps, t_s, mean, spread))
+        Self::with(data.channels.clone(), grasps, t_s, mean, spread)
     }
 
     /// Adds what follows from means and spreads.

@@ -43,9 +43,10 @@ impl<'b> TensorFile<'b> {
                 Dtype::F32 => Numbers::F32(numbers(bytes, f32::from_le_bytes)),
                 Dtype::F64 => Numbers::F64(numbers(bytes, f64::from_le_bytes)),
                 Dtype::I64 => Numbers::I64(numbers(bytes, i64::from_le_bytes)),
+                Dtype::I16 => Numbers::I16(numbers(bytes, i16::from_le_bytes)),
                 other => {
                     let found = format!("{other:?}").to_lowercase();
-                    return Err(ArrayError::Kind { name: name.to_owned(), found, expected: "f32, f64 or i64" });
+                    return Err(ArrayError::Kind { name: name.to_owned(), found, expected: "f32, f64, i64 or i16" });
                 }
             };
             arrays.0.insert(name.to_owned(), Array { shape: tensor.shape().to_vec(), numbers });
@@ -60,6 +61,7 @@ impl View for &Array {
             Numbers::F32(_) => Dtype::F32,
             Numbers::F64(_) => Dtype::F64,
             Numbers::I64(_) => Dtype::I64,
+            Numbers::I16(_) => Dtype::I16,
         }
     }
 
@@ -72,11 +74,16 @@ impl View for &Array {
             Numbers::F32(values) => values.iter().flat_map(|x| x.to_le_bytes()).collect(),
             Numbers::F64(values) => values.iter().flat_map(|x| x.to_le_bytes()).collect(),
             Numbers::I64(values) => values.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Numbers::I16(values) => values.iter().flat_map(|x| x.to_le_bytes()).collect(),
         })
     }
 
     fn data_len(&self) -> usize {
-        let bytes = if matches!(self.numbers, Numbers::F32(_)) { 4 } else { 8 };
+        let bytes = match self.numbers {
+            Numbers::I16(_) => 2,
+            Numbers::F32(_) => 4,
+            Numbers::F64(_) | Numbers::I64(_) => 8,
+        };
         self.numbers.len() * bytes
     }
 }

@@ -51,6 +51,7 @@ const HOMES: &[(&str, &[&str])] = &[
             "src/learn/methods.rs",
             "src/lab/grasping/error_band.rs",
             "src/lab/grasping/known_geometry.rs",
+            "src/lab/grasping/lessons.rs",
             "src/lab/study",
         ],
     ),

@@ -389,9 +389,9 @@ pub(crate) fn stored(
     id
 }
 
-/// File of the shipped model as one of contact pressure, which only simulations have, in a folder.
+/// File of a model of contact pressure, which only simulations have, in a folder.
 pub(crate) fn model_of_contact(at: &Path) -> String {
-    let mut model = palpate_learn::Shipped::PerfectSensors.model().unwrap();
+    let mut model = crate::scripted::made_up();
     model.card.data.signals = Some("contact".to_owned());
     for channel in &mut model.card.channels {
         *channel = channel.replace("pressure_", "contact_pressure_");
@@ -400,9 +400,9 @@ pub(crate) fn model_of_contact(at: &Path) -> String {
     "contact.safetensors".to_owned()
 }
 
-/// File of the shipped model as one that was trained on trials of a board, in a folder: any answer will do.
+/// File of a model as one that was trained on trials of a board, in a folder: any answer will do.
 pub(crate) fn model_of_pads(at: &Path) -> String {
-    let mut model = palpate_learn::Shipped::PerfectSensors.model().unwrap();
+    let mut model = crate::scripted::made_up();
     let data = &mut model.card.data;
     (data.signals, data.sensors, data.layout) = (None, None, None);
     model.save(&at.join("pads.safetensors")).unwrap();

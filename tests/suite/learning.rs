@@ -228,10 +228,12 @@ fn the_demo_goes_on_until_it_is_sure_and_says_so() {
         let most = grasp["pmf"].as_object().unwrap().values().map(|p| p.as_f64().unwrap()).fold(0.0, f64::max);
         assert!(most < 0.9, "it would have been sure earlier: {grasp}");
     }
-    assert!(catalogue().len() + 1 == last.len() && story["stage_one"]["size"].is_string());
+    assert_eq!(catalogue().len() + 2, last.len(), "the sixteen, the empty hand, and other objects");
+    let touch = &grasps.last().unwrap()["touch"];
+    assert!(touch["shape"].is_string() && touch["width_mm"][0].as_f64().unwrap() > 10.0, "{touch}");
     let found = run(at, &["demo", "--object", "box", "--seed", "3", "--no-pictures", "--no-store"]);
     assert!(
-        found.code == Some(0) && found.out.contains("Most likely:") && found.out.contains("Stage one: "),
+        found.code == Some(0) && found.out.contains("Most likely:") && found.out.contains("Felt: "),
         "{found:?}"
     );
     assert_eq!(run(at, &["demo", "--threshold", "1.5"]).code, Some(2));
@@ -277,4 +279,49 @@ fn a_live_step_allocates_nothing() {
     let mut live = LiveMacroLayer::new(&layer);
     let (count, sum) = allocations_in(|| (0..100).map(|k| live.step(&[k as f32 * 0.01; 6], &[])[0]).sum::<f32>());
     assert!(count == 0 && sum.is_finite(), "{count} allocations");
+}
+
+/// A tall box that none of the sixteen resembles.
+pub(crate) const CARTON: &str = r#"<robot name="carton"><link name="carton">
+  <inertial><mass value="0.12"/><inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>
+  <visual><geometry><box size="0.05 0.05 0.11"/></geometry></visual>
+  <collision><geometry><box size="0.05 0.05 0.11"/></geometry></collision>
+</link></robot>"#;
+
+#[test]
+fn a_model_is_taught_an_object_by_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("carton.urdf"), CARTON).unwrap();
+    let taught = json(at, &["teach", "carton.urdf", "--grasps", "30", "--out", "m.safetensors", "--json"]);
+    assert_eq!(taught["taught"], serde_json::json!(["carton"]));
+    let classes: Vec<&str> = taught["classes"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+    assert!(classes.ends_with(&["carton"]) && catalogue().iter().all(|built_in| classes.contains(&built_in.name.as_str())));
+
+    // It knows the new object, and the others as well as before.
+    let objects = "carton.urdf,lemon,case,smallbutton";
+    json(at, &["collect", "--objects", objects, "--trials", "10", "--preset", "B", "--seed", "99", "--json"]);
+    let trials: Vec<String> = (1..=40).map(|id| id.to_string()).collect();
+    let mut arguments = vec!["recognise", "--model", "m.safetensors", "--json"];
+    arguments.extend(trials.iter().map(String::as_str));
+    let answers = json(at, &arguments);
+    let answers = answers["trials"].as_array().unwrap();
+    let right = |name: &str| {
+        let of = |answer: &&serde_json::Value| answer["truth"] == name && answer["decided"] == name;
+        answers.iter().filter(of).count()
+    };
+    let counts = ["carton", "lemon", "case", "smallbutton"].map(right);
+    assert!(counts[0] >= 8 && counts[1..].iter().sum::<usize>() >= 24, "{counts:?}");
+
+    // Taught again from where it was left, it learns another one besides.
+    std::fs::write(at.join("bar.urdf"), CARTON.replace("0.05 0.05 0.11", "0.025 0.025 0.1")).unwrap();
+    let more = ["teach", "bar.urdf", "--model", "m.safetensors", "--grasps", "10", "--out", "m2.safetensors", "--json"];
+    assert_eq!(json(at, &more)["taught"], serde_json::json!(["carton", "bar"]));
+
+    refused(at, &["teach", "lemon"], &["already knows", "lemon"]);
+    refused(at, &["teach", "empty"], &["empty", "is no object"]);
+    refused(at, &["teach", "gone.urdf"], &["gone.urdf"]);
+    refused(at, &["teach", "carton.urdf", "--out", "no/folder/m.safetensors"], &["no/folder"]);
+    json(at, &["train", "knn", "--out", "knn.safetensors", "--json"]);
+    refused(at, &["teach", "bar.urdf", "--model", "knn.safetensors"], &["cannot learn new objects", "geometry-network"]);
 }

@@ -5,7 +5,7 @@ use crate::program::{json, refused, run};
 use palpate_device::emulator::HiddenParts;
 use palpate_lab::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_lab::grasping::grasp;
-use palpate_learn::{Model, Shipped};
+use palpate_learn::Model;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
@@ -148,7 +148,7 @@ fn contact_pressure_is_refused_where_only_pads_can_be_read() {
 fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("old.safetensors");
-    let mut model = Shipped::PerfectSensors.model().unwrap();
+    let mut model = crate::scripted::made_up();
     // As versions wrote it that knew no definition: contact pressure was called pressure.
     model.card.data.signals = None;
     model.card.data.sensors = Some("virtual".to_owned());
@@ -163,7 +163,7 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     assert!(refused.contains("no real gripper can run this model"), "{refused}");
     assert!(refused.contains("simulated grasps need --signals contact"), "{refused}");
     // One that was trained on a board's readings stays as it was.
-    let mut recorded = Shipped::PerfectSensors.model().unwrap();
+    let mut recorded = crate::scripted::made_up();
     (recorded.card.data.signals, recorded.card.data.sensors) = (None, None);
     recorded.save(&path).unwrap();
     assert_eq!(Model::load(&path).unwrap().card.channels, recorded.card.channels);

@@ -7,10 +7,11 @@ use egui::accesskit::Role;
 use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, PanelKind, SimulationAction};
+use palpate::app::{ALL_PANELS, PanelKind, RecognitionAction, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, Snapshot};
-use palpate_learn::{ModelError, StopReason};
+use palpate_learn::{ModelError, Shipped, StopReason};
+use std::sync::Arc;
 
 fn panel() -> &'static PanelKind {
     ALL_PANELS.iter().find(|panel| panel.name == "recognition").unwrap()
@@ -182,4 +183,40 @@ fn nothing_is_cut_off_or_covered_in_the_smallest_window() {
     }
     let others = bench.harness.query_all_by_label_contains("others,").next().expect("some classes do not fit");
     assert!(whole.contains_rect(others.rect()));
+}
+
+#[test]
+fn an_object_from_a_file_is_learned_by_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("carton.urdf");
+    std::fs::write(&file, crate::learning::CARTON).unwrap();
+    let shipped = Shipped::PerfectSensors.model().map(Arc::new);
+    let size = [330.0, 708.0];
+    let mut bench = bench(BenchSetup { size, panel: Some(panel()), model: shipped, ..BenchSetup::default() });
+    let knows = |bench: &Bench| {
+        let snapshot = bench.workbench().snapshot();
+        let view = snapshot.as_ref().and_then(|snapshot| snapshot.identification.as_ref());
+        view.is_some_and(|view| view.labels.class("carton").is_some())
+    };
+    bench.tell(SimulationAction::OpenObject(file.to_string_lossy().into_owned()));
+    bench.until_shown(true, "Learning carton");
+    bench.harness.get_by_label("Stop").click();
+    bench.until_shown(false, "Learning carton");
+    assert!(!knows(&bench) && bench.workbench().messages().iter().any(|text| text == "The model stays as it is."));
+
+    bench.tell(RecognitionAction::TeachObject);
+    bench.until_told("The model knows carton now.");
+    while !knows(&bench) {
+        bench.wait();
+    }
+    let saved = bench.workbench().view().simulation_model.clone().unwrap();
+    let model = palpate_learn::Model::load(&saved).unwrap();
+    assert_eq!(model.card.taught, ["carton"]);
+    // It is learned once, and not again when it is opened again.
+    bench.tell(SimulationAction::OpenObject("lemon".to_owned()));
+    bench.until(|s| s.truth() == "lemon");
+    bench.tell(SimulationAction::OpenObject(file.to_string_lossy().into_owned()));
+    bench.until(|s| s.truth() == "carton");
+    bench.harness.run_steps(5);
+    assert!(bench.harness.query_by_label_contains("Learning carton").is_none());
 }

@@ -3,10 +3,11 @@
 
 use palpate_lab::datasets::labels_of_catalogue;
 use palpate_learn::{
-    Arrays, DataCard, Dataset, Example, Labels, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser,
-    Sequence, Signatures, StopRule, Verdict,
+    Arrays, DataCard, Dataset, Example, Fitting, Labels, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser,
+    Sequence, Shipped, Signatures, StopRule, Verdict, method,
 };
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Says lemon, a little surer with time and with each grasp: 61 % after the first one, 92 % after the second.
 pub(crate) fn model() -> Arc<Model> {
@@ -29,9 +30,33 @@ pub(crate) fn model() -> Arc<Model> {
         train_cpu_s: 0.0,
         metrics: serde_json::Value::Null,
         signature_grasps: None,
+        taught: Vec::new(),
         version: String::new(),
     };
     Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })
+}
+
+/// A model that learned made-up grasps in the channels of the shipped one, with its card: what it answers does not matter.
+pub(crate) fn made_up() -> Model {
+    let shipped = Shipped::PerfectSensors.model().expect("is shipped").card;
+    let labels = labels_of_catalogue();
+    let width = shipped.channels.len();
+    let example = |k: usize| {
+        let class = k % labels.classes.len();
+        let values = (0..60 * width).map(|at| (class * 7 + at * k) as f32 % 11.0).collect();
+        let grasp = Arc::new(Sequence { t_s: (1..=60).map(|k| 0.05 * k as f32).collect(), values });
+        Example { id: k as i64, class, content: grasp.content(), grasp, ..Example::default() }
+    };
+    let data = Dataset {
+        channels: shipped.channels.clone(),
+        examples: (0..4 * labels.classes.len()).map(example).collect(),
+        labels: labels.clone(),
+        about: shipped.data,
+    };
+    let stop = AtomicBool::new(false);
+    let settings = serde_json::Map::new();
+    let fitting = Fitting { seed: 1, quick: true, settings, second: None, progress: &|_| (), stop: &stop };
+    method("knn").expect("is one").train(&data, &fitting).expect("fits")
 }
 
 /// The same model as one that learned from perfect sensors.

@@ -5,11 +5,13 @@ use crate::bench::{Bench, BenchSetup};
 use crate::golden::compare;
 use crate::gripper_tools::{bench, press};
 use crate::panels::side_by_side;
+use crate::program::{json, refused};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{TrainCommand, TrainRequest, Trainer, TrainerView};
-use palpate_learn::Model;
+use palpate_lab::datasets::{DatasetQuery, SensorView};
+use palpate_learn::{Example, Model, Shipped};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
@@ -231,4 +233,43 @@ fn the_window_trains_and_uses_what_it_trained() {
         picture
     });
     compare("training_done", &side_by_side(&dark, &light), "the CPU renderer of the tests");
+}
+
+#[test]
+fn recorded_grasps_of_a_new_object_are_taught_to_the_model_for_real_grippers() {
+    fn with_mug(store: &mut Store) {
+        labelled(store);
+        (0..6).for_each(|number| trial(store, "mug", 20.0, 4.0, number));
+        (0..3).for_each(|number| trial(store, "pen", 80.0, 0.5, number));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    with_mug(&mut Store::open(&at.join("t.sqlite")).unwrap());
+    let teach = |label: &'static str| {
+        ["teach", "--real", "--recorded", label, "--store", "t.sqlite", "--out", "m.safetensors", "--json"]
+    };
+    assert_eq!(json(at, &teach("mug"))["taught"], serde_json::json!(["mug"]));
+    refused(at, &teach("pen"), &["\"pen\" has 3 usable recorded grasps", "needs 5"]);
+    refused(at, &teach("nobody"), &["nobody"]);
+    let model = Model::load(&at.join("m.safetensors")).unwrap();
+    let query = DatasetQuery { objects: vec!["mug".to_owned()], ..DatasetQuery::default() };
+    let store = Store::open(&at.join("t.sqlite")).unwrap();
+    let mugs = query.read(&store, &SensorView::of_model(&model.card), &mut |_, _| ()).unwrap();
+    let mug = model.card.labels.class("mug").unwrap();
+    let right = |example: &&Example| model.recogniser.recognise(&example.grasp, None).pmf.top().0 == mug;
+    assert_eq!(mugs.examples.iter().filter(right).count(), 6);
+
+    let setup = BenchSetup {
+        size: [320.0, 760.0],
+        fill: with_mug,
+        model: Shipped::AnyGripper.model().map(Arc::new),
+        ..BenchSetup::default()
+    };
+    let mut bench: Bench = bench("training", Theme::Dark, setup);
+    bench.until_shown(true, "72 trials of 7 objects");
+    assert!(bench.harness.query_by_label_contains("Teach the model in use: pen").is_none());
+    press(&mut bench, "Teach the model in use: mug");
+    bench.until_told("taught mug");
+    bench.harness.step();
+    assert!(bench.harness.query_by_label_contains("Teach the model in use: mug").is_none());
 }

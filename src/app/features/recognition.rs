@@ -1,4 +1,4 @@
-//! Recognition by both grippers: threshold, next object, and the model for the real one.
+//! Recognition by both grippers: threshold, next object, models, and new objects that a model is taught.
 
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::InspectFeature;
@@ -8,11 +8,11 @@ use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
 use palpate_lab::workers::{
-    Command, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TrainCommand, TrainedModel,
+    Command, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand, TrainedModel,
 };
 use palpate_learn::Model;
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Action on the recognition.
@@ -28,6 +28,12 @@ pub enum RecognitionAction {
     UseModel(Option<PathBuf>),
     /// Use the model in this file for the simulation and other trials; without one, the shipped model.
     UseSimulationModel(Option<PathBuf>),
+    /// Teach the model of the simulation the object in the hand.
+    TeachObject,
+    /// Teach the model of the real gripper its recorded grasps of an object; simulated ones too, where the simulation holds it.
+    TeachRecorded(String),
+    /// Cancel the lesson.
+    StopTeaching,
 }
 
 /// State of the recognition in the window.
@@ -36,6 +42,13 @@ pub(in crate::app) struct RecognitionFeature {
     shipped: [Option<Arc<Model>>; 2],
     /// Models to be loaded, and for which gripper; the first one is being loaded.
     loading: VecDeque<(PathBuf, ViewSource)>,
+    /// Models in use: that of the simulation and that of the real gripper.
+    simulated: Option<Arc<Model>>,
+    real: Option<Arc<Model>>,
+    /// Object file that the model in use was last asked to learn.
+    taught: Option<String>,
+    /// Number of lessons that were taken note of.
+    lessons: u64,
     explainer: Explainer,
     /// Grasp explained last.
     asked: Option<ExplainRequest>,
@@ -58,7 +71,9 @@ impl RecognitionFeature {
         view: &mut ViewState,
         notices: &mut Notices,
     ) -> Self {
-        let mut feature = Self { shipped, loading: VecDeque::new(), explainer, asked: None };
+        let [simulated, real] = shipped.clone();
+        let loading = VecDeque::new();
+        let mut feature = Self { shipped, loading, simulated, real, taught: None, lessons: 0, explainer, asked: None };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
@@ -67,6 +82,11 @@ impl RecognitionFeature {
             }
         }
         feature
+    }
+
+    /// Model of the real gripper.
+    pub(in crate::app) fn gripper_model(&self) -> Option<&Model> {
+        self.real.as_deref()
     }
 
     /// Loads a model after those that are being loaded.
@@ -105,8 +125,7 @@ impl RecognitionFeature {
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
                 let [_, shipped] = self.shipped.clone();
-                on.inspect.set_model(ViewSource::Gripper, shipped.clone());
-                on.gripper.worker().command(GripperCommand::SetModel(shipped));
+                self.use_for_gripper(shipped, on);
             }
             RecognitionAction::UseSimulationModel(Some(path)) => {
                 self.load(path, ViewSource::Simulation, on.tools, notices);
@@ -114,9 +133,92 @@ impl RecognitionFeature {
             RecognitionAction::UseSimulationModel(None) => {
                 view.simulation_model = None;
                 let [shipped, _] = self.shipped.clone();
-                on.inspect.set_model(ViewSource::Simulation, shipped.clone());
-                on.simulation.send(Command::SetModel(shipped), notices);
+                self.use_in_simulation(shipped, on, notices);
             }
+            RecognitionAction::TeachObject => {
+                self.taught = None;
+                self.teach_new_object(on);
+            }
+            RecognitionAction::TeachRecorded(name) => {
+                let held = on.simulation.worker().snapshot().filter(|snapshot| {
+                    snapshot.object.as_ref().is_some_and(|object| object.name == name)
+                });
+                let object = held.map(|snapshot| snapshot.scene.object.clone());
+                if let Some(model) = self.real.clone() {
+                    on.tools.teacher.ask(TeachRequest { model, name, object, recorded: true });
+                }
+            }
+            RecognitionAction::StopTeaching => {
+                on.tools.teacher.give_up();
+                notices.info("The model stays as it is.");
+            }
+        }
+    }
+
+    /// Uses a model in the simulation from now on.
+    fn use_in_simulation(&mut self, model: Option<Arc<Model>>, on: &mut Recognisers<'_>, notices: &mut Notices) {
+        self.simulated.clone_from(&model);
+        self.taught = None;
+        on.inspect.set_model(ViewSource::Simulation, model.clone());
+        on.simulation.send(Command::SetModel(model), notices);
+    }
+
+    /// Uses a model for the real gripper from now on.
+    fn use_for_gripper(&mut self, model: Option<Arc<Model>>, on: &mut Recognisers<'_>) {
+        self.real.clone_from(&model);
+        on.inspect.set_model(ViewSource::Gripper, model.clone());
+        on.gripper.worker().command(GripperCommand::SetModel(model));
+    }
+
+    /// Uses a model from a file for the real gripper from now on.
+    fn use_file_for_gripper(
+        &mut self,
+        trained: &TrainedModel,
+        on: &mut Recognisers<'_>,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
+        view.gripper_model = Some(trained.path.clone());
+        self.use_for_gripper(Some(Arc::clone(&trained.model)), on);
+        notices.info(format!("Model for the real gripper: {}", trained.about));
+    }
+
+    /// Has the model of the simulation learn the object in the hand, where it comes from a file and the model lacks it: once
+    /// for each object.
+    fn teach_new_object(&mut self, on: &mut Recognisers<'_>) {
+        let Some(model) = self.simulated.as_ref().filter(|model| model.learns_new_objects()) else { return };
+        let Some(snapshot) = on.simulation.worker().snapshot() else { return };
+        let Some(card) = &snapshot.object else { return };
+        let source = &snapshot.scene.object.source;
+        if model.card.labels.class(&card.name).is_some() || self.taught.as_ref() == Some(source) {
+            return;
+        }
+        self.taught = Some(source.clone());
+        if Path::new(source).is_file() {
+            let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
+            on.tools.teacher.ask(TeachRequest { model: Arc::clone(model), name, object, recorded: false });
+        }
+    }
+
+    /// Takes in a lesson that has ended.
+    fn take_lesson(&mut self, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
+        let Some(teacher) = on.tools.teacher.view() else { return };
+        let Some((request, outcome)) = &teacher.last else { return };
+        if std::mem::replace(&mut self.lessons, teacher.ended) == teacher.ended {
+            return;
+        }
+        let is_current =
+            |model: &Option<Arc<Model>>| model.as_ref().is_some_and(|model| Arc::ptr_eq(model, &request.model));
+        match outcome {
+            Ok(trained) if is_current(&self.real) => self.use_file_for_gripper(trained, on, view, notices),
+            Ok(trained) if is_current(&self.simulated) => {
+                view.simulation_model = Some(trained.path.clone());
+                self.use_in_simulation(Some(Arc::clone(&trained.model)), on, notices);
+                notices.info(format!("The model knows {} now.", request.name));
+            }
+            // Another model is in use by now.
+            Ok(trained) => notices.info(format!("Taught {}, saved as {}.", request.name, trained.path.display())),
+            Err(cause) => notices.warning(format!("The model did not learn {}: {cause}", request.name)),
         }
     }
 
@@ -137,38 +239,26 @@ impl RecognitionFeature {
             Some(Ok(finished)) => {
                 let f1 = finished.judged.evaluation.f1_macro;
                 notices.info(format!("Trained: macro F1 {f1:.2} on held-back trials."));
-                use_for_gripper(&finished.trained, on, view, notices);
+                self.use_file_for_gripper(&finished.trained, on, view, notices);
             }
             Some(Err(cause)) => notices.error(format!("Training failed: {cause}")),
             None => {}
         }
+        self.take_lesson(on, view, notices);
+        self.teach_new_object(on);
         let Some(outcome) = on.tools.loaded() else { return };
         let gripper = self.loading.pop_front().map_or(ViewSource::Gripper, |(_, gripper)| gripper);
         if let Some((next, _)) = self.loading.front() {
             on.tools.apply(ToolAction::Train(TrainCommand::Load(next.clone())), notices);
         }
         match (outcome, gripper) {
-            (Ok(trained), ViewSource::Gripper) => use_for_gripper(&trained, on, view, notices),
+            (Ok(trained), ViewSource::Gripper) => self.use_file_for_gripper(&trained, on, view, notices),
             (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
-                use_for_simulation(&trained, on, view, notices);
+                view.simulation_model = Some(trained.path.clone());
+                self.use_in_simulation(Some(Arc::clone(&trained.model)), on, notices);
+                notices.info(format!("Model for the simulation: {}", trained.about));
             }
             (Err(cause), _) => notices.error(format!("Model not changed: {cause}")),
         }
     }
-}
-
-/// Uses a model for the simulation from now on.
-fn use_for_simulation(trained: &TrainedModel, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
-    view.simulation_model = Some(trained.path.clone());
-    on.inspect.set_model(ViewSource::Simulation, Some(Arc::clone(&trained.model)));
-    on.simulation.send(Command::SetModel(Some(Arc::clone(&trained.model))), notices);
-    notices.info(format!("Model for the simulation: {}", trained.about));
-}
-
-/// Uses a model for the real gripper from now on.
-fn use_for_gripper(trained: &TrainedModel, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
-    view.gripper_model = Some(trained.path.clone());
-    on.inspect.set_model(ViewSource::Gripper, Some(Arc::clone(&trained.model)));
-    on.gripper.worker().command(GripperCommand::SetModel(Some(Arc::clone(&trained.model))));
-    notices.info(format!("Model for the real gripper: {}", trained.about));
 }

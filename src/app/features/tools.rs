@@ -1,11 +1,11 @@
-//! Tools for the real gripper, each in a thread of its own behind a panel: diagnostics, finger fit, training.
+//! Tools, each in a thread of its own behind a panel: diagnostics, finger fit, training, teaching of new objects.
 
 use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
 use palpate_lab::study::TrainingError;
 use palpate_lab::workers::{
     DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, TrainCommand,
-    TrainRequest, TrainedModel, Trainer, Wake,
+    Teacher, TrainRequest, TrainedModel, Trainer, Wake,
 };
 use palpate_learn::ModelError;
 use std::path::{Path, PathBuf};
@@ -53,6 +53,8 @@ pub struct GripperTools {
     pub fitter: Fitter,
     /// Training on labelled trials.
     pub trainer: Trainer,
+    /// Teaching of new objects.
+    pub teacher: Teacher,
     /// Loads of models taken note of.
     loads: u64,
     /// Training whose model is used once it has ended.
@@ -73,7 +75,9 @@ impl GripperTools {
         Ok(Self {
             examiner: DiagnosticsJob::start(setup.examine, wake()).map_err(ThreadError::of("the doctor"))?,
             fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(ThreadError::of("the finger fit"))?,
-            trainer: Trainer::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("training"))?,
+            trainer: Trainer::start(store.to_owned(), setup.models.clone(), wake())
+                .map_err(ThreadError::of("training"))?,
+            teacher: Teacher::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("teaching"))?,
             loads: 0,
             awaited: None,
         })

@@ -31,7 +31,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             None => {}
         }
         match &view.classes {
-            Some(Ok(classes)) => classes_ui(ui, context.view.theme, classes),
+            Some(Ok(classes)) => classes_ui(ui, context, classes, actions),
             Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
             None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
         }
@@ -134,7 +134,7 @@ fn name_of(path: &Path) -> std::borrow::Cow<'_, str> {
 }
 
 /// Trials of each object.
-fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
+fn classes_ui(ui: &mut Ui, context: &PanelContext<'_>, classes: &[LabelledClass], actions: &mut Actions) {
     ui.add_space(6.0);
     let all: usize = classes.iter().map(|class| class.trials).sum();
     wrapped(ui, RichText::new("Labelled trials").strong());
@@ -146,7 +146,15 @@ fn classes_ui(ui: &mut Ui, theme: Theme, classes: &[LabelledClass]) {
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
-        class_ui(ui, theme, class, class.trials as f32 / most as f32);
+        class_ui(ui, context.view.theme, class, class.trials as f32 / most as f32);
+    }
+    let Some(model) = context.gripper_model.filter(|model| model.learns_new_objects()) else { return };
+    let is_new = |class: &&LabelledClass| class.is_enough() && model.card.labels.class(&class.name).is_none();
+    for class in classes.iter().filter(is_new) {
+        let hint = format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
+        if ui.button(format!("Teach the model in use: {}", class.name)).on_hover_text(hint).clicked() {
+            actions.push(RecognitionAction::TeachRecorded(class.name.clone()));
+        }
     }
 }
 

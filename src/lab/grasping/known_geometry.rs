@@ -77,10 +77,8 @@ impl KnownGrasps {
         scene.object.source.clone_from(&self.objects[number]);
         let Some(object) = scene.load_object()? else { return Ok(Vec::new()) };
         let sampler = PoseSampler::new(&scene, Some(&object));
-        let mut seeds = ChaCha8Rng::seed_from_u64(self.seed ^ object.content);
         let mut touches = Vec::new();
-        for _ in 0..self.poses {
-            let seed = seeds.random_range(1..i64::MAX as u64);
+        for seed in seeds_of(&object, self.seed).take(self.poses as usize) {
             let (mut drawn, _) = sampler.draw(Some(&object), seed);
             for &fixed in &self.fixed {
                 drawn.object.fixed = fixed;
@@ -96,6 +94,12 @@ impl KnownGrasps {
         }
         Ok(touches)
     }
+}
+
+/// Seeds of grasps of an object.
+pub(super) fn seeds_of(object: &ObjectModel, seed: u64) -> impl Iterator<Item = u64> {
+    let mut seeds = ChaCha8Rng::seed_from_u64(seed ^ object.content);
+    std::iter::repeat_with(move || seeds.random_range(1..i64::MAX as u64))
 }
 
 /// Geometry of the object as the gripper found it; `None` for a trial without frames.

@@ -1,5 +1,6 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, and
-//! identification of an object by successive grasps. Adapting to a real gripper by one close of its empty hand.
+//! identification of an object by successive grasps. Adapting to a real gripper by one close of its empty hand. Lessons:
+//! grasps by which a model learns new objects.
 
 mod adaptation;
 mod agreement;
@@ -9,6 +10,7 @@ mod error_band;
 mod felt_geometry;
 mod identify;
 mod known_geometry;
+mod lessons;
 mod row;
 mod run;
 mod shuffled_objects;
@@ -24,6 +26,7 @@ pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCom
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
+pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

@@ -318,16 +318,7 @@ impl Comparison<'_> {
         let by_chance = answer(shuffled.recogniser.as_ref(), self.test);
         let model = method.train(self.train, &fitting).map_err(failed)?;
         let plain = answer(model.recogniser.as_ref(), self.test);
-        let mut oracle = plain.clone();
-        let labels = &self.test.labels;
-        for (verdict, class) in oracle.verdicts.iter_mut().zip(&truth) {
-            let like = |other: usize| {
-                let (own, other) = (&labels.classes[*class], &labels.classes[other]);
-                (own.size, own.shape) == (other.size, other.shape)
-            };
-            let kept = verdict.pmf.probabilities().iter().enumerate().map(|(c, p)| if like(c) { *p } else { 0.0 });
-            verdict.pmf = Pmf::from_weights(kept.collect::<Vec<_>>());
-        }
+        let oracle = with_true_size_and_shape(&plain, self.test);
         let of = |answers: &Answers| accuracy(answers).ok_or(ComparisonError::NoTest);
         Ok(Controls {
             method: method.key,
@@ -337,6 +328,21 @@ impl Comparison<'_> {
             true_size_and_shape: of(&oracle)?,
         })
     }
+}
+
+/// Answers as if the true size and shape of each grasped object were known.
+pub(super) fn with_true_size_and_shape(answers: &Answers, test: &Dataset) -> Answers {
+    let mut told = answers.clone();
+    let labels = &test.labels;
+    for (verdict, class) in told.verdicts.iter_mut().zip(test.truth()) {
+        let like = |other: usize| {
+            let (own, other) = (&labels.classes[class], &labels.classes[other]);
+            (own.size, own.shape) == (other.size, other.shape)
+        };
+        let kept = verdict.pmf.probabilities().iter().enumerate().map(|(c, p)| if like(c) { *p } else { 0.0 });
+        verdict.pmf = Pmf::from_weights(kept.collect::<Vec<_>>());
+    }
+    told
 }
 
 /// Macro-accuracy of the controls, with 95 % intervals.

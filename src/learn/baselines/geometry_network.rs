@@ -2,18 +2,22 @@
 //! answers from the beginning of a grasp on, like the encoder.
 //!
 //! The class "other" has half of the prior while training, as with trees.
+//!
+//! It keeps some of its training grasps. With them it learns new objects later: training goes on from what it has learned, on
+//! kept and new grasps, and each class has one more output.
 
 use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{Columns, FeltSteps, STAGES, Views, end_of_stage, stage_of};
-use super::geometry::{GeometryEncoder, Shipped};
-use super::other::{as_one_of_many, other_weight};
+use super::geometry::Shipped;
+use super::kept_grasps::KeptGrasps;
+use super::other::{as_one_of_many, balanced_weights, other_weight};
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
 use crate::model::{LoadError, ModelCard};
 use crate::pmf::Pmf;
-use crate::recogniser::{LiveRecogniser, Recogniser, Verdict};
+use crate::recogniser::{LiveRecogniser, Pupil, Recogniser, Verdict};
 use crate::temperature::{Calibration, Temperatures};
 use candle_core::{D, Device, Result, Tensor};
 use candle_nn::{Linear, Module as _, VarBuilder};
@@ -30,6 +34,7 @@ struct Fitted {
     learned: Learned,
     columns: Columns,
     network: Variables<Head>,
+    kept: KeptGrasps,
     /// Number of classes, and the class "other".
     classes: usize,
     other: Option<usize>,
@@ -43,6 +48,9 @@ struct Learned {
     epochs: usize,
     /// Calibration at each stage of a grasp.
     calibrations: Vec<Calibration>,
+    /// Number of grasps that are kept; files of early versions have none.
+    #[serde(default)]
+    kept: usize,
 }
 
 /// The encoder's [`Trunk`], then a linear layer.
@@ -51,30 +59,51 @@ struct Head {
     last: Linear,
 }
 
-/// Share of values dropped before and after the dense layer.
-const DROPOUT: f32 = 0.3;
-/// Training grasps times passes over them: many grasps need fewer passes.
+/// Name of the last layer.
+const CLASSES: &str = "classes";
+/// Share of values dropped before and after the dense layer, with few readings and with many.
+const DROPOUT: [f32; 2] = [0.3, 0.1];
+/// Number of readings from which they are many.
+const MANY: usize = 3000;
+/// Training readings times passes over them, where the settings do not say how many: many readings need fewer passes.
 const DRAWS: usize = 300_000;
 /// Fewest and most passes.
-const PASSES: [usize; 2] = [20, 80];
+const PASSES: [usize; 2] = [20, 150];
+/// Training grasps times passes over them when new objects are learned.
+const DRAWS_OF_NEW: usize = 25_000;
+/// Highest learning rate then.
+const RATE_OF_NEW: f64 = 1e-3;
 /// One in this many grasps is held out for calibration.
 const CALIBRATION: usize = 6;
 const TEMPERATURES: Temperatures = Temperatures { range: 0.2..=5.0, count: 60 };
 
+/// Passes over the training grasps that the settings ask for.
+fn epochs_of(fitting: &Fitting<'_>) -> std::result::Result<Option<usize>, LearnError> {
+    let unknown = |name: &String| name != "epochs";
+    if let Some(name) = fitting.settings.keys().find(|name| unknown(name)) {
+        let cause = "this method has one setting, epochs".to_owned();
+        return Err(LearnError::Setting { name: name.clone(), cause });
+    }
+    let Some(value) = fitting.settings.get("epochs") else { return Ok(None) };
+    let epochs = value.as_u64().filter(|epochs| (1..=10_000).contains(epochs));
+    let cause = || LearnError::Setting { name: "epochs".to_owned(), cause: "write a number from 1 to 10000".to_owned() };
+    epochs.map(|epochs| Some(epochs as usize)).ok_or_else(cause)
+}
+
 impl CandleNetwork for Head {
     const REVISION: u32 = 1;
-    const NOISE: f32 = 0.1;
+    const NOISE: f32 = 0.005;
 
     fn new(inputs: usize, classes: usize, variables: &VarBuilder<'_>) -> Result<Self> {
         Ok(Self {
             trunk: Trunk::new(inputs, variables)?,
-            last: candle_nn::linear(DENSE, classes, variables.pp("classes"))?,
+            last: candle_nn::linear(DENSE, classes, variables.pp(CLASSES))?,
         })
     }
 
     fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor> {
-        let x = self.trunk.forward(x, DROPOUT, pass)?;
-        self.last.forward(&pass.dropout(&x, DROPOUT)?)
+        let x = self.trunk.forward(x, DROPOUT[0], pass)?;
+        self.last.forward(&pass.dropout(&x, DROPOUT[0])?)
     }
 }
 
@@ -82,7 +111,7 @@ impl GeometryNetwork {
     /// Fits the network and its calibration.
     pub(crate) fn fit(data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, LearnError> {
         check_enough(data, 2)?;
-        fitting.refuse_settings()?;
+        let set = epochs_of(fitting)?;
         let encoder = Shipped::of(&data.about).encoder().map_err(LearnError::failed)?;
         let columns = Columns::of(encoder.channels(), &data.channels).ok_or_else(|| LearnError::Encoder {
             needs: encoder.channels().join(", "),
@@ -91,32 +120,79 @@ impl GeometryNetwork {
         let steps = encoder.steps().clone();
         let views: Vec<Views> = data.examples.iter().map(|e| steps.views(&columns.pick(&e.grasp))).collect();
         let [least, most] = PASSES;
-        let passes = (DRAWS / data.examples.len().max(1)).clamp(least, most);
+        let passes = set.unwrap_or_else(|| (DRAWS / data.examples.len().max(1)).clamp(least, most));
         let epochs = if fitting.quick { passes.div_ceil(2) } else { passes };
-        let work = Work { data, encoder: &encoder, views: &views, epochs, fitting };
+        let (truth, other) = (data.truth(), data.labels.other());
+        let classes = data.labels.classes.len();
+        let start = encoder.arrays();
+        let work = Work {
+            steps: &steps,
+            views: &views,
+            truth: &truth,
+            weights: None,
+            size: (classes, other),
+            start: &start,
+            epochs,
+            rate: Head::RATE,
+            fitting,
+        };
         let part_of = data.folds(CALIBRATION, fitting.seed ^ 0xca11b);
         let of = |inside: bool| (0..part_of.len()).filter(|k| (part_of[*k] == 0) == inside).collect::<Vec<usize>>();
-        let first = work.train(&of(false), 0.0).map_err(LearnError::failed)?;
+        let first = work.train(&of(false), [0.0, 0.5]).map_err(LearnError::failed)?;
         fitting.check()?;
         let calibrations = (0..STAGES).map(|stage| work.calibration(&first, &of(true), stage)).collect::<Result<_>>();
-        let learned = Learned {
-            steps,
-            revision: Head::REVISION,
-            epochs,
-            calibrations: calibrations.map_err(LearnError::failed)?,
-        };
+        let calibrations = calibrations.map_err(LearnError::failed)?;
         let all: Vec<usize> = (0..data.examples.len()).collect();
-        let network = work.train(&all, 0.5).map_err(LearnError::failed)?;
+        let network = work.train(&all, [0.5, 1.0]).map_err(LearnError::failed)?;
         fitting.check()?;
+        let kept = KeptGrasps::of(&truth, classes, other, &views);
+        let learned = Learned { steps, revision: Head::REVISION, epochs, calibrations, kept: kept.len() };
+        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
+    }
+
+    /// Learns grasps of classes that come after its own, and further ones of its own.
+    fn with_new(&self, data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, LearnError> {
+        let Fitted { learned, network, kept, .. } = &*self.0;
+        let steps = learned.steps.clone();
+        let columns = Columns::of(&steps.channels, &data.channels).ok_or_else(|| LearnError::Encoder {
+            needs: steps.channels.join(", "),
+            found: data.channels.join(", "),
+        })?;
+        let (mut truth, mut views): (Vec<usize>, Vec<Views>) = kept.views(&steps).unzip();
+        truth.extend(data.examples.iter().map(|example| example.class));
+        views.extend(data.examples.iter().map(|example| steps.views(&columns.pick(&example.grasp))));
         let (classes, other) = (data.labels.classes.len(), data.labels.other());
-        Ok(Self(Arc::new(Fitted { learned, columns, network, classes, other })))
+        let weights = balanced_weights(other, &truth);
+        let mut start = network.arrays();
+        for name in [format!("{CLASSES}.weight"), format!("{CLASSES}.bias")] {
+            start.extend_rows(&name, classes);
+        }
+        let epochs = DRAWS_OF_NEW.div_ceil(views.len().max(1));
+        let work = Work {
+            steps: &steps,
+            views: &views,
+            truth: &truth,
+            weights: Some(&weights),
+            size: (classes, other),
+            start: &start,
+            epochs: if fitting.quick { epochs.div_ceil(4) } else { epochs },
+            rate: RATE_OF_NEW,
+            fitting,
+        };
+        let all: Vec<usize> = (0..views.len()).collect();
+        let network = work.train(&all, [0.0, 1.0]).map_err(LearnError::failed)?;
+        fitting.check()?;
+        let kept = KeptGrasps::of(&truth, classes, other, &views);
+        let learned = Learned { kept: kept.len(), ..learned.clone() };
+        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
     }
 
     /// Everything that decides a fit, besides the data, the seed and the options of the fit.
     pub(crate) fn decided_by() -> serde_json::Value {
         serde_json::json!({
             "revision": Head::REVISION,
-            "training": [Head::RATE, Head::WEIGHT_DECAY, f64::from(Head::NOISE), DRAWS as f64],
+            "training": [Head::RATE, Head::WEIGHT_DECAY, f64::from(Head::NOISE), DRAWS as f64, MANY as f64],
+            "dropout": DROPOUT,
             "passes": PASSES,
             "encoder": Shipped::encoders(),
         })
@@ -142,7 +218,8 @@ impl GeometryNetwork {
         let network = Variables::<Head>::new(learned.steps.inputs(), classes, &mut random)
             .map_err(|error| LoadError::Failed { cause: error.to_string() })?;
         network.read(arrays, "")?;
-        Ok(Self(Arc::new(Fitted { learned, columns, network, classes, other })))
+        let kept = KeptGrasps::read(arrays, learned.kept, &learned.steps, classes)?;
+        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
     }
 }
 
@@ -165,27 +242,36 @@ fn uncalibrated(network: &Variables<Head>, views: &Views) -> Result<Pmf> {
     Ok(Pmf::from_scores(logarithms.into_iter().map(f64::from)))
 }
 
-/// Training data of a fit.
+/// Training data of a fit, and how it is done.
 struct Work<'a> {
-    data: &'a Dataset,
-    encoder: &'a GeometryEncoder,
+    steps: &'a FeltSteps,
     views: &'a [Views],
+    /// Class of each.
+    truth: &'a [usize],
+    /// Weight of each, where it is not that of its class.
+    weights: Option<&'a [f32]>,
+    /// Number of classes, and the class "other".
+    size: (usize, Option<usize>),
+    start: &'a Arrays,
     epochs: usize,
+    rate: f64,
     fitting: &'a Fitting<'a>,
 }
 
 impl Work<'_> {
-    /// Trains on some of the grasps. Progress goes on from `start` by a half.
-    fn train(&self, grasps: &[usize], start: f64) -> Result<Variables<Head>> {
-        let class = |k: &usize| self.data.examples[*k].class;
-        let other = other_weight(self.data, &grasps.iter().map(class).collect::<Vec<_>>());
+    /// Trains on some of the grasps. Progress goes on from one share to another.
+    fn train(&self, grasps: &[usize], [from, to]: [f64; 2]) -> Result<Variables<Head>> {
+        let (classes, other) = self.size;
+        let of_other = other_weight(other, &grasps.iter().map(|k| self.truth[*k]).collect::<Vec<_>>());
+        let weight = |k: &usize| match self.weights {
+            Some(weights) => weights[*k],
+            None => of_other.filter(|(other, _)| *other == self.truth[*k]).map_or(1.0, |(_, weight)| weight as f32),
+        };
         let batch = |group: &[usize], random: &mut ChaCha8Rng| {
             group.iter().flat_map(|k| self.views[*k].drawn(Head::NOISE, random)).collect()
         };
         let loss = |scores: &Tensor, group: &[usize]| {
-            let y: Vec<u32> = group.iter().map(|k| class(k) as u32).collect();
-            let weight =
-                |k: &usize| other.filter(|(other, _)| *other == class(k)).map_or(1.0, |(_, weight)| weight as f32);
+            let y: Vec<u32> = group.iter().map(|k| self.truth[*k] as u32).collect();
             let weights: Vec<f32> = group.iter().map(weight).collect();
             let total: f32 = weights.iter().sum();
             let y = Tensor::from_vec(y, (group.len(), 1), &Device::Cpu)?;
@@ -193,13 +279,14 @@ impl Work<'_> {
             let likely = candle_nn::ops::log_softmax(scores, D::Minus1)?.gather(&y, 1)?;
             likely.mul(&weights)?.sum_all()?.affine(f64::from(-1.0 / total.max(1e-6)), 0.0)
         };
-        let progress = |share: f64| (self.fitting.progress)(start + 0.5 * share);
-        let encoder = self.encoder.arrays();
+        let progress = |share: f64| (self.fitting.progress)(from + (to - from) * share);
         let training = Training {
-            size: (self.encoder.steps().inputs(), self.data.labels.classes.len()),
+            size: (self.steps.inputs(), classes),
             sequences: grasps,
             epochs: self.epochs,
-            start: Some(&encoder),
+            rate: self.rate,
+            dropout: Some(DROPOUT[usize::from(grasps.len() >= MANY)]),
+            start: Some(self.start),
             batch: &batch,
             loss: &loss,
             progress: &progress,
@@ -210,14 +297,12 @@ impl Work<'_> {
     /// Calibration at a stage of a grasp, on held-out grasps.
     fn calibration(&self, network: &Variables<Head>, held_out: &[usize], stage: usize) -> Result<Calibration> {
         let answer = |k: &usize| {
-            Ok((
-                uncalibrated(network, &self.views[*k].clone().until(end_of_stage(stage)))?,
-                self.data.examples[*k].class,
-            ))
+            Ok((uncalibrated(network, &self.views[*k].clone().until(end_of_stage(stage)))?, self.truth[*k]))
         };
         let answers: Vec<(Pmf, usize)> = held_out.iter().map(answer).collect::<Result<_>>()?;
         let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();
-        let other = other_weight(self.data, &truths);
+        let (_, other) = self.size;
+        let other = other_weight(other, &truths);
         let weight = |class: usize| other.filter(|(other, _)| *other == class).map_or(1.0, |(_, weight)| weight);
         Ok(Calibration::fit(&answers, weight, &TEMPERATURES).0)
     }
@@ -234,7 +319,13 @@ impl Recogniser for GeometryNetwork {
     }
 
     fn arrays(&self) -> Arrays {
-        self.0.network.arrays()
+        let mut arrays = self.0.network.arrays();
+        self.0.kept.put_into(&mut arrays);
+        arrays
+    }
+
+    fn as_pupil(&self) -> Option<&dyn Pupil> {
+        (self.0.kept.len() > 0).then_some(self)
     }
 
     fn parameters(&self) -> usize {
@@ -243,6 +334,12 @@ impl Recogniser for GeometryNetwork {
 
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(&self.0.learned).unwrap_or_default()
+    }
+}
+
+impl Pupil for GeometryNetwork {
+    fn taught(&self, data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Box<dyn Recogniser>, LearnError> {
+        Ok(Box::new(self.with_new(data, fitting)?))
     }
 }
 
@@ -278,30 +375,74 @@ mod tests {
     use super::*;
     use crate::conformance_tests::quick;
     use crate::data::{Class, DataCard, Example, Labels};
+    use crate::{Model, method};
 
-    /// Two classes that touch at different times and press differently hard.
-    fn data() -> Dataset {
+    /// Grasps of objects that are touched at different times.
+    fn data_of(names: &[&str]) -> Dataset {
         let channels = Shipped::AnyGripper.encoder().expect("is shipped").channels().to_vec();
-        let grasp = |class: usize, k: usize| {
+        let onset = |name: &str| match name {
+            "thick" => 1.0,
+            "thin" => 1.5,
+            "wide" => 0.5,
+            other => panic!("{other}"),
+        };
+        let grasp = |name: &str, k: usize| {
             let t_s: Vec<f32> = (1..=200).map(|k| k as f32 * 0.02).collect();
             let wiggle = (k * 7919 % 100) as f32 * 1e-3;
             let row = |t: f32| -> Vec<f32> {
-                let touched = (t - 1.0 - 0.5 * class as f32 - wiggle).max(0.0);
+                let touched = (t - onset(name) - wiggle).max(0.0);
                 let of = |c: &String| if c.starts_with("curvature") { 4.0 * t - touched } else { 0.3 * touched };
                 channels.iter().map(of).collect()
             };
             let values = t_s.iter().flat_map(|t| row(*t)).collect();
             Arc::new(Sequence { t_s, values })
         };
-        let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+        let class = |name: &&str| Class { name: (*name).to_owned(), size: None, shape: None };
+        let of = |k: usize| {
+            let class = k % names.len();
+            let grasp = grasp(names[class], k);
+            Example { id: k as i64, class, content: grasp.content(), grasp, ..Example::default() }
+        };
         Dataset {
-            labels: Labels { classes: vec![class("thick"), class("thin")], ..Labels::default() },
-            examples: (0..60)
-                .map(|k| Example { id: k as i64, class: k % 2, grasp: grasp(k % 2, k), ..Example::default() })
-                .collect(),
+            labels: Labels { classes: names.iter().map(class).collect(), ..Labels::default() },
+            examples: (0..30 * names.len()).map(of).collect(),
             about: DataCard::default(),
             channels: channels.clone(),
         }
+    }
+
+    fn data() -> Dataset {
+        data_of(&["thick", "thin"])
+    }
+
+    #[test]
+    fn it_learns_a_new_object_and_forgets_none() {
+        let method = method("geometry-network").expect("is one");
+        let model = method.train(&data(), &quick(1)).expect("fits");
+        let lesson = data_of(&["wide"]);
+        let taught = model.taught(&lesson, &quick(1)).expect("learns");
+        let names: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
+        assert_eq!((names, &taught.card.taught[..]), (vec!["thick", "thin", "wide"], &["wide".to_owned()][..]));
+        // Stored and read again, as a model that learns further.
+        let taught = Model::from_bytes("taught", &taught.to_bytes().expect("writes")).expect("reads");
+        for data in [data(), lesson.clone()] {
+            let data = data.relabelled(&taught.card.labels).expect("knows all");
+            let right = |e: &&Example| taught.recogniser.recognise(&e.grasp, None).pmf.top().0 == e.class;
+            let right = data.examples.iter().filter(right).count();
+            assert!(right * 10 > data.examples.len() * 9, "{right} of {}", data.examples.len());
+            assert!(data.examples.iter().all(|example| taught.card.learned.contains(example)));
+        }
+        let again = taught.taught(&lesson, &quick(1)).expect("learns the same object again");
+        assert_eq!((again.card.labels.classes.len(), again.card.taught.len()), (3, 1));
+        let signatures = again.signatures.expect("has signatures");
+        assert_eq!(signatures.grasps().len(), 3);
+    }
+
+    #[test]
+    fn a_model_that_keeps_no_grasps_learns_nothing_new() {
+        let knn = method("knn").expect("is one").train(&data(), &quick(1)).expect("fits");
+        let error = knn.taught(&data_of(&["wide"]), &quick(1)).map(|model| model.card).expect_err("cannot");
+        assert!(error.to_string().contains("geometry-network"), "{error}");
     }
 
     #[test]

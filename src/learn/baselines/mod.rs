@@ -9,6 +9,7 @@ mod geometry;
 mod geometry_network;
 #[cfg(test)]
 mod guide_network;
+mod kept_grasps;
 mod measures;
 mod neighbours;
 mod other;

@@ -288,7 +288,7 @@ impl FeatureRows<'_> {
                 rows.labels.push(self.data.examples[k].class);
             }
         }
-        rows.weights = other_weight(self.data, &rows.labels).map(|(other, weight)| {
+        rows.weights = other_weight(self.data.labels.other(), &rows.labels).map(|(other, weight)| {
             rows.labels.iter().map(|class| if *class == other { weight } else { 1.0 }).collect()
         });
         rows
@@ -327,7 +327,7 @@ impl FeatureRows<'_> {
             progress((part + 1) as f64 / parts as f64);
         }
         let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();
-        let other = other_weight(self.data, &truths);
+        let other = other_weight(self.data.labels.other(), &truths);
         let weight = |class: usize| other.filter(|(other, _)| *other == class).map_or(1.0, |(_, weight)| weight);
         Ok(Calibration::fit(&answers, weight, &TEMPERATURES))
     }

@@ -190,7 +190,7 @@ mod tests {
             Some(Numbers::F32(numbers)) => numbers[index] = number as f32,
             Some(Numbers::F64(numbers)) => numbers[index] = number,
             Some(Numbers::I64(numbers)) => numbers[index] = number as i64,
-            None => panic!("no array {name}"),
+            Some(Numbers::I16(_)) | None => panic!("no array {name}"),
         }
         arrays
     }

@@ -1,7 +1,8 @@
-//! Recognition: the answer and its reason, size and shape, the measured dimensions, a bar for each class with the threshold
+//! Recognition: a lesson that is running, the answer and its reason, size and shape, the measured dimensions, a bar for each class with the threshold
 //! across them, and the grasps so far.
 
 mod classes;
+mod lesson;
 mod properties;
 mod strip;
 mod touch;
@@ -111,6 +112,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let measures = Measures::fitting(room);
         ui.spacing_mut().item_spacing.y = measures.gap;
+        lesson::ui(ui, context, actions);
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
@@ -313,6 +315,11 @@ impl Part<'_, '_> {
                     let hint = "What spoke for and against this answer (panel Why)";
                     if ui.link("Why?").on_hover_text(hint).clicked() {
                         self.actions.push(ViewAction::ShowPanel("why"));
+                    }
+                    let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
+                    let is_unknown = words::is_unknown(self.view) && self.context.source == ViewSource::Gripper;
+                    if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
+                        self.actions.push(ViewAction::ShowPanel("label"));
                     }
                 });
             }

@@ -66,7 +66,7 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
     let grasp = format!("grasp {} of at most {most}", view.beliefs.len() + 1);
     let is_other = view.labels.other() == Some(now.top().0);
     match view.decision {
-        Some(StopReason::Sure) if is_other => "none of the known objects: name it in the panel Label".to_owned(),
+        Some(StopReason::Sure) if is_other => "none of the known objects".to_owned(),
         Some(StopReason::Sure) if certain => format!("{} reaches the threshold of {threshold}", percent(p)),
         Some(StopReason::Sure) => format!("{} reached the former threshold", percent(p)),
         Some(StopReason::GraspLimit) => format!("grasp limit reached ({}): best guess", view.beliefs.len()),
@@ -87,8 +87,12 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
 /// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class.
 pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
     let decided = view.decided()?;
-    let named = view.decision != Some(StopReason::Unknown) && decided != OTHER;
-    Some(if named { decided == truth } else { view.labels.class(truth).is_none() })
+    Some(if is_unknown(view) { view.labels.class(truth).is_none() } else { decided == truth })
+}
+
+/// True where the decision is that the object is none of the known ones.
+pub(super) fn is_unknown(view: &IdentificationView) -> bool {
+    view.decision == Some(StopReason::Unknown) || view.decided() == Some(OTHER)
 }
 
 /// Title of a class.

@@ -170,6 +170,19 @@ impl<'a> StudyBench<'a> {
 
     /// Fits a method; none where it was cancelled.
     pub fn fit(&self, method: &Method, data: &Dataset) -> Result<Option<Model>, StudyError> {
+        self.fitted(method.key, |fitting| method.train(data, fitting))
+    }
+
+    /// Teaches a model further grasps; `None` where it was cancelled.
+    pub fn teach(&self, model: &Model, grasps: &Dataset) -> Result<Option<Model>, StudyError> {
+        self.fitted(&model.card.method, |fitting| model.taught(grasps, fitting))
+    }
+
+    fn fitted(
+        &self,
+        method: &str,
+        fit: impl FnOnce(&Fitting<'_>) -> Result<Model, LearnError>,
+    ) -> Result<Option<Model>, StudyError> {
         let fitting = Fitting {
             seed: self.plan.seed,
             quick: self.plan.has_quick_fits(),
@@ -178,10 +191,10 @@ impl<'a> StudyBench<'a> {
             stop: self.work.cancelled,
             second: None,
         };
-        match method.train(data, &fitting) {
+        match fit(&fitting) {
             Ok(model) => Ok(Some(model)),
             Err(LearnError::Stopped) => Ok(None),
-            Err(cause) => Err(StudyError::Fit { method: method.key.to_owned(), cause }),
+            Err(cause) => Err(StudyError::Fit { method: method.to_owned(), cause }),
         }
     }
 }

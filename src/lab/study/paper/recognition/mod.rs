@@ -1,6 +1,7 @@
 //! Recognition beyond the paper: what methods of our own reach, with perfect sensors, with real ones, and on grippers of which
 //! no grasp is labelled, beside the targets.
 
+mod new_objects;
 mod novelty;
 mod questions;
 
@@ -13,7 +14,9 @@ use super::emulated_grasps::EmulatedGrippers;
 use super::plan::{POSES, StudyPlan};
 use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{OWN, StudyCard, UnitResult};
+use new_objects::{mean_f1, new_object};
 use novelty::{NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, Scored, area, novelty};
+use crate::study::comparison::with_true_size_and_shape;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
@@ -21,7 +24,7 @@ use palpate_learn::{Belief, Dataset, Method, Shipped, check_apart, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_tactile::model::PhysicalLike;
 use palpate_tactile::trial::TrialId;
-use questions::{JUDGED, Learns, QUESTIONS, Question, Reads, TESTED};
+use questions::{JUDGED, Learns, NEW_OBJECTS, QUESTIONS, Question, Reads, TESTED};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -43,6 +46,7 @@ const EMULATED_EACH: u64 = 3;
 pub(super) enum Case {
     Answers { question: &'static Question, method: &'static Method, draw: usize },
     Novelty { left_out: String, method: &'static Method },
+    NewObject { question: &'static Question, left_out: String, method: &'static Method },
 }
 
 impl StudyCase for Case {
@@ -54,9 +58,14 @@ impl StudyCase for Case {
                 cases.extend((0..draws).map(|draw| Self::Answers { question, method, draw }));
             }
         }
-        let left_out = plan.objects().into_iter().take(plan.pick(usize::MAX, 2, 1));
+        let left_out = || plan.objects().into_iter().take(plan.pick(usize::MAX, 2, 1));
         let novelty = method(NOVELTY_METHOD);
-        cases.extend(left_out.filter_map(|left_out| Some(Self::Novelty { left_out, method: novelty? })));
+        cases.extend(left_out().filter_map(|left_out| Some(Self::Novelty { left_out, method: novelty? })));
+        for question in &NEW_OBJECTS {
+            for method in question.methods.iter().filter_map(|key| method(key)) {
+                cases.extend(left_out().map(|left_out| Self::NewObject { question, left_out, method }));
+            }
+        }
         cases
     }
 
@@ -66,17 +75,20 @@ impl StudyCase for Case {
                 // Answers of another shipped model are others.
                 let shipped = match question.learns {
                     Learns::Shipped(shipped) => format!(", {:08x}", shipped.model_content()),
-                    Learns::Like { .. } | Learns::Shuffled { .. } => String::new(),
+                    Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => String::new(),
                 };
                 format!("{}, {}, draw {}{shipped}", question.name, method.key, draw + 1)
             }
             Self::Novelty { left_out, method } => format!("{NOVELTY}, {}, without {left_out}", method.key),
+            Self::NewObject { question, left_out, method } => {
+                format!("{}, {}, {left_out}", question.name, method.key)
+            }
         }
     }
 
     fn method(&self) -> &'static Method {
         match self {
-            Self::Answers { method, .. } | Self::Novelty { method, .. } => method,
+            Self::Answers { method, .. } | Self::Novelty { method, .. } | Self::NewObject { method, .. } => method,
         }
     }
 }
@@ -101,7 +113,7 @@ impl Case {
         let Some(test) = tested(question, bench)? else { return Ok(None) };
         let model = match question.learns {
             Learns::Shipped(shipped) => shipped.model().map_err(|error| StudyError::Missing(error.to_string()))?,
-            Learns::Like { .. } | Learns::Shuffled { .. } => {
+            Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
                 let Some(all) = bench.data(&question.wanted(plan, of_each * draws, POSES))? else { return Ok(None) };
                 let own = all.by_class().into_iter().flat_map(|of| of.into_iter().skip(draw * of_each).take(of_each));
                 let mut train = all.part(&own.collect::<Vec<_>>());
@@ -119,6 +131,10 @@ impl Case {
         let test =
             test.ok_or_else(|| StudyError::Missing("a model of this method that knows the objects".to_owned()))?;
         let answers = answer(model.recogniser.as_ref(), &test);
+        let answers = match question.learns {
+            Learns::Told { .. } => with_true_size_and_shape(&answers, &test),
+            Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Shipped(_) => answers,
+        };
         let one = judge_answers(&model, &test, &answers);
         let rounds = rounds(model.recogniser.as_ref(), &test, &answers, plan.seed);
         let after_three = |belief: &Belief| belief.steps().get(2).or(belief.now()).map_or(0, |pmf| pmf.top().0);
@@ -171,12 +187,14 @@ impl CaseStudy for Recognition {
         match case {
             Case::Answers { question, method, draw } => Case::answers(question, method, draw, bench),
             Case::Novelty { left_out, method } => novelty(&left_out, method, bench),
+            Case::NewObject { question, left_out, method } => new_object(question, &left_out, method, bench),
         }
     }
 
     fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
         let mut kinds: Vec<(&'static Question, &'static str, Vec<Answered>)> = Vec::new();
         let (mut scored, mut data): (Vec<Scored>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut taught: Vec<(&'static Question, &'static str, Vec<Scored>)> = Vec::new();
         let mut note = |text: &String| {
             if !data.contains(text) {
                 data.push(text.clone());
@@ -197,6 +215,14 @@ impl CaseStudy for Recognition {
                     let own: Scored = unit.read()?;
                     note(&own.data);
                     scored.push(own);
+                }
+                Case::NewObject { question, method, .. } => {
+                    let own: Scored = unit.read()?;
+                    note(&own.data);
+                    match taught.iter_mut().find(|(known, key, _)| known.name == question.name && *key == method.key) {
+                        Some((.., parts)) => parts.push(own),
+                        None => taught.push((question, method.key, vec![own])),
+                    }
                 }
             }
         }
@@ -229,7 +255,12 @@ impl CaseStudy for Recognition {
             let tested = scored.iter().map(|own| own.trials.len()).max().unwrap_or(0);
             push(&mut table, [NOVELTY, NOVELTY_METHOD], scored.len(), found, targets, (tested, Vec::new()));
         }
-        Ok(StudyReport::new(data, vec![table], Vec::new()))
+        for (question, key, parts) in &taught {
+            let found = [0, 1].map(|grasps| mean_f1(parts, grasps));
+            let tested = parts.iter().map(|own| own.trials.len()).max().unwrap_or(0);
+            push(&mut table, [question.name, key], parts.len(), found, question.targets, (tested, Vec::new()));
+        }
+        Ok(StudyReport::new(data, vec![table, costs(&kinds)], Vec::new()))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
@@ -274,6 +305,44 @@ fn push(
         ],
         misjudged,
     );
+}
+
+/// What the models of the rows cost, means over draws.
+fn costs(kinds: &[(&'static Question, &'static str, Vec<Answered>)]) -> StudyTable {
+    let columns = [
+        ("grasps", ""),
+        ("model", ""),
+        ("training", "CPU s"),
+        ("answer", "ms"),
+        ("live step", "µs"),
+        ("file", "kB"),
+        ("parameters", ""),
+    ];
+    let mut table = StudyTable::new("costs", "Cost of the models", &columns);
+    for (question, key, parts) in kinds {
+        let mean = |of: &dyn Fn(&Answered) -> Option<f64>| {
+            let all: Option<Vec<f64>> = parts.iter().map(of).collect();
+            let all = all.filter(|all| !all.is_empty());
+            all.map_or(Cell::Missing, |all| Cell::Number(all.iter().sum::<f64>() / all.len() as f64))
+        };
+        let cost = |of: fn(&ModelAnswers) -> Option<f64>| mean(&|part| of(&part.one));
+        let row = vec![
+            Cell::text(question.name),
+            Cell::text(*key),
+            // Whatever made a shipped model is measured elsewhere.
+            if matches!(question.learns, Learns::Shipped(_)) {
+                Cell::Missing
+            } else {
+                cost(|own| Some(own.cost.train_cpu_s))
+            },
+            cost(|own| Some(own.cost.answer_ms)),
+            cost(|own| own.cost.step_us),
+            cost(|own| Some(own.cost.bytes as f64 * 1e-3)),
+            cost(|own| Some(own.cost.parameters as f64)),
+        ];
+        table.push(row, Vec::new());
+    }
+    table
 }
 
 /// One plot for one grasp and one for three: a row for each question and model, with the target as a line.

@@ -26,9 +26,9 @@ pub(super) const NOVELTY_TARGETS: [[f64; 2]; 2] = [[0.87, 0.95], [0.90, 0.97]];
 pub(super) struct Scored {
     pub(super) data: String,
     pub(super) trials: Vec<TrialId>,
-    is_new: Vec<bool>,
+    pub(super) is_new: Vec<bool>,
     /// After one grasp, and after three.
-    scores: [Vec<f64>; 2],
+    pub(super) scores: [Vec<f64>; 2],
 }
 
 /// How surely each test grasp is of a known object, for a model that has not learned one of them.
@@ -47,7 +47,8 @@ pub(super) fn novelty(
     let Some(others) = bench.data(&wanted)? else { return Ok(None) };
     let known: Vec<usize> =
         (0..all.examples.len()).filter(|k| all.labels.classes[all.examples[*k].class].name != left_out).collect();
-    let train = all.part(&known).with_class_of(&others);
+    let other_channels = || StudyError::Missing("random shapes with the channels of the objects".to_owned());
+    let train = all.part(&known).with(&others).ok_or_else(other_channels)?;
     check_apart(&train.examples, &test.examples)?;
     let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;

@@ -19,6 +19,8 @@ pub(in crate::study::paper) enum Learns {
     Like { of_each: usize, draws: usize },
     /// The same with labels in random order, a control.
     Shuffled { of_each: usize },
+    /// The same, with the true size and shape of each test grasp known: an upper bound for what estimates them.
+    Told { of_each: usize },
     /// It comes with the program.
     Shipped(Shipped),
 }
@@ -58,7 +60,7 @@ const UNKNOWN: Reads = Reads::Sensors { sensors: SensorModel::Drawn, build: 1.0 
 const FIFTY: Learns = Learns::Like { of_each: 50, draws: DRAWS };
 
 /// All rows.
-pub(super) const QUESTIONS: [Question; 13] = [
+pub(super) const QUESTIONS: [Question; 15] = [
     Question {
         name: "B free, 50 of each",
         preset: "B",
@@ -110,7 +112,7 @@ pub(super) const QUESTIONS: [Question; 13] = [
         fixed: false,
         learns: Learns::Shipped(Shipped::PerfectSensors),
         reads: VIRTUAL,
-        methods: &["ids-lstm-cross"],
+        methods: &["geometry-network"],
         targets: [[Some(0.95), Some(0.995)], [Some(0.97), None]],
     },
     Question {
@@ -119,7 +121,7 @@ pub(super) const QUESTIONS: [Question; 13] = [
         fixed: false,
         learns: Learns::Shipped(Shipped::PerfectSensors),
         reads: Reads::MildNoise,
-        methods: &["ids-lstm-cross"],
+        methods: &["geometry-network"],
         targets: [[Some(0.90), None], [Some(0.93), None]],
     },
     Question {
@@ -168,6 +170,15 @@ pub(super) const QUESTIONS: [Question; 13] = [
         targets: [[None; 2]; 2],
     },
     Question {
+        name: "control: true size and shape given, B free",
+        preset: "B",
+        fixed: false,
+        learns: Learns::Told { of_each: 50 },
+        reads: VIRTUAL,
+        methods: &["geometry-trees"],
+        targets: [[None; 2]; 2],
+    },
+    Question {
         name: "contact pressure, B free, 50 of each",
         preset: "B",
         fixed: false,
@@ -176,6 +187,37 @@ pub(super) const QUESTIONS: [Question; 13] = [
         methods: &["extra-trees"],
         targets: [[None; 2]; 2],
     },
+    Question {
+        name: "contact pressure, B fixed, 50 of each",
+        preset: "B",
+        fixed: true,
+        learns: FIFTY,
+        reads: Reads::Contact,
+        methods: &["extra-trees"],
+        targets: [[None; 2]; 2],
+    },
+];
+
+/// Rows of new objects: each object in turn is taught to a model of the others; F1 of its class.
+pub(super) const NEW_OBJECTS: [Question; 2] = [
+    Question {
+        name: "new object by its file, B free",
+        preset: "B",
+        fixed: false,
+        learns: FIFTY,
+        reads: VIRTUAL,
+        methods: &["geometry-network"],
+        targets: [[Some(0.80), None], [Some(0.90), None]],
+    },
+    Question {
+        name: "new object by its file, unknown gripper",
+        preset: "B",
+        fixed: false,
+        learns: FIFTY,
+        reads: UNKNOWN,
+        methods: &["geometry-network"],
+        targets: [[Some(0.60), None], [Some(0.70), None]],
+    },
 ];
 
 impl Question {
@@ -183,7 +225,7 @@ impl Question {
     pub(super) fn draws(&self, plan: &StudyPlan) -> (usize, usize) {
         match self.learns {
             Learns::Like { of_each, draws } => (plan.grasps(of_each, 20), plan.pick(draws, 1, 1)),
-            Learns::Shuffled { of_each } => (plan.grasps(of_each, 20), 1),
+            Learns::Shuffled { of_each } | Learns::Told { of_each } => (plan.grasps(of_each, 20), 1),
             Learns::Shipped(_) => (0, 1),
         }
     }

@@ -1,0 +1,232 @@
+//! Lessons: grasps by which a model learns new objects, simulated from an object's file, recorded with the real gripper, or
+//! both.
+
+use super::agreement::{Recompute, grasp_soundly};
+use super::known_geometry::seeds_of;
+use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
+use palpate_learn::{Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence};
+use palpate_sim::objects::{ObjectError, ObjectModel};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::{ObjectSetup, PosePreset, Scene};
+use palpate_store::Store;
+use palpate_tactile::model::SensorModel;
+use palpate_tactile::trial::TrialSource;
+use palpate_tactile::{Channel, LayoutError};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Simulated grasps of a new object by which a model usually learns it.
+pub const LESSON_GRASPS: usize = 80;
+/// Fewest recorded grasps of an object that a model learns.
+const LEAST_RECORDED: usize = 5;
+/// Grippers with drawn sensors that read each simulated grasp.
+const DRAWS: u32 = 6;
+/// Pose preset where the model's own is unknown.
+const PRESET: &str = "B";
+
+/// Progress of a lesson.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LessonStage {
+    /// Number of simulated grasps, and of all.
+    Simulating(usize, usize),
+    /// Completed share of the fit.
+    Fitting(f64),
+}
+
+/// Objects to learn, and how.
+pub struct Lessons<'a> {
+    /// Objects whose grasps are simulated.
+    pub objects: &'a [ObjectSetup],
+    /// Labels of recorded grasps, in the store.
+    pub recorded: &'a [String],
+    /// Simulated grasps of each object.
+    pub grasps: usize,
+    /// Seed of poses and of the fit.
+    pub seed: u64,
+    /// Receives the progress.
+    pub progress: &'a (dyn Fn(LessonStage) + Sync),
+    /// Flag that cancels the lesson.
+    pub stop: &'a AtomicBool,
+}
+
+/// Reason why a model learned nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum LessonError {
+    /// An object failed to load.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// A source without an object, such as the empty hand.
+    #[error("\"{source_name}\" is no object; name a URDF, OBJ or STL file")]
+    NoObject {
+        /// What was named.
+        source_name: String,
+    },
+    /// The model already has such a class.
+    #[error("the model already knows \"{name}\"; rename the file to teach another object")]
+    Known {
+        /// Name of the object.
+        name: String,
+    },
+    /// None of the simulated grasps is sound.
+    #[error("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")]
+    Unsound {
+        /// Name of the object.
+        name: String,
+    },
+    /// Too few recorded grasps.
+    #[error("\"{name}\" has {found} usable recorded grasps; teaching needs {LEAST_RECORDED}. Record and label more")]
+    TooFew {
+        /// Label.
+        name: String,
+        /// Usable grasps.
+        found: usize,
+    },
+    /// Nothing to learn from.
+    #[error("name an object file, or a label with --recorded")]
+    Nothing,
+    /// The gripper has no such sensors.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The recorded grasps cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The grasps have other channels than the model.
+    #[error("these grasps lack channels of the model: {needs}")]
+    Channels {
+        /// Channels of the model.
+        needs: String,
+    },
+    /// The fit failed.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+}
+
+impl Lessons<'_> {
+    /// Teaches a model these objects. The store is read only for recorded grasps.
+    pub fn teach(&self, model: &Model, store: Option<&Store>) -> Result<Model, LessonError> {
+        model.check_learns_new_objects()?;
+        let view = view_of(&model.card);
+        let mut lessons: Option<Dataset> = None;
+        let mut add = |data: Dataset| -> Result<(), LessonError> {
+            let joined = match lessons.take() {
+                Some(before) => before.with(&data),
+                None => Some(data),
+            };
+            let needs = || model.card.channels.join(", ");
+            lessons = Some(joined.ok_or_else(|| LessonError::Channels { needs: needs() })?);
+            Ok(())
+        };
+        let scene = scene_of(&model.card);
+        let known = |name: &String| !model.card.taught.contains(name) && model.card.labels.class(name).is_some();
+        for (number, setup) in self.objects.iter().enumerate() {
+            let mut scene = scene.clone();
+            let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
+            scene.object = ObjectSetup { fixed, shift, ..setup.clone() };
+            let object = scene.load_object()?;
+            let object = object.ok_or_else(|| LessonError::NoObject { source_name: setup.source.clone() })?;
+            if known(&object.name) || object.name == OTHER {
+                return Err(LessonError::Known { name: object.name });
+            }
+            add(self.simulated(number, &scene, &object, &view)?)?;
+        }
+        for name in self.recorded {
+            let store = store.ok_or(LessonError::Nothing)?;
+            let simulated = self.objects.len() * self.grasps;
+            add(recorded(name, store, &view, simulated)?)?;
+        }
+        let lessons = lessons.ok_or(LessonError::Nothing)?;
+        if lessons.channels != model.card.channels {
+            return Err(LessonError::Channels { needs: model.card.channels.join(", ") });
+        }
+        let progress = |share: f64| (self.progress)(LessonStage::Fitting(share));
+        let settings = serde_json::Map::new();
+        let fitting =
+            Fitting { seed: self.seed, quick: false, settings, second: None, progress: &progress, stop: self.stop };
+        fitting.check()?;
+        Ok(model.taught(&lessons, &fitting)?)
+    }
+
+    /// Simulated grasps of one object.
+    fn simulated(
+        &self,
+        number: usize,
+        scene: &Scene,
+        object: &ObjectModel,
+        view: &SensorView,
+    ) -> Result<Dataset, LessonError> {
+        let sampler = PoseSampler::new(scene, Some(object));
+        let seeds: Vec<u64> = seeds_of(object, self.seed).take(self.grasps).collect();
+        let done = AtomicUsize::new(number * self.grasps);
+        let of = self.objects.len() * self.grasps;
+        let read = |(k, seed): (usize, &u64)| -> Result<Option<Example>, LessonError> {
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(LearnError::Stopped.into());
+            }
+            let (drawn, _) = sampler.draw(Some(object), *seed);
+            let trial = grasp_soundly(&drawn, Some(object), *seed, Recompute::Unsettled);
+            (self.progress)(LessonStage::Simulating(done.fetch_add(1, Ordering::Relaxed) + 1, of));
+            if !trial.data.quality.is_sound() {
+                return Ok(None);
+            }
+            let mut readings = view.readings(&trial)?.into_iter().map(|signals| Arc::new(sequence_of(&signals)));
+            let Some(grasp) = readings.next() else { return Ok(None) };
+            let content = grasp.content();
+            Ok(Some(Example { id: k as i64, grasp, content, further: readings.collect(), ..Example::default() }))
+        };
+        let examples: Vec<Option<Example>> = seeds.par_iter().enumerate().map(read).collect::<Result<_, _>>()?;
+        let examples: Vec<Example> = examples.into_iter().flatten().collect();
+        if examples.is_empty() {
+            return Err(LessonError::Unsound { name: object.name.clone() });
+        }
+        let class = Class { name: object.name.clone(), size: None, shape: None };
+        let channels = view.learnt()?.channels(&scene.gripper, view.signals)?;
+        Ok(Dataset {
+            channels: channels.iter().map(Channel::name).collect(),
+            labels: Labels { classes: vec![class], ..Labels::default() },
+            about: DataCard { grasps: examples.len(), ..DataCard::default() },
+            examples,
+        })
+    }
+}
+
+/// Recorded grasps of one object, each counted so often that together they weigh as much as simulated ones.
+fn recorded(name: &str, store: &Store, view: &SensorView, simulated: usize) -> Result<Dataset, LessonError> {
+    let query = DatasetQuery {
+        source: Some(TrialSource::Recorded),
+        objects: vec![name.to_owned()],
+        ..DatasetQuery::default()
+    };
+    let mut data = query.read(store, view, &mut |_, _| ())?;
+    let found = data.examples.len();
+    if found < LEAST_RECORDED {
+        return Err(LessonError::TooFew { name: name.to_owned(), found });
+    }
+    let times = (simulated * view.readers() as usize).div_ceil(found).max(1);
+    for example in &mut data.examples {
+        let again: Vec<Arc<Sequence>> = vec![Arc::clone(&example.grasp); times - 1];
+        example.further.extend(again);
+    }
+    Ok(data)
+}
+
+/// The scene in which a model's training grasps were made, as far as its card says.
+fn scene_of(card: &ModelCard) -> Scene {
+    let preset = card.data.preset.as_deref().and_then(PosePreset::named).or_else(|| PosePreset::named(PRESET));
+    let mut scene = Scene::default();
+    if let Some(preset) = preset {
+        scene.pose = preset.poses();
+    }
+    scene.pose.build = if view_of(card).sensors == SensorModel::Drawn { 1.0 } else { 0.0 };
+    if card.data.object.starts_with("fixed") {
+        scene.set_object_fixed(true);
+    }
+    scene
+}
+
+/// How simulated grasps are read for a model: as its own were, or, where it learned from a real gripper, as any gripper reads.
+fn view_of(card: &ModelCard) -> SensorView {
+    let view = SensorView::of_model(card);
+    let sensors = if card.data.sensors.is_none() { SensorModel::Drawn } else { view.sensors };
+    SensorView { draws: DRAWS, sensors, ..view }
+}

@@ -1,0 +1,76 @@
+//! New objects: a model that knows all others is taught each object in turn, from simulated grasps alone.
+
+use super::super::UnitResult;
+use super::super::answers::BOOTSTRAP;
+use super::super::bench::{StudyBench, StudyError};
+use super::super::plan::POSES;
+use super::novelty::Scored;
+use super::questions::Question;
+use super::tested;
+use palpate_learn::evaluation::{answer, rounds};
+use palpate_learn::metrics::Interval;
+use palpate_learn::{Belief, Method, check_apart};
+
+/// Grasps of each object by which models learn.
+const GRASPS: usize = 50;
+
+/// Which test grasps a model that was taught one object takes for it.
+pub(super) fn new_object(
+    question: &Question,
+    left_out: &str,
+    method: &Method,
+    bench: &StudyBench<'_>,
+) -> Result<Option<UnitResult>, StudyError> {
+    let plan = bench.plan();
+    let Some(test) = tested(question, bench)? else { return Ok(None) };
+    let mut wanted = question.wanted(plan, plan.grasps(GRASPS, 20), POSES);
+    // As the shipped model for any gripper learns; sensors that are not drawn are read once.
+    wanted.view.draws = plan.pick(6, 2, 1);
+    let Some(all) = bench.data(&wanted)? else { return Ok(None) };
+    check_apart(&all.examples, &test.examples)?;
+    let of_class = |known: bool| -> Vec<usize> {
+        let is_known = |k: &usize| all.labels.classes[all.examples[*k].class].name != left_out;
+        (0..all.examples.len()).filter(|k| is_known(k) == known).collect()
+    };
+    let known = all.part(&of_class(true)).without_empty_classes();
+    let lesson = all.part(&of_class(false)).without_empty_classes();
+    let Some(model) = bench.fit(method, &known)? else { return Ok(None) };
+    let Some(model) = bench.teach(&model, &lesson)? else { return Ok(None) };
+    let missing = || StudyError::Missing(format!("grasps of {left_out}"));
+    let new = model.card.labels.class(left_out).ok_or_else(missing)?;
+    let test = test.relabelled(&model.card.labels).ok_or_else(missing)?;
+    let recogniser = model.recogniser.as_ref();
+    let answers = answer(recogniser, &test);
+    let rounds = rounds(recogniser, &test, &answers, plan.seed);
+    let says_new = |belief: &Belief, grasps: usize| {
+        let pmf = belief.steps().get(grasps - 1).or(belief.now());
+        f64::from(u8::from(pmf.is_some_and(|pmf| pmf.top().0 == new)))
+    };
+    let scored = Scored {
+        data: test.about.described(),
+        trials: test.examples.iter().map(|example| example.id).collect(),
+        is_new: test.examples.iter().map(|example| example.class == new).collect(),
+        scores: [1, 3].map(|grasps| rounds.iter().map(|round| says_new(&round.belief, grasps)).collect()),
+    };
+    UnitResult::new(&scored).map(Some)
+}
+
+/// Mean over the objects of the F1 of the object's class, over resampled trials.
+pub(super) fn mean_f1(scored: &[Scored], grasps: usize) -> Option<Interval> {
+    let all: Vec<(usize, bool, bool)> = scored
+        .iter()
+        .enumerate()
+        .flat_map(|(k, own)| own.is_new.iter().zip(&own.scores[grasps]).map(move |(new, said)| (k, *new, *said > 0.5)))
+        .collect();
+    let strata: Vec<usize> = all.iter().map(|(k, new, _)| 2 * k + usize::from(*new)).collect();
+    BOOTSTRAP.interval(&strata, |chosen| {
+        // True positives, and all grasps that are of the class or taken for it.
+        let mut counts = vec![[0_usize; 2]; scored.len()];
+        for (k, new, said) in chosen.iter().map(|at| all[*at]) {
+            counts[k][0] += usize::from(new && said);
+            counts[k][1] += usize::from(new) + usize::from(said);
+        }
+        let f1 = counts.iter().map(|[right, of]| 2.0 * *right as f64 / (*of).max(1) as f64);
+        Some(f1.sum::<f64>() / scored.len().max(1) as f64)
+    })
+}
