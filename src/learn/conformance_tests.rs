@@ -492,7 +492,8 @@ fn damaged_arrays_are_refused_by_name_and_shape() {
                     Numbers::I16(values) => Numbers::F32(vec![0.0; values.len()]),
                 };
             });
-            let is_small = Model::from_bytes(key, bytes).expect("valid").recogniser.arrays().0[name].numbers.kind() == "i16";
+            let is_small =
+                Model::from_bytes(key, bytes).expect("valid").recogniser.arrays().0[name].numbers.kind() == "i16";
             for number in [f64::NAN, f64::INFINITY].into_iter().filter(|_| !is_small) {
                 let change = |array: &mut crate::Array| match &mut array.numbers {
                     Numbers::F32(values) => values[0] = number as f32,

@@ -190,8 +190,7 @@ impl Model {
         let lessons = grasps.relabelled(&labels).ok_or(LearnError::NoData)?;
         let pupil = self.pupil()?;
         let (recogniser, train_cpu_s) = on_one_thread(|| pupil.taught(&lessons.with_further(), fitting))?;
-        let signatures =
-            self.signatures.as_ref().map(|own| own.with_new_classes(&gaps::filled_data(&lessons)));
+        let signatures = self.signatures.as_ref().map(|own| own.with_new_classes(&gaps::filled_data(&lessons)));
         let mut card = self.card.clone();
         let is_new = |class: &Class| known.class(&class.name).is_none();
         card.taught.extend(labels.classes.iter().filter(|class| is_new(class)).map(|class| class.name.clone()));
@@ -207,9 +206,7 @@ impl Model {
 }
 
 /// What a fit makes, and its CPU time (s).
-fn on_one_thread<T: Send>(
-    fit: impl FnOnce() -> Result<T, LearnError> + Send,
-) -> Result<(T, f64), LearnError> {
+fn on_one_thread<T: Send>(fit: impl FnOnce() -> Result<T, LearnError> + Send) -> Result<(T, f64), LearnError> {
     let timed = || {
         let start = cpu_time::ThreadTime::now();
         fit().map(|made| (made, start.elapsed().as_secs_f64()))

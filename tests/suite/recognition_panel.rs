@@ -209,6 +209,9 @@ fn an_object_from_a_file_is_learned_by_itself() {
     while !knows(&bench) {
         bench.wait();
     }
+    // Its bar is there before the next grasp.
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label_contains("carton 0 %").is_some());
     let saved = bench.workbench().view().simulation_model.clone().unwrap();
     let model = palpate_learn::Model::load(&saved).unwrap();
     assert_eq!(model.card.taught, ["carton"]);

@@ -8,7 +8,8 @@ use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
 use palpate_lab::workers::{
-    Command, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand, TrainedModel,
+    Command, EndedLesson, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand,
+    TrainedModel,
 };
 use palpate_learn::Model;
 use std::collections::VecDeque;
@@ -140,9 +141,11 @@ impl RecognitionFeature {
                 self.teach_new_object(on);
             }
             RecognitionAction::TeachRecorded(name) => {
-                let held = on.simulation.worker().snapshot().filter(|snapshot| {
-                    snapshot.object.as_ref().is_some_and(|object| object.name == name)
-                });
+                let held = on
+                    .simulation
+                    .worker()
+                    .snapshot()
+                    .filter(|snapshot| snapshot.object.as_ref().is_some_and(|object| object.name == name));
                 let object = held.map(|snapshot| snapshot.scene.object.clone());
                 if let Some(model) = self.real.clone() {
                     on.tools.teacher.ask(TeachRequest { model, name, object, recorded: true });
@@ -203,7 +206,7 @@ impl RecognitionFeature {
     /// Takes in a lesson that has ended.
     fn take_lesson(&mut self, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
         let Some(teacher) = on.tools.teacher.view() else { return };
-        let Some((request, outcome)) = &teacher.last else { return };
+        let Some(EndedLesson { request, outcome }) = &teacher.last else { return };
         if std::mem::replace(&mut self.lessons, teacher.ended) == teacher.ended {
             return;
         }
@@ -215,6 +218,10 @@ impl RecognitionFeature {
                 view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(Arc::clone(&trained.model)), on, notices);
                 notices.info(format!("The model knows {} now.", request.name));
+                // What was decided without the new class is tried again.
+                if on.simulation.worker().snapshot().is_some_and(|snapshot| snapshot.status.finished) {
+                    on.simulation.send(Command::Play, notices);
+                }
             }
             // Another model is in use by now.
             Ok(trained) => notices.info(format!("Taught {}, saved as {}.", request.name, trained.path.display())),

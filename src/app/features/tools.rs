@@ -4,8 +4,8 @@ use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
 use palpate_lab::study::TrainingError;
 use palpate_lab::workers::{
-    DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, TrainCommand,
-    Teacher, TrainRequest, TrainedModel, Trainer, Wake,
+    DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, Teacher, TrainCommand,
+    TrainRequest, TrainedModel, Trainer, Wake,
 };
 use palpate_learn::ModelError;
 use std::path::{Path, PathBuf};

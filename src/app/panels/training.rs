@@ -151,7 +151,8 @@ fn classes_ui(ui: &mut Ui, context: &PanelContext<'_>, classes: &[LabelledClass]
     let Some(model) = context.gripper_model.filter(|model| model.learns_new_objects()) else { return };
     let is_new = |class: &&LabelledClass| class.is_enough() && model.card.labels.class(&class.name).is_none();
     for class in classes.iter().filter(is_new) {
-        let hint = format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
+        let hint =
+            format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
         if ui.button(format!("Teach the model in use: {}", class.name)).on_hover_text(hint).clicked() {
             actions.push(RecognitionAction::TeachRecorded(class.name.clone()));
         }

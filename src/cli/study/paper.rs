@@ -77,7 +77,7 @@ fn subcommands() -> Vec<Command> {
     let all = of(
         ALL,
         "Run all studies of the paper, one after the other.".to_owned(),
-        "Cost: about 4 CPU hours, with --quick a few minutes. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study all \
+        "Cost: about 9 CPU hours, with --quick a few minutes. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study all \
          --quick\n  palpate study all --out studies/\n\nSee also: palpate help studies"
             .to_owned(),
     );

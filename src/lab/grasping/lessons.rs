@@ -4,7 +4,9 @@
 use super::agreement::{Recompute, grasp_soundly};
 use super::known_geometry::seeds_of;
 use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
-use palpate_learn::{Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence};
+use palpate_learn::{
+    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence,
+};
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{ObjectSetup, PosePreset, Scene};
@@ -192,11 +194,8 @@ impl Lessons<'_> {
 
 /// Recorded grasps of one object, each counted so often that together they weigh as much as simulated ones.
 fn recorded(name: &str, store: &Store, view: &SensorView, simulated: usize) -> Result<Dataset, LessonError> {
-    let query = DatasetQuery {
-        source: Some(TrialSource::Recorded),
-        objects: vec![name.to_owned()],
-        ..DatasetQuery::default()
-    };
+    let query =
+        DatasetQuery { source: Some(TrialSource::Recorded), objects: vec![name.to_owned()], ..DatasetQuery::default() };
     let mut data = query.read(store, view, &mut |_, _| ())?;
     let found = data.examples.len();
     if found < LEAST_RECORDED {

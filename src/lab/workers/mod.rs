@@ -93,5 +93,5 @@ pub use student::{
     DrawFigure, Student, StudentCommand, StudentError, StudentView, StudyFiles, StudyOrigin, StudyOutcome,
     StudyRequest, StudyResult,
 };
-pub use teacher::{TeachError, TeachRequest, Teacher, TeacherView};
+pub use teacher::{EndedLesson, TeachError, TeachRequest, Teacher, TeacherView};
 pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};

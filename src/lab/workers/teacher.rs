@@ -51,7 +51,16 @@ pub struct TeacherView {
     /// Number of ended lessons that were not cancelled.
     pub ended: u64,
     /// The last of them.
-    pub last: Option<(Arc<TeachRequest>, Result<Arc<TrainedModel>, Arc<TeachError>>)>,
+    pub last: Option<EndedLesson>,
+}
+
+/// A lesson that has ended.
+#[derive(Clone, Debug)]
+pub struct EndedLesson {
+    /// What was asked.
+    pub request: Arc<TeachRequest>,
+    /// The model that learned it, or why none did.
+    pub outcome: Result<Arc<TrainedModel>, Arc<TeachError>>,
 }
 
 /// Handle of the teaching thread.
@@ -66,7 +75,8 @@ impl Teacher {
             let outcome = taught(&store, &models, &request, &view, stop, outlet);
             if !stop.load(Ordering::Relaxed) {
                 view.ended += 1;
-                view.last = Some((request, outcome.map(Arc::new).map_err(Arc::new)));
+                let outcome = outcome.map(Arc::new).map_err(Arc::new);
+                view.last = Some(EndedLesson { request, outcome });
             }
             outlet.publish(view.clone());
         })

@@ -330,7 +330,8 @@ pub(super) struct Training<'a> {
 impl<N: CandleNetwork> Variables<N> {
     /// Trains a new network. Ends early, with what it has learned so far, if the fit is stopped.
     pub(super) fn trained(training: &Training<'_>, fitting: &Fitting<'_>) -> Result<Self> {
-        let &Training { size: (inputs, outputs), sequences, epochs, rate, dropout, start, batch, loss, progress } = training;
+        let &Training { size: (inputs, outputs), sequences, epochs, rate, dropout, start, batch, loss, progress } =
+            training;
         let mut random = ChaCha8Rng::seed_from_u64(fitting.seed);
         let network = Self::new(inputs, outputs, &mut random)?;
         for (name, var) in &network.by_name {

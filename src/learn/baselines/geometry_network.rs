@@ -86,7 +86,8 @@ fn epochs_of(fitting: &Fitting<'_>) -> std::result::Result<Option<usize>, LearnE
     }
     let Some(value) = fitting.settings.get("epochs") else { return Ok(None) };
     let epochs = value.as_u64().filter(|epochs| (1..=10_000).contains(epochs));
-    let cause = || LearnError::Setting { name: "epochs".to_owned(), cause: "write a number from 1 to 10000".to_owned() };
+    let cause =
+        || LearnError::Setting { name: "epochs".to_owned(), cause: "write a number from 1 to 10000".to_owned() };
     epochs.map(|epochs| Some(epochs as usize)).ok_or_else(cause)
 }
 
@@ -154,10 +155,8 @@ impl GeometryNetwork {
     fn with_new(&self, data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Self, LearnError> {
         let Fitted { learned, network, kept, .. } = &*self.0;
         let steps = learned.steps.clone();
-        let columns = Columns::of(&steps.channels, &data.channels).ok_or_else(|| LearnError::Encoder {
-            needs: steps.channels.join(", "),
-            found: data.channels.join(", "),
-        })?;
+        let columns = Columns::of(&steps.channels, &data.channels)
+            .ok_or_else(|| LearnError::Encoder { needs: steps.channels.join(", "), found: data.channels.join(", ") })?;
         let (mut truth, mut views): (Vec<usize>, Vec<Views>) = kept.views(&steps).unzip();
         truth.extend(data.examples.iter().map(|example| example.class));
         views.extend(data.examples.iter().map(|example| steps.views(&columns.pick(&example.grasp))));

@@ -6,7 +6,8 @@ use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::workers::THRESHOLDS;
-use palpate_learn::Pmf;
+use palpate_learn::{Labels, OTHER, Pmf};
+use palpate_sim::objects::{EMPTY, catalogue};
 
 /// Size of letters where there is room (points).
 const LETTERS: f32 = 12.5;
@@ -26,7 +27,7 @@ struct Columns {
 pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f32)) {
     let labels = &part.view.labels;
     let pmf = newest(part.view);
-    let shown = shown_classes(labels.classes.len(), lines, pmf);
+    let shown = shown_classes(labels, lines, pmf);
     let rest = labels.classes.len() - shown.len();
     let width = ui.available_width();
     let left = ui.cursor().left();
@@ -53,12 +54,20 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f3
     threshold_ui(ui, part, columns, [top, bottom]);
 }
 
-/// All classes or, with fewer lines, the most likely ones; one line is left for the number of the others.
-fn shown_classes(classes: usize, lines: usize, pmf: Option<&Pmf>) -> Vec<usize> {
+/// All classes or, with fewer lines, those that the model was taught and the most likely ones; one line is left for the number
+/// of the others.
+fn shown_classes(labels: &Labels, lines: usize, pmf: Option<&Pmf>) -> Vec<usize> {
+    let classes = labels.classes.len();
     if classes <= lines {
         return (0..classes).collect();
     }
-    let mut shown = pmf.map_or_else(|| (0..classes).collect(), ranked);
+    let is_usual = |class: &usize| {
+        let name = &labels.classes[*class].name;
+        [EMPTY, OTHER].contains(&name.as_str()) || catalogue().iter().any(|built_in| built_in.name == *name)
+    };
+    let (usual, mut shown): (Vec<usize>, Vec<usize>) =
+        pmf.map_or_else(|| (0..classes).collect(), ranked).into_iter().partition(is_usual);
+    shown.extend(usual);
     shown.truncate(lines.saturating_sub(1));
     shown.sort_unstable();
     shown
@@ -126,6 +135,7 @@ pub(super) fn stepped(threshold: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_learn::Class;
 
     #[test]
     fn thresholds_come_in_steps_and_leave_room_for_doubt() {
@@ -133,10 +143,18 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_little_room_the_likeliest_stay_in_their_order() {
+    fn where_there_is_little_room_taught_classes_and_the_likeliest_stay_in_their_order() {
+        let labels = |names: [&str; 5]| {
+            let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
+            Labels { classes: names.map(class).to_vec(), ..Labels::default() }
+        };
+        let usual = labels(["ball", "box", "case", EMPTY, OTHER]);
         let pmf = Pmf::from_weights([0.1, 0.4, 0.0, 0.3, 0.2]);
-        assert_eq!(shown_classes(5, 5, Some(&pmf)), [0, 1, 2, 3, 4]);
-        assert_eq!(shown_classes(5, 4, Some(&pmf)), [1, 3, 4]);
-        assert_eq!(shown_classes(5, 4, None), [0, 1, 2]);
+        assert_eq!(shown_classes(&usual, 5, Some(&pmf)), [0, 1, 2, 3, 4]);
+        assert_eq!(shown_classes(&usual, 4, Some(&pmf)), [1, 3, 4]);
+        assert_eq!(shown_classes(&usual, 4, None), [0, 1, 2]);
+        let taught = labels(["ball", "box", "mug", EMPTY, OTHER]);
+        assert_eq!(shown_classes(&taught, 4, Some(&pmf)), [1, 2, 3]);
+        assert_eq!(shown_classes(&taught, 2, None), [2]);
     }
 }

@@ -14,9 +14,9 @@ use super::emulated_grasps::EmulatedGrippers;
 use super::plan::{POSES, StudyPlan};
 use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{OWN, StudyCard, UnitResult};
+use crate::study::comparison::with_true_size_and_shape;
 use new_objects::{mean_f1, new_object};
 use novelty::{NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, Scored, area, novelty};
-use crate::study::comparison::with_true_size_and_shape;
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
@@ -36,7 +36,7 @@ const CARD: StudyCard = StudyCard {
     title: "Recognition beyond the paper",
     about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
     paper: OWN,
-    budget: "about 90 CPU minutes",
+    budget: "about 150 CPU minutes",
 };
 
 /// Seeds of the emulated grippers' parts, and grasps of each object by each.
