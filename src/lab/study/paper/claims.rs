@@ -10,6 +10,7 @@ const STORED: &[(&str, &str)] = &[
     ("layouts", include_str!("../../../../assets/studies/paper/layouts.json")),
     ("modality", include_str!("../../../../assets/studies/paper/modality.json")),
     ("stages", include_str!("../../../../assets/studies/paper/stages.json")),
+    ("training-size", include_str!("../../../../assets/studies/paper/training-size.json")),
     ("models", include_str!("../../../../assets/studies/paper/models.json")),
     ("grasps", include_str!("../../../../assets/studies/paper/grasps.json")),
     ("drift", include_str!("../../../../assets/studies/paper/drift.json")),

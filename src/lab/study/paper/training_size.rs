@@ -21,7 +21,7 @@ const CARD: StudyCard = StudyCard {
     title: "Size of the training set",
     about: "models over 5 to 800 training grasps of each object, and the fewest that are enough",
     paper: "Fig. 6c",
-    budget: "about 110 CPU minutes",
+    budget: "about 140 CPU minutes",
 };
 
 /// Models of the figure: the paper's and what it is compared with.
