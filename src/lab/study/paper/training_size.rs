@@ -299,7 +299,12 @@ fn gains_shrink(curves: &[Point<'_>], sensors: &[&str], least: &StudyTable) -> F
             && let Some(size) = least.cell(row, "for that of the largest").value()
         {
             let largest = least.cell(row, "largest").value().unwrap_or(0.0);
-            found.push(format!("{}: {size:.0} grasps are as good as {largest:.0}", least.text(row, "sensors")));
+            let sensors = least.text(row, "sensors");
+            found.push(if size < largest {
+                format!("{sensors}: {size:.0} grasps are as good as {largest:.0}")
+            } else {
+                format!("{sensors}: fewer than {largest:.0} grasps are not as good as {largest:.0}")
+            });
         }
     }
     let why = "Agrees where the 95 % interval of the first step's gain is above that of the last. Enough is the fewest grasps whose interval \
@@ -331,8 +336,14 @@ fn figure(at: usize, table: &StudyTable, report: &StudyReport) -> LinkedFigure {
         }
         let enough = report.table("training-size-least").and_then(|(_, least)| {
             let row = *least.rows_with(&[("sensors", sensors), ("model", PAPERS_MODEL)]).first()?;
-            let at = least.cell(row, "for that of the largest").value()?;
-            Some(ReferenceLine { horizontal: false, at, text: format!("{at:.0} are enough for {PAPERS_MODEL}") })
+            let [at, largest] = ["for that of the largest", "largest"].map(|column| least.cell(row, column).value());
+            let (at, largest) = (at?, largest?);
+            let text = if at < largest {
+                format!("{at:.0} are enough for {PAPERS_MODEL}")
+            } else {
+                format!("{PAPERS_MODEL}: fewer than {at:.0} are not enough")
+            };
+            Some(ReferenceLine { horizontal: false, at, text })
         });
         plots.push(Plot {
             title: format!("{sensors} sensors"),
