@@ -340,10 +340,12 @@ fn truncated_or_altered_models_are_refused() {
 }
 
 #[test]
-fn the_shipped_model_is_live_and_rejects_unknown_objects() {
-    let model = Shipped::PerfectSensors.model().expect("valid");
-    assert!(model.recogniser.live().is_some() && model.card.rejection.is_some());
-    assert!(!model.card.quick, "a quick model must not ship");
+fn shipped_models_are_live_know_other_objects_and_learn_new_ones() {
+    for shipped in Shipped::ALL {
+        let model = shipped.model().expect("valid");
+        assert!(model.recogniser.live().is_some() && model.card.labels.other().is_some(), "{shipped:?}");
+        assert!(model.learns_new_objects() && !model.card.quick, "{shipped:?}: a quick model must not ship");
+    }
 }
 
 /// Models of every method, trained by version 0.1.0 on `made_up(3, 1)` (dual-stage networks: `made_up(5, 1)`), with their
