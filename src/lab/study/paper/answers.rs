@@ -218,9 +218,12 @@ impl Pool {
         self.trials.len()
     }
 
-    /// Macro F1 with its interval.
+    /// Macro F1 with its interval, over the classes of the test grasps: a model may know others too.
     pub(super) fn f1(&self) -> Option<Interval> {
-        self.scored(Confusion::macro_f1)
+        let mut tested: Vec<usize> = self.trials.values().map(|(truth, _)| *truth).collect();
+        tested.sort_unstable();
+        tested.dedup();
+        self.scored(|confusion| confusion.scores_over(&tested).map(|scores| scores.f1))
     }
 
     /// Macro-accuracy with its interval.
