@@ -1,4 +1,5 @@
-//! Adapting to a real gripper without labels: calibrations of its parts from one close of its empty hand. Afterwards its readings are those that a recogniser for any gripper has learned.
+//! Adapting to a real gripper without labels: calibrations of its parts from one close of its empty hand. Afterwards its
+//! readings are those that a recogniser for any gripper has learned.
 
 use super::run::grasp;
 use palpate_sim::gripper::Side;

@@ -7,9 +7,8 @@ use super::super::plan::POSES;
 use super::novelty::Scored;
 use super::questions::Question;
 use super::tested;
-use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Method, check_apart};
+use palpate_learn::{Method, Pmf, check_apart};
 
 /// Grasps of each object by which models learn.
 const GRASPS: usize = 50;
@@ -39,20 +38,8 @@ pub(super) fn new_object(
     let missing = || StudyError::Missing(format!("grasps of {left_out}"));
     let new = model.card.labels.class(left_out).ok_or_else(missing)?;
     let test = test.relabelled(&model.card.labels).ok_or_else(missing)?;
-    let recogniser = model.recogniser.as_ref();
-    let answers = answer(recogniser, &test);
-    let rounds = rounds(recogniser, &test, &answers, plan.seed);
-    let says_new = |belief: &Belief, grasps: usize| {
-        let pmf = belief.steps().get(grasps - 1).or(belief.now());
-        f64::from(u8::from(pmf.is_some_and(|pmf| pmf.top().0 == new)))
-    };
-    let scored = Scored {
-        data: test.about.described(),
-        trials: test.examples.iter().map(|example| example.id).collect(),
-        is_new: test.examples.iter().map(|example| example.class == new).collect(),
-        scores: [1, 3].map(|grasps| rounds.iter().map(|round| says_new(&round.belief, grasps)).collect()),
-    };
-    UnitResult::new(&scored).map(Some)
+    let says_new = |pmf: &Pmf| f64::from(u8::from(pmf.top().0 == new));
+    UnitResult::new(&Scored::of(&model, &test, left_out, plan.seed, says_new)).map(Some)
 }
 
 /// Mean over the objects of the F1 of the object's class, over resampled trials.

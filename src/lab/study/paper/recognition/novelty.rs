@@ -10,7 +10,7 @@ use super::tested;
 use crate::grasping::random_shapes;
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Example, Method, check_apart};
+use palpate_learn::{Belief, Dataset, Example, Method, Model, Pmf, check_apart};
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 
@@ -52,21 +52,25 @@ pub(super) fn novelty(
     check_apart(&train.examples, &test.examples)?;
     let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
-    let recogniser = model.recogniser.as_ref();
-    let answers = answer(recogniser, &test);
-    let rounds = rounds(recogniser, &test, &answers, plan.seed);
-    let score = |belief: &Belief, grasps: usize| {
-        let pmf = belief.steps().get(grasps - 1).or(belief.now());
-        pmf.map_or(0.0, |pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln())
-    };
-    let is_new = |example: &Example| test.labels.classes[example.class].name == left_out;
-    let scored = Scored {
-        data: test.about.described(),
-        trials: test.examples.iter().map(|example| example.id).collect(),
-        is_new: test.examples.iter().map(is_new).collect(),
-        scores: [1, 3].map(|grasps| rounds.iter().map(|round| score(&round.belief, grasps)).collect()),
-    };
-    UnitResult::new(&scored).map(Some)
+    let score = |pmf: &Pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln();
+    UnitResult::new(&Scored::of(&model, &test, left_out, plan.seed, score)).map(Some)
+}
+
+impl Scored {
+    /// Scores what a model believes after one test grasp of each round, and after three.
+    pub(super) fn of(model: &Model, test: &Dataset, left_out: &str, seed: u64, score: impl Fn(&Pmf) -> f64) -> Self {
+        let recogniser = model.recogniser.as_ref();
+        let rounds = rounds(recogniser, test, &answer(recogniser, test), seed);
+        let after =
+            |belief: &Belief, grasps: usize| belief.steps().get(grasps - 1).or(belief.now()).map_or(0.0, &score);
+        let is_new = |example: &Example| test.labels.classes[example.class].name == left_out;
+        Self {
+            data: test.about.described(),
+            trials: test.examples.iter().map(|example| example.id).collect(),
+            is_new: test.examples.iter().map(is_new).collect(),
+            scores: [1, 3].map(|grasps| rounds.iter().map(|round| after(&round.belief, grasps)).collect()),
+        }
+    }
 }
 
 /// Share of pairs of an unknown and a known object in which the unknown one has the higher score (AUROC), over resampled trials.
