@@ -38,11 +38,12 @@ pub(super) struct DataArguments {
     pub(super) trials: QueryArguments,
     #[command(flatten)]
     pub(super) signals: SignalArguments,
-    /// Sensor model for simulated trials: virtual (perfect), physical-like (as on the real gripper), adapted (the same after
-    /// `palpate adapt`), or drawn (as on any gripper after it, another one for each grasp).
+    /// Sensor model for simulated trials: virtual (perfect), noisy (the same with slip, drift and noise), physical-like (as on
+    /// the real gripper), adapted (the same after `palpate adapt`), or drawn (as on any gripper after it, another one for each
+    /// grasp).
     #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
     pub(super) sensors: SensorModel,
-    /// With --sensors drawn: number of grippers that read each grasp for training.
+    /// With --sensors drawn or noisy: number of readings of each grasp for training, each by other sensors.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64), requires = "sensors")]
     draws: u32,
     /// Read the readings at this rate (Hz; default: as they were sampled).
@@ -61,7 +62,7 @@ pub(super) struct DataArguments {
 
 /// Parser of a sensor model's name.
 pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
-    SensorModel::named(text).ok_or_else(|| "choose virtual, physical-like, adapted or drawn".to_owned())
+    SensorModel::named(text).ok_or_else(|| format!("choose {}", SensorModel::ALL.map(SensorModel::name).join(", ")))
 }
 
 impl QueryArguments {

@@ -147,7 +147,7 @@ pub struct DataCard {
     pub layout: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
-    /// Number of grippers with drawn sensors that read each simulated grasp, where it is not one.
+    /// Number of times that drawn or noisy sensors read each simulated grasp, where it is not one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub draws: Option<u32>,
     /// Definition of the signals of simulated grasps: `parts`, as on a real gripper, or `contact` or `hull`, which only
@@ -283,6 +283,15 @@ impl Dataset {
         })
     }
 
+    /// Adds the readings of the same grasps in another data set as further ones.
+    pub fn add_readings(&mut self, other: &Self) {
+        let of: BTreeMap<i64, &Example> = other.examples.iter().map(|example| (example.id, example)).collect();
+        for example in &mut self.examples {
+            let other = of.get(&example.id).into_iter();
+            example.further.extend(other.flat_map(|own| std::iter::once(&own.grasp).chain(&own.further).cloned()));
+        }
+    }
+
     /// Shuffles the labels among the grasps, as a control.
     pub fn with_shuffled_labels(&self, seed: u64) -> Self {
         let mut truth = self.truth();
@@ -372,6 +381,23 @@ mod tests {
     fn hashes_are_those_of_its_authors() {
         assert_eq!(fnv_1a([]), 0xcbf2_9ce4_8422_2325);
         assert_eq!(fnv_1a("foobar".bytes()), 0x8594_4171_f739_67e8);
+    }
+
+    #[test]
+    fn readings_of_the_same_grasps_are_added_to_them() {
+        let read = |value: f32| Arc::new(Sequence { t_s: vec![0.0], values: vec![value] });
+        let example = |id: i64, values: &[f32]| Example {
+            id,
+            grasp: read(values[0]),
+            further: values[1..].iter().map(|value| read(*value)).collect(),
+            ..Example::default()
+        };
+        let of = |examples: Vec<Example>| Dataset { examples, ..Dataset::default() };
+        let mut data = of(vec![example(1, &[1.0]), example(2, &[2.0]), example(3, &[3.0])]);
+        data.add_readings(&of(vec![example(3, &[3.1, 3.2]), example(1, &[1.1]), example(9, &[9.0])]));
+        let wanted = [example(1, &[1.0, 1.1]), example(2, &[2.0]), example(3, &[3.0, 3.1, 3.2])];
+        assert_eq!(data.examples, wanted);
+        assert_eq!(data.with_further().examples.len(), 6);
     }
 
     #[test]

@@ -26,6 +26,8 @@ struct Recipe {
     /// Seeds of random shapes, each grasped once, of the class "other".
     others: Range<u64>,
     view: SensorView,
+    /// Number of further readings of each training grasp through noisy sensors.
+    noisy: u32,
     /// How much the build of the gripper varies.
     build: f64,
 }
@@ -46,6 +48,7 @@ impl Recipe {
                 seeds: [7, 2],
                 others: 5000..6000,
                 view: virtual_view,
+                noisy: 2,
                 build: 0.0,
             },
             // Its random shapes are not those that the encoder has learned from.
@@ -57,6 +60,7 @@ impl Recipe {
                 seeds: [1, 2],
                 others: 5000..5600,
                 view: SensorView { sensors: SensorModel::Drawn, draws: 6, ..virtual_view },
+                noisy: 0,
                 build: 1.0,
             },
         }
@@ -76,7 +80,12 @@ impl Recipe {
             collection = collect(&plan, store, threads, &mut |_| ControlFlow::Continue(()))?.collection;
         }
         let source = DatasetQuery { collection: Some(collection), ..DatasetQuery::default() };
-        Ok(source.read(store, &self.view, &mut |_, _| ())?)
+        let mut grasps = source.read(store, &self.view, &mut |_, _| ())?;
+        if set == 0 && self.noisy > 0 {
+            let noisy = SensorView { sensors: SensorModel::Noisy, draws: self.noisy, ..self.view.clone() };
+            grasps.add_readings(&source.read(store, &noisy, &mut |_, _| ())?);
+        }
+        Ok(grasps)
     }
 }
 

@@ -70,6 +70,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             for model in SensorModel::BOTH {
                 let hint = match model {
                     SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
+                    SensorModel::Noisy => "Perfect parts that slip and drift a little and are read with noise",
                     SensorModel::PhysicalLike => "Strips, pads and clock of a real gripper, with their noise and drift",
                     SensorModel::Adapted => "The same, calibrated by one close of the empty hand",
                     SensorModel::Drawn => {

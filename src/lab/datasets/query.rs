@@ -20,7 +20,7 @@ pub struct SensorView {
     pub layout: String,
     /// Sensor model: ideal, like those of the real gripper, or like those of any.
     pub sensors: SensorModel,
-    /// Number of grippers, each with drawn sensors of its own, that read each grasp for training; the others read it once.
+    /// Number of times that drawn or noisy sensors, others each time, read each grasp for training; the others read it once.
     pub draws: u32,
     /// Definition of the signals.
     pub signals: SignalDefinition,
@@ -416,9 +416,12 @@ impl SensorView {
         Self { signals, ..self }
     }
 
-    /// Number of grippers that read each grasp: one, unless they are drawn.
+    /// Number of readings of each grasp: one, unless they differ.
     pub fn readers(&self) -> u32 {
-        if self.sensors == SensorModel::Drawn { self.draws.max(1) } else { 1 }
+        match self.sensors {
+            SensorModel::Noisy | SensorModel::Drawn => self.draws.max(1),
+            SensorModel::Virtual | SensorModel::PhysicalLike | SensorModel::Adapted => 1,
+        }
     }
 
     /// True for sensors such as a real gripper has.
@@ -448,7 +451,7 @@ impl SensorView {
         Ok(once.readings(trial)?.swap_remove(0))
     }
 
-    /// The same as each of the drawn grippers reads it; one at least.
+    /// The same as often as the view reads a grasp; once at least.
     pub fn readings(&self, trial: &SimulatedTrial) -> Result<Vec<Signals>, LayoutError> {
         self.check_parts()?;
         let layout = SensorLayout::named(&self.layout)?;

@@ -33,8 +33,15 @@ impl DatasetQuery {
         let found = library.find(store, &self.library_query()).map_err(failed)?;
         let mut rows: Vec<&TrialRow> = found.iter().map(|trial| &trial.row).collect();
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
-        let mut left_out = LeftOut::new();
         let matching = rows.len();
+        // An object whose trials are all left out is counted among those.
+        let has_trials = |object: &&String| rows.iter().any(|row| row.object == **object);
+        if matching > 0
+            && let Some(object) = self.objects.iter().find(|object| !has_trials(object))
+        {
+            return Err(DatasetError::NoSuchObject { object: object.clone() });
+        }
+        let mut left_out = LeftOut::new();
         let (mut kept, mut held) = (BTreeMap::<&str, usize>::new(), BTreeSet::new());
         rows.retain(|row| {
             let count = kept.entry(row.object.as_str()).or_default();
@@ -104,9 +111,6 @@ impl DatasetQuery {
         mut left_out: LeftOut,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
-        if let Some(object) = self.objects.iter().find(|object| !rows.iter().any(|row| row.object == **object)) {
-            return Err(DatasetError::NoSuchObject { object: object.clone() });
-        }
         let mut channels: Option<(TrialId, Vec<String>)> = None;
         let mut named = BTreeMap::new();
         let (mut read, mut origins) = (Vec::new(), Vec::new());

@@ -170,7 +170,9 @@ fn a_lower_threshold_between_two_grasps_ends_the_round() {
     watched.until(|s| s.last.is_some());
     watched.send(Command::SetThreshold(0.55));
     let end = watched.until(|s| s.status.finished);
-    assert_eq!((end.grasp, decision(&end)), (1, Some(StopReason::Sure)));
+    assert_eq!(decision(&end), Some(StopReason::Sure));
+    // On a busy machine the next grasp has begun when the command comes; it is the last one then.
+    assert!(end.grasp <= 2, "{}", end.grasp);
 }
 
 #[test]

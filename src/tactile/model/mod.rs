@@ -49,6 +49,8 @@ pub enum SensorModel {
     /// Perfect ones, as in the paper's simulation.
     #[default]
     Virtual,
+    /// Perfect parts that slip a little, drift a little and are read with noise.
+    Noisy,
     /// Such as the real gripper has: [`PhysicalLike`] with everything on.
     PhysicalLike,
     /// The same after one close of the empty hand, by which [`crate::calibration::EmptyHand`] calibrates them.
@@ -60,7 +62,7 @@ pub enum SensorModel {
 
 impl SensorModel {
     /// All.
-    pub const ALL: [Self; 4] = [Self::Virtual, Self::PhysicalLike, Self::Adapted, Self::Drawn];
+    pub const ALL: [Self; 5] = [Self::Virtual, Self::Noisy, Self::PhysicalLike, Self::Adapted, Self::Drawn];
     /// Those of one gripper, the clean one first.
     pub const BOTH: [Self; 2] = [Self::Virtual, Self::PhysicalLike];
 
@@ -68,6 +70,7 @@ impl SensorModel {
     pub fn name(self) -> &'static str {
         match self {
             Self::Virtual => "virtual",
+            Self::Noisy => "noisy",
             Self::PhysicalLike => "physical-like",
             Self::Adapted => "adapted",
             Self::Drawn => "drawn",
@@ -84,6 +87,7 @@ impl SensorModel {
     pub fn apply(self, clean: &Signals, seed: u64) -> Signals {
         match self {
             Self::Virtual => clean.clone(),
+            Self::Noisy => PhysicalLike::MILD.apply(clean, seed),
             Self::PhysicalLike => PhysicalLike::default().apply(clean, seed),
             Self::Adapted => PhysicalLike { closed_empty: true, ..PhysicalLike::default() }.apply(clean, seed),
             Self::Drawn => PhysicalLike::any(seed).apply(clean, seed),

@@ -87,6 +87,9 @@ impl PhysicalLike {
         full_force: 0.3,
     };
 
+    /// Nominal parts that slip and drift, are noisy and are read in counts.
+    pub const MILD: Self = Self { slip: true, drift: true, noise: true, counts: true, ..Self::OFF };
+
     /// Any gripper, with everything on: its parts and their mounting are drawn, and it has closed empty once. Every other
     /// one closes in steps.
     pub fn any(gripper: u64) -> Self {

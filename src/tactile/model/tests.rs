@@ -56,7 +56,7 @@ fn column(signals: &Signals, name: &str) -> Vec<f32> {
 
 #[test]
 fn names_lead_back_to_models() {
-    for model in SensorModel::BOTH {
+    for model in SensorModel::ALL {
         assert_eq!(SensorModel::named(model.name()), Some(model));
         let written = serde_json::to_string(&model).expect("plain");
         assert_eq!(written, format!("\"{}\"", model.name()));
@@ -68,6 +68,21 @@ fn names_lead_back_to_models() {
 #[test]
 fn virtual_sensors_change_nothing() {
     assert_eq!(SensorModel::Virtual.apply(&grasp(), 7), grasp());
+}
+
+#[test]
+fn noisy_sensors_read_nearly_what_perfect_ones_do() {
+    let clean = PhysicalLike::OFF.apply(&grasp(), 7);
+    let [a, b] = [7, 8].map(|seed| SensorModel::Noisy.apply(&grasp(), seed));
+    assert_ne!(a, b);
+    assert_eq!(a.t_s, clean.t_s, "no jitter, no steps");
+    for name in NAMES {
+        let [noisy, clean] = [&a, &clean].map(|signals| column(signals, name));
+        let most = clean.iter().fold(0.0, |a: f32, b| a.max(b.abs()));
+        let apart = noisy.iter().zip(&clean).map(|(a, b)| (a - b).abs()).sum::<f32>() / clean.len() as f32;
+        // Pads read 4 N, far above where the drift of their conductance is small.
+        assert!(apart > 0.0 && apart < 0.2 * most, "{name}: {apart} of {most}");
+    }
 }
 
 #[test]

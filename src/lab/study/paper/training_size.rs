@@ -19,7 +19,7 @@ pub(super) struct TrainingSize;
 const CARD: StudyCard = StudyCard {
     key: "training-size",
     title: "Size of the training set",
-    about: "models over 5 to 800 training grasps of each object, and the fewest that are enough",
+    about: "models over 5 to 800 training grasps of each object (networks and noisy SVMs to fewer), and the fewest that are enough",
     paper: "Fig. 6c",
     budget: "about 140 CPU minutes",
 };
