@@ -67,6 +67,11 @@ impl Pmf {
         self.0.iter().map(|p| p.max(FLOOR).ln())
     }
 
+    /// Entropy (nat).
+    pub fn entropy(&self) -> f64 {
+        self.0.iter().filter(|p| **p > 0.0).map(|p| -p * p.ln()).sum()
+    }
+
     /// Combines two independent observations under a uniform prior (product of experts).
     pub fn times(&self, other: &Self) -> Self {
         Self::from_scores(self.logarithms().zip(other.logarithms()).map(|(a, b)| a + b))

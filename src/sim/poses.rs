@@ -38,7 +38,7 @@ impl PoseSampler {
         let mut drawn = self.scene.clone();
         for rejected in 0..MOST_DRAWS {
             self.draw_once(&mut drawn, &mut random);
-            if drawn.check().is_ok() && SimRun::new(&drawn, object).0.starting_overlap() <= 0.0 {
+            if has_room(&drawn, object) {
                 return (drawn, rejected);
             }
         }
@@ -118,6 +118,11 @@ impl PoseSampler {
         let filling_s = share * random.random_range(BUILD.filling_s[0]..=BUILD.filling_s[1]);
         drawn.actuation.filling_time = nominal.actuation.filling_time + filling_s;
     }
+}
+
+/// Whether a scene is valid and its open fingers do not stand inside the object.
+pub fn has_room(scene: &Scene, object: Option<&ObjectModel>) -> bool {
+    scene.check().is_ok() && SimRun::new(scene, object).0.starting_overlap() <= 0.0
 }
 
 /// Without the feature no object can be dropped; [`Scene::check`] refuses scenes that need it.

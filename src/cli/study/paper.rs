@@ -66,13 +66,13 @@ fn subcommands() -> Vec<Command> {
         PaperArguments::augment_args(Command::new(name)).about(about).after_help(format!("{GRASPS}\n\n{examples}"))
     };
     let studies = PAPER_STUDIES.iter().map(|study| {
-        let StudyCard { key, about, paper, budget, .. } = study.card();
+        let StudyCard { key, title, about, budget, .. } = study.card();
         let examples = format!(
             "Cost: {budget}, with --quick less than a minute. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study \
              {key} --quick\n  palpate study {key} --out studies/\n  palpate study {key} --preset A --sensors physical-like\n  \
              palpate study {key} --source serial --json\n\nSee also: palpate help studies"
         );
-        of(key, format!("{} ({paper} of the paper): {about}.", study.card().title), examples)
+        of(key, format!("{title} ({}): {about}.", study.card().origin()), examples)
     });
     let all = of(
         ALL,
@@ -190,7 +190,7 @@ fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &Stu
 
 fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, quick: bool) -> Result<(), Failure> {
     let card = study.card();
-    say(format!("{} ({} of the paper)", card.title, card.paper))?;
+    say(format!("{} ({})", card.title, card.origin()))?;
     for line in &stored.result.data {
         say(format!("  {line}"))?;
     }

@@ -161,11 +161,7 @@ fn zeroed(data: &Dataset) -> Dataset {
 }
 
 /// Readings of the same simulated grasps by real sensors with these faults; none where one is not simulated.
-pub(super) fn read_again(
-    bench: &StudyBench<'_>,
-    data: &Dataset,
-    settings: &PhysicalLike,
-) -> Result<Option<Dataset>, StudyError> {
+fn read_again(bench: &StudyBench<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Option<Dataset>, StudyError> {
     let mut read = Vec::new();
     for example in &data.examples {
         let Some(trial) = bench.simulated(example.id)? else { return Ok(None) };

@@ -1,10 +1,10 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
 use super::claims::stored_report;
-use super::report::{StudyColumn, StudyRow, StudyTable};
+use super::report::{StudyColumn, StudyReport, StudyRow, StudyTable};
 use super::{PaperStudy, grasps, models, recognition};
 use crate::study::shipped::shipped_text;
-use crate::study::stored_study::{GeneratedSection, markdown_table};
+use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 use palpate_learn::METHODS;
 
 /// Kinds of grasps of the comparison of methods, and of the study of successive grasps.
@@ -23,12 +23,14 @@ fn stored_table(study: &dyn PaperStudy) -> Result<Option<(StudyTable, String)>, 
 /// The sections.
 pub(in crate::study) fn sections_in_short() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let none = "Not measured in full with this version.".to_owned();
-    let beyond = stored_table(&recognition::Recognition)?.map_or_else(|| none.clone(), |own| beyond_the_paper(&own));
+    let beyond = stored_report(&recognition::Recognition)?;
     let (methods, grasps) = (stored_table(&models::Models)?, stored_table(&grasps::Grasps)?);
     let (text, short) = match (&methods, &grasps) {
         (Some(methods), Some(grasps)) => (scores(methods, grasps), best_in_short(&methods.0, &grasps.0)),
-        _ => (none, shipped_text()),
+        _ => (none.clone(), shipped_text()),
     };
+    let short = [short, beyond.as_ref().map_or_else(String::new, |own| unlabelled_in_short(&own.result))].concat();
+    let beyond = beyond.map_or(none, |own| beyond_the_paper(&own));
     Ok(vec![
         GeneratedSection { document: "assets/help/recognition.md", name: "scores", text },
         GeneratedSection { document: "assets/help/recognition.md", name: "beyond the paper", text: beyond },
@@ -36,12 +38,31 @@ pub(in crate::study) fn sections_in_short() -> Result<Vec<GeneratedSection>, ser
     ])
 }
 
-/// The table of the study of recognition beyond the paper.
-fn beyond_the_paper((table, origin): &(StudyTable, String)) -> String {
-    let header: Vec<String> = table.columns.iter().map(StudyColumn::titled).collect();
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let row = |row: &StudyRow| row.cells.iter().zip(&table.columns).map(|(cell, own)| cell.shown(&own.unit)).collect();
-    format!("{}\n\n{origin}.", markdown_table(&header, &table.rows.iter().map(row).collect::<Vec<_>>()))
+/// The tables of the study of recognition beyond the paper: targets, the next grasp, costs.
+fn beyond_the_paper(stored: &StoredStudy<StudyReport>) -> String {
+    let text = |table: &StudyTable| {
+        let header: Vec<String> = table.columns.iter().map(StudyColumn::titled).collect();
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        let cells =
+            |row: &StudyRow| row.cells.iter().zip(&table.columns).map(|(cell, own)| cell.shown(&own.unit)).collect();
+        let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
+        format!("{}:\n\n{}\n\n", table.title, markdown_table(&header, &rows))
+    };
+    let tables: String = stored.result.tables.iter().map(text).collect();
+    format!("{tables}{}.", stored.origin())
+}
+
+/// A sentence on grippers without labelled grasps.
+fn unlabelled_in_short(report: &StudyReport) -> String {
+    let Some((_, table)) = report.table(recognition::Recognition.card().key) else { return String::new() };
+    let Some(row) = table.rows_with(&[("grasps", recognition::UNLABELLED)]).first().copied() else {
+        return String::new();
+    };
+    let [one, three] = ["one grasp", "three grasps"].map(|column| shown(table, Some(&row), column));
+    format!(
+        " On a gripper with parts and mechanics that no training saw, and without a labelled grasp, the shipped model reaches \
+         {one} % after one grasp and {three} % after three (`palpate help recognition`)."
+    )
 }
 
 /// F1 after one grasp, or after several put down anew, in percent.

@@ -86,6 +86,11 @@ impl StudyCard {
     pub fn is_of_the_paper(&self) -> bool {
         self.paper != OWN
     }
+
+    /// Where it comes from: `Fig. 7 of the paper`.
+    pub fn origin(&self) -> String {
+        if self.is_of_the_paper() { format!("{} of the paper", self.paper) } else { "our own methods".to_owned() }
+    }
 }
 
 /// Section of the paper of a study of our own methods.

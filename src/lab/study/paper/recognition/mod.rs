@@ -1,6 +1,7 @@
 //! Recognition beyond the paper: what methods of our own reach, with perfect sensors, with real ones, and on grippers of which
 //! no grasp is labelled, beside the targets.
 
+mod guided;
 mod new_objects;
 mod novelty;
 mod questions;
@@ -9,12 +10,12 @@ use super::answers::{ModelAnswers, Pool, judge_answers};
 use super::bench::{StudyBench, StudyError};
 use super::cases::{CaseStudy, StudyCase};
 use super::drawing::{named_rows, percent_row};
-use super::drift::read_again;
 use super::emulated_grasps::EmulatedGrippers;
-use super::plan::{POSES, StudyPlan};
+use super::plan::StudyPlan;
 use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{OWN, StudyCard, UnitResult};
 use crate::study::comparison::with_true_size_and_shape;
+use guided::{GUIDED, GUIDED_METHOD, GuidedRounds, guided};
 use new_objects::{mean_f1, new_object};
 use novelty::{NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, Scored, area, novelty};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
@@ -22,8 +23,8 @@ use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Belief, Dataset, Method, Shipped, check_apart, method};
 use palpate_sim::scene::{PosePreset, Scene};
-use palpate_tactile::model::PhysicalLike;
 use palpate_tactile::trial::TrialId;
+pub(super) use questions::UNLABELLED;
 use questions::{JUDGED, Learns, NEW_OBJECTS, QUESTIONS, Question, Reads, TESTED};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -47,6 +48,7 @@ pub(super) enum Case {
     Answers { question: &'static Question, method: &'static Method, draw: usize },
     Novelty { left_out: String, method: &'static Method },
     NewObject { question: &'static Question, left_out: String, method: &'static Method },
+    Guided { method: &'static Method },
 }
 
 impl StudyCase for Case {
@@ -66,6 +68,7 @@ impl StudyCase for Case {
                 cases.extend(left_out().map(|left_out| Self::NewObject { question, left_out, method }));
             }
         }
+        cases.extend(method(GUIDED_METHOD).map(|method| Self::Guided { method }));
         cases
     }
 
@@ -75,7 +78,9 @@ impl StudyCase for Case {
                 // Answers of another shipped model are others.
                 let shipped = match question.learns {
                     Learns::Shipped(shipped) => format!(", {:08x}", shipped.model_content()),
-                    Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => String::new(),
+                    Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
+                        String::new()
+                    }
                 };
                 format!("{}, {}, draw {}{shipped}", question.name, method.key, draw + 1)
             }
@@ -83,12 +88,16 @@ impl StudyCase for Case {
             Self::NewObject { question, left_out, method } => {
                 format!("{}, {}, {left_out}", question.name, method.key)
             }
+            Self::Guided { method } => format!("{GUIDED}, {}", method.key),
         }
     }
 
     fn method(&self) -> &'static Method {
         match self {
-            Self::Answers { method, .. } | Self::Novelty { method, .. } | Self::NewObject { method, .. } => method,
+            Self::Answers { method, .. }
+            | Self::Novelty { method, .. }
+            | Self::NewObject { method, .. }
+            | Self::Guided { method } => method,
         }
     }
 }
@@ -109,12 +118,12 @@ impl Case {
         bench: &StudyBench<'_>,
     ) -> Result<Option<UnitResult>, StudyError> {
         let plan = bench.plan();
-        let (of_each, draws) = question.draws(plan);
+        let (of_each, _) = question.draws(plan);
         let Some(test) = tested(question, bench)? else { return Ok(None) };
         let model = match question.learns {
             Learns::Shipped(shipped) => shipped.model().map_err(|error| StudyError::Missing(error.to_string()))?,
-            Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
-                let Some(all) = bench.data(&question.wanted(plan, of_each * draws, POSES))? else { return Ok(None) };
+            Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
+                let Some(all) = bench.data(&question.learned(plan))? else { return Ok(None) };
                 let own = all.by_class().into_iter().flat_map(|of| of.into_iter().skip(draw * of_each).take(of_each));
                 let mut train = all.part(&own.collect::<Vec<_>>());
                 check_apart(&train.examples, &test.examples)?;
@@ -133,7 +142,7 @@ impl Case {
         let answers = answer(model.recogniser.as_ref(), &test);
         let answers = match question.learns {
             Learns::Told { .. } => with_true_size_and_shape(&answers, &test),
-            Learns::Like { .. } | Learns::Shuffled { .. } | Learns::Shipped(_) => answers,
+            Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Shipped(_) => answers,
         };
         let one = judge_answers(&model, &test, &answers);
         let rounds = rounds(model.recogniser.as_ref(), &test, &answers, plan.seed);
@@ -149,12 +158,6 @@ fn tested(question: &Question, bench: &StudyBench<'_>) -> Result<Option<Arc<Data
     let wanted = question.wanted(plan, plan.grasps(TESTED, 10), JUDGED);
     match question.reads {
         Reads::Sensors { .. } | Reads::Contact => bench.data(&wanted),
-        Reads::MildNoise => {
-            let settings = PhysicalLike { slip: true, drift: true, noise: true, counts: true, ..PhysicalLike::OFF };
-            let Some(data) = bench.data(&wanted)? else { return Ok(None) };
-            let noisy = read_again(bench, &data, &settings)?;
-            noisy.map(|noisy| Some(Arc::new(noisy))).ok_or_else(|| StudyError::Missing("simulated grasps".to_owned()))
-        }
         Reads::Emulated => {
             let preset = PosePreset::named(question.preset);
             let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", question.preset)))?;
@@ -188,6 +191,7 @@ impl CaseStudy for Recognition {
             Case::Answers { question, method, draw } => Case::answers(question, method, draw, bench),
             Case::Novelty { left_out, method } => novelty(&left_out, method, bench),
             Case::NewObject { question, left_out, method } => new_object(question, &left_out, method, bench),
+            Case::Guided { method } => guided(method, bench),
         }
     }
 
@@ -195,6 +199,7 @@ impl CaseStudy for Recognition {
         let mut kinds: Vec<(&'static Question, &'static str, Vec<Answered>)> = Vec::new();
         let (mut scored, mut data): (Vec<Scored>, Vec<String>) = (Vec::new(), Vec::new());
         let mut taught: Vec<(&'static Question, &'static str, Vec<Scored>)> = Vec::new();
+        let mut next: Option<StudyTable> = None;
         let mut note = |text: &String| {
             if !data.contains(text) {
                 data.push(text.clone());
@@ -223,6 +228,11 @@ impl CaseStudy for Recognition {
                         Some((.., parts)) => parts.push(own),
                         None => taught.push((question, method.key, vec![own])),
                     }
+                }
+                Case::Guided { .. } => {
+                    let own: GuidedRounds = unit.read()?;
+                    note(&own.data);
+                    next = Some(guided::table(&own));
                 }
             }
         }
@@ -260,7 +270,8 @@ impl CaseStudy for Recognition {
             let tested = parts.iter().map(|own| own.trials.len()).max().unwrap_or(0);
             push(&mut table, [question.name, key], parts.len(), found, question.targets, (tested, Vec::new()));
         }
-        Ok(StudyReport::new(data, vec![table, costs(&kinds)], Vec::new()))
+        let tables = [Some(table), next, Some(costs(&kinds))];
+        Ok(StudyReport::new(data, tables.into_iter().flatten().collect(), Vec::new()))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {

@@ -5,7 +5,7 @@ use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
 use super::novelty::Scored;
-use super::questions::Question;
+use super::questions::{Question, READINGS};
 use super::tested;
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Method, Pmf, check_apart};
@@ -23,8 +23,8 @@ pub(super) fn new_object(
     let plan = bench.plan();
     let Some(test) = tested(question, bench)? else { return Ok(None) };
     let mut wanted = question.wanted(plan, plan.grasps(GRASPS, 20), POSES);
-    // As the shipped model for any gripper learns; sensors that are not drawn are read once.
-    wanted.view.draws = plan.pick(6, 2, 1);
+    // Sensors that are not drawn are read once.
+    wanted.view.draws = plan.pick(READINGS, 2, 1);
     let Some(all) = bench.data(&wanted)? else { return Ok(None) };
     check_apart(&all.examples, &test.examples)?;
     let of_class = |known: bool| -> Vec<usize> {

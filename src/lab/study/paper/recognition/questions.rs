@@ -1,6 +1,6 @@
 //! What is asked: grasps, sensors, models and targets of each row.
 
-use super::super::plan::{DataWanted, StudyPlan};
+use super::super::plan::{DataWanted, POSES, StudyPlan};
 use palpate_learn::Shipped;
 use palpate_tactile::SignalDefinition;
 use palpate_tactile::model::SensorModel;
@@ -9,6 +9,10 @@ use palpate_tactile::model::SensorModel;
 pub(super) const JUDGED: u64 = 8;
 /// Grasps of each object that judge.
 pub(super) const TESTED: usize = 100;
+/// Training grasps of each fixed object where there are many.
+pub(super) const LEARNED: usize = 400;
+/// Drawn grippers that read each training grasp, as for the shipped model for any gripper.
+pub(super) const READINGS: u32 = 6;
 /// Training draws.
 const DRAWS: usize = 5;
 
@@ -17,7 +21,9 @@ const DRAWS: usize = 5;
 pub(in crate::study::paper) enum Learns {
     /// So many grasps of each object like those that it is judged on.
     Like { of_each: usize, draws: usize },
-    /// The same with labels in random order, a control.
+    /// So many simulated grasps of each object as any gripper reads them.
+    Drawn { of_each: usize },
+    /// The same as [`Self::Like`] with labels in random order, a control.
     Shuffled { of_each: usize },
     /// The same, with the true size and shape of each test grasp known: an upper bound for what estimates them.
     Told { of_each: usize },
@@ -32,8 +38,6 @@ pub(in crate::study::paper) enum Reads {
     Sensors { sensors: SensorModel, build: f64 },
     /// Through the contact pressure, which only simulations have.
     Contact,
-    /// Through sensors that only slip, drift and are noisy.
-    MildNoise,
     /// By emulated grippers.
     Emulated,
 }
@@ -55,12 +59,16 @@ const TREES: &[&str] = &["extra-trees", "geometry-trees"];
 const ALL: &[&str] = &["extra-trees", "geometry-trees", "geometry-network"];
 const VIRTUAL: Reads = Reads::Sensors { sensors: SensorModel::Virtual, build: 0.0 };
 const PHYSICAL: Reads = Reads::Sensors { sensors: SensorModel::PhysicalLike, build: 0.0 };
+const NOISY: Reads = Reads::Sensors { sensors: SensorModel::Noisy, build: 0.0 };
 const ADAPTED: Reads = Reads::Sensors { sensors: SensorModel::Adapted, build: 0.0 };
 const UNKNOWN: Reads = Reads::Sensors { sensors: SensorModel::Drawn, build: 1.0 };
 const FIFTY: Learns = Learns::Like { of_each: 50, draws: DRAWS };
 
+/// Grasps of grippers that are unknown in all respects.
+pub(in crate::study::paper) const UNLABELLED: &str = "no labels, unknown mechanics too, B";
+
 /// All rows.
-pub(super) const QUESTIONS: [Question; 15] = [
+pub(super) const QUESTIONS: [Question; 16] = [
     Question {
         name: "B free, 50 of each",
         preset: "B",
@@ -83,7 +91,7 @@ pub(super) const QUESTIONS: [Question; 15] = [
         name: "B fixed, 400 of each",
         preset: "B",
         fixed: true,
-        learns: Learns::Like { of_each: 400, draws: 1 },
+        learns: Learns::Like { of_each: LEARNED, draws: 1 },
         reads: VIRTUAL,
         methods: &["geometry-trees", "geometry-network"],
         targets: [[Some(0.72), Some(0.94)], [Some(0.76), None]],
@@ -120,7 +128,7 @@ pub(super) const QUESTIONS: [Question; 15] = [
         preset: "B",
         fixed: false,
         learns: Learns::Shipped(Shipped::PerfectSensors),
-        reads: Reads::MildNoise,
+        reads: NOISY,
         methods: &["geometry-network"],
         targets: [[Some(0.90), None], [Some(0.93), None]],
     },
@@ -140,10 +148,19 @@ pub(super) const QUESTIONS: [Question; 15] = [
         learns: Learns::Shipped(Shipped::AnyGripper),
         reads: ADAPTED,
         methods: &["geometry-network"],
+        targets: [[None; 2]; 2],
+    },
+    Question {
+        name: "no labels, physical-like A, trained on A",
+        preset: "A",
+        fixed: false,
+        learns: Learns::Drawn { of_each: 150 },
+        reads: ADAPTED,
+        methods: &["geometry-network"],
         targets: [[Some(0.90), None], [Some(0.93), None]],
     },
     Question {
-        name: "no labels, unknown mechanics too, B",
+        name: UNLABELLED,
         preset: "B",
         fixed: false,
         learns: Learns::Shipped(Shipped::AnyGripper),
@@ -225,16 +242,28 @@ impl Question {
     pub(super) fn draws(&self, plan: &StudyPlan) -> (usize, usize) {
         match self.learns {
             Learns::Like { of_each, draws } => (plan.grasps(of_each, 20), plan.pick(draws, 1, 1)),
-            Learns::Shuffled { of_each } | Learns::Told { of_each } => (plan.grasps(of_each, 20), 1),
+            Learns::Shuffled { of_each } | Learns::Told { of_each } | Learns::Drawn { of_each } => {
+                (plan.grasps(of_each, 20), 1)
+            }
             Learns::Shipped(_) => (0, 1),
         }
+    }
+
+    /// Grasps that a model learns from.
+    pub(super) fn learned(&self, plan: &StudyPlan) -> DataWanted {
+        let (of_each, draws) = self.draws(plan);
+        let mut wanted = self.wanted(plan, of_each * draws, POSES);
+        if matches!(self.learns, Learns::Drawn { .. }) {
+            (wanted.view.sensors, wanted.view.draws) = (SensorModel::Drawn, plan.pick(READINGS, 2, 1));
+        }
+        wanted
     }
 
     /// Grasps that judge, or a draw of those that a model learns from.
     pub(super) fn wanted(&self, plan: &StudyPlan, grasps: usize, poses: u64) -> DataWanted {
         let (sensors, build) = match self.reads {
             Reads::Sensors { sensors, build } => (sensors, build),
-            Reads::Contact | Reads::MildNoise | Reads::Emulated => (SensorModel::Virtual, 0.0),
+            Reads::Contact | Reads::Emulated => (SensorModel::Virtual, 0.0),
         };
         let usual = plan.wanted(grasps, sensors);
         let mut view = usual.view.clone();
