@@ -15,6 +15,7 @@ const STORED: &[(&str, &str)] = &[
     ("grasps", include_str!("../../../../assets/studies/paper/grasps.json")),
     ("drift", include_str!("../../../../assets/studies/paper/drift.json")),
     ("shaking", include_str!("../../../../assets/studies/paper/shaking.json")),
+    ("recognition", include_str!("../../../../assets/studies/paper/recognition.json")),
 ];
 
 /// Descriptions of grasps below the claims of a study: the others differ in layout or signals.

@@ -37,7 +37,7 @@ const CARD: StudyCard = StudyCard {
     title: "Recognition beyond the paper",
     about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
     paper: OWN,
-    budget: "about 150 CPU minutes",
+    budget: "about 120 CPU minutes",
 };
 
 /// Seeds of the emulated grippers' parts, and grasps of each object by each.
