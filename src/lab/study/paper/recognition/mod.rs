@@ -237,7 +237,7 @@ impl CaseStudy for Recognition {
             }
         }
         let title =
-            "Recognition beyond the paper: macro F1, for unknown objects the area under the curve; targets in brackets";
+            "Recognition beyond the paper: macro F1, for unknown objects the area under the curve, beside targets";
         let columns = [
             ("grasps", ""),
             ("model", ""),
