@@ -189,6 +189,10 @@ fn commands(context: &PanelContext<'_>) -> Vec<(String, Action)> {
         (text("Teach the model the object file in the hand"), RecognitionAction::TeachObject.into()),
         (text("Detect trials automatically, or by key"), GripperAction::ToggleWatch.into()),
         (text("Next actuation: manual, board or untimed"), GripperAction::NextControl.into()),
+        (
+            text("Adapt to the real gripper by one close of the empty hand"),
+            GripperCommand::Adapt(context.view.control).into(),
+        ),
         (text("List serial ports"), GripperCommand::ListPorts.into()),
     ];
     if let Some(snapshot) = context.snapshot {

@@ -39,9 +39,14 @@ pub(super) struct Recognised<'a> {
     pub(super) truth: Option<(&'a str, String)>,
     /// Text before the first answer.
     pub(super) waiting: &'static str,
+    /// Text where another grasp is due.
+    pub(super) again: &'static str,
     /// No further grasp follows automatically.
     pub(super) finished: bool,
 }
+
+/// Text where another grasp follows by itself.
+const GRASPING_AGAIN: &str = "grasping again";
 
 /// Picture of one time.
 #[derive(Clone, Copy)]
@@ -152,6 +157,7 @@ impl<'a> SourceData<'a> {
                     off: trial.recognition_off.as_deref(),
                     truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
                     waiting: "no contact yet",
+                    again: GRASPING_AGAIN,
                     finished: true,
                 }
             }),
@@ -163,6 +169,7 @@ impl<'a> SourceData<'a> {
                     off: snapshot.recognition_off.as_deref(),
                     truth: Some((truth, title)),
                     waiting: if snapshot.status.playing { "fingers closing" } else { "press play to start a grasp" },
+                    again: GRASPING_AGAIN,
                     finished: snapshot.status.finished,
                 }
             }),
@@ -171,6 +178,7 @@ impl<'a> SourceData<'a> {
                 off: gripper.recognition_off.as_deref(),
                 truth: None,
                 waiting: if gripper.trial.is_some() { "fingers closing" } else { "press R to start a grasp" },
+                again: "press R to grasp again",
                 finished: false,
             }),
         }

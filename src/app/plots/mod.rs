@@ -200,7 +200,8 @@ fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'sta
     nothing.then_some(if plot.id == "line pressure" {
         "The board does not report line pressure."
     } else {
-        "Sensors not calibrated: see the Calibration panel in Label mode. Raw counts: Counts panel."
+        "Sensors not calibrated: Adapt in the Gripper panel does it by one close of the empty hand, the Calibration panel by \
+         references. Raw counts: Counts panel."
     })
 }
 

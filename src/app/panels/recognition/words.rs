@@ -77,10 +77,10 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
         },
         None if recognised.finished => format!("stopped below the threshold: {}", leaders(&view.labels, now)),
         None if certain && view.beliefs.len() == 1 => {
-            format!("{}, but unlike any known object: grasping again", percent(p))
+            format!("{}, but unlike any known object: {}", percent(p), recognised.again)
         }
-        None if certain => format!("{}, but the grasps disagree: grasping again", percent(p)),
-        None => format!("grasping again: {}", leaders(&view.labels, now)),
+        None if certain => format!("{}, but the grasps disagree: {}", percent(p), recognised.again),
+        None => format!("{}: {}", recognised.again, leaders(&view.labels, now)),
     }
 }
 
@@ -160,8 +160,8 @@ mod tests {
 
     fn said(view: &IdentificationView) -> (String, String) {
         let text = Headline::of(view).text(&view.labels).0;
-        let waiting = "fingers closing";
-        (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, finished: false }))
+        let (waiting, again) = ("fingers closing", "grasping again");
+        (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, again, finished: false }))
     }
 
     #[test]

@@ -24,7 +24,11 @@ impl GripperSession {
 
     pub(super) fn begin_recognition(&mut self) {
         let (Some(listener), Some(connection)) = (&mut self.listener, &self.connection) else { return };
-        let place = "on the gripper: the model needs sensors that are not calibrated";
+        // The empty hand that calibrates the sensors.
+        if self.adapting {
+            return;
+        }
+        let place = "on the gripper, whose sensors are not calibrated (Adapt in the Gripper panel does it)";
         let calibrated = connection.readout.channels();
         let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
         let columns = columns.map(|(place, channel)| (place, channel.name()));
