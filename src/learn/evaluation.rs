@@ -2,7 +2,7 @@
 
 use crate::belief::{Belief, StopReason, StopRule};
 use crate::data::{Class, Dataset, Example};
-use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, Scores};
+use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
 use rand::SeedableRng;
@@ -180,19 +180,9 @@ pub fn most_grasps(rounds: &[Round]) -> usize {
 pub fn f1_by_grasps(classes: usize, rounds: &[Round]) -> Vec<f64> {
     let of = |grasps: usize| {
         let pairs = rounds.iter().filter_map(|r| Some((r.truth, Some(r.belief.steps().get(grasps)?.top().0))));
-        Confusion::from_pairs(classes, pairs).and_then(|c| f1_over_occurring(&c)).unwrap_or(0.0)
+        Confusion::from_pairs(classes, pairs).and_then(|c| c.f1_over_occurring()).unwrap_or(0.0)
     };
     (0..most_grasps(rounds)).map(of).collect()
-}
-
-/// Macro F1 over the classes with trials.
-fn f1_over_occurring(confusion: &Confusion) -> Option<f64> {
-    scores_over_occurring(confusion).map(|scores| scores.f1)
-}
-
-fn scores_over_occurring(confusion: &Confusion) -> Option<Scores> {
-    let occurring: Vec<usize> = (0..confusion.classes()).filter(|c| confusion.class(*c).trials > 0).collect();
-    confusion.scores_over(&occurring)
 }
 
 /// Computes all test results; `None` without grasps.
@@ -221,13 +211,13 @@ pub fn evaluate_stopped(
     let truth = &answers.truth;
     let decided: Vec<Option<usize>> = answers.verdicts.iter().map(|v| Some(v.pmf.top().0)).collect();
     let confusion = Confusion::of(classes, truth, &decided)?;
-    let scores = scores_over_occurring(&confusion)?;
+    let scores = confusion.scores_over_occurring()?;
     let probabilities: Vec<Vec<f64>> = answers.verdicts.iter().map(|v| v.pmf.probabilities().to_vec()).collect();
     let forecasts = Forecasts::new(truth, &probabilities)?;
     let (of_trial, truth_of_trial) = trials(data);
     let of_trials = |trials: &[usize]| {
         let tests = trials.iter().flat_map(|trial| &of_trial[*trial]);
-        f1_over_occurring(&Confusion::from_pairs(classes, tests.map(|k| (truth[*k], decided[*k])))?)
+        Confusion::from_pairs(classes, tests.map(|k| (truth[*k], decided[*k])))?.f1_over_occurring()
     };
     let Interval { low, high, .. } = bootstrap.interval(&truth_of_trial, of_trials)?;
     let confident = forecasts.confident(stop.threshold);
@@ -272,7 +262,7 @@ fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
         let pairs = data.examples.iter().zip(verdicts).filter_map(|(example, verdict)| {
             Some((pick(&labels.classes[example.class])?, Some(pmf(verdict)?.top().0)))
         });
-        f1_over_occurring(&Confusion::from_pairs(count, pairs)?)
+        Confusion::from_pairs(count, pairs)?.f1_over_occurring()
     };
     Some(StageOneScores {
         size_f1: f1(labels.sizes.len(), &|c| c.size, &|v| v.properties.as_ref().map(|p| &p.size))?,

@@ -94,6 +94,7 @@ pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, count
 pub use fitting::{Fitting, LearnError};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
+pub use mirror::mirror;
 pub use model::{LoadError, Model, ModelCard, ModelError};
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};

@@ -2,7 +2,7 @@
 
 /// For each channel, the index of its counterpart on the other finger (`.._left..` and `.._right..`); `None` unless
 /// every channel has one.
-pub(crate) fn mirror(channels: &[String]) -> Option<Vec<usize>> {
+pub fn mirror(channels: &[String]) -> Option<Vec<usize>> {
     let other = |name: &String| {
         let swapped = if name.contains("left") { name.replace("left", "right") } else { name.replace("right", "left") };
         channels.iter().position(|c| *c == swapped && swapped != *name)

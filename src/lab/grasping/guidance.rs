@@ -7,7 +7,7 @@
 //! belief after such answers.
 
 use glam::{DQuat, DVec2, EulerRot};
-use palpate_learn::{Pmf, Sequence};
+use palpate_learn::{Pmf, Sequence, mirror};
 use palpate_sim::scene::Scene;
 
 /// Differences of pose that a grasp feels, for distances between poses: a turn, a shift in the plane, a lift.
@@ -202,13 +202,7 @@ impl TouchLibrary {
             (all().map(|x| (x - mean) * (x - mean)).sum::<f32>() / count).sqrt().max(f32::MIN_POSITIVE)
         };
         scale.deviations = (0..width).map(deviation).collect();
-        let counterpart = |channel: usize| {
-            let name = &channels[channel];
-            let other =
-                if name.contains("left") { name.replace("left", "right") } else { name.replace("right", "left") };
-            channels.iter().position(|own| *own == other).unwrap_or(channel)
-        };
-        let counterparts: Vec<usize> = (0..width).map(counterpart).collect();
+        let counterparts = mirror(channels).unwrap_or_else(|| (0..width).collect());
         let half_turn = GripperMove { turn_deg: 180.0, ..GripperMove::default() };
         let mut touches = vec![Vec::new(); classes];
         for (class, stance, grasp, answer) in grasps {

@@ -104,6 +104,17 @@ impl Confusion {
         self.scores().map(|scores| scores.f1)
     }
 
+    /// Scores over the classes with trials; `None` without any.
+    pub fn scores_over_occurring(&self) -> Option<Scores> {
+        let occurring: Vec<usize> = (0..self.classes()).filter(|class| self.class(*class).trials > 0).collect();
+        self.scores_over(&occurring)
+    }
+
+    /// Macro F1 over the classes with trials; `None` without any.
+    pub fn f1_over_occurring(&self) -> Option<f64> {
+        self.scores_over_occurring().map(|scores| scores.f1)
+    }
+
     /// Scores over all classes; `None` without trials.
     pub fn scores(&self) -> Option<Scores> {
         let classes: Vec<usize> = (0..self.classes()).collect();

@@ -220,10 +220,7 @@ impl Pool {
 
     /// Macro F1 with its interval, over the classes of the test grasps: a model may know others too.
     pub(super) fn f1(&self) -> Option<Interval> {
-        let mut tested: Vec<usize> = self.trials.values().map(|(truth, _)| *truth).collect();
-        tested.sort_unstable();
-        tested.dedup();
-        self.scored(|confusion| confusion.scores_over(&tested).map(|scores| scores.f1))
+        self.scored(Confusion::f1_over_occurring)
     }
 
     /// Macro-accuracy with its interval.
