@@ -30,6 +30,7 @@
 //! | Where are bytes of the board parsed? | [`palpate_device::protocol`] |
 //! | Where does a grasp run? | [`palpate_lab::grasping::GraspController`] |
 //! | Where is a trial recorded? | [`palpate_lab::recording`] |
+//! | Which grasp comes next? | [`palpate_lab::grasping::Advisor`] |
 //! | Where does a model learn a new object? | [`palpate_lab::grasping::Lessons`] |
 //!
 //! # The tour

@@ -12,10 +12,11 @@ use glam::Vec2;
 use palpate_geometry::drawing::Camera;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{FrameReader, GraspSummary, Identification, Recompute, SHAPES, grasp_soundly};
+use palpate_lab::grasping::{Advisor, FrameReader, GraspSummary, Identification, Recompute, SHAPES, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::{Measure, OTHER, Shipped, StopReason, StopRule};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
+use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
@@ -35,6 +36,7 @@ use std::sync::Arc;
 #[command(after_help = "Examples:
   palpate demo
   palpate demo --object tomato --out pictures/
+  palpate demo --guided --fixed --object lemon
   palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json
   palpate demo --port /dev/ttyACM0
   palpate demo --port /dev/ttyACM0 --object lemon
@@ -46,7 +48,7 @@ pub(super) struct DemoArguments {
     #[arg(long, value_name = "NAME|FILE")]
     object: Option<String>,
     /// Grasp with the real gripper on this port, after `palpate adapt`; trials are stored.
-    #[arg(long, value_name = "PORT", conflicts_with_all = ["as_released", "no_pictures", "no_store", "seed"])]
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["as_released", "guided", "no_pictures", "no_store", "seed"])]
     port: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArguments,
@@ -65,6 +67,9 @@ pub(super) struct DemoArguments {
     /// Leave the object as released between grasps instead of placing it anew.
     #[arg(long)]
     as_released: bool,
+    /// The same, and choose each next grasp by what is expected to be learned from it instead of at random.
+    #[arg(long, conflicts_with = "as_released")]
+    guided: bool,
     /// Folder for the pictures.
     #[arg(long, value_name = "FOLDER", default_value = "palpate-demo")]
     out: PathBuf,
@@ -101,6 +106,8 @@ struct GraspReport {
     seed: u64,
     offset_mm: [f64; 3],
     yaw_deg: f64,
+    /// Move of the gripper by which a guided grasp was chosen.
+    guided: Option<String>,
     picture: Option<PathBuf>,
     trial_id: Option<TrialId>,
     stage_one: Option<StageOne>,
@@ -125,6 +132,9 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     if arguments.as_released {
         nominal.pose.between = Between::AsReleased;
     }
+    if arguments.guided {
+        nominal.pose.between = Between::Guided;
+    }
     let object = nominal.load_object()?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::PerfectSensors)?);
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
@@ -140,10 +150,17 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     }
     let sampler = PoseSampler::new(&nominal, object.as_ref());
     let mut grasps: Vec<GraspReport> = Vec::new();
-    let mut released = None;
+    let mut before: Option<(Scene, Frame)> = None;
+    let mut advisor = Advisor::default();
     let stopped = loop {
         let pose_seed = seed.wrapping_add(grasps.len() as u64).wrapping_add(1);
-        let (scene, _) = sampler.draw_after(object.as_ref(), pose_seed, released.as_ref());
+        let released = before.as_ref().map(|(_, released)| released);
+        let (drawn, _) = sampler.draw_after(object.as_ref(), pose_seed, released);
+        let guided = before
+            .as_ref()
+            .zip(identification.last())
+            .and_then(|((last, _), grasp)| advisor.next(grasp, [last, &drawn], &sampler, object.as_ref()));
+        let (guided, scene) = guided.map_or((None, drawn), |(by, scene)| (Some(by), scene));
         let trial = grasp_soundly(&scene, object.as_ref(), pose_seed, Recompute::Unsettled);
         let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
         identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
@@ -167,12 +184,13 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
             }
             None => None,
         };
-        let report = GraspReport { picture, trial_id, ..report };
+        let guided = guided.map(|by| by.to_string());
+        let report = GraspReport { picture, trial_id, guided, ..report };
         if !arguments.json {
             print_grasp(grasps.len() + 1, &report, object.as_ref().map_or(&[], |o| &o.warnings))?;
         }
         grasps.push(report);
-        released = trial.frames().last().cloned();
+        before = trial.frames().last().map(|released| (scene, released.clone()));
         if let Some(reason) = identification.decision() {
             break reason;
         }
@@ -209,6 +227,7 @@ fn motion_report(trial: &SimulatedTrial, scene: &Scene, seed: u64) -> GraspRepor
         seed,
         offset_mm: mount.offset.map(|x| (x * 1e5).round() * 1e-2),
         yaw_deg: (mount.yaw_deg * 10.0).round() * 0.1,
+        guided: None,
         picture: None,
         trial_id: None,
         stage_one: None,
@@ -242,6 +261,9 @@ fn print_grasp(number: usize, report: &GraspReport, known: &[String]) -> Result<
     let [x, y, z] = report.offset_mm.map(|v| format!("{v:+.1}"));
     say("")?;
     say(format!("Grasp {number}: gripper shifted by {x} {y} {z} mm, turned by {:+.0} degrees.", report.yaw_deg))?;
+    if let Some(by) = &report.guided {
+        say(format!("  Chosen to learn most: gripper {by}."))?;
+    }
     let summary = &report.summary;
     match summary.contact_onset_s {
         Some(onset) => say(format!("  First contact after {onset:.2} s."))?,

@@ -125,6 +125,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let store = read_store(store)?;
     let model = load_model(arguments.model.as_deref(), shipped_for(&store, &arguments.trials)?)?;
     let labels = &model.card.labels;
+    let prior = model.card.prior();
     let mut belief = Belief::default();
     let mut trials = Vec::new();
     let mut is_real = false;
@@ -134,10 +135,9 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         model.check_channels(&data.channels)?;
         is_real |= data.about.sensors.is_none();
         let grasp = &data.examples[0].grasp;
-        let alone = model.recogniser.recognise(grasp, None);
-        let with = belief
-            .now()
-            .map_or_else(|| alone.pmf.clone(), |before| model.recogniser.recognise(grasp, Some(before)).pmf);
+        let after = |before: Option<&Pmf>| model.recogniser.recognise(grasp, before.or(prior.as_ref()));
+        let alone = after(None);
+        let with = belief.now().map_or_else(|| alone.pmf.clone(), |before| after(Some(before)).pmf);
         belief.add(with, alone.pmf.clone());
         let why = match &mut explanations {
             Some(explanations) => {

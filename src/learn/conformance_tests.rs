@@ -345,6 +345,13 @@ fn shipped_models_are_live_know_other_objects_and_learn_new_ones() {
         let model = shipped.model().expect("valid");
         assert!(model.recogniser.live().is_some() && model.card.labels.other().is_some(), "{shipped:?}");
         assert!(model.learns_new_objects() && !model.card.quick, "{shipped:?}: a quick model must not ship");
+        let (prior, other) = (model.card.prior().expect("knows others"), model.card.labels.other().expect("known"));
+        let known = 2.0 / 3.0 / (prior.classes() - 1) as f64;
+        let wanted = |class: usize| if class == other { 1.0 / 3.0 } else { known };
+        assert!((0..prior.classes()).all(|class| (prior.probabilities()[class] - wanted(class)).abs() < 1e-12));
+        let mut card = model.card;
+        card.labels.classes.remove(other);
+        assert_eq!(card.prior(), None);
     }
 }
 

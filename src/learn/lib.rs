@@ -100,3 +100,4 @@ pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};
 pub use split::{Split, SplitError, SplitPlan, check_apart};
+pub use tensor_file::{TensorFile, encode};

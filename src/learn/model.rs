@@ -5,6 +5,7 @@ use crate::belief::{Rejection, StopRule};
 use crate::data::{DataCard, Labels};
 use crate::fitting::LearnError;
 use crate::learned::LearnedGrasps;
+use crate::pmf::Pmf;
 use crate::recogniser::Recogniser;
 use crate::signatures::Signatures;
 use serde::de::DeserializeOwned;
@@ -137,6 +138,15 @@ impl ModelCard {
             }
         }
         Ok(card)
+    }
+
+    /// Belief before the first grasp: a third of the objects in the hand are taken to be [`crate::OTHER`], where that is a class.
+    /// Recognisers answer as if it were as likely as each known object.
+    pub fn prior(&self) -> Option<Pmf> {
+        let classes = self.labels.classes.len();
+        let (other, rest) = (self.labels.other()?, classes.saturating_sub(1).max(1) as f64);
+        let share = |class| if class == other { 1.0 / 3.0 } else { 2.0 / 3.0 / rest };
+        Some(Pmf::from_weights((0..classes).map(share)))
     }
 
     /// True where it learned from simulated grasps through perfect sensors: on a real gripper most of its answers are wrong.

@@ -9,21 +9,21 @@ use std::collections::HashMap;
 const CARD_KEY: &str = "palpate";
 
 /// Encodes a card and arrays; the error is a sentence.
-pub(crate) fn encode(card: String, arrays: &Arrays) -> Result<Vec<u8>, String> {
+pub fn encode(card: String, arrays: &Arrays) -> Result<Vec<u8>, String> {
     let header = HashMap::from([(CARD_KEY.to_owned(), card)]);
     safetensors::serialize(&arrays.0, Some(header)).map_err(|error| error.to_string())
 }
 
 /// A decoded file, its arrays unread.
-pub(crate) struct TensorFile<'b> {
+pub struct TensorFile<'b> {
     /// The card as JSON.
-    pub(crate) card: String,
+    pub card: String,
     tensors: SafeTensors<'b>,
 }
 
 impl<'b> TensorFile<'b> {
     /// Decodes a file; the error is a sentence.
-    pub(crate) fn decode(bytes: &'b [u8]) -> Result<Self, String> {
+    pub fn decode(bytes: &'b [u8]) -> Result<Self, String> {
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| error.to_string())?;
         let card = header.metadata().as_ref().and_then(|metadata| metadata.get(CARD_KEY).cloned());
         let card = card.ok_or("its header has no card")?;
@@ -32,7 +32,7 @@ impl<'b> TensorFile<'b> {
     }
 
     /// Reads the arrays.
-    pub(crate) fn arrays(&self) -> Result<Arrays, ArrayError> {
+    pub fn arrays(&self) -> Result<Arrays, ArrayError> {
         fn numbers<T, const N: usize>(bytes: &[u8], from: fn([u8; N]) -> T) -> Vec<T> {
             bytes.as_chunks::<N>().0.iter().map(|bytes| from(*bytes)).collect()
         }

@@ -8,7 +8,7 @@ use crate::objects::ObjectModel;
 use crate::physics::natural_rotations;
 use crate::physics::random_rotation;
 use crate::run::SimRun;
-use crate::scene::{BUILD, Between, Faces, ObjectSetup, Scene, SupportKind};
+use crate::scene::{BUILD, Faces, ObjectSetup, Scene, SupportKind};
 use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -29,6 +29,11 @@ impl PoseSampler {
     pub fn new(scene: &Scene, object: Option<&ObjectModel>) -> Self {
         let natural = object.filter(|_| scene.uses_resting_faces()).map(natural_rotations).unwrap_or_default();
         Self { scene: scene.clone(), natural }
+    }
+
+    /// The scene about which poses are drawn.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
     }
 
     /// The scene in the pose that `seed` names, and how many draws were thrown away because the open fingers would
@@ -57,13 +62,13 @@ impl PoseSampler {
 
     /// True for a scene of [`PoseSampler::draw_after`] in which the object stayed as it was left.
     pub fn is_left(&self, drawn: &Scene) -> bool {
-        self.scene.pose.between == Between::AsReleased && drawn.object.shift != self.scene.object.shift
+        self.scene.pose.between.leaves_object() && drawn.object.shift != self.scene.object.shift
     }
 
     /// The object's setup in the pose in which it was left; `None` where it is to be put down anew.
     fn left_behind(&self, object: &ObjectModel, frame: &Frame) -> Option<ObjectSetup> {
         let pose = frame.world_from_object?;
-        if self.scene.pose.between != Between::AsReleased || self.scene.holds_object() {
+        if !self.scene.pose.between.leaves_object() || self.scene.holds_object() {
             return None;
         }
         let centre = pose.point(object.mass.centre);
@@ -145,6 +150,7 @@ pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Between;
     #[cfg(feature = "rapier")]
     use crate::scene::{PRESETS, PosePreset};
     use glam::DVec3;

@@ -3,7 +3,7 @@
 
 use super::{Failure, report};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_lab::grasping::{CollectionPlan, collect, random_shapes};
+use palpate_lab::grasping::{CollectionPlan, KnownTouches, Stance, collect, random_shapes};
 use palpate_lab::study::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
 use palpate_learn::{Dataset, Fitting, Model, Shipped, Signatures, StopRule, method};
@@ -20,9 +20,9 @@ struct Recipe {
     method: &'static str,
     /// Passes over the grasps.
     epochs: usize,
-    /// Grasps of each object to learn from, and to judge by, and the seeds of their poses.
-    trials: [u32; 2],
-    seeds: [u64; 2],
+    /// Grasps of each object to learn from, to judge by, and to guide by, and the seeds of their poses.
+    trials: [u32; 3],
+    seeds: [u64; 3],
     /// Seeds of random shapes, each grasped once, of the class "other".
     others: Range<u64>,
     view: SensorView,
@@ -44,8 +44,8 @@ impl Recipe {
                 which,
                 method: "geometry-network",
                 epochs: 60,
-                trials: [900, 100],
-                seeds: [7, 2],
+                trials: [900, 100, 200],
+                seeds: [7, 2, 11],
                 others: 5000..6000,
                 view: virtual_view,
                 noisy: 2,
@@ -55,10 +55,10 @@ impl Recipe {
             Shipped::AnyGripper => Self {
                 which,
                 method: "geometry-network",
-                epochs: 20,
-                trials: [150, 50],
-                seeds: [1, 2],
-                others: 5000..5600,
+                epochs: 14,
+                trials: [800, 50, 200],
+                seeds: [1, 2, 11],
+                others: 5000..9000,
                 view: SensorView { sensors: SensorModel::Drawn, draws: 6, ..virtual_view },
                 noisy: 0,
                 build: 1.0,
@@ -66,7 +66,7 @@ impl Recipe {
         }
     }
 
-    /// Grasps to learn from (0) or to judge by (1).
+    /// Grasps to learn from (0), to judge by (1) or to guide by (2).
     fn collected(&self, set: usize, store: &mut Store) -> Result<Dataset, Failure> {
         let mut pose = PosePreset::named(PRESET).ok_or("the preset is gone")?.poses();
         pose.build = self.build;
@@ -112,6 +112,27 @@ pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failur
         then.collections.join(", ")
     ));
     report(format_args!("saved as {}, {} bytes", path.display(), std::fs::metadata(&path)?.len()));
+    Ok(())
+}
+
+/// Collects and writes the grasps in known poses that guide the next grasp.
+pub(crate) fn make_touches(which: Shipped, out: &Path, store: &mut Store) -> Result<(), Failure> {
+    std::fs::create_dir_all(out)?;
+    let mut recipe = Recipe::of(which);
+    recipe.view.draws = 1;
+    let grasps = recipe.collected(2, store)?;
+    let mut touches = Vec::new();
+    for example in &grasps.examples {
+        let header = store.load(example.id)?.header;
+        touches.push((example.class, Stance::of(&header.scene), example.grasp.as_ref()));
+    }
+    let classes = grasps.labels.classes.iter().map(|class| class.name.clone()).collect();
+    let about = grasps.about.lines();
+    let touches = KnownTouches::new(grasps.channels.clone(), classes, about, &touches);
+    let path = out.join(KnownTouches::file(which));
+    let bytes = touches.to_bytes()?;
+    std::fs::write(&path, &bytes)?;
+    report(format_args!("{} grasps saved as {}, {} bytes", grasps.examples.len(), path.display(), bytes.len()));
     Ok(())
 }
 

@@ -104,6 +104,18 @@ enum Command {
         #[arg(long)]
         store: PathBuf,
     },
+    /// Collect the grasps in known poses that guide the next grasp.
+    Touches {
+        /// Those for any gripper, instead of those for perfect sensors.
+        #[arg(long)]
+        any_gripper: bool,
+        /// Output folder.
+        #[arg(long, default_value = "models")]
+        out: PathBuf,
+        /// Trial store that receives the grasps; a second run reuses them.
+        #[arg(long)]
+        store: PathBuf,
+    },
     /// Grasp random shapes, and train a shipped geometry encoder on them.
     Encoder {
         /// The one for real sensors on any gripper, instead of the one for perfect sensors.
@@ -147,6 +159,9 @@ fn main() -> Result<(), Failure> {
         }
         Command::Model { any_gripper, out, store } => {
             live_model::make(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
+        }
+        Command::Touches { any_gripper, out, store } => {
+            live_model::make_touches(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
         }
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Encoder { any_gripper, out, shapes, poses } => {

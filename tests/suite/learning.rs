@@ -238,6 +238,20 @@ fn the_demo_goes_on_until_it_is_sure_and_says_so() {
 }
 
 #[test]
+fn a_guided_demo_chooses_each_grasp_after_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let demo = ["demo", "--guided", "--fixed", "--object", "lemon", "--seed", "4", "--threshold", "1", "--grasps", "2"];
+    let rest = ["--no-pictures", "--no-store"];
+    let story = json(folder.path(), &[&demo[..], &rest, &["--json"]].concat());
+    let guided: Vec<_> = story["grasps"].as_array().unwrap().iter().map(|grasp| grasp["guided"].as_str()).collect();
+    assert!(guided.len() == 2 && guided[0].is_none() && guided[1].is_some(), "{guided:?}");
+    let found = run(folder.path(), &[&demo[..], &rest].concat());
+    assert!(found.out.contains(&format!("Chosen to learn most: gripper {}.", guided[1].unwrap())), "{found:?}");
+    let refusal = run(folder.path(), &["demo", "--guided", "--as-released"]);
+    assert_eq!(refusal.code, Some(2), "{refusal:?}");
+}
+
+#[test]
 fn the_demo_names_objects_as_the_window_does() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -11,6 +11,7 @@ use palpate::app::{ALL_PANELS, PanelKind, RecognitionAction, SimulationAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, Snapshot};
 use palpate_learn::{ModelError, Shipped, StopReason};
+use palpate_sim::scene::{Between, Scene};
 use std::sync::Arc;
 
 fn panel() -> &'static PanelKind {
@@ -65,6 +66,25 @@ fn a_grasp_is_followed_until_it_is_sure() {
     let view = end.identification.clone().unwrap();
     assert_eq!((view.decided(), view.decision), (Some("lemon"), Some(StopReason::Sure)));
     assert!(says(&bench, "Right: Lemon") && says(&bench, "Grasp 4: not needed"));
+}
+
+#[test]
+fn a_guided_grasp_says_by_which_move_it_was_chosen() {
+    let model = Shipped::PerfectSensors.model().map(Arc::new);
+    let mut bench = bench(BenchSetup { model, size: [330.0, 708.0], panel: Some(panel()), ..BenchSetup::default() });
+    let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
+    scene.pose.between = Between::Guided;
+    scene.set_object_fixed(true);
+    bench.tell(SimulationAction::SetScene(Box::new(scene)));
+    bench.until(|s| s.scene.pose.between == Between::Guided);
+    bench.tell(RecognitionAction::SetThreshold(0.999));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
+    let second = bench.until(|s| s.status.grasp_of_round == 2);
+    bench.tell(Command::Pause);
+    bench.harness.run_steps(3);
+    let by = second.status.guided.unwrap();
+    assert!(says(&bench, &format!("Guided: gripper {by}")), "{by}");
 }
 
 #[test]

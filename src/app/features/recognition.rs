@@ -7,6 +7,7 @@ use crate::app::features::tools::{GripperTools, ToolAction};
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
+use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::workers::{
     Command, EndedLesson, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand,
     TrainedModel,
@@ -53,6 +54,8 @@ pub(in crate::app) struct RecognitionFeature {
     explainer: Explainer,
     /// Grasp explained last.
     asked: Option<ExplainRequest>,
+    /// Grasp on which advice was asked last.
+    advised: Option<Arc<RecognisedGrasp>>,
 }
 
 /// Features that recognition acts on.
@@ -74,7 +77,8 @@ impl RecognitionFeature {
     ) -> Self {
         let [simulated, real] = shipped.clone();
         let loading = VecDeque::new();
-        let mut feature = Self { shipped, loading, simulated, real, taught: None, lessons: 0, explainer, asked: None };
+        let (taught, asked, advised) = (None, None, None);
+        let mut feature = Self { shipped, loading, simulated, real, taught, lessons: 0, explainer, asked, advised };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
@@ -240,6 +244,17 @@ impl RecognitionFeature {
         }
     }
 
+    /// Asks for advice after a grasp of the real gripper that decided nothing.
+    fn ask_for_advice(&mut self, on: &Recognisers<'_>) {
+        let Some(gripper) = on.gripper.worker().view() else { return };
+        let undecided = gripper.identification.as_ref().filter(|view| view.decision.is_none() && !view.listening);
+        let Some(last) = undecided.and_then(|view| view.last.clone()) else { return };
+        if !self.advised.as_ref().is_some_and(|advised| Arc::ptr_eq(advised, &last)) {
+            on.tools.adviser.ask(Arc::clone(&last));
+            self.advised = Some(last);
+        }
+    }
+
     /// Takes in models that were trained or loaded since the last frame.
     pub(in crate::app) fn gather(&mut self, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
         match on.tools.trained() {
@@ -253,6 +268,7 @@ impl RecognitionFeature {
         }
         self.take_lesson(on, view, notices);
         self.teach_new_object(on);
+        self.ask_for_advice(on);
         let Some(outcome) = on.tools.loaded() else { return };
         let gripper = self.loading.pop_front().map_or(ViewSource::Gripper, |(_, gripper)| gripper);
         if let Some((next, _)) = self.loading.front() {

@@ -1,11 +1,12 @@
-//! Tools, each in a thread of its own behind a panel: diagnostics, finger fit, training, teaching of new objects.
+//! Tools, each in a thread of its own behind a panel: diagnostics, finger fit, training, teaching of new objects, advice on the
+//! next grasp.
 
 use crate::app::notices::Notices;
 use crate::app::startup::ThreadError;
 use palpate_lab::study::TrainingError;
 use palpate_lab::workers::{
-    DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, Teacher, TrainCommand,
-    TrainRequest, TrainedModel, Trainer, Wake,
+    Adviser, DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, Teacher,
+    TrainCommand, TrainRequest, TrainedModel, Trainer, Wake,
 };
 use palpate_learn::ModelError;
 use std::path::{Path, PathBuf};
@@ -55,6 +56,8 @@ pub struct GripperTools {
     pub trainer: Trainer,
     /// Teaching of new objects.
     pub teacher: Teacher,
+    /// Advice on the next grasp of the real gripper.
+    pub adviser: Adviser,
     /// Loads of models taken note of.
     loads: u64,
     /// Training whose model is used once it has ended.
@@ -78,6 +81,7 @@ impl GripperTools {
             trainer: Trainer::start(store.to_owned(), setup.models.clone(), wake())
                 .map_err(ThreadError::of("training"))?,
             teacher: Teacher::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("teaching"))?,
+            adviser: Adviser::start(wake()).map_err(ThreadError::of("advice"))?,
             loads: 0,
             awaited: None,
         })

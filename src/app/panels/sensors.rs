@@ -178,6 +178,11 @@ fn poses_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         for (between, name, hint) in [
             (Between::Reposed, "re-posed", "Every grasp draws its pose anew"),
             (Between::AsReleased, "as released", "The object stays as the grasp before left it"),
+            (
+                Between::Guided,
+                "guided",
+                "The object stays; the gripper comes from where most is expected to be learned about it",
+            ),
         ] {
             let chosen = scene.pose.between == between;
             if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {

@@ -9,7 +9,7 @@ use super::super::terminal::{note, say, say_json, typed_lines, warn};
 use super::{DemoArguments, Touched, grasps_in_words, likely};
 use palpate_device::serial::LinkOptions;
 use palpate_lab::datasets::{SensorView, trial_signals};
-use palpate_lab::grasping::{Identification, Row};
+use palpate_lab::grasping::{Advisor, Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
 use palpate_learn::{OTHER, Shipped, StopReason, StopRule};
@@ -69,12 +69,15 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let mut identification = Identification::new(Arc::clone(&model), rule);
     let keys = std::io::stdin().is_terminal().then(typed_lines).transpose()?;
     let mut grasps: Vec<GraspReport> = Vec::new();
+    let mut advisor = Advisor::default();
     let stopped = loop {
         if let Some(keys) = &keys {
-            note(match grasps.len() {
-                0 => "Put an object between the open fingers and press Enter.",
-                _ => "Turn the object a little and press Enter.",
-            });
+            let next = identification.last().and_then(|last| advisor.advice(last));
+            match next {
+                _ if grasps.is_empty() => note("Put an object between the open fingers and press Enter."),
+                Some(by) => note(&format!("To learn most from the next grasp: {}. Then press Enter.", by.of_object())),
+                None => note("Turn the object a little and press Enter."),
+            }
             wait_for_enter(keys, &stop)?;
         }
         let adds = !grasps.is_empty();

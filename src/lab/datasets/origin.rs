@@ -29,7 +29,7 @@ impl TrialOrigin {
         let preset = PRESETS.iter().find(|preset| preset.poses() == drawn_as).map(|preset| preset.name);
         // Early versions stored no predecessor; a random pose never shifts the object itself.
         let stayed = header.origin.is_none()
-            && scene.pose.between == Between::AsReleased
+            && scene.pose.between.leaves_object()
             && !scene.holds_object()
             && scene.object.shift != [0.0; 2];
         Self {

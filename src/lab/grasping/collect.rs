@@ -135,7 +135,7 @@ impl CollectionPlan {
         };
         let succession = match scene.pose.between {
             Between::Reposed => 0,
-            Between::AsReleased => mixed(SUCCESSION),
+            Between::AsReleased | Between::Guided => mixed(SUCCESSION),
         };
         format!("{:016x}", mixed(hash(&scene.to_toml()) ^ mixed(self.seed) ^ agreement ^ succession))
     }
@@ -328,7 +328,7 @@ impl<'a> Bench<'a> {
         // read from the store, so that trials can be simulated independently and in any order.
         let first = match self.plan.scene.pose.between {
             Between::Reposed => task.number,
-            Between::AsReleased => task.number - task.number % SUCCESSION,
+            Between::AsReleased | Between::Guided => task.number - task.number % SUCCESSION,
         };
         let mut before: Option<SimulatedTrial> = None;
         for number in first..task.number {

@@ -56,14 +56,16 @@ impl RecognisedGrasp {
     /// Recognises a grasp that no other came before.
     pub fn alone(model: Arc<Model>, grasp: Sequence, hold_s: Option<f64>) -> Self {
         let mut belief = Belief::default();
-        let pmf = model.recogniser.recognise(&grasp, None).pmf;
-        belief.add(pmf.clone(), pmf);
+        let alone = model.recogniser.recognise(&grasp, None).pmf;
+        let prior = model.card.prior();
+        let with = prior.map(|prior| model.recogniser.recognise(&grasp, Some(&prior)).pmf);
+        belief.add(with.unwrap_or_else(|| alone.clone()), alone);
         Self { model, grasp, hold_s, belief }
     }
 
-    /// Belief before this grasp; none before the first.
-    pub fn before(&self) -> Option<&Pmf> {
-        self.belief.steps().iter().rev().nth(1)
+    /// Belief before this grasp; before the first that of [`palpate_learn::ModelCard::prior`].
+    pub fn before(&self) -> Option<Pmf> {
+        self.belief.steps().iter().rev().nth(1).cloned().or_else(|| self.model.card.prior())
     }
 }
 
@@ -71,6 +73,8 @@ impl RecognisedGrasp {
 pub struct Identification {
     model: Arc<Model>,
     labels: Arc<Labels>,
+    /// Belief before the first grasp.
+    prior: Option<Pmf>,
     rule: StopRule,
     /// Column of each channel of the model in a row.
     columns: Vec<usize>,
@@ -144,6 +148,7 @@ impl Identification {
         let live = model.recogniser.live();
         Self {
             labels: Arc::new(model.card.labels.clone()),
+            prior: model.card.prior(),
             model,
             rule,
             columns: Vec::new(),
@@ -223,7 +228,7 @@ impl Identification {
         self.geometry.begin(Shipped::of(&self.model.card.data), &named);
         self.closed = false;
         if let Some(live) = &mut self.live {
-            live.begin(self.belief.now());
+            live.begin(self.belief.now().or(self.prior.as_ref()));
         }
         Ok(())
     }
@@ -261,9 +266,10 @@ impl Identification {
             return;
         }
         let recogniser = &self.model.recogniser;
+        let before = self.belief.now().or(self.prior.as_ref());
         let streamed = self.live.as_mut().and_then(|live| live.finish());
-        let verdict = streamed.unwrap_or_else(|| recogniser.recognise(&self.readings, self.belief.now()));
-        let alone = match self.belief.now() {
+        let verdict = streamed.unwrap_or_else(|| recogniser.recognise(&self.readings, before));
+        let alone = match before {
             Some(_) => recogniser.recognise(&self.readings, None).pmf,
             None => verdict.pmf.clone(),
         };
@@ -287,6 +293,11 @@ impl Identification {
     /// Belief after the grasps so far.
     pub fn belief(&self) -> &Belief {
         &self.belief
+    }
+
+    /// The last finished grasp of this object.
+    pub fn last(&self) -> Option<&Arc<RecognisedGrasp>> {
+        self.last.as_ref()
     }
 
     /// The newest verdict on the running or last grasp.

@@ -1,6 +1,6 @@
-//! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, and
-//! identification of an object by successive grasps. Adapting to a real gripper by one close of its empty hand. Lessons:
-//! grasps by which a model learns new objects.
+//! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, identification of
+//! an object by successive grasps, and advice on the next one. Adapting to a real gripper by one close of its empty hand.
+//! Lessons: grasps by which a model learns new objects.
 
 mod adaptation;
 mod agreement;
@@ -25,7 +25,7 @@ pub(crate) use collect::SUCCESSION;
 pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
-pub use guidance::{GripperMove, Guide, Stance, TouchLibrary};
+pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance, TouchLibrary, TouchesError};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};

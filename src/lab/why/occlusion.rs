@@ -136,7 +136,7 @@ impl CountedModel<'_> {
             return Err(WhyError::Stopped);
         }
         self.calls += 1;
-        Ok(self.of.model.recogniser.recognise(grasp, self.of.before()).pmf)
+        Ok(self.of.model.recogniser.recognise(grasp, self.of.before().as_ref()).pmf)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Live recognition: reads rows of successive grasps and decides when a round of grasps is complete.
 
-use crate::grasping::{Identification, IdentificationView, IdentifyError, Row};
+use crate::grasping::{Identification, IdentificationView, IdentifyError, RecognisedGrasp, Row};
 use palpate_learn::{Model, StopReason, StopRule};
 use palpate_sim::gripper::GripperModel;
 use palpate_tactile::Channel;
@@ -112,6 +112,11 @@ impl Listener {
     /// The grasps so far, for the trial that builds on them.
     pub(super) fn earlier(&self) -> Option<EarlierGrasps> {
         self.identification.earlier().filter(|_| self.off.is_none())
+    }
+
+    /// The last finished grasp of this object.
+    pub(super) fn last(&self) -> Option<Arc<RecognisedGrasp>> {
+        self.view.last.clone().filter(|_| self.off.is_none())
     }
 
     /// Reason to stop grasping, once there is one.

@@ -4,8 +4,10 @@ use super::sim_tests::{Watched, ball, start_with};
 use super::{Command, Notice, Snapshot};
 use crate::datasets::labels_of_catalogue;
 use palpate_learn::{
-    Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Recogniser, Sequence, StopReason, StopRule, Verdict,
+    Arrays, DataCard, LiveRecogniser, Model, ModelCard, Pmf, Recogniser, Sequence, Shipped, StopReason, StopRule,
+    Verdict,
 };
+use palpate_sim::scene::{Between, Scene};
 use palpate_store::Store;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -245,4 +247,24 @@ fn the_model_that_comes_with_the_program_answers_while_the_first_grasp_goes_on()
     watched.send(Command::Play);
     let early = watched.until(|s| s.identification.as_ref().is_some_and(|view| view.verdict.is_some()));
     assert!(early.frame.t < 0.5, "{} s", early.frame.t);
+}
+
+#[test]
+fn a_guide_chooses_the_next_grasp_of_an_object_that_stays() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut scene = ball();
+    scene.timing.duration_s = Scene::default().timing.duration_s;
+    scene.pose.between = Between::Guided;
+    scene.set_object_fixed(true);
+    let model = Shipped::PerfectSensors.model().expect("valid");
+    let watched = start_with(Some(model), scene.clone(), folder.path().join("trials.sqlite"), 2);
+    watched.send(Command::SetThreshold(0.999));
+    watched.send(Command::SetSpeed(64.0));
+    let first = watched.until(|s| s.status.grasp_of_round == 1);
+    assert_eq!(first.status.guided, None);
+    let second = watched.until(|s| s.status.grasp_of_round == 2 || s.status.finished);
+    let by = second.status.guided.expect("chosen");
+    assert_eq!(second.scene.object, first.scene.object);
+    let moved = second.scene.gripper.mount.yaw_deg - first.scene.gripper.mount.yaw_deg;
+    assert!((moved - by.turn_deg).rem_euclid(360.0) < 1e-9 && second.scene != first.scene, "{by:?}");
 }

@@ -1,7 +1,7 @@
 //! Messages of the simulation thread: commands in, snapshots, rows and notices out.
 
 use crate::datasets::SensorView;
-use crate::grasping::{GraspSummary, IdentificationView, Row};
+use crate::grasping::{GraspSummary, GripperMove, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
 use glam::DVec3;
@@ -182,6 +182,8 @@ pub struct Status {
     pub error_band: bool,
     /// What is being done to check the last finished grasp.
     pub checking: Option<Checking>,
+    /// Move of the gripper by which this grasp was chosen, where one was.
+    pub guided: Option<GripperMove>,
 }
 
 /// Work that tells how far a finished grasp can be trusted.

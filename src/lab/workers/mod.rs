@@ -19,7 +19,8 @@
 //! The thread "label" handles labels, "library" search and edits of all trials. Both show changes by other programs.
 //!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it.
+//! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it,
+//! "advise" how to move the object before the next one.
 //! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials,
 //! "study" runs the studies of the paper.
 //!
@@ -29,6 +30,7 @@
 //! their order and none is lost.
 
 mod accuracy_job;
+mod adviser;
 mod background_job;
 mod check_job;
 mod current;
@@ -61,6 +63,7 @@ mod student;
 mod teacher;
 mod trainer;
 
+pub use adviser::{Advice, Adviser};
 pub use background_job::BackgroundJob;
 pub use diagnostics_job::{DiagnosticsJob, DiagnosticsReport, DiagnosticsView, Examine, ExamineRequest, examine_port};
 pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};

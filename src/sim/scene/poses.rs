@@ -60,6 +60,19 @@ pub enum Between {
     Reposed,
     /// It stays as the fingers have left it; one that has fallen off its support is put down anew.
     AsReleased,
+    /// The same, and the gripper comes from where most is expected to be learned about it; where nothing recognises objects,
+    /// from anywhere.
+    Guided,
+}
+
+impl Between {
+    /// True where the object stays as the fingers have left it.
+    pub fn leaves_object(self) -> bool {
+        match self {
+            Self::Reposed => false,
+            Self::AsReleased | Self::Guided => true,
+        }
+    }
 }
 
 /// On which of its faces an object lies.

@@ -1,6 +1,7 @@
-//! Recognition: a lesson that is running, the answer and its reason, size and shape, the measured dimensions, a bar for each
+//! Recognition: a lesson that is running, the answer and its reason, advice on the next grasp, size and shape, the measured dimensions, a bar for each
 //! class with the threshold across them, and the grasps so far.
 
+mod advice;
 mod classes;
 mod lesson;
 mod properties;
@@ -118,12 +119,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 let view = calmed(ui, view);
                 let mut part = Part { context, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
+                let advised = advice::ui(ui, &part);
                 if let Some(truth) = &recognised.truth {
                     part.truth_ui(ui, truth);
                 }
                 properties::ui(ui, &part);
                 let has_touch = touch::ui(ui, &part);
-                let lines = measures.lines(room.y, view.labels.classes.len(), view.has_stage_one, has_touch);
+                let lines = measures.lines(room.y - advised, view.labels.classes.len(), view.has_stage_one, has_touch);
                 classes::ui(ui, &mut part, lines);
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);

@@ -51,14 +51,20 @@ impl Session {
         // The first grasp is the scene as written; the following ones come from random poses, on the object as it was
         // released if the scene asks for it.
         let mut after = None;
+        self.status.guided = None;
         let (scene, seed) = if again {
             self.poses_drawn += 1;
             let sampler = self.sampler.get_or_insert_with(|| PoseSampler::new(&self.nominal, model.as_deref()));
             let before = self.current.as_ref().filter(|current| current.ended && self.status.grasp_of_round > 1);
             let released = before.map(|current| current.frame.as_ref());
-            let scene = sampler.draw_after(model.as_deref(), self.poses_drawn, released).0;
-            after = before.filter(|_| sampler.is_left(&scene)).and_then(|current| current.run.header().identity());
-            (scene, self.poses_drawn)
+            let drawn = sampler.draw_after(model.as_deref(), self.poses_drawn, released).0;
+            after = before.filter(|_| sampler.is_left(&drawn)).and_then(|current| current.run.header().identity());
+            let last = self.listener.as_ref().and_then(Listener::last);
+            let guided = before.zip(last).and_then(|(current, last)| {
+                self.advisor.next(&last, [current.scene.as_ref(), &drawn], sampler, model.as_deref())
+            });
+            self.status.guided = guided.as_ref().map(|(by, _)| *by);
+            (guided.map_or(drawn, |(_, scene)| scene), self.poses_drawn)
         } else {
             (self.nominal.clone(), 0)
         };

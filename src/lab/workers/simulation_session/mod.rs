@@ -16,7 +16,7 @@ use super::messages::{
 };
 use super::pace::Pace;
 use crate::datasets::SensorView;
-use crate::grasping::{EndState, FrameReader, GraspSummary};
+use crate::grasping::{Advisor, EndState, FrameReader, GraspSummary};
 use crate::recording::{Recorder, RecorderNotice};
 use palpate_sim::objects::ObjectError;
 use palpate_sim::poses::PoseSampler;
@@ -98,6 +98,8 @@ pub(super) struct Session {
     next_grasp_at: Option<Instant>,
     recorder_busy: bool,
     ghost: GhostMaker,
+    /// Chooses poses, where the scene asks for it.
+    advisor: Advisor,
 }
 
 impl Session {
@@ -157,6 +159,7 @@ impl Session {
             next_grasp_at: None,
             recorder_busy: false,
             ghost: GhostMaker::new(Arc::clone(&outlets.ghost), Arc::clone(&outlets.wake)),
+            advisor: Advisor::default(),
             outlets,
         };
         session.begin_somehow();

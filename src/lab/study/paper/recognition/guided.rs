@@ -6,20 +6,22 @@ use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
 use super::super::report::{Cell, PERCENT, StudyTable};
-use super::questions::{LEARNED, QUESTIONS, Question};
+use super::questions::{LEARNED, QUESTIONS, Question, UNLABELLED};
 use crate::datasets::{SensorView, sequence_of};
-use crate::grasping::{GripperMove, Guide, Recompute, Stance, TouchLibrary, grasp_soundly};
+use crate::grasping::{GripperMove, Guide, KnownTouches, Recompute, Stance, TouchLibrary, grasp_soundly};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Method, Model, Pmf, Sequence, check_apart};
+use palpate_learn::{Belief, Dataset, Model, Pmf, Shipped, check_apart, method};
+use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::ObjectModel;
-use palpate_sim::poses::{PoseSampler, has_room};
-use palpate_sim::scene::{Faces, PosePreset, Scene};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::{Between, Faces, PosePreset, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-pub(super) const GUIDED: &str = "guided grasps, B fixed";
-pub(super) const GUIDED_METHOD: &str = "geometry-trees";
+/// Method of the model that learns here.
+const GUIDED_METHOD: &str = "geometry-trees";
 /// Share of the grasps after the first that guidance is to save.
 const TO_SAVE: f64 = 1.0 / 3.0;
 
@@ -75,27 +77,91 @@ pub(super) struct GuidedRounds {
     rounds: Vec<BothRounds>,
 }
 
-/// The question whose grasps a model learns from: fixed objects, many grasps of each.
-fn question() -> &'static Question {
-    &QUESTIONS[2]
+/// Grasps and recogniser of the rounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::study::paper) enum GuidedCase {
+    /// Fixed objects, and a model that has learned many grasps of each.
+    Fixed,
+    /// Free objects on grippers of unknown parts and mechanics, and the shipped model.
+    Unlabelled,
+}
+
+impl GuidedCase {
+    pub(super) const ALL: [Self; 2] = [Self::Fixed, Self::Unlabelled];
+
+    /// Method of its model.
+    pub(super) fn method(self) -> &'static str {
+        match self {
+            Self::Fixed => GUIDED_METHOD,
+            Self::Unlabelled => "geometry-network",
+        }
+    }
+
+    /// Name of its unit.
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::Fixed => format!("guided grasps, B fixed, {GUIDED_METHOD}"),
+            Self::Unlabelled => {
+                format!("guided grasps, no labels, B free, {:08x}", Shipped::AnyGripper.model_content())
+            }
+        }
+    }
+
+    /// Grasps and model, for the table.
+    fn described(self) -> String {
+        match self {
+            Self::Fixed => format!("B fixed, {GUIDED_METHOD} of {LEARNED} grasps of each"),
+            Self::Unlabelled => format!("{UNLABELLED} free, shipped model"),
+        }
+    }
+
+    fn question(self) -> &'static Question {
+        match self {
+            Self::Fixed => &QUESTIONS[2],
+            Self::Unlabelled => QUESTIONS.iter().find(|own| own.name == UNLABELLED).unwrap_or(&QUESTIONS[2]),
+        }
+    }
+
+    /// A model, grasps that it has not learned from with its answers, and what it learned; none where it was cancelled.
+    fn model(self, bench: &StudyBench<'_>) -> Result<Option<(Model, TouchLibrary, String)>, StudyError> {
+        let missing = |what: &str| StudyError::Missing(what.to_owned());
+        if self == Self::Unlabelled {
+            let failed = |cause: &dyn std::fmt::Display| StudyError::Missing(cause.to_string());
+            let model = Shipped::AnyGripper.model().map_err(|cause| failed(&cause))?;
+            let touches = KnownTouches::shipped(Shipped::AnyGripper).map_err(|cause| failed(&cause))?;
+            let library = touches.library(&model).ok_or_else(|| missing("channels of the shipped model"))?;
+            let about = model.card.data.described();
+            return Ok(Some((model, library, about)));
+        }
+        let (plan, question) = (bench.plan(), self.question());
+        let wanted = |grasps: usize, quick: usize, poses: u64| question.wanted(plan, plan.grasps(grasps, quick), poses);
+        let method = method(GUIDED_METHOD).ok_or_else(|| missing(GUIDED_METHOD))?;
+        let Some(train) = bench.data(&wanted(LEARNED, 20, POSES))? else { return Ok(None) };
+        let Some(known) = bench.data(&wanted(KNOWN, 20, KNOWN_POSES))? else { return Ok(None) };
+        check_apart(&train.examples, &known.examples)?;
+        let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
+        let known = known.relabelled(&model.card.labels).ok_or_else(|| missing("simulated grasps"))?;
+        let library = library(&model, &known, bench)?;
+        Ok(Some((model, library, train.about.described())))
+    }
 }
 
 /// Runs all rounds; none where it was cancelled.
-pub(super) fn guided(method: &Method, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
-    let plan = bench.plan();
-    let wanted = |grasps: usize, quick: usize, poses: u64| question().wanted(plan, plan.grasps(grasps, quick), poses);
-    let Some(train) = bench.data(&wanted(LEARNED, 20, POSES))? else { return Ok(None) };
-    let Some(known) = bench.data(&wanted(KNOWN, 20, KNOWN_POSES))? else { return Ok(None) };
-    check_apart(&train.examples, &known.examples)?;
-    let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
+pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    let (plan, question) = (bench.plan(), case.question());
     let missing = || StudyError::Missing("simulated grasps of the same objects".to_owned());
-    let known = known.relabelled(&model.card.labels).ok_or_else(missing)?;
-    let library = library(&model, &known, bench)?;
-    let preset = PosePreset::named(question().preset).ok_or_else(missing)?;
+    let Some((model, library, data)) = case.model(bench)? else { return Ok(None) };
+    let library = Arc::new(library);
+    let wanted = question.wanted(plan, 1, 0);
+    let preset = PosePreset::named(question.preset).ok_or_else(missing)?;
     let mut nominal = Scene { pose: preset.poses(), ..Scene::default() };
-    nominal.set_object_fixed(true);
+    (nominal.pose.between, nominal.pose.build) = (Between::AsReleased, wanted.build);
+    nominal.set_object_fixed(question.fixed);
     let mut rounds = Vec::new();
     for (class, own) in model.card.labels.classes.iter().enumerate() {
+        if !plan.objects().contains(&own.name) {
+            continue;
+        }
         let mut scene = nominal.clone();
         scene.object.source.clone_from(&own.name);
         let object = scene.load_object().ok().flatten().ok_or_else(missing)?;
@@ -104,7 +170,8 @@ pub(super) fn guided(method: &Method, bench: &StudyBench<'_>) -> Result<Option<U
         let round = |number: usize| {
             let seed = ROUND_SEEDS + (class * ROUNDS + number) as u64;
             let first = sampler.draw(Some(&object), seed).0;
-            let round = Round { model: &model, library: &library, nominal: &scene, object: &object, class, seed };
+            let view = &wanted.view;
+            let round = Round { model: &model, library: &library, view, nominal: &scene, object: &object, class, seed };
             let run = |next: NextPose| round.run(&first, next, bench);
             Some(BothRounds { class, random: run(NextPose::Random)?, guided: run(NextPose::Guided)? })
         };
@@ -112,7 +179,7 @@ pub(super) fn guided(method: &Method, bench: &StudyBench<'_>) -> Result<Option<U
         let Some(ended) = ended else { return Ok(None) };
         rounds.extend(ended);
     }
-    UnitResult::new(&GuidedRounds { data: train.about.described(), rounds }).map(Some)
+    UnitResult::new(&GuidedRounds { data, rounds }).map(Some)
 }
 
 /// The guide's library: grasps that the model has not learned from, and its answers.
@@ -126,10 +193,11 @@ fn library(model: &Model, known: &Dataset, bench: &StudyBench<'_>) -> Result<Tou
     Ok(TouchLibrary::new(&known.channels, known.labels.classes.len(), &touches))
 }
 
-/// Grasps of one object that stays where it is.
+/// Grasps of one object that stays where it is, or as the grasp before released it.
 struct Round<'a> {
     model: &'a Model,
-    library: &'a TouchLibrary,
+    library: &'a Arc<TouchLibrary>,
+    view: &'a SensorView,
     nominal: &'a Scene,
     object: &'a ObjectModel,
     class: usize,
@@ -140,17 +208,24 @@ impl Round<'_> {
     /// Grasps until the recogniser is sure; none where it was cancelled.
     fn run(&self, first: &Scene, next: NextPose, bench: &StudyBench<'_>) -> Option<Ended> {
         let mut belief = Belief::default();
-        let mut guide = Guide::new(self.library);
+        let mut guide = Guide::new(Arc::clone(self.library));
         let (mut scene, mut by) = (first.clone(), GripperMove::default());
-        // Random poses of the gripper about the object as it lies.
-        let mut lying = Scene { object: first.object.clone(), ..self.nominal.clone() };
-        lying.pose.faces = Faces::Nominal;
-        let sampler = PoseSampler::new(&lying, Some(self.object));
+        // The same gripper in all grasps, about the object as it lies.
+        let mut nominal = self.nominal.clone();
+        nominal.gripper = GripperModel { mount: nominal.gripper.mount.clone(), ..first.gripper.clone() };
+        nominal.pose.build = 0.0;
+        let is_fixed = nominal.holds_object();
+        if is_fixed {
+            nominal.object.clone_from(&first.object);
+            nominal.pose.faces = Faces::Nominal;
+        }
+        let sampler = PoseSampler::new(&nominal, Some(self.object));
         loop {
             if bench.is_cancelled() {
                 return None;
             }
-            let grasp = self.grasp(&scene)?;
+            let trial = grasp_soundly(&scene, Some(self.object), self.seed, Recompute::Unsettled);
+            let grasp = sequence_of(self.view.readings(&trial).ok()?.first()?);
             let recogniser = &self.model.recogniser;
             let alone = recogniser.recognise(&grasp, None).pmf;
             let with = belief.now().map(|before| recogniser.recognise(&grasp, Some(before)).pmf);
@@ -161,35 +236,32 @@ impl Round<'_> {
             if sure || belief.grasps() >= MOST_GRASPS {
                 return Some(Ended { grasps: belief.grasps(), sure, right });
             }
-            match next {
-                NextPose::Random => {
-                    let seed = self.seed.wrapping_mul(1000).wrapping_add(belief.grasps() as u64);
-                    scene = sampler.draw(Some(self.object), seed).0;
-                }
-                NextPose::Guided => {
-                    guide.felt(&grasp, &by);
-                    let all = GripperMove::all(&scene, self.nominal);
-                    let moves: Vec<GripperMove> = all.iter().map(|(by, _)| *by).collect();
-                    let expected = guide.expected_entropy(&now, &moves);
-                    let mut order: Vec<usize> = (0..all.len()).collect();
-                    order.sort_by(|a, b| expected[*a].total_cmp(&expected[*b]));
-                    let chosen = order.into_iter().find(|k| has_room(&all[*k].1, Some(self.object)));
-                    let Some(k) = chosen else { return Some(Ended { grasps: MOST_GRASPS, sure, right }) };
-                    (by, scene) = all[k].clone();
-                }
+            let seed = self.seed.wrapping_mul(1000).wrapping_add(belief.grasps() as u64);
+            let random = sampler.draw_after(Some(self.object), seed, trial.frames().last()).0;
+            // An object that has fallen off its support is put down anew: nothing is known of its pose.
+            let stays = is_fixed || sampler.is_left(&random);
+            if next == NextPose::Random || !stays {
+                scene = random;
+                continue;
             }
+            // A free object has moved in the hand: its readings tell more of its pose than the moves so far.
+            if !is_fixed {
+                guide = Guide::new(Arc::clone(self.library));
+            }
+            guide.felt(&grasp, &by);
+            let from = Scene { object: random.object, ..scene };
+            let Some(chosen) = guide.best(&now, &from, &nominal, Some(self.object)) else {
+                return Some(Ended { grasps: MOST_GRASPS, sure, right });
+            };
+            (by, scene) = chosen;
         }
-    }
-
-    fn grasp(&self, scene: &Scene) -> Option<Sequence> {
-        let trial = grasp_soundly(scene, Some(self.object), self.seed, Recompute::Unsettled);
-        SensorView::default().signals(&trial).ok().map(|signals| sequence_of(&signals))
     }
 }
 
 /// Table of grasps after the first with random poses and guided.
-pub(super) fn table(found: &GuidedRounds) -> StudyTable {
+pub(super) fn table(all: &[(GuidedCase, GuidedRounds)]) -> StudyTable {
     let columns = [
+        ("grasps", ""),
         ("poses", ""),
         ("grasps after the first", ""),
         ("saved", PERCENT),
@@ -198,38 +270,39 @@ pub(super) fn table(found: &GuidedRounds) -> StudyTable {
         ("right when sure", PERCENT),
         ("rounds", ""),
     ];
-    let title = format!(
-        "Which grasp next: {GUIDED_METHOD}, {LEARNED} fixed grasps of each object, until {:.0} % sure; the object stays",
-        100.0 * SURE
-    );
+    let title = format!("Which grasp next: grasps until {:.0} % sure, of an object that nobody moves", 100.0 * SURE);
     let mut table = StudyTable::new("guided", title, &columns);
-    let strata: Vec<usize> = found.rounds.iter().map(|own| own.class).collect();
-    let after_first = |next: NextPose, chosen: &[usize]| {
-        let all = chosen.iter().map(|k| found.rounds[*k].of(next).grasps as f64 - 1.0);
-        all.sum::<f64>() / chosen.len().max(1) as f64
-    };
-    for (name, next) in [("random", NextPose::Random), ("guided", NextPose::Guided)] {
-        let share = |of: &dyn Fn(&Ended) -> Option<bool>| -> Option<Interval> {
-            BOOTSTRAP.interval(&strata, |chosen| {
-                let said: Vec<bool> = chosen.iter().filter_map(|k| of(found.rounds[*k].of(next))).collect();
-                Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
-            })
+    for (case, found) in all {
+        let strata: Vec<usize> = found.rounds.iter().map(|own| own.class).collect();
+        let after_first = |next: NextPose, chosen: &[usize]| {
+            let all = chosen.iter().map(|k| found.rounds[*k].of(next).grasps as f64 - 1.0);
+            all.sum::<f64>() / chosen.len().max(1) as f64
         };
-        let saved = |chosen: &[usize]| Some(1.0 - after_first(next, chosen) / after_first(NextPose::Random, chosen));
-        let (saved, to_save) = match next {
-            NextPose::Random => (Cell::Missing, Cell::Missing),
-            NextPose::Guided => (Cell::interval(BOOTSTRAP.interval(&strata, saved)), Cell::Number(TO_SAVE)),
-        };
-        let cells = vec![
-            Cell::text(name),
-            Cell::interval(BOOTSTRAP.interval(&strata, |chosen| Some(after_first(next, chosen)))),
-            saved,
-            to_save,
-            Cell::interval(share(&|ended| Some(ended.sure))),
-            Cell::interval(share(&|ended| ended.sure.then_some(ended.right))),
-            Cell::Number(found.rounds.len() as f64),
-        ];
-        table.push(cells, Vec::new());
+        for (name, next) in [("random", NextPose::Random), ("guided", NextPose::Guided)] {
+            let share = |of: &dyn Fn(&Ended) -> Option<bool>| -> Option<Interval> {
+                BOOTSTRAP.interval(&strata, |chosen| {
+                    let said: Vec<bool> = chosen.iter().filter_map(|k| of(found.rounds[*k].of(next))).collect();
+                    Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
+                })
+            };
+            let saved =
+                |chosen: &[usize]| Some(1.0 - after_first(next, chosen) / after_first(NextPose::Random, chosen));
+            let (saved, to_save) = match next {
+                NextPose::Random => (Cell::Missing, Cell::Missing),
+                NextPose::Guided => (Cell::interval(BOOTSTRAP.interval(&strata, saved)), Cell::Number(TO_SAVE)),
+            };
+            let cells = vec![
+                Cell::text(case.described()),
+                Cell::text(name),
+                Cell::interval(BOOTSTRAP.interval(&strata, |chosen| Some(after_first(next, chosen)))),
+                saved,
+                to_save,
+                Cell::interval(share(&|ended| Some(ended.sure))),
+                Cell::interval(share(&|ended| ended.sure.then_some(ended.right))),
+                Cell::Number(found.rounds.len() as f64),
+            ];
+            table.push(cells, Vec::new());
+        }
     }
     table
 }

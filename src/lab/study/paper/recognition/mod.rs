@@ -15,9 +15,12 @@ use super::plan::StudyPlan;
 use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
 use super::{OWN, StudyCard, UnitResult};
 use crate::study::comparison::with_true_size_and_shape;
-use guided::{GUIDED, GUIDED_METHOD, GuidedRounds, guided};
+use guided::{GuidedCase, GuidedRounds, guided};
 use new_objects::{mean_f1, new_object};
-use novelty::{NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, Scored, area, novelty};
+use novelty::{
+    EMULATED_NOVELTY, EmulatedRounds, NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, OTHERS, Scored, area, decisions,
+    emulated_novelty, novelty,
+};
 use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
@@ -47,8 +50,9 @@ const EMULATED_EACH: u64 = 3;
 pub(super) enum Case {
     Answers { question: &'static Question, method: &'static Method, draw: usize },
     Novelty { left_out: String, method: &'static Method },
+    EmulatedNovelty { method: &'static Method },
     NewObject { question: &'static Question, left_out: String, method: &'static Method },
-    Guided { method: &'static Method },
+    Guided { which: GuidedCase, method: &'static Method },
 }
 
 impl StudyCase for Case {
@@ -63,12 +67,14 @@ impl StudyCase for Case {
         let left_out = || plan.objects().into_iter().take(plan.pick(usize::MAX, 2, 1));
         let novelty = method(NOVELTY_METHOD);
         cases.extend(left_out().filter_map(|left_out| Some(Self::Novelty { left_out, method: novelty? })));
+        cases.extend(method("geometry-network").map(|method| Self::EmulatedNovelty { method }));
         for question in &NEW_OBJECTS {
             for method in question.methods.iter().filter_map(|key| method(key)) {
                 cases.extend(left_out().map(|left_out| Self::NewObject { question, left_out, method }));
             }
         }
-        cases.extend(method(GUIDED_METHOD).map(|method| Self::Guided { method }));
+        let guided = |which: GuidedCase| Some(Self::Guided { which, method: method(which.method())? });
+        cases.extend(GuidedCase::ALL.into_iter().filter_map(guided));
         cases
     }
 
@@ -84,11 +90,16 @@ impl StudyCase for Case {
                 };
                 format!("{}, {}, draw {}{shipped}", question.name, method.key, draw + 1)
             }
-            Self::Novelty { left_out, method } => format!("{NOVELTY}, {}, without {left_out}", method.key),
+            Self::Novelty { left_out, method } => {
+                format!("{NOVELTY}, {}, {} shapes, without {left_out}", method.key, OTHERS.count())
+            }
+            Self::EmulatedNovelty { .. } => {
+                format!("{EMULATED_NOVELTY}, {:08x}", Shipped::AnyGripper.model_content())
+            }
             Self::NewObject { question, left_out, method } => {
                 format!("{}, {}, {left_out}", question.name, method.key)
             }
-            Self::Guided { method } => format!("{GUIDED}, {}", method.key),
+            Self::Guided { which, .. } => which.name(),
         }
     }
 
@@ -96,8 +107,9 @@ impl StudyCase for Case {
         match self {
             Self::Answers { method, .. }
             | Self::Novelty { method, .. }
+            | Self::EmulatedNovelty { method }
             | Self::NewObject { method, .. }
-            | Self::Guided { method } => method,
+            | Self::Guided { method, .. } => method,
         }
     }
 }
@@ -158,23 +170,18 @@ fn tested(question: &Question, bench: &StudyBench<'_>) -> Result<Option<Arc<Data
     let wanted = question.wanted(plan, plan.grasps(TESTED, 10), JUDGED);
     match question.reads {
         Reads::Sensors { .. } | Reads::Contact => bench.data(&wanted),
-        Reads::Emulated => {
-            let preset = PosePreset::named(question.preset);
-            let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", question.preset)))?;
-            let scene = Scene { pose: preset.poses(), ..Scene::default() };
-            let seeds = EMULATED.start..EMULATED.start + plan.pick(EMULATED.end - EMULATED.start, 1, 1);
-            let objects = plan.objects();
-            let grippers = EmulatedGrippers {
-                scene: &scene,
-                preset: question.preset,
-                seeds,
-                objects: &objects,
-                each: plan.pick(EMULATED_EACH, 1, 1),
-            };
-            let shipped = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
-            grippers.grasps(&shipped.card.channels).map(|data| Some(Arc::new(data)))
-        }
+        Reads::Emulated => emulated(question.preset, &plan.objects(), plan).map(|data| Some(Arc::new(data))),
     }
+}
+
+/// Grasps of objects by emulated grippers, as the shipped model for any gripper reads them.
+fn emulated(preset: &'static str, objects: &[String], plan: &StudyPlan) -> Result<Dataset, StudyError> {
+    let poses = PosePreset::named(preset).ok_or_else(|| StudyError::Unknown(format!("preset {preset}")))?.poses();
+    let scene = Scene { pose: poses, ..Scene::default() };
+    let seeds = EMULATED.start..EMULATED.start + plan.pick(EMULATED.end - EMULATED.start, 1, 1);
+    let each = plan.pick(EMULATED_EACH, 1, 1);
+    let shipped = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
+    EmulatedGrippers { scene: &scene, preset, seeds, objects, each }.grasps(&shipped.card.channels)
 }
 
 impl CaseStudy for Recognition {
@@ -190,8 +197,9 @@ impl CaseStudy for Recognition {
         match case {
             Case::Answers { question, method, draw } => Case::answers(question, method, draw, bench),
             Case::Novelty { left_out, method } => novelty(&left_out, method, bench),
+            Case::EmulatedNovelty { .. } => emulated_novelty(bench),
             Case::NewObject { question, left_out, method } => new_object(question, &left_out, method, bench),
-            Case::Guided { method } => guided(method, bench),
+            Case::Guided { which, .. } => guided(which, bench),
         }
     }
 
@@ -199,7 +207,8 @@ impl CaseStudy for Recognition {
         let mut kinds: Vec<(&'static Question, &'static str, Vec<Answered>)> = Vec::new();
         let (mut scored, mut data): (Vec<Scored>, Vec<String>) = (Vec::new(), Vec::new());
         let mut taught: Vec<(&'static Question, &'static str, Vec<Scored>)> = Vec::new();
-        let mut next: Option<StudyTable> = None;
+        let mut strangers: Option<(&'static str, EmulatedRounds)> = None;
+        let mut guided = Vec::new();
         let mut note = |text: &String| {
             if !data.contains(text) {
                 data.push(text.clone());
@@ -221,6 +230,11 @@ impl CaseStudy for Recognition {
                     note(&own.data);
                     scored.push(own);
                 }
+                Case::EmulatedNovelty { method } => {
+                    let own: EmulatedRounds = unit.read()?;
+                    note(&own.scored.data);
+                    strangers = Some((method.key, own));
+                }
                 Case::NewObject { question, method, .. } => {
                     let own: Scored = unit.read()?;
                     note(&own.data);
@@ -229,10 +243,10 @@ impl CaseStudy for Recognition {
                         None => taught.push((question, method.key, vec![own])),
                     }
                 }
-                Case::Guided { .. } => {
+                Case::Guided { which, .. } => {
                     let own: GuidedRounds = unit.read()?;
                     note(&own.data);
-                    next = Some(guided::table(&own));
+                    guided.push((which, own));
                 }
             }
         }
@@ -265,12 +279,19 @@ impl CaseStudy for Recognition {
             let tested = scored.iter().map(|own| own.trials.len()).max().unwrap_or(0);
             push(&mut table, [NOVELTY, NOVELTY_METHOD], scored.len(), found, targets, (tested, Vec::new()));
         }
+        let said = strangers.as_ref().map(|(_, own)| decisions(own));
+        if let Some((key, EmulatedRounds { scored, .. })) = strangers {
+            let (tested, all) = (scored.trials.len(), [scored]);
+            let found = [0, 1].map(|grasps| area(&all, grasps));
+            push(&mut table, [EMULATED_NOVELTY, key], 1, found, [[None; 2]; 2], (tested, Vec::new()));
+        }
         for (question, key, parts) in &taught {
             let found = [0, 1].map(|grasps| mean_f1(parts, grasps));
             let tested = parts.iter().map(|own| own.trials.len()).max().unwrap_or(0);
             push(&mut table, [question.name, key], parts.len(), found, question.targets, (tested, Vec::new()));
         }
-        let tables = [Some(table), next, Some(costs(&kinds))];
+        let next = (!guided.is_empty()).then(|| guided::table(&guided));
+        let tables = [Some(table), said, next, Some(costs(&kinds))];
         Ok(StudyReport::new(data, tables.into_iter().flatten().collect(), Vec::new()))
     }
 

@@ -39,7 +39,7 @@ pub(super) fn new_object(
     let new = model.card.labels.class(left_out).ok_or_else(missing)?;
     let test = test.relabelled(&model.card.labels).ok_or_else(missing)?;
     let says_new = |pmf: &Pmf| f64::from(u8::from(pmf.top().0 == new));
-    UnitResult::new(&Scored::of(&model, &test, left_out, plan.seed, says_new)).map(Some)
+    UnitResult::new(&Scored::of(&model, &test, |name| name == left_out, plan.seed, says_new)).map(Some)
 }
 
 /// Mean over the objects of the F1 of the object's class, over resampled trials.

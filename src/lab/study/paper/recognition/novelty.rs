@@ -5,21 +5,27 @@ use super::super::UnitResult;
 use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::{DataWanted, POSES};
+use super::super::report::{Cell, PERCENT, StudyTable};
 use super::questions::QUESTIONS;
-use super::tested;
+use super::{emulated, tested};
 use crate::grasping::random_shapes;
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Example, Method, Model, Pmf, check_apart};
+use palpate_learn::{Belief, Dataset, Example, Method, Model, ModelCard, Pmf, Shipped, check_apart};
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 
 /// Seeds of the random shapes of the class "other", which the encoders have not seen either.
-const OTHERS: std::ops::Range<u64> = 20_000..21_000;
+pub(super) const OTHERS: std::ops::Range<u64> = 20_000..23_000;
 /// Row of the unknown objects: area under the curve of known against unknown ones, each object left out in turn.
 pub(super) const NOVELTY: &str = "unknown objects, B free";
 pub(super) const NOVELTY_METHOD: &str = "geometry-trees";
 pub(super) const NOVELTY_TARGETS: [[f64; 2]; 2] = [[0.87, 0.95], [0.90, 0.97]];
+
+/// Row of unknown objects on grippers without labels: random shapes against the sixteen, by the shipped model.
+pub(super) const EMULATED_NOVELTY: &str = "unknown objects, no labels, emulated gripper, B";
+/// Seeds of those shapes.
+const STRANGERS: std::ops::Range<u64> = 30_000..30_032;
 
 /// Score of each test grasp, and whether its object was left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,17 +59,119 @@ pub(super) fn novelty(
     let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
     let score = |pmf: &Pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln();
-    UnitResult::new(&Scored::of(&model, &test, left_out, plan.seed, score)).map(Some)
+    UnitResult::new(&Scored::of(&model, &test, |name| name == left_out, plan.seed, score)).map(Some)
+}
+
+/// Rounds with emulated grippers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct EmulatedRounds {
+    pub(super) scored: Scored,
+    /// What the identification of window and commands says at the end of each round, and after how many grasps.
+    decided: Vec<Decided>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Decided {
+    grasps: usize,
+    /// Reached the threshold.
+    sure: bool,
+    other: bool,
+    right: bool,
+}
+
+/// How surely grasps of emulated grippers are of a known object, for the shipped model, and what is decided.
+pub(super) fn emulated_novelty(bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    let plan = bench.plan();
+    let model = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
+    let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
+    let strangers = random_shapes(STRANGERS.start..STRANGERS.start + plan.pick(STRANGERS.end - STRANGERS.start, 4, 2));
+    let objects = [plan.objects(), strangers.clone()].concat();
+    let test = emulated(QUESTIONS[0].preset, &objects, plan)?;
+    let score = |pmf: &Pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln();
+    let is_new = |name: &str| strangers.iter().any(|stranger| stranger == name);
+    let scored = Scored::of(&model, &test, is_new, plan.seed, score);
+    let recogniser = model.recogniser.as_ref();
+    let rounds = rounds(recogniser, &test, &answer(recogniser, &test), plan.seed);
+    let decided = rounds.iter().map(|round| {
+        let truth = &test.labels.classes[round.truth].name;
+        let class = if is_new(truth) { Some(other) } else { model.card.labels.class(truth) };
+        Decided::of(&round.belief, &model.card, class)
+    });
+    let decided = decided.collect();
+    UnitResult::new(&EmulatedRounds { scored, decided }).map(Some)
+}
+
+impl Decided {
+    /// Follows a round grasp by grasp, from the belief before the first one on.
+    fn of(belief: &Belief, card: &ModelCard, truth: Option<usize>) -> Self {
+        let prior = card.prior();
+        let mut followed = Belief::default();
+        for (step, alone) in belief.pairs() {
+            followed.add(prior.as_ref().map_or_else(|| step.clone(), |prior| prior.times(step)), alone.clone());
+            if card.stop.judge(&followed, card.rejection.as_ref()).is_some() {
+                break;
+            }
+        }
+        let (class, p) = followed.now().map_or((0, 0.0), Pmf::top);
+        let (sure, other) = (p >= card.stop.threshold, Some(class) == card.labels.other());
+        Self { grasps: followed.grasps(), sure, other, right: Some(class) == truth }
+    }
+}
+
+/// Table of what is decided about known objects and others.
+pub(super) fn decisions(found: &EmulatedRounds) -> StudyTable {
+    let columns = [
+        ("objects", ""),
+        ("right", PERCENT),
+        ("said \"other\"", PERCENT),
+        ("sure", PERCENT),
+        ("right when sure", PERCENT),
+        ("grasps", ""),
+        ("rounds", ""),
+    ];
+    let title = "Grasps until sure, by emulated grippers, without labels: what the shipped model says";
+    let mut table = StudyTable::new("decisions", title, &columns);
+    for (name, is_new) in [("the sixteen", false), ("random shapes, none of them", true)] {
+        let own = || found.decided.iter().zip(&found.scored.is_new).filter(move |(_, new)| **new == is_new);
+        let all: Vec<&Decided> = own().map(|(decided, _)| decided).collect();
+        let strata = vec![0; all.len()];
+        let share = |of: &dyn Fn(&Decided) -> Option<bool>| {
+            Cell::interval(BOOTSTRAP.interval(&strata, |chosen| {
+                let said: Vec<bool> = chosen.iter().filter_map(|k| of(all[*k])).collect();
+                Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
+            }))
+        };
+        let grasps = |chosen: &[usize]| {
+            Some(chosen.iter().map(|k| all[*k].grasps as f64).sum::<f64>() / chosen.len().max(1) as f64)
+        };
+        let cells = vec![
+            Cell::text(name),
+            share(&|own| Some(own.right)),
+            share(&|own| Some(own.other)),
+            share(&|own| Some(own.sure)),
+            share(&|own| own.sure.then_some(own.right)),
+            Cell::interval(BOOTSTRAP.interval(&strata, grasps)),
+            Cell::Number(all.len() as f64),
+        ];
+        table.push(cells, Vec::new());
+    }
+    table
 }
 
 impl Scored {
     /// Scores what a model believes after one test grasp of each round, and after three.
-    pub(super) fn of(model: &Model, test: &Dataset, left_out: &str, seed: u64, score: impl Fn(&Pmf) -> f64) -> Self {
+    pub(super) fn of(
+        model: &Model,
+        test: &Dataset,
+        is_new: impl Fn(&str) -> bool,
+        seed: u64,
+        score: impl Fn(&Pmf) -> f64,
+    ) -> Self {
         let recogniser = model.recogniser.as_ref();
         let rounds = rounds(recogniser, test, &answer(recogniser, test), seed);
         let after =
             |belief: &Belief, grasps: usize| belief.steps().get(grasps - 1).or(belief.now()).map_or(0.0, &score);
-        let is_new = |example: &Example| test.labels.classes[example.class].name == left_out;
+        let is_new = |example: &Example| is_new(&test.labels.classes[example.class].name);
         Self {
             data: test.about.described(),
             trials: test.examples.iter().map(|example| example.id).collect(),
