@@ -84,7 +84,7 @@ fn a_guided_grasp_says_by_which_move_it_was_chosen() {
     bench.tell(Command::Pause);
     bench.harness.run_steps(3);
     let by = second.status.guided.unwrap();
-    assert!(says(&bench, &format!("Guided: gripper {by}")), "{by}");
+    assert!(says(&bench, &format!("Guided: gripper {by}").replace(" mm", "\u{a0}mm")), "{by}");
 }
 
 #[test]

@@ -9,7 +9,10 @@ use std::sync::Arc;
 /// Draws the line; returns its height (points), 0 without advice.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> f32 {
     let Some(text) = text(part) else { return 0.0 };
-    let text = RichText::new(text).size(part.measures.reason_letters).color(colour(part.colours().accent));
+    // No line break between number and unit.
+    let text = RichText::new(text.replace(" mm", "\u{a0}mm"))
+        .size(part.measures.reason_letters)
+        .color(colour(part.colours().accent));
     let hint = "The grasp from which most is expected to be learned, by the readings so far";
     ui.add(Label::new(text).wrap()).on_hover_text(hint).rect.height() + ui.spacing().item_spacing.y
 }
