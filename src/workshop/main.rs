@@ -84,17 +84,7 @@ enum Command {
         out: PathBuf,
     },
     /// Collect grasps and train a shipped recognition model.
-    Model {
-        /// The one for any gripper, instead of the one for perfect sensors.
-        #[arg(long)]
-        any_gripper: bool,
-        /// Output folder.
-        #[arg(long, default_value = "models")]
-        out: PathBuf,
-        /// Trial store that receives the grasps; a second run reuses them.
-        #[arg(long)]
-        store: PathBuf,
-    },
+    Model(ForModel),
     /// Collect the training grasps again and store their class signatures in the shipped model, whose weights stay.
     Signatures {
         /// Folder of the model.
@@ -105,17 +95,7 @@ enum Command {
         store: PathBuf,
     },
     /// Collect the grasps in known poses that guide the next grasp.
-    Touches {
-        /// Those for any gripper, instead of those for perfect sensors.
-        #[arg(long)]
-        any_gripper: bool,
-        /// Output folder.
-        #[arg(long, default_value = "models")]
-        out: PathBuf,
-        /// Trial store that receives the grasps; a second run reuses them.
-        #[arg(long)]
-        store: PathBuf,
-    },
+    Touches(ForModel),
     /// Grasp random shapes, and train a shipped geometry encoder on them.
     Encoder {
         /// The one for real sensors on any gripper, instead of the one for perfect sensors.
@@ -140,6 +120,20 @@ enum Command {
     },
 }
 
+/// Shipped model that is made, or that files are made for.
+#[derive(Debug, clap::Args)]
+struct ForModel {
+    /// The one for any gripper, instead of the one for perfect sensors.
+    #[arg(long)]
+    any_gripper: bool,
+    /// Output folder.
+    #[arg(long, default_value = "models")]
+    out: PathBuf,
+    /// Trial store that receives the grasps; a second run reuses them.
+    #[arg(long)]
+    store: PathBuf,
+}
+
 fn main() -> Result<(), Failure> {
     match Arguments::parse().command {
         Command::Objects { out } => {
@@ -157,10 +151,10 @@ fn main() -> Result<(), Failure> {
             let count = thumbnails::draw_all(&out)?;
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
-        Command::Model { any_gripper, out, store } => {
+        Command::Model(ForModel { any_gripper, out, store }) => {
             live_model::make(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
         }
-        Command::Touches { any_gripper, out, store } => {
+        Command::Touches(ForModel { any_gripper, out, store }) => {
             live_model::make_touches(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
         }
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,

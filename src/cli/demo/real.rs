@@ -72,9 +72,8 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let mut advisor = Advisor::default();
     let stopped = loop {
         if let Some(keys) = &keys {
-            let next = identification.last().and_then(|last| advisor.advice(last));
-            match next {
-                _ if grasps.is_empty() => note("Put an object between the open fingers and press Enter."),
+            match identification.last().and_then(|last| advisor.advice(last)) {
+                None if grasps.is_empty() => note("Put an object between the open fingers and press Enter."),
                 Some(by) => note(&format!("To learn most from the next grasp: {}. Then press Enter.", by.of_object())),
                 None => note("Turn the object a little and press Enter."),
             }

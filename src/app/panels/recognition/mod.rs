@@ -1,5 +1,5 @@
-//! Recognition: a lesson that is running, the answer and its reason, advice on the next grasp, size and shape, the measured dimensions, a bar for each
-//! class with the threshold across them, and the grasps so far.
+//! Recognition: a lesson that is running, the answer and its reason, advice on the next grasp, size and shape, the measured
+//! dimensions, a bar for each class with the threshold across them, and the grasps so far.
 
 mod advice;
 mod classes;

@@ -61,6 +61,13 @@ impl Scale {
     }
 }
 
+/// Median of the ends of grasps (s).
+pub(super) fn usual_end_s<'g>(grasps: impl Iterator<Item = &'g Sequence>) -> f32 {
+    let mut ends: Vec<f32> = grasps.filter_map(|grasp| grasp.t_s.last().copied()).collect();
+    ends.sort_by(f32::total_cmp);
+    ends.get(ends.len() / 2).copied().unwrap_or(1.0)
+}
+
 impl TouchLibrary {
     /// A library of so many classes in these channels: class, pose, readings and answer of each grasp.
     pub fn new(channels: &[String], classes: usize, grasps: &[(usize, Stance, &Sequence, Pmf)]) -> Self {
@@ -76,9 +83,7 @@ impl TouchLibrary {
             true => 0.0,
             false => 0.05 * readings(channel).into_iter().fold(0.0, f32::max),
         };
-        let mut ends: Vec<f32> = grasps.iter().filter_map(|(_, _, grasp, _)| grasp.t_s.last().copied()).collect();
-        ends.sort_by(f32::total_cmp);
-        let end_s = ends.get(ends.len() / 2).copied().unwrap_or(1.0);
+        let end_s = usual_end_s(grasps.iter().map(|(_, _, grasp, _)| *grasp));
         let mut scale = Scale { end_s, knees: (0..width).map(knee).collect(), deviations: vec![1.0; width] };
         let raw: Vec<Vec<f32>> = grasps.iter().map(|(_, _, grasp, _)| scale.felt(grasp)).collect();
         let deviation = |channel: usize| {

@@ -84,7 +84,7 @@ impl StudyCase for Case {
                 // Answers of another shipped model are others.
                 let shipped = match question.learns {
                     Learns::Shipped(shipped) => format!(", {:08x}", shipped.model_content()),
-                    Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
+                    Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Given { .. } => {
                         String::new()
                     }
                 };
@@ -134,7 +134,7 @@ impl Case {
         let Some(test) = tested(question, bench)? else { return Ok(None) };
         let model = match question.learns {
             Learns::Shipped(shipped) => shipped.model().map_err(|error| StudyError::Missing(error.to_string()))?,
-            Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Told { .. } => {
+            Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Given { .. } => {
                 let Some(all) = bench.data(&question.learned(plan))? else { return Ok(None) };
                 let own = all.by_class().into_iter().flat_map(|of| of.into_iter().skip(draw * of_each).take(of_each));
                 let mut train = all.part(&own.collect::<Vec<_>>());
@@ -153,7 +153,7 @@ impl Case {
             test.ok_or_else(|| StudyError::Missing("a model of this method that knows the objects".to_owned()))?;
         let answers = answer(model.recogniser.as_ref(), &test);
         let answers = match question.learns {
-            Learns::Told { .. } => with_true_size_and_shape(&answers, &test),
+            Learns::Given { .. } => with_true_size_and_shape(&answers, &test),
             Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Shipped(_) => answers,
         };
         let one = judge_answers(&model, &test, &answers);

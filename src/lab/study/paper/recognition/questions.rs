@@ -26,7 +26,7 @@ pub(in crate::study::paper) enum Learns {
     /// The same as [`Self::Like`] with labels in random order, a control.
     Shuffled { of_each: usize },
     /// The same, with the true size and shape of each test grasp known: an upper bound for what estimates them.
-    Told { of_each: usize },
+    Given { of_each: usize },
     /// It comes with the program.
     Shipped(Shipped),
 }
@@ -190,7 +190,7 @@ pub(super) const QUESTIONS: [Question; 16] = [
         name: "control: true size and shape given, B free",
         preset: "B",
         fixed: false,
-        learns: Learns::Told { of_each: 50 },
+        learns: Learns::Given { of_each: 50 },
         reads: VIRTUAL,
         methods: &["geometry-trees"],
         targets: [[None; 2]; 2],
@@ -242,7 +242,7 @@ impl Question {
     pub(super) fn draws(&self, plan: &StudyPlan) -> (usize, usize) {
         match self.learns {
             Learns::Like { of_each, draws } => (plan.grasps(of_each, 20), plan.pick(draws, 1, 1)),
-            Learns::Shuffled { of_each } | Learns::Told { of_each } | Learns::Drawn { of_each } => {
+            Learns::Shuffled { of_each } | Learns::Given { of_each } | Learns::Drawn { of_each } => {
                 (plan.grasps(of_each, 20), 1)
             }
             Learns::Shipped(_) => (0, 1),
