@@ -268,7 +268,8 @@ proptest! {
 
     #[test]
     fn random_scenes_are_refused_sound_or_flagged(seed: u64) {
-        prop_assert!(watched(seed).is_ok(), "{:?}", watched(seed));
+        let found = watched(seed);
+        prop_assert!(found.is_ok(), "{found:?}");
     }
 }
 

@@ -184,8 +184,8 @@ impl GraspRun {
                 (data.quality.missed_steps, data.quality.steps, data.quality.least_step_s * 1e6);
             let tolerance = scene.solver.accuracy;
             warnings.push(format!(
-                "{missed} of {steps} steps missed the accuracy {tolerance}, though they were as short as steps get ({least:.1} \
-                 µs): try a larger tolerance"
+                "{missed} of {steps} steps missed the accuracy {tolerance}, though steps became as short as {least:.1} µs: try \
+                 a larger tolerance"
             ));
         }
         warnings.extend(self.gripper.run().notes());

@@ -56,7 +56,7 @@ struct Control {
     wanted: f64,
     /// No step is longer (s).
     longest: f64,
-    /// No step is made shorter because of its error (s).
+    /// No step is made shorter because of its error (s); grows where most steps miss the tolerance.
     least: f64,
     /// The state at the beginning of the step.
     origin: State,
@@ -70,6 +70,11 @@ struct Control {
 
 /// The shortest step as a share of the longest: 1/75 s becomes 13 µs.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
+/// Steps that may miss the tolerance before the shortest step grows: more than in any of 144 000 grasps of presets
+/// (16 059). Deep inside something no step is short enough, and the grasp would take minutes to be no better.
+pub(super) const PATIENCE: u64 = 20_000;
+/// From then on the shortest step doubles with so many of them.
+const MISSES_PER_DOUBLING: u64 = 500;
 /// The next step is planned to have this share of the tolerance's error, to the power of 1 / (p + 1).
 const SAFETY: f64 = 0.9;
 /// Motion with less than this share of the energy of bent joints is not guarded.
@@ -205,6 +210,9 @@ impl Control {
                 }
                 totals.missed += 1;
                 totals.solves += 1;
+                if totals.missed > PATIENCE && totals.missed.is_multiple_of(MISSES_PER_DOUBLING) {
+                    self.least = (2.0 * self.least).min(self.longest);
+                }
                 within.step(state, h)?
             }
         };

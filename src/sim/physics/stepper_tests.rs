@@ -2,7 +2,7 @@
 
 use super::integrator::{Integrator, Surroundings};
 use super::step::Drive;
-use super::stepper::Stepper;
+use super::stepper::{PATIENCE, Stepper};
 use super::{PhysicsModel, Placement, Simulation, State, Workspace};
 use crate::gripper::Phase;
 use crate::objects::ObjectModel;
@@ -234,6 +234,23 @@ fn a_tolerance_that_cannot_be_met_is_counted() {
     assert!(
         quality.least_step_s <= 1.001 / 50.0 / 1024.0 && quality.solves >= 2 * quality.steps + quality.missed_steps
     );
+}
+
+#[test]
+fn a_tolerance_that_is_missed_for_ever_costs_a_bounded_number_of_steps() {
+    // The whole gripper stands inside a barrel. A floor that stays takes 42 108 steps.
+    let barrel = Primitive::Cylinder { radius: 0.21, half_length: 0.09 };
+    let barrel = ObjectModel::from_primitive("barrel", barrel, 400.0, 0.6);
+    let mut scene = grasp_scene(Accuracy::Standard);
+    scene.object.fixed = true;
+    (scene.gripper.pad.rows, scene.gripper.pad.columns) = (10, 1);
+    let (mut simulation, _) = Simulation::new(&scene, Some(&barrel));
+    for _ in 0..250 {
+        simulation.advance().expect("finite");
+    }
+    let quality = simulation.quality();
+    assert!(quality.missed_steps > PATIENCE, "{quality:?}");
+    assert!(quality.steps < 30_000, "{quality:?}");
 }
 
 proptest! {
