@@ -5,7 +5,7 @@ mod real;
 
 use super::Failure;
 use super::output::make_folder;
-use super::recognise::{StageOne, load_model, named};
+use super::recognise::{StageOne, load_model, named, warn_of_free_objects};
 use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
@@ -36,7 +36,7 @@ use std::sync::Arc;
 #[command(after_help = "Examples:
   palpate demo
   palpate demo --object tomato --out pictures/
-  palpate demo --guided --fixed --object lemon
+  palpate demo --guided --object lemon
   palpate demo --seed 5 --threshold 0.99 --grasps 10 --no-pictures --json
   palpate demo --port /dev/ttyACM0
   palpate demo --port /dev/ttyACM0 --object lemon
@@ -137,6 +137,9 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     }
     let object = nominal.load_object()?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::PerfectSensors)?);
+    if nominal.holds_object() {
+        warn_of_free_objects(&model);
+    }
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(&model), rule);
     let mut painter = if arguments.no_pictures { None } else { Painter::find() };

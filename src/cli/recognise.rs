@@ -116,6 +116,16 @@ pub(super) fn warn_of_perfect_sensors(model: &Model) {
     }
 }
 
+/// Warns about a model from free objects that answers for a fixed one.
+pub(super) fn warn_of_free_objects(model: &Model) {
+    if model.card.learned_from_free_objects() {
+        warn(
+            "the object is fixed and the model knows free objects only, so most of its answers are wrong; train one on fixed \
+             objects: palpate collect --fixed",
+        );
+    }
+}
+
 /// Probabilities by name, for JSON.
 pub(super) fn named(model: &Model, pmf: &Pmf) -> BTreeMap<String, f64> {
     model.card.labels.classes.iter().map(|c| c.name.clone()).zip(pmf.probabilities().iter().copied()).collect()
@@ -128,12 +138,13 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let prior = model.card.prior();
     let mut belief = Belief::default();
     let mut trials = Vec::new();
-    let mut is_real = false;
+    let (mut is_real, mut is_fixed) = (false, false);
     let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
         is_real |= data.about.sensors.is_none();
+        is_fixed |= data.about.object.starts_with("fixed");
         let grasp = &data.examples[0].grasp;
         let after = |before: Option<&Pmf>| model.recogniser.recognise(grasp, before.or(prior.as_ref()));
         let alone = after(None);
@@ -167,6 +178,9 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     });
     if is_real {
         warn_of_perfect_sensors(&model);
+    }
+    if is_fixed {
+        warn_of_free_objects(&model);
     }
     if arguments.json {
         return say_json(&Report { trials, together });

@@ -186,6 +186,11 @@ impl DataCard {
         self.sensors.as_deref() == Some("virtual")
     }
 
+    /// True for simulated grasps of which none was of an object fixed in place.
+    pub fn of_free_objects(&self) -> bool {
+        self.object.split(',').next() == Some("free")
+    }
+
     /// One-line summary: `preset B, object free, virtual sensors, C1`.
     pub fn described(&self) -> String {
         let mut parts = Vec::new();

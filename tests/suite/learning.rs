@@ -247,8 +247,21 @@ fn a_guided_demo_chooses_each_grasp_after_the_first() {
     assert!(guided.len() == 2 && guided[0].is_none() && guided[1].is_some(), "{guided:?}");
     let found = run(folder.path(), &[&demo[..], &rest].concat());
     assert!(found.out.contains(&format!("Chosen to learn most: gripper {}.", guided[1].unwrap())), "{found:?}");
+    assert!(found.err.contains("the object is fixed and the model knows free objects only"), "{found:?}");
     let refusal = run(folder.path(), &["demo", "--guided", "--as-released"]);
     assert_eq!(refusal.code, Some(2), "{refusal:?}");
+}
+
+#[test]
+fn a_fixed_object_brings_a_warning_about_a_model_of_free_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let warning = "the object is fixed and the model knows free objects only";
+    for (id, fixed) in [("1", &["--fixed"][..]), ("2", &[])] {
+        let grasp = run(folder.path(), &[&["grasp", "lemon"], fixed].concat());
+        let recognised = run(folder.path(), &["recognise", id]);
+        assert_eq!((grasp.code, recognised.code), (Some(0), Some(0)), "{grasp:?} {recognised:?}");
+        assert_eq!(recognised.err.contains(warning), !fixed.is_empty(), "{recognised:?}");
+    }
 }
 
 #[test]

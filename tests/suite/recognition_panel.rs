@@ -88,6 +88,22 @@ fn a_guided_grasp_says_by_which_move_it_was_chosen() {
 }
 
 #[test]
+fn a_model_of_free_objects_warns_about_a_fixed_one() {
+    let model = Shipped::PerfectSensors.model().map(Arc::new);
+    let mut bench = bench(BenchSetup { model, size: [330.0, 708.0], panel: Some(panel()), ..BenchSetup::default() });
+    let warning = "Not to be trusted: the object is fixed, and this model knows free objects only.";
+    for fixed in [true, false] {
+        let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
+        scene.set_object_fixed(fixed);
+        bench.tell(SimulationAction::SetScene(Box::new(scene)));
+        bench.until(|s| s.scene.holds_object() == fixed && s.identification.is_some());
+        bench.advance_to(2.0);
+        bench.harness.run_steps(3);
+        assert_eq!(says(&bench, warning), fixed);
+    }
+}
+
+#[test]
 fn the_panel_in_every_state_and_both_themes() {
     type Reach = fn(&mut Bench);
     let states: [(&str, Reach); 5] = [

@@ -125,6 +125,8 @@ pub struct IdentificationView {
     pub decision: Option<StopReason>,
     /// True where the model learned from perfect sensors, which no real gripper has.
     pub from_perfect_sensors: bool,
+    /// True where the model learned from free objects only, which move in the hand as fixed ones do not.
+    pub from_free_objects: bool,
     /// Class signatures of the model, where its file has them.
     pub signatures: Option<Arc<Signatures>>,
     /// The last finished grasp of this object.
@@ -318,6 +320,7 @@ impl Identification {
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
             from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
+            from_free_objects: self.model.card.learned_from_free_objects(),
             signatures: self.model.signatures.clone(),
             last: self.last.clone(),
         }

@@ -22,7 +22,7 @@ use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
-use words::{FOREIGN, Headline, percent, reason};
+use words::{FOREIGN, FREE_ONLY, Headline, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -184,9 +184,17 @@ impl Part<'_, '_> {
         self.context.view.theme.colours()
     }
 
-    /// True for a model from perfect sensors on a real gripper.
-    fn is_foreign(&self) -> bool {
-        self.view.from_perfect_sensors && self.context.shown().board().is_some()
+    /// Why the model's answers are not to be trusted on what is grasped; none where they are.
+    fn distrust(&self) -> Option<&'static str> {
+        let is_real = self.context.shown().board().is_some();
+        let simulates = self.context.source == ViewSource::Simulation;
+        if self.view.from_perfect_sensors && is_real {
+            Some(FOREIGN)
+        } else if self.view.from_free_objects && simulates && self.context.scene.holds_object() {
+            Some(FREE_ONLY)
+        } else {
+            None
+        }
     }
 
     /// Picture of a class, or a frame with a question mark.
@@ -229,9 +237,9 @@ impl Part<'_, '_> {
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
-        let is_foreign = self.is_foreign();
-        let why = if is_foreign { FOREIGN.to_owned() } else { reason(self.view, self.recognised) };
-        let ink = colour(if is_foreign { colours.warning } else { colours.quiet_text });
+        let distrust = self.distrust();
+        let why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
+        let ink = colour(if distrust.is_some() { colours.warning } else { colours.quiet_text });
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
         // No line break between number and unit.

@@ -36,7 +36,7 @@ pub(super) fn height(measures: &Measures, has_stage_one: bool) -> f32 {
 /// Draws the lines; false where nothing can be measured.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     // For a model from perfect sensors, the encoder knows those only.
-    if !part.view.measures_geometry || part.is_foreign() {
+    if !part.view.measures_geometry || part.distrust().is_some() {
         return false;
     }
     let measured = part.view.measured.as_deref();

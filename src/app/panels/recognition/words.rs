@@ -12,6 +12,9 @@ const WORTH_NAMING: f64 = 0.4;
 /// Warning about a model on a gripper whose sensors it does not know.
 pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
 
+/// Warning about a model on a fixed object where it learned from free ones only.
+pub(super) const FREE_ONLY: &str = "Not to be trusted: the object is fixed, and this model knows free objects only.";
+
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Headline {
@@ -153,6 +156,7 @@ mod tests {
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
             from_perfect_sensors: false,
+            from_free_objects: false,
             signatures: None,
             last: None,
         }
