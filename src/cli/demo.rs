@@ -5,7 +5,7 @@ mod real;
 
 use super::Failure;
 use super::output::make_folder;
-use super::recognise::{StageOne, load_model, named, warn_of_free_objects};
+use super::recognise::{StageOne, load_model, named, warn_unless_learned};
 use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
@@ -137,9 +137,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     }
     let object = nominal.load_object()?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::PerfectSensors)?);
-    if nominal.holds_object() {
-        warn_of_free_objects(&model);
-    }
+    warn_unless_learned(&model, nominal.holds_object());
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(&model), rule);
     let mut painter = if arguments.no_pictures { None } else { Painter::find() };

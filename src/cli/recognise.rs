@@ -11,7 +11,7 @@ use palpate_store::labels::shown_title;
 use palpate_store::{Store, TrialRow};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use why::{Explanations, WhyReport};
 
@@ -116,13 +116,14 @@ pub(super) fn warn_of_perfect_sensors(model: &Model) {
     }
 }
 
-/// Warns about a model from free objects that answers for a fixed one.
-pub(super) fn warn_of_free_objects(model: &Model) {
-    if model.card.learned_from_free_objects() {
-        warn(
-            "the object is fixed and the model knows free objects only, so most of its answers are wrong; train one on fixed \
-             objects: palpate collect --fixed",
-        );
+/// Warns about a model from free objects that answers for a fixed one, or the other way round.
+pub(super) fn warn_unless_learned(model: &Model, fixed: bool) {
+    if model.card.data.fixed().is_some_and(|learned| learned != fixed) {
+        let [own, other, option] = if fixed { ["fixed", "free", " --fixed"] } else { ["free", "fixed", ""] };
+        warn(&format!(
+            "the object is {own} and the model knows {other} objects only, so most of its answers are wrong; train one on {own} \
+             objects: palpate collect{option}"
+        ));
     }
 }
 
@@ -138,13 +139,14 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let prior = model.card.prior();
     let mut belief = Belief::default();
     let mut trials = Vec::new();
-    let (mut is_real, mut is_fixed) = (false, false);
+    let mut is_real = false;
+    let mut fixed = BTreeSet::new();
     let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
         is_real |= data.about.sensors.is_none();
-        is_fixed |= data.about.object.starts_with("fixed");
+        fixed.extend(data.about.fixed());
         let grasp = &data.examples[0].grasp;
         let after = |before: Option<&Pmf>| model.recogniser.recognise(grasp, before.or(prior.as_ref()));
         let alone = after(None);
@@ -179,9 +181,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     if is_real {
         warn_of_perfect_sensors(&model);
     }
-    if is_fixed {
-        warn_of_free_objects(&model);
-    }
+    fixed.into_iter().for_each(|fixed| warn_unless_learned(&model, fixed));
     if arguments.json {
         return say_json(&Report { trials, together });
     }

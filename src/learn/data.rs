@@ -186,9 +186,13 @@ impl DataCard {
         self.sensors.as_deref() == Some("virtual")
     }
 
-    /// True for simulated grasps of which none was of an object fixed in place.
-    pub fn of_free_objects(&self) -> bool {
-        self.object.split(',').next() == Some("free")
+    /// Whether the object was fixed in place in all simulated grasps (true) or in none; `None` for mixed and recorded ones.
+    pub fn fixed(&self) -> Option<bool> {
+        match self.object.split(',').next() {
+            Some("fixed") => Some(true),
+            Some("free") => Some(false),
+            _ => None,
+        }
     }
 
     /// One-line summary: `preset B, object free, virtual sensors, C1`.

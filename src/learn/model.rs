@@ -154,11 +154,6 @@ impl ModelCard {
         self.data.from_perfect_sensors()
     }
 
-    /// True where it learned from simulated grasps of free objects only: most of its answers for fixed ones are wrong.
-    pub fn learned_from_free_objects(&self) -> bool {
-        self.data.of_free_objects()
-    }
-
     /// True where it reads channels that only simulations have.
     pub fn only_simulated(&self) -> bool {
         self.channels.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE))

@@ -88,18 +88,24 @@ fn a_guided_grasp_says_by_which_move_it_was_chosen() {
 }
 
 #[test]
-fn a_model_of_free_objects_warns_about_a_fixed_one() {
-    let model = Shipped::PerfectSensors.model().map(Arc::new);
-    let mut bench = bench(BenchSetup { model, size: [330.0, 708.0], panel: Some(panel()), ..BenchSetup::default() });
-    let warning = "Not to be trusted: the object is fixed, and this model knows free objects only.";
-    for fixed in [true, false] {
-        let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
-        scene.set_object_fixed(fixed);
-        bench.tell(SimulationAction::SetScene(Box::new(scene)));
-        bench.until(|s| s.scene.holds_object() == fixed && s.identification.is_some());
-        bench.advance_to(2.0);
-        bench.harness.run_steps(3);
-        assert_eq!(says(&bench, warning), fixed);
+fn a_model_of_free_objects_warns_about_a_fixed_one_and_the_other_way_round() {
+    for (learned, other) in [("free", true), ("fixed", false)] {
+        let mut model = Shipped::PerfectSensors.model().unwrap();
+        learned.clone_into(&mut model.card.data.object);
+        let setup = BenchSetup { model: Ok(Arc::new(model)), size: [330.0, 708.0], ..BenchSetup::default() };
+        let mut bench = bench(BenchSetup { panel: Some(panel()), ..setup });
+        let warning = format!("this model knows {learned} objects only.");
+        for fixed in [true, false] {
+            let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
+            scene.set_object_fixed(fixed);
+            bench.tell(SimulationAction::SetScene(Box::new(scene)));
+            bench.until(|s| s.scene.holds_object() == fixed && s.identification.is_some());
+            bench.advance_to(2.0);
+            bench.harness.run_steps(3);
+            let held = if fixed { "fixed" } else { "free" };
+            let spoken = format!("Not to be trusted: the object is {held}, and {warning}");
+            assert_eq!(says(&bench, &spoken), fixed == other, "{learned}, {held}");
+        }
     }
 }
 

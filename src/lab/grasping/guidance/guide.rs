@@ -155,7 +155,7 @@ mod tests {
         let [stay, turn] = guide.expected_entropy(&Pmf::from_weights([0.5, 0.5]), &moves)[..] else { panic!("two") };
         assert!(turn < stay - 0.1 && stay <= 2.0_f64.ln() + 1e-9, "{stay} and {turn}");
 
-        // Once it is felt across, the belief tells the object, and the guide where it is gripped.
+        // Once it is felt across, the belief names the object, and the guide where it is gripped.
         guide.felt(&readings[1], &moves[1]);
         let sure = Pmf::from_weights([1.0, 0.0]);
         assert!(guide.expected_entropy(&sure, &moves).iter().all(|entropy| *entropy < 1e-3));
