@@ -38,7 +38,7 @@ use palpate_lab::workers::{
     Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
     Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
-use palpate_learn::{Model, ModelError, Shipped};
+use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::describe_adapter;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
@@ -54,8 +54,8 @@ pub struct WorkbenchSetup<'a> {
     pub store: PathBuf,
     /// View state of the last run.
     pub view: ViewState,
-    /// Recognition models for the simulation and for the real gripper, or why there is none; everything else works without.
-    pub models: [Result<Arc<Model>, ModelError>; 2],
+    /// Recognition models, or why there are none; everything else works without.
+    pub models: Result<Models, ModelError>,
     /// Measures cost and influence of effects.
     pub explain: Explain,
     /// Opens the port of a real gripper.
@@ -80,7 +80,7 @@ impl WorkbenchSetup<'_> {
             scene,
             store,
             view,
-            models: Shipped::ALL.map(|shipped| shipped.model().map(Arc::new)),
+            models: Models::shipped(),
             explain: Arc::new(explain_scene),
             listen: Arc::new(listen_to_port),
             tools: GripperToolsSetup {
@@ -140,8 +140,10 @@ impl Workbench {
     /// Starts all threads and prepares the graphics.
     pub fn new(ctx: &egui::Context, setup: WorkbenchSetup<'_>) -> Result<Self, ThreadError> {
         let WorkbenchSetup { scene, store, mut view, explain, listen, playing, wake, .. } = setup;
-        let models = setup.models.each_ref().map(|model| model.as_ref().ok().cloned());
-        let [model, gripper_model] = models.clone();
+        let (models, without) = match setup.models {
+            Ok(models) => (models, None),
+            Err(cause) => (Models::default(), Some(cause)),
+        };
         // Before the other threads, so that it opens the store first and can report what an update did to the file.
         let labeller =
             start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
@@ -154,7 +156,7 @@ impl Workbench {
             store: store.clone(),
             recording: true,
             grasps: GRASPS,
-            model,
+            models: models.clone(),
             playing,
             wake: Arc::clone(&wake),
         });
@@ -167,7 +169,7 @@ impl Workbench {
         let gripper = GripperWorker::start(GripperSetup {
             scene: scene.clone(),
             store: store.clone(),
-            model: gripper_model,
+            model: models.of(Shipped::AnyGripper).cloned(),
             grasps: GRASPS,
             listen,
             wake: Arc::clone(&wake),
@@ -216,7 +218,7 @@ impl Workbench {
         if workbench.view.ghost {
             workbench.act(ctx, SimulationAction::SetGhost(true));
         }
-        if let Some(cause) = setup.models.into_iter().find_map(Result::err) {
+        if let Some(cause) = without {
             workbench.notices.error(format!("Recognition is off: {cause}"));
         }
         Ok(workbench)
@@ -423,7 +425,7 @@ impl Workbench {
                 if ids.is_empty() {
                     return Some(Err("Select trials in the library first.".to_owned()));
                 }
-                Some(Ok(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options())))
+                Some(Ok(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options().clone())))
             }
         }
     }

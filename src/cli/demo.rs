@@ -61,7 +61,7 @@ pub(super) struct DemoArguments {
     /// Probability at which to stop; 1 grasps up to the limit.
     #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = within(0.0..=1.0))]
     threshold: f64,
-    /// Recognition model (default: the shipped one; with --port, the one for any gripper).
+    /// Recognition model (default: the shipped one for free or fixed objects; with --port, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Leave the object as released between grasps instead of placing it anew.
@@ -136,7 +136,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         nominal.pose.between = Between::Guided;
     }
     let object = nominal.load_object()?;
-    let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::PerfectSensors)?);
+    let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
     warn_unless_learned(&model, nominal.holds_object());
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(&model), rule);

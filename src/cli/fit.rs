@@ -76,7 +76,10 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
     }
     print(&fit)?;
     match &arguments.out {
-        Some(path) => say(format!("written: {}, a scene with the fitted gripper", path.display())),
+        Some(path) => say(format!(
+            "written: {}, a scene with the fitted gripper; palpate help gripper says how a model learns its grasps",
+            path.display()
+        )),
         None => Ok(()),
     }
 }

@@ -26,7 +26,7 @@ pub(super) struct RecogniseArguments {
     /// Trial numbers.
     #[arg(required = true)]
     trials: Vec<TrialId>,
-    /// Recognition model (default: the shipped one; for trials of a real gripper, the one for any gripper).
+    /// Recognition model (default: the shipped one for free or fixed objects, or for any real gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Treat the trials as grasps of one object, and also combine them.
@@ -100,10 +100,18 @@ pub(super) fn load_model(path: Option<&Path>, shipped: Shipped) -> Result<Model,
     })
 }
 
-/// The shipped model that reads stored trials: the one for any gripper where one of them is of a real gripper.
+/// The shipped model that reads stored trials: the one for any gripper where one of them is of a real gripper, the one for
+/// fixed objects where all objects are fixed.
 pub(super) fn shipped_for(store: &Store, trials: &[TrialId]) -> Result<Shipped, Failure> {
     let is_real = |row: &TrialRow| row.source == TrialSource::Recorded && trials.contains(&row.id);
-    Ok(if store.list(false)?.iter().any(is_real) { Shipped::AnyGripper } else { Shipped::PerfectSensors })
+    if store.list(false)?.iter().any(is_real) {
+        return Ok(Shipped::AnyGripper);
+    }
+    let mut all_fixed = true;
+    for id in trials {
+        all_fixed &= store.load(*id)?.header.scene.holds_object();
+    }
+    Ok(Shipped::simulated(all_fixed))
 }
 
 /// Warns about a model from perfect sensors that answers readings of a real gripper.
@@ -121,8 +129,8 @@ pub(super) fn warn_unless_learned(model: &Model, fixed: bool) {
     if model.card.data.fixed().is_some_and(|learned| learned != fixed) {
         let [own, other, option] = if fixed { ["fixed", "free", " --fixed"] } else { ["free", "fixed", ""] };
         warn(&format!(
-            "the object is {own} and the model knows {other} objects only, so most of its answers are wrong; train one on {own} \
-             objects: palpate collect{option}"
+            "the object is {own} and the model knows {other} objects only, so most of its answers are wrong; leave --model out, \
+             or train one on {own} objects: palpate collect{option}"
         ));
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct ReplayArguments {
     /// Number of a stored trial, or file of captured bytes.
     #[arg(value_name = "TRIAL|FILE")]
     source: PathBuf,
-    /// Recognition model (default: the shipped one; for a real gripper, the one for any gripper).
+    /// Recognition model (default: the shipped one for free or fixed objects, or for any real gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Speed, as a multiple of the original; 0: as fast as possible.

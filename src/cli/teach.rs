@@ -37,9 +37,12 @@ pub(super) struct TeachArguments {
     /// Labels whose trials of the real gripper are learned, separated by commas.
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     recorded: Vec<String>,
-    /// Teach the model for real grippers (default: the one for the simulation).
+    /// Teach the model for real grippers (default: the one for simulated grasps of free objects).
     #[arg(long, conflicts_with = "model")]
     real: bool,
+    /// Teach the model for simulated grasps of fixed objects.
+    #[arg(long, conflicts_with_all = ["model", "real"])]
+    fixed: bool,
     /// Model to teach, of the method geometry-network (default: the shipped one).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -74,7 +77,7 @@ struct Report<'a> {
 
 pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<(), Failure> {
     let (began, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-    let shipped = if arguments.real { Shipped::AnyGripper } else { Shipped::PerfectSensors };
+    let shipped = if arguments.real { Shipped::AnyGripper } else { Shipped::simulated(arguments.fixed) };
     let model = load_model(arguments.model.as_deref(), shipped)?;
     let store = if arguments.recorded.is_empty() { None } else { Some(read_store(store)?) };
     // Before the work, which takes seconds.

@@ -171,15 +171,44 @@ fn more_grasps_do_not_reduce_f1() {
 #[test]
 fn live_recognition_ends_with_the_verdict_on_the_whole_grasp() {
     let train = made_up(10, 9);
-    let model = trained(method("ids-lstm-cross").expect("in the list"), &train);
-    let mut live = model.recogniser.live().expect("networks are live");
-    let before = Pmf::from_weights([0.1, 0.2, 0.3, 0.4]);
-    for (example, before) in train.examples.iter().take(5).zip([None, Some(&before), None, Some(&before), None]) {
-        live.begin(before);
-        let pushed = example.grasp.rows().filter(|(t, row)| live.push(*t, row).is_some()).count();
-        assert!(pushed >= 10, "verdicts during the grasp: {pushed}");
-        assert_eq!(live.finish(), Some(model.recogniser.recognise(&example.grasp, before)));
+    for key in ["ids-lstm-cross", "extra-trees", "random-forest"] {
+        let model = trained(method(key).expect("in the list"), &train);
+        let model = Model::from_bytes(key, &model.to_bytes().expect("writes")).expect("reads");
+        let mut live = model.recogniser.live().expect("is live");
+        let before = Pmf::from_weights([0.1, 0.2, 0.3, 0.4]);
+        for (example, before) in train.examples.iter().take(5).zip([None, Some(&before), None, Some(&before), None]) {
+            live.begin(before);
+            let pushed = example.grasp.rows().filter(|(t, row)| live.push(*t, row).is_some()).count();
+            assert!(pushed >= 10, "verdicts during the grasp: {pushed}");
+            assert_eq!(live.finish(), Some(model.recogniser.recognise(&example.grasp, before)), "{key}");
+        }
     }
+}
+
+#[test]
+fn forests_grow_surer_and_better_during_a_grasp() {
+    let (train, test) = (made_up(20, 9), made_up(20, 10));
+    let fitting = Fitting { quick: false, ..quick(1) };
+    let model = method("extra-trees").expect("in the list").train(&train, &fitting).expect("fits");
+    let mut live = model.recogniser.live().expect("is live");
+    let mut right_and_sure = |share: f32| {
+        let of = |example: &Example| {
+            live.begin(None);
+            let end = share * example.grasp.t_s.last().copied().unwrap_or_default();
+            let rows = example.grasp.rows().take_while(|(t, _)| *t <= end);
+            let answer = rows.filter_map(|(t, row)| live.push(t, row)).last().expect("answers");
+            let (class, p) = answer.pmf.top();
+            (f64::from(u8::from(class == example.class)), p)
+        };
+        let answers: Vec<(f64, f64)> = test.examples.iter().map(of).collect();
+        let count = answers.len() as f64;
+        [answers.iter().map(|own| own.0).sum::<f64>() / count, answers.iter().map(|own| own.1).sum::<f64>() / count]
+    };
+    let [begun, half, whole] = [0.1, 0.62, 1.0].map(&mut right_and_sure);
+    assert!(begun[0] < half[0] && half[0] <= whole[0] && whole[0] > 0.9, "{begun:?} {half:?} {whole:?}");
+    assert!(begun[1] < half[1] && half[1] < whole[1], "{begun:?} {half:?} {whole:?}");
+    // As sure as right, as far as so few grasps tell.
+    assert!([begun, half, whole].iter().all(|own| (own[0] - own[1]).abs() < 0.2), "{begun:?} {half:?} {whole:?}");
 }
 
 #[test]

@@ -68,7 +68,7 @@ impl Levels {
 pub(crate) const REVISION: u32 = 1;
 
 /// Number of windows: three per tenth of a grasp.
-const WINDOWS: usize = 30;
+pub(crate) const WINDOWS: usize = 30;
 /// Largest number of onsets of a channel.
 const MOST_ONSETS: usize = 8;
 /// Number of measures of each channel.
@@ -124,6 +124,41 @@ impl Features {
                     self.levels.len() == channels && self.levels.iter().all(sound)
                 }
             }
+    }
+
+    /// True for features of which the beginning of a grasp gives some for good.
+    pub(crate) fn tell_beginnings(&self) -> bool {
+        self.kind != FeatureKind::Measures
+    }
+
+    /// Window of a reading, from the time since the start of the grasp (s); the last one has no end.
+    pub(crate) fn window_of(&self, t: f32) -> usize {
+        ((t / self.duration_s * WINDOWS as f32 - 1e-3) as usize).min(WINDOWS - 1)
+    }
+
+    /// End of a window (s).
+    pub(crate) fn end_of_window(&self, windows: usize) -> f32 {
+        self.duration_s * windows as f32 / WINDOWS as f32
+    }
+
+    /// Replaces by NaN what is unknown after the first windows, in a row of the whole grasp or of its beginning.
+    pub(crate) fn forget_after(&self, windows: usize, row: &mut [f32]) {
+        let pairs = 2 * self.pairs().count();
+        let (own, rest) = row.split_at_mut(self.channels * WINDOWS);
+        own[self.channels * windows..].fill(f32::NAN);
+        if self.kind != FeatureKind::ExtendedCourse {
+            return;
+        }
+        let (both, mut events) = rest.split_at_mut(pairs * WINDOWS);
+        both[pairs * windows..].fill(f32::NAN);
+        let end = self.end_of_window(windows);
+        for levels in &self.levels {
+            let (of_channel, others) = events.split_at_mut(3 + levels.onsets.len());
+            let (peak, onsets) = of_channel.split_at_mut(3);
+            peak.fill(f32::NAN);
+            onsets.iter_mut().filter(|onset| **onset >= end).for_each(|onset| *onset = f32::NAN);
+            events = others;
+        }
     }
 
     /// True if grasps can be mirrored.
@@ -187,7 +222,7 @@ impl Features {
         let mut sums = vec![0.0; self.channels * WINDOWS];
         let mut counts = [0u32; WINDOWS];
         for (t, row) in grasp.rows() {
-            let window = ((t / self.duration_s * WINDOWS as f32 - 1e-3) as usize).min(WINDOWS - 1);
+            let window = self.window_of(t);
             counts[window] += 1;
             sums[window * self.channels..].iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
         }

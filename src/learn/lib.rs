@@ -26,7 +26,7 @@
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
 //! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution. The geometry encoder |
 //! | 6 | `methods` | table of all methods |
-//! | 7 | `model_file` | model files; the shipped model |
+//! | 7 | `model_file` | model files; the shipped models |
 //!
 //! To add a recogniser, write its file and add one line to [`METHODS`].
 //!
@@ -96,6 +96,7 @@ pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;
 pub use model::{LoadError, Model, ModelCard, ModelError};
+pub use model_file::Models;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};

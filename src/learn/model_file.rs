@@ -3,6 +3,7 @@
 
 use crate::baselines::Shipped;
 use crate::data::{Class, Labels, fnv_1a};
+use crate::learned::LearnedGrasps;
 use crate::methods::method;
 use crate::model::{LoadError, Model, ModelCard, ModelError};
 use crate::signatures::Signatures;
@@ -19,6 +20,7 @@ impl Shipped {
         match self {
             Self::PerfectSensors => "live.safetensors",
             Self::AnyGripper => "any-gripper.safetensors",
+            Self::FixedObjects => "fixed.safetensors",
         }
     }
 
@@ -36,7 +38,48 @@ impl Shipped {
         match self {
             Self::PerfectSensors => include_bytes!("../../models/live.safetensors"),
             Self::AnyGripper => include_bytes!("../../models/any-gripper.safetensors"),
+            Self::FixedObjects => include_bytes!("../../models/fixed.safetensors"),
         }
+    }
+}
+
+/// Models in use, one for each kind of grasps; without one, such grasps are not recognised.
+#[derive(Clone, Debug, Default)]
+pub struct Models([Option<Arc<Model>>; Shipped::ALL.len()]);
+
+impl Models {
+    /// The shipped ones.
+    pub fn shipped() -> Result<Self, ModelError> {
+        let mut own = Self::default();
+        for kind in Shipped::ALL {
+            own.0[kind as usize] = Some(Arc::new(kind.model()?));
+        }
+        Ok(own)
+    }
+
+    /// One model for all kinds.
+    pub fn all(model: &Arc<Model>) -> Self {
+        Self(std::array::from_fn(|_| Some(Arc::clone(model))))
+    }
+
+    /// The model for a kind of grasps.
+    pub fn of(&self, kind: Shipped) -> Option<&Arc<Model>> {
+        self.0[kind as usize].as_ref()
+    }
+
+    /// With another model for real grippers.
+    pub fn with_real(mut self, model: Option<Arc<Model>>) -> Self {
+        self.0[Shipped::AnyGripper as usize] = model;
+        self
+    }
+
+    /// With another model for simulated grasps: of fixed objects or of free ones, whichever it has learned, else of both.
+    pub fn with_simulated(mut self, model: &Arc<Model>) -> Self {
+        let learned = model.card.data.fixed();
+        for fixed in [false, true].into_iter().filter(|fixed| learned.is_none_or(|learned| learned == *fixed)) {
+            self.0[Shipped::simulated(fixed) as usize] = Some(Arc::clone(model));
+        }
+        self
     }
 }
 
@@ -57,7 +100,9 @@ impl Model {
 
     /// Writes the model and its card into a folder that exists. Interrupted writes leave the old file intact.
     pub fn save(&self, path: &Path) -> Result<(), ModelError> {
-        let card = serde_json::to_string_pretty(&self.card).map_err(|e| malformed(&path.display().to_string(), e))?;
+        // The file itself lists the grasps that were learned; nobody reads their hashes.
+        let card = ModelCard { learned: LearnedGrasps::default(), ..self.card.clone() };
+        let card = serde_json::to_string_pretty(&card).map_err(|e| malformed(&path.display().to_string(), e))?;
         replace_file(path, &self.to_bytes()?)?;
         replace_file(&card_path(path), (card + "\n").as_bytes())
     }

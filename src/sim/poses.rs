@@ -2,13 +2,13 @@
 //! that a seed names a pose.
 
 use crate::frame::Frame;
-use crate::gripper::GripperModel;
+use crate::gripper::{BUILD, GripperModel};
 use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
 use crate::physics::natural_rotations;
 use crate::physics::random_rotation;
 use crate::run::SimRun;
-use crate::scene::{BUILD, Faces, ObjectSetup, Scene, SupportKind};
+use crate::scene::{Faces, ObjectSetup, Scene, SupportKind};
 use glam::{DQuat, DVec2, EulerRot};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -114,14 +114,21 @@ impl PoseSampler {
     fn draw_build(&self, drawn: &mut GripperModel, random: &mut ChaCha8Rng) {
         let (nominal, share) = (&self.scene.gripper, self.scene.pose.build);
         let mut factor = |[low, high]: [f64; 2]| 1.0 + share * (random.random_range(low..=high) - 1.0);
-        drawn.finger.bending_stiffness = nominal.finger.bending_stiffness * factor(BUILD.stiffness);
+        let stiffness = factor(nominal.fitted.map_or(BUILD.stiffness, |fitted| fitted.stiffness));
+        drawn.finger.bending_stiffness = nominal.finger.bending_stiffness * stiffness;
         drawn.pad.modulus = nominal.pad.modulus * factor(BUILD.pad_modulus);
         drawn.pad.friction = nominal.pad.friction * factor(BUILD.pad_friction);
-        let torque = factor(BUILD.torque);
+        let torque = match nominal.fitted {
+            Some(fitted) => stiffness * factor(fitted.torque_per_stiffness),
+            None => factor(BUILD.torque),
+        };
         drawn.actuation.curve.clone_from(&nominal.actuation.curve);
         drawn.actuation.curve.iter_mut().for_each(|point| point.torque *= torque);
-        let filling_s = share * random.random_range(BUILD.filling_s[0]..=BUILD.filling_s[1]);
-        drawn.actuation.filling_time = nominal.actuation.filling_time + filling_s;
+        let [least, most] = nominal.fitted.map_or(BUILD.filling_s, |fitted| fitted.filling_s);
+        let filling_s = share * random.random_range(least..=most);
+        drawn.actuation.filling_time = (nominal.actuation.filling_time + filling_s).max(0.0);
+        // The one that is drawn is known.
+        drawn.fitted = None;
     }
 }
 
@@ -150,6 +157,7 @@ pub fn jittered(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -> (Scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gripper::FittedRanges;
     use crate::scene::Between;
     #[cfg(feature = "rapier")]
     use crate::scene::{PRESETS, PosePreset};
@@ -206,6 +214,30 @@ mod tests {
         assert!((0.0..=0.12).contains(&b.gripper.actuation.filling_time));
         scene.pose.build = 2.0;
         assert!(scene.check().is_err());
+    }
+
+    #[test]
+    fn builds_of_a_fitted_gripper_stay_within_what_the_fit_leaves_open() {
+        let mut scene = Scene::default();
+        scene.pose.build = 1.0;
+        let fitted =
+            FittedRanges { stiffness: [0.9, 1.1], torque_per_stiffness: [0.99, 1.01], filling_s: [-0.2, 0.01] };
+        scene.gripper.fitted = Some(fitted);
+        assert_eq!(Scene::from_toml(&scene.to_toml()).expect("reads").gripper.fitted, Some(fitted));
+        let [mut least, mut most] = [f64::INFINITY, 0.0_f64];
+        for seed in 0..100 {
+            let own = jittered(&scene, None, seed).0.gripper;
+            let nominal = &scene.gripper;
+            let stiffness = own.finger.bending_stiffness / nominal.finger.bending_stiffness;
+            let torque = own.actuation.torque(1.0) / nominal.actuation.torque(1.0);
+            assert!((0.99..=1.01).contains(&(torque / stiffness)), "{torque} {stiffness}");
+            assert!((0.0..=nominal.actuation.filling_time + 0.01).contains(&own.actuation.filling_time));
+            assert!(own.fitted.is_none() && jittered(&scene, None, seed).0.check().is_ok());
+            (least, most) = (least.min(stiffness), most.max(stiffness));
+        }
+        assert!((0.9..0.93).contains(&least) && (1.07..1.1).contains(&most), "{least} {most}");
+        scene.gripper.fitted = Some(FittedRanges { stiffness: [1.1, 0.9], ..fitted });
+        assert!(scene.check().is_err(), "a range that ends before it begins");
     }
 
     #[test]

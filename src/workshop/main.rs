@@ -120,12 +120,15 @@ enum Command {
     },
 }
 
-/// Shipped model that is made, or that files are made for.
+/// Shipped model that is made, or that files are made for: the one for perfect sensors and free objects, or another.
 #[derive(Debug, clap::Args)]
 struct ForModel {
-    /// The one for any gripper, instead of the one for perfect sensors.
+    /// The one for any gripper.
     #[arg(long)]
     any_gripper: bool,
+    /// The one for fixed objects.
+    #[arg(long, conflicts_with = "any_gripper")]
+    fixed: bool,
     /// Output folder.
     #[arg(long, default_value = "models")]
     out: PathBuf,
@@ -151,15 +154,15 @@ fn main() -> Result<(), Failure> {
             let count = thumbnails::draw_all(&out)?;
             report(format_args!("{count} thumbnails in {}", out.display()));
         }
-        Command::Model(ForModel { any_gripper, out, store }) => {
-            live_model::make(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
+        Command::Model(ForModel { any_gripper, fixed, out, store }) => {
+            live_model::make(shipped(any_gripper, fixed), &out, &mut Store::open(&store)?)?;
         }
-        Command::Touches(ForModel { any_gripper, out, store }) => {
-            live_model::make_touches(shipped(any_gripper), &out, &mut Store::open(&store)?)?;
+        Command::Touches(ForModel { any_gripper, fixed, out, store }) => {
+            live_model::make_touches(shipped(any_gripper, fixed), &out, &mut Store::open(&store)?)?;
         }
         Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Encoder { any_gripper, out, shapes, poses } => {
-            encoder::make(shipped(any_gripper), &out, shapes, poses)?;
+            encoder::make(shipped(any_gripper, false), &out, shapes, poses)?;
         }
         Command::Tables => write_tables()?,
         Command::Fuzz { seconds } => fuzz::run(seconds)?,
@@ -170,8 +173,8 @@ fn main() -> Result<(), Failure> {
 /// Size of the stored picture, as `palpate study accuracy` draws it (points).
 const FIGURE_SIZE: [u32; 2] = [960, 860];
 
-fn shipped(any_gripper: bool) -> Shipped {
-    if any_gripper { Shipped::AnyGripper } else { Shipped::PerfectSensors }
+fn shipped(any_gripper: bool, fixed: bool) -> Shipped {
+    if any_gripper { Shipped::AnyGripper } else { Shipped::simulated(fixed) }
 }
 
 fn write_tables() -> Result<(), Failure> {

@@ -8,7 +8,7 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::study::{Explanation, Measuring};
 use palpate_lab::workers::{Command, Examine, FitTrials, Snapshot, examine_port, explain_scene, fit_trials};
-use palpate_learn::{Model, ModelError};
+use palpate_learn::{ModelError, Models};
 use palpate_sim::objects::ObjectError;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
@@ -26,7 +26,7 @@ pub(crate) struct BenchSetup {
     pub(crate) panel: Option<&'static PanelKind>,
     pub(crate) render_state: Option<egui_wgpu::RenderState>,
     /// What recognises, or why nothing does.
-    pub(crate) model: Result<Arc<Model>, ModelError>,
+    pub(crate) models: Result<Models, ModelError>,
     /// Listens to the board of a real gripper.
     pub(crate) listen: Listen,
     /// Looks at its port for the doctor.
@@ -39,14 +39,13 @@ pub(crate) struct BenchSetup {
 
 impl Default for BenchSetup {
     fn default() -> Self {
-        let model = Ok(scripted::model());
         Self {
             object: "lemon",
             theme: Theme::Dark,
             size: [1280.0, 820.0],
             panel: None,
             render_state: None,
-            model,
+            models: Ok(scripted::models(&scripted::model())),
             listen: Arc::new(listen_to_port),
             examine: Arc::new(examine_port),
             fit: Arc::new(fit_trials),
@@ -84,7 +83,7 @@ impl Bench {
         let (wake, woken) = channel();
         let mut scene = Scene::default();
         setup.object.clone_into(&mut scene.object.source);
-        let BenchSetup { theme, panel, render_state, size, model, listen, examine, fit, fill, .. } = setup;
+        let BenchSetup { theme, panel, render_state, size, models, listen, examine, fit, fill, .. } = setup;
         fill(&mut Store::open(&path).unwrap());
         let draw = move |ui: &mut egui::Ui, workbench: &mut Option<Workbench>| {
             let ctx = ui.ctx().clone();
@@ -94,7 +93,7 @@ impl Bench {
                     scene: scene.clone(),
                     store: path.clone(),
                     view: ViewState { theme, ..ViewState::default() },
-                    models: [model.clone().map(|own| scripted::of_perfect_sensors(&own)), model.clone()],
+                    models: models.clone(),
                     explain: Arc::new(explain_steadily),
                     listen: Arc::clone(&listen),
                     tools: GripperToolsSetup {

@@ -227,6 +227,13 @@ fn the_hidden_finger_is_fitted_within_3_per_cent() {
     println!("{:+.4} {:?} {} steps {:?}", off(&fit), fit.estimates, fit.steps, fit.remainders);
     assert!(off(&fit).abs() < 0.03 && fit.estimates[0].known == Known::Well, "{}", off(&fit));
     assert_ne!(fit.gripper, GripperModel::default());
+    // The grippers that a model learns, drawn about the fitted one, have the hidden one among them.
+    let (ranges, [_, hidden]) = (fit.gripper.fitted.unwrap(), scenes());
+    let ratio = |own: &GripperModel| own.actuation.torque(0.8) / own.finger.bending_stiffness;
+    let within = |[low, high]: [f64; 2], x: f64| (low..=high).contains(&x);
+    assert!(within(ranges.stiffness, 1.0 / (1.0 + off(&fit))), "{ranges:?}");
+    assert!(within(ranges.torque_per_stiffness, ratio(&hidden.gripper) / ratio(&fit.gripper)), "{ranges:?}");
+    assert!(ranges.stiffness[1] < 1.1 && ranges.torque_per_stiffness[1] < 1.05, "{ranges:?}");
 }
 
 /// A file of a strip's points, as `palpate calibrate --points` takes them.

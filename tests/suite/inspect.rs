@@ -10,6 +10,7 @@ use palpate_lab::grasping::grasp;
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial, TouchPhase};
 use palpate_lab::picture::PictureView;
 use palpate_lab::workers::{Command, Notice, SimWorker, SimWorkerSetup, TraceRow};
+use palpate_learn::Models;
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 use rand::{RngExt, SeedableRng};
@@ -32,7 +33,7 @@ fn a_stored_grasp_opens_as_it_was_live() {
         store: store.clone(),
         recording: true,
         grasps: 3,
-        model: Some(Arc::clone(&model)),
+        models: Models::all(&model),
         playing: false,
         wake: Arc::new(|| ()),
     };
@@ -58,12 +59,8 @@ fn a_stored_grasp_opens_as_it_was_live() {
     let view = PictureView::default();
     for (number, id) in stored.into_iter().enumerate() {
         let live: Vec<&TraceRow> = rows.iter().filter(|row| row.grasp == number as u64 + 1).collect();
-        let options = OpenOptions {
-            model: Some(Arc::clone(&model)),
-            grasps: Some(3),
-            keep: Keep::Scenery,
-            ..OpenOptions::default()
-        };
+        let options =
+            OpenOptions { models: Models::all(&model), grasps: Some(3), keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options).unwrap();
         assert_eq!(open.t_s, live.iter().map(|row| row.t).collect::<Vec<f64>>());
         assert_eq!(open.line_bar, live.iter().map(|row| row.line_bar).collect::<Vec<f64>>());

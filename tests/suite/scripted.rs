@@ -3,8 +3,8 @@
 
 use palpate_lab::datasets::labels_of_catalogue;
 use palpate_learn::{
-    Arrays, DataCard, Dataset, Example, Fitting, Labels, LiveRecogniser, Model, ModelCard, Pmf, Properties, Recogniser,
-    Sequence, Shipped, Signatures, StopRule, Verdict, method,
+    Arrays, DataCard, Dataset, Example, Fitting, Labels, LiveRecogniser, Model, ModelCard, Models, Pmf, Properties,
+    Recogniser, Sequence, Shipped, Signatures, StopRule, Verdict, method,
 };
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -59,11 +59,11 @@ pub(crate) fn made_up() -> Model {
     method("knn").expect("is one").train(&data, &fitting).expect("fits")
 }
 
-/// The same model as one that learned from perfect sensors.
-pub(crate) fn of_perfect_sensors(model: &Model) -> Arc<Model> {
-    let mut perfect = model.clone();
+/// This model for real grippers; the same as one that learned from perfect sensors for simulated grasps.
+pub(crate) fn models(model: &Arc<Model>) -> Models {
+    let mut perfect = Model::clone(model);
     perfect.card.data.sensors = Some("virtual".to_owned());
-    Arc::new(perfect)
+    Models::all(&Arc::new(perfect)).with_real(Some(Arc::clone(model)))
 }
 
 /// Knows lemon from tomato by the force on the left pad, and has signatures: nothing before contact, then 0.5 N and 0.1 N.

@@ -6,6 +6,7 @@ use crate::golden::compare;
 use crate::gripper_tools::{bench, press};
 use crate::panels::side_by_side;
 use crate::program::{json, refused};
+use crate::scripted;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
@@ -262,7 +263,7 @@ fn recorded_grasps_of_a_new_object_are_taught_to_the_model_for_real_grippers() {
     let setup = BenchSetup {
         size: [320.0, 760.0],
         fill: with_mug,
-        model: Shipped::AnyGripper.model().map(Arc::new),
+        models: Shipped::AnyGripper.model().map(|model| scripted::models(&Arc::new(model))),
         ..BenchSetup::default()
     };
     let mut bench: Bench = bench("training", Theme::Dark, setup);

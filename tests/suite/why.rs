@@ -95,9 +95,9 @@ fn fill(store: &mut Store) {
 
 #[test]
 fn the_panel_shows_evidence_and_the_nearest_trials() {
-    let model = Ok(scripted::weighing());
+    let models = Ok(scripted::models(&scripted::weighing()));
     let size = [280.0, 760.0];
-    let setup = BenchSetup { panel: Some(panel()), model, fill, theme: Theme::Light, size, ..BenchSetup::default() };
+    let setup = BenchSetup { panel: Some(panel()), models, fill, theme: Theme::Light, size, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
     assert!(bench.harness.query_by_label_contains("appears when a grasp ends: press play").is_some());
     run_out(&mut bench);
@@ -116,7 +116,12 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
 #[test]
 fn a_link_beside_the_answer_opens_the_panel() {
     let mut bench = Bench::new(
-        BenchSetup { model: Ok(scripted::weighing()), fill, size: [1280.0, 1400.0], ..BenchSetup::default() },
+        BenchSetup {
+            models: Ok(scripted::models(&scripted::weighing())),
+            fill,
+            size: [1280.0, 1400.0],
+            ..BenchSetup::default()
+        },
         CpuRenderer::default(),
     );
     assert!(bench.harness.query_by_label("Why?").is_none(), "no answer yet");

@@ -8,7 +8,7 @@ use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, Keep, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
 use palpate_lab::workers::{Inspector, LabelView};
-use palpate_learn::Model;
+use palpate_learn::Models;
 use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::BTreeMap;
@@ -114,8 +114,7 @@ pub(in crate::app) struct InspectFeature {
     /// Cursor in the stored trial, and in the past of the live gripper.
     stored: Playback,
     live: Playback,
-    /// Models by which trials are read: of the simulation, of the real gripper.
-    models: [Option<Arc<Model>>; 2],
+    /// How trials are opened, with the models in use.
     options: OpenOptions,
     /// Source that was shown before the trial.
     before: ViewSource,
@@ -125,8 +124,8 @@ pub(in crate::app) struct InspectFeature {
 }
 
 impl InspectFeature {
-    pub(in crate::app) fn new(inspector: Inspector, models: [Option<Arc<Model>>; 2], grasps: u32) -> Self {
-        let options = OpenOptions { grasps: Some(grasps), ..OpenOptions::default() };
+    pub(in crate::app) fn new(inspector: Inspector, models: Models, grasps: u32) -> Self {
+        let options = OpenOptions { models, grasps: Some(grasps), ..OpenOptions::default() };
         Self {
             inspector,
             wanted: None,
@@ -141,7 +140,6 @@ impl InspectFeature {
             spread: false,
             stored: Playback::default(),
             live: Playback::default(),
-            models,
             options,
             before: ViewSource::default(),
             grasp: 0,
@@ -150,9 +148,8 @@ impl InspectFeature {
     }
 
     /// How trials are opened, with the models in use.
-    pub(in crate::app) fn options(&self) -> OpenOptions {
-        let [model, board_model] = self.models.clone();
-        OpenOptions { model, board_model, ..self.options.clone() }
+    pub(in crate::app) fn options(&self) -> &OpenOptions {
+        &self.options
     }
 
     /// True while a trial is being opened.
@@ -196,9 +193,9 @@ impl InspectFeature {
         &self.pinned
     }
 
-    /// Reads trials by another model from now on: those of the simulation, or of the real gripper.
-    pub(in crate::app) fn set_model(&mut self, source: ViewSource, model: Option<Arc<Model>>) {
-        self.models[usize::from(source == ViewSource::Gripper)] = model;
+    /// Reads trials by these models from now on.
+    pub(in crate::app) fn set_models(&mut self, models: Models) {
+        self.options.models = models;
         self.open_again();
     }
 
@@ -289,7 +286,7 @@ impl InspectFeature {
     }
 
     fn ask(&self, id: TrialId, keep: Keep) {
-        self.inspector.open(id, OpenOptions { keep, ..self.options() });
+        self.inspector.open(id, OpenOptions { keep, ..self.options.clone() });
     }
 
     /// Applies an action; returns the change of a stored trial that follows from it.

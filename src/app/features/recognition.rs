@@ -12,7 +12,7 @@ use palpate_lab::workers::{
     Command, EndedLesson, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand,
     TrainedModel,
 };
-use palpate_learn::Model;
+use palpate_learn::{Model, Models, Shipped};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -40,13 +40,12 @@ pub enum RecognitionAction {
 
 /// State of the recognition in the window.
 pub(in crate::app) struct RecognitionFeature {
-    /// Models that come with the program, for the simulation and for the real gripper.
-    shipped: [Option<Arc<Model>>; 2],
+    /// Models that come with the program.
+    shipped: Models,
     /// Models to be loaded, and for which gripper; the first one is being loaded.
     loading: VecDeque<(PathBuf, ViewSource)>,
-    /// Models in use: that of the simulation and that of the real gripper.
-    simulated: Option<Arc<Model>>,
-    real: Option<Arc<Model>>,
+    /// Models in use.
+    models: Models,
     /// Object file that the model in use was last asked to learn.
     taught: Option<String>,
     /// Number of lessons that were taken note of.
@@ -69,16 +68,16 @@ pub(in crate::app) struct Recognisers<'a> {
 impl RecognitionFeature {
     /// Loads the model of the last run, which is remembered again once it is loaded.
     pub(in crate::app) fn new(
-        shipped: [Option<Arc<Model>>; 2],
+        shipped: Models,
         explainer: Explainer,
         tools: &mut GripperTools,
         view: &mut ViewState,
         notices: &mut Notices,
     ) -> Self {
-        let [simulated, real] = shipped.clone();
+        let models = shipped.clone();
         let loading = VecDeque::new();
         let (taught, asked, advised) = (None, None, None);
-        let mut feature = Self { shipped, loading, simulated, real, taught, lessons: 0, explainer, asked, advised };
+        let mut feature = Self { shipped, loading, models, taught, lessons: 0, explainer, asked, advised };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
@@ -91,7 +90,7 @@ impl RecognitionFeature {
 
     /// Model of the real gripper.
     pub(in crate::app) fn gripper_model(&self) -> Option<&Model> {
-        self.real.as_deref()
+        self.models.of(Shipped::AnyGripper).map(Arc::as_ref)
     }
 
     /// Loads a model after those that are being loaded.
@@ -129,7 +128,7 @@ impl RecognitionFeature {
             RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools, notices),
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
-                let [_, shipped] = self.shipped.clone();
+                let shipped = self.shipped.of(Shipped::AnyGripper).cloned();
                 self.use_for_gripper(shipped, on);
             }
             RecognitionAction::UseSimulationModel(Some(path)) => {
@@ -137,8 +136,7 @@ impl RecognitionFeature {
             }
             RecognitionAction::UseSimulationModel(None) => {
                 view.simulation_model = None;
-                let [shipped, _] = self.shipped.clone();
-                self.use_in_simulation(shipped, on, notices);
+                self.use_in_simulation(None, on, notices);
             }
             RecognitionAction::TeachObject => {
                 self.taught = None;
@@ -151,7 +149,7 @@ impl RecognitionFeature {
                     .snapshot()
                     .filter(|snapshot| snapshot.object.as_ref().is_some_and(|object| object.name == name));
                 let object = held.map(|snapshot| snapshot.scene.object.clone());
-                if let Some(model) = self.real.clone() {
+                if let Some(model) = self.models.of(Shipped::AnyGripper).cloned() {
                     on.tools.teacher.ask(TeachRequest { model, name, object, recorded: true });
                 }
             }
@@ -162,18 +160,23 @@ impl RecognitionFeature {
         }
     }
 
-    /// Uses a model in the simulation from now on.
-    fn use_in_simulation(&mut self, model: Option<Arc<Model>>, on: &mut Recognisers<'_>, notices: &mut Notices) {
-        self.simulated.clone_from(&model);
+    /// Uses a model in the simulation from now on, for grasps of objects that are held as it learned them; the shipped models
+    /// for all others.
+    fn use_in_simulation(&mut self, model: Option<&Arc<Model>>, on: &mut Recognisers<'_>, notices: &mut Notices) {
+        let real = self.models.of(Shipped::AnyGripper).cloned();
+        self.models = self.shipped.clone().with_real(real);
+        if let Some(model) = model {
+            self.models = self.models.clone().with_simulated(model);
+        }
         self.taught = None;
-        on.inspect.set_model(ViewSource::Simulation, model.clone());
-        on.simulation.send(Command::SetModel(model), notices);
+        on.inspect.set_models(self.models.clone());
+        on.simulation.send(Command::SetModels(self.models.clone()), notices);
     }
 
     /// Uses a model for the real gripper from now on.
     fn use_for_gripper(&mut self, model: Option<Arc<Model>>, on: &mut Recognisers<'_>) {
-        self.real.clone_from(&model);
-        on.inspect.set_model(ViewSource::Gripper, model.clone());
+        self.models = self.models.clone().with_real(model.clone());
+        on.inspect.set_models(self.models.clone());
         on.gripper.worker().command(GripperCommand::SetModel(model));
     }
 
@@ -193,8 +196,9 @@ impl RecognitionFeature {
     /// Has the model of the simulation learn the object in the hand, where it comes from a file and the model lacks it: once
     /// for each object.
     fn teach_new_object(&mut self, on: &mut Recognisers<'_>) {
-        let Some(model) = self.simulated.as_ref().filter(|model| model.learns_new_objects()) else { return };
         let Some(snapshot) = on.simulation.worker().snapshot() else { return };
+        let model = self.models.of(Shipped::simulated(snapshot.scene.holds_object()));
+        let Some(model) = model.filter(|model| model.learns_new_objects()) else { return };
         let Some(card) = &snapshot.object else { return };
         let source = &snapshot.scene.object.source;
         if model.card.labels.class(&card.name).is_some() || self.taught.as_ref() == Some(source) {
@@ -214,13 +218,13 @@ impl RecognitionFeature {
         if std::mem::replace(&mut self.lessons, teacher.ended) == teacher.ended {
             return;
         }
-        let is_current =
-            |model: &Option<Arc<Model>>| model.as_ref().is_some_and(|model| Arc::ptr_eq(model, &request.model));
+        let is_current = |kind: &Shipped| self.models.of(*kind).is_some_and(|model| Arc::ptr_eq(model, &request.model));
+        let simulated = [false, true].map(Shipped::simulated);
         match outcome {
-            Ok(trained) if is_current(&self.real) => self.use_file_for_gripper(trained, on, view, notices),
-            Ok(trained) if is_current(&self.simulated) => {
+            Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(trained, on, view, notices),
+            Ok(trained) if simulated.iter().any(is_current) => {
                 view.simulation_model = Some(trained.path.clone());
-                self.use_in_simulation(Some(Arc::clone(&trained.model)), on, notices);
+                self.use_in_simulation(Some(&trained.model), on, notices);
                 notices.info(format!("The model knows {} now.", request.name));
                 // What was decided without the new class is tried again.
                 if on.simulation.worker().snapshot().is_some_and(|snapshot| snapshot.status.finished) {
@@ -278,7 +282,7 @@ impl RecognitionFeature {
             (Ok(trained), ViewSource::Gripper) => self.use_file_for_gripper(&trained, on, view, notices),
             (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
                 view.simulation_model = Some(trained.path.clone());
-                self.use_in_simulation(Some(Arc::clone(&trained.model)), on, notices);
+                self.use_in_simulation(Some(&trained.model), on, notices);
                 notices.info(format!("Model for the simulation: {}", trained.about));
             }
             (Err(cause), _) => notices.error(format!("Model not changed: {cause}")),

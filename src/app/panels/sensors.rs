@@ -128,7 +128,8 @@ fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     wrapped(
         ui,
         RichText::new(
-            "For the simulation and its trials. The model of the real gripper is chosen in the panel Training.",
+            "For the simulation and its trials: a model answers for fixed or free objects, whichever it learned; the shipped \
+             ones answer for the others. The model of the real gripper is chosen in the panel Training.",
         )
         .weak()
         .small(),

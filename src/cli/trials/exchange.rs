@@ -3,12 +3,11 @@
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
 use super::super::output::check_folder;
-use super::super::recognise::load_model;
 use super::super::terminal::say;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::{ExchangeFormat, read_mcap};
 use palpate_lab::inspection::OpenOptions;
-use palpate_learn::Shipped;
+use palpate_learn::{Model, Models};
 use palpate_store::{Import, Store, read_trials_csv};
 use palpate_tactile::trial::TrialId;
 use std::path::Path;
@@ -23,10 +22,11 @@ pub(super) fn export(
     sensors: SensorView,
 ) -> Result<(), Failure> {
     check_folder(out)?;
-    let own = Arc::new(load_model(model, Shipped::PerfectSensors)?);
-    let board_model = if model.is_some() { Arc::clone(&own) } else { Arc::new(Shipped::AnyGripper.model()?) };
-    let (model, board_model) = (Some(own), Some(board_model));
-    let options = OpenOptions { sensors, model, board_model, ..OpenOptions::default() };
+    let models = match model {
+        Some(path) => Models::all(&Arc::new(Model::load(path)?)),
+        None => Models::shipped()?,
+    };
+    let options = OpenOptions { sensors, models, ..OpenOptions::default() };
     let stop = stop_flag()?;
     format.write(store, ids, &options, out, &mut |_, _| !stop.load(Ordering::Relaxed))?;
     say(out.display())

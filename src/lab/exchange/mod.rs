@@ -157,7 +157,6 @@ mod tests {
     use palpate_sim::scene::Scene;
     use palpate_store::ImportedTrial;
     use palpate_tactile::Signals;
-    use std::sync::Arc;
 
     fn store_of(objects: &[&str]) -> (tempfile::TempDir, Store) {
         let folder = tempfile::tempdir().expect("a folder");
@@ -194,8 +193,8 @@ mod tests {
         };
         store.insert_imported("mine", &[imported])?;
         let path = folder.path().join("out.mcap");
-        let model = Arc::new(palpate_learn::Shipped::PerfectSensors.model()?);
-        let options = OpenOptions { model: Some(model), ..OpenOptions::default() };
+        let models = palpate_learn::Models::shipped()?;
+        let options = OpenOptions { models, ..OpenOptions::default() };
         let mut steps = Vec::new();
         write_trials(&store, &[1, 2, 3], &options, &path, &mut |done, all| {
             steps.push((done, all));

@@ -125,8 +125,6 @@ pub struct IdentificationView {
     pub decision: Option<StopReason>,
     /// True where the model learned from perfect sensors, which no real gripper has.
     pub from_perfect_sensors: bool,
-    /// Whether the model learned from fixed objects only, or from free ones only, which move in the hand.
-    pub learned_fixed: Option<bool>,
     /// Class signatures of the model, where its file has them.
     pub signatures: Option<Arc<Signatures>>,
     /// The last finished grasp of this object.
@@ -320,7 +318,6 @@ impl Identification {
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
             from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
-            learned_fixed: self.model.card.data.fixed(),
             signatures: self.model.signatures.clone(),
             last: self.last.clone(),
         }

@@ -6,7 +6,7 @@ use crate::grasping::{FrameReader, Identification, IdentificationView, Row, prep
 use crate::picture::{Stage, evenly_bent};
 use crate::recording::{Replay, ReplayError};
 use palpate_geometry::Pose;
-use palpate_learn::{Model, StopRule};
+use palpate_learn::{Model, Models, Shipped, StopRule};
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
@@ -21,10 +21,8 @@ use std::sync::Arc;
 pub struct OpenOptions {
     /// Sensors through which a simulated trial is read.
     pub sensors: SensorView,
-    /// Recogniser of simulated and imported trials; none leaves out its answers.
-    pub model: Option<Arc<Model>>,
-    /// Recogniser of trials of a board.
-    pub board_model: Option<Arc<Model>>,
+    /// Recognisers; where there is none for a trial, its answers are left out.
+    pub models: Models,
     /// Most grasps of its stop rule, in place of the model's own.
     pub grasps: Option<u32>,
     /// What is kept besides channels and answers.
@@ -231,7 +229,8 @@ impl OpenTrial {
     fn read_simulated(&mut self, data: SimulatedData, options: &OpenOptions) -> Result<(), OpenTrialError> {
         let scene = self.header.scene.clone();
         let gripper = &scene.gripper;
-        let mut identification = options.model.clone().map(|model| identification(model, options));
+        let model = options.models.of(Shipped::simulated(scene.holds_object())).cloned();
+        let mut identification = model.map(|model| identification(model, options));
         let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
         let (layout, signals) = (options.sensors.shown()?, options.sensors.signals);
         let shown = layout.channels(gripper, signals)?.len();
@@ -295,12 +294,13 @@ impl OpenTrial {
         gaps: &[Gap],
     ) -> Result<(), OpenTrialError> {
         let id = self.id;
-        let model = match self.source {
-            TrialSource::Recorded => &options.board_model,
-            TrialSource::Simulated | TrialSource::Imported => &options.model,
+        let kind = match self.source {
+            TrialSource::Recorded => Shipped::AnyGripper,
+            TrialSource::Simulated | TrialSource::Imported => Shipped::PerfectSensors,
         };
+        let model = options.models.of(kind);
         let failed = |cause: String| OpenTrialError::Replay { id, cause };
-        let mut replay = Replay::of_loaded(store, id, trial, model.clone()).map_err(|error| match error {
+        let mut replay = Replay::of_loaded(store, id, trial, model.cloned()).map_err(|error| match error {
             ReplayError::Store(error) => OpenTrialError::Store(error),
             ReplayError::Layout(error) => OpenTrialError::Layout(error),
         })?;
@@ -495,8 +495,8 @@ mod tests {
     #[test]
     fn a_simulated_trial_opens_as_it_was() -> Result<(), Box<dyn std::error::Error>> {
         let (_folder, store, id) = stored("lemon");
-        let model = Arc::new(palpate_learn::Shipped::PerfectSensors.model()?);
-        let options = OpenOptions { model: Some(model), keep: Keep::Scenery, ..OpenOptions::default() };
+        let models = Models::shipped()?;
+        let options = OpenOptions { models, keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options)?;
         let trial = store.load(id)?;
         assert_eq!((open.title.as_str(), open.source_title()), ("Lemon", "simulated"));

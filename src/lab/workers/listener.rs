@@ -32,6 +32,11 @@ impl Listener {
         Self { identification, rule, off: None, warned: false, view }
     }
 
+    /// True where it asks this model.
+    pub(super) fn follows(&self, model: &Arc<Model>) -> bool {
+        std::ptr::eq(self.identification.model(), model.as_ref())
+    }
+
     /// Another scene is grasped.
     pub(super) fn another_scene(&mut self) {
         self.warned = false;

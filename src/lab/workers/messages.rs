@@ -5,7 +5,7 @@ use crate::grasping::{GraspSummary, GripperMove, IdentificationView, Row};
 use crate::picture::Stage;
 use crate::study::AccuracyCost;
 use glam::DVec3;
-use palpate_learn::Model;
+use palpate_learn::Models;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::{Accuracy, Scene};
@@ -40,7 +40,7 @@ pub enum Command {
     /// trials.
     SetSensors(SensorView),
     /// Recogniser from now on; restarts the grasp.
-    SetModel(Option<Arc<Model>>),
+    SetModels(Models),
     /// Whether trials are stored.
     SetRecording(bool),
     /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.
@@ -259,8 +259,8 @@ pub struct SimWorkerSetup {
     pub recording: bool,
     /// Grasps in a round. With a model this is the limit: a round ends once the object is recognised.
     pub grasps: u32,
-    /// Recognition model; none turns recognition off.
-    pub model: Option<Arc<Model>>,
+    /// Recognition models; without one, such grasps are not recognised.
+    pub models: Models,
     /// Whether the simulation runs from the start.
     pub playing: bool,
     /// Called when there is something new.

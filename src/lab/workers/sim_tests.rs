@@ -4,7 +4,7 @@ use super::{Command, Notice, Refusal, SimWorker, SimWorkerSetup, Snapshot, Trace
 use crate::datasets::SensorView;
 use crate::grasping::grasp;
 use glam::DVec3;
-use palpate_learn::Model;
+use palpate_learn::{Model, Models};
 use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
@@ -30,8 +30,8 @@ pub(super) fn start_with(model: Option<Model>, scene: Scene, store: PathBuf, gra
         let _heard = wake.send(());
     });
     let sensors = SensorView { layout: "C1".to_owned(), ..SensorView::default() };
-    let model = model.map(Arc::new);
-    let setup = SimWorkerSetup { scene, sensors, store, recording: true, grasps, model, playing: true, wake };
+    let models = model.map(Arc::new).map_or_else(Models::default, |model| Models::all(&model));
+    let setup = SimWorkerSetup { scene, sensors, store, recording: true, grasps, models, playing: true, wake };
     Watched { worker: SimWorker::start(setup).expect("starts"), woken }
 }
 

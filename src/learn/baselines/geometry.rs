@@ -42,35 +42,42 @@ struct Learned {
     trained_on: [usize; 2],
 }
 
-/// What ships with the program: a geometry encoder and a model each for two kinds of sensors.
+/// Kinds of grasps that a model ships for, each with a geometry encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shipped {
-    /// For perfect sensors on the gripper of the default scene.
+    /// Perfect sensors on the gripper of the default scene; objects are free.
     PerfectSensors,
-    /// For real sensors on any gripper, after an empty close.
+    /// Real sensors on any gripper, after an empty close; objects are free.
     AnyGripper,
+    /// Perfect sensors on the gripper of the default scene; objects are held in place.
+    FixedObjects,
 }
 
 impl Shipped {
     /// All.
-    pub const ALL: [Self; 2] = [Self::PerfectSensors, Self::AnyGripper];
+    pub const ALL: [Self; 3] = [Self::PerfectSensors, Self::AnyGripper, Self::FixedObjects];
 
-    /// Name of the encoder's file.
+    /// Name of the encoder's file. Encoders learn from free and fixed objects.
     pub fn encoder_file(self) -> &'static str {
         match self {
-            Self::PerfectSensors => "geometry.safetensors",
+            Self::PerfectSensors | Self::FixedObjects => "geometry.safetensors",
             Self::AnyGripper => "geometry-any-gripper.safetensors",
         }
     }
 
-    /// The kind of sensors of such grasps.
+    /// The kind of such grasps.
     pub fn of(data: &DataCard) -> Self {
-        if data.from_perfect_sensors() { Self::PerfectSensors } else { Self::AnyGripper }
+        if data.from_perfect_sensors() { Self::simulated(data.fixed() == Some(true)) } else { Self::AnyGripper }
+    }
+
+    /// The kind of simulated grasps of an object that is held in place or free.
+    pub fn simulated(fixed: bool) -> Self {
+        if fixed { Self::FixedObjects } else { Self::PerfectSensors }
     }
 
     fn encoder_bytes(self) -> &'static [u8] {
         match self {
-            Self::PerfectSensors => include_bytes!("../../../models/geometry.safetensors"),
+            Self::PerfectSensors | Self::FixedObjects => include_bytes!("../../../models/geometry.safetensors"),
             Self::AnyGripper => include_bytes!("../../../models/geometry-any-gripper.safetensors"),
         }
     }
@@ -85,7 +92,7 @@ impl Shipped {
 
     /// Hash of all encoders, part of the fingerprint of methods that read their features.
     pub(super) fn encoders() -> u64 {
-        fnv_1a(Self::ALL.iter().flat_map(|own| own.encoder_bytes().iter().copied()))
+        fnv_1a([Self::PerfectSensors, Self::AnyGripper].iter().flat_map(|own| own.encoder_bytes().iter().copied()))
     }
 }
 

@@ -22,6 +22,11 @@ pub(super) trait RowModel: Debug + Send + Sync {
     /// Weight of each class for a row of features, not negative and not normalised.
     fn predict(&self, row: &[f32]) -> Vec<f64>;
 
+    /// True if NaN may stand for a value that is not known.
+    fn answers_in_part(&self) -> bool {
+        false
+    }
+
     /// Adds the learned parameters.
     fn save(&self, arrays: &mut Arrays);
 }

@@ -11,7 +11,7 @@ use super::row_model::{RowModel, Rows};
 use super::svm::Svm;
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Sequence};
-use crate::features::{self, FeatureKind, Features};
+use crate::features::{self, FeatureKind, Features, WINDOWS};
 use crate::fitting::{Fitting, LearnError, check_enough};
 use crate::forest::{
     self, Examples, FeatureSampling, Forest, ForestSettings, GradientBoosting, GradientBoostingSettings, RusBoost,
@@ -19,7 +19,7 @@ use crate::forest::{
 };
 use crate::model::{LoadError, ModelCard};
 use crate::pmf::Pmf;
-use crate::recogniser::{Recogniser, Verdict};
+use crate::recogniser::{LiveRecogniser, Recogniser, Verdict};
 use crate::temperature::{Calibration, Temperatures};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -43,8 +43,11 @@ pub(crate) enum TabularKind {
     MeasuresForest,
 }
 
-/// Features and a classifier of them.
-pub(crate) struct Tabular {
+/// Features and a classifier of them. Forests answer on the beginning of a grasp too: features that are not known yet count
+/// as either side of a cut.
+pub(crate) struct Tabular(Arc<Fitted>);
+
+struct Fitted {
     learned: Learned,
     rows: RowMaker,
     model: Box<dyn RowModel>,
@@ -77,6 +80,16 @@ impl ReadEncoder {
 }
 
 impl RowMaker {
+    /// The row of a whole grasp or of its beginning as after the first windows; the encoder reads the beginning.
+    fn forget_after(&self, windows: usize, mut row: Vec<f32>, beginning: &Sequence) -> Vec<f32> {
+        let (own, encoded) = row.split_at_mut(self.features.width());
+        self.features.forget_after(windows, own);
+        if let Some(encoder) = &self.encoder {
+            encoded.copy_from_slice(&encoder.features(beginning));
+        }
+        row
+    }
+
     fn width(&self) -> usize {
         self.features.width() + self.encoder.as_ref().map_or(0, |own| own.encoder.width())
     }
@@ -114,7 +127,17 @@ struct Learned {
     /// True if the answers on a grasp and on its mirror image are averaged.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     both_views: bool,
+    /// Calibration of answers on the beginning of a grasp, for each stage but the last; empty for classifiers that need the
+    /// whole grasp.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    so_far: Vec<Calibration>,
 }
+
+/// Number of stages of a grasp that are calibrated apart, and windows of features in each.
+const STAGES: usize = 10;
+const STAGE: usize = WINDOWS / STAGES;
+/// Most grasps that calibrate the stages before the last.
+const MOST_BEGINNINGS: usize = 200;
 
 /// Use of mirrored grasps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -268,6 +291,17 @@ impl Classifier {
     }
 }
 
+/// Answers on held-out parts of the grasps.
+struct HeldOut {
+    /// Part of each grasp.
+    part_of: Vec<usize>,
+    /// Classifier fitted without each part; none for an empty one.
+    models: Vec<Option<Box<dyn RowModel>>>,
+    calibration: Calibration,
+    /// Negative log-likelihood with it (nat).
+    loss: f64,
+}
+
 /// Scaled features of all grasps.
 struct FeatureRows<'a> {
     data: &'a Dataset,
@@ -300,21 +334,23 @@ impl FeatureRows<'_> {
         answer(model, &self.own[k], mirrored)
     }
 
-    /// Fits without each part of the grasps and answers that part; returns the calibration and the
-    /// negative log-likelihood with it.
-    fn calibrated(
+    /// Fits without each part of the grasps and answers that part.
+    fn held_out(
         &self,
         (kind, classifier): (TabularKind, &Classifier),
         mirroring: Mirroring,
         fitting: &Fitting<'_>,
         progress: &dyn Fn(f64),
-    ) -> Result<(Calibration, f64), LearnError> {
+    ) -> Result<HeldOut, LearnError> {
         let parts = kind.parts();
-        let part_of = &self.data.folds(parts, fitting.seed ^ 0xca11b)[..];
+        let part_of = self.data.folds(parts, fitting.seed ^ 0xca11b);
+        let mut models: Vec<Option<Box<dyn RowModel>>> = Vec::new();
         let mut answers: Vec<(Pmf, usize)> = Vec::new();
         for part in 0..parts {
+            let part_of = &part_of[..];
             let of = |inside: bool| (0..part_of.len()).filter(move |k| (part_of[*k] == part) == inside);
             if of(true).next().is_none() {
+                models.push(None);
                 continue;
             }
             fitting.check()?;
@@ -324,12 +360,40 @@ impl FeatureRows<'_> {
                 let pmf = self.answer(model.as_ref(), k, mirroring);
                 answers.push((pmf, self.data.examples[k].class));
             }
+            models.push(Some(model));
             progress((part + 1) as f64 / parts as f64);
         }
+        let (calibration, loss) = self.calibration(&answers);
+        Ok(HeldOut { part_of, models, calibration, loss })
+    }
+
+    fn calibration(&self, answers: &[(Pmf, usize)]) -> (Calibration, f64) {
         let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();
         let other = other_weight(self.data.labels.other(), &truths);
         let weight = |class: usize| other.filter(|(other, _)| *other == class).map_or(1.0, |(_, weight)| weight);
-        Ok(Calibration::fit(&answers, weight, &TEMPERATURES))
+        Calibration::fit(answers, weight, &TEMPERATURES)
+    }
+
+    /// Calibrates answers on the beginnings of held-out grasps, for each stage but the last.
+    fn so_far(&self, maker: &RowMaker, held_out: &HeldOut, mirroring: Mirroring) -> Vec<Calibration> {
+        let answers_in_part = held_out.models.iter().flatten().all(|model| model.answers_in_part());
+        if !answers_in_part || !maker.features.tell_beginnings() {
+            return Vec::new();
+        }
+        let every = self.data.examples.len().div_ceil(MOST_BEGINNINGS);
+        let calibration = |stage: usize| {
+            let answer = |k: usize| {
+                let model = held_out.models[held_out.part_of[k]].as_deref()?;
+                let example = &self.data.examples[k];
+                let beginning = example.grasp.until(maker.features.end_of_window(stage * STAGE));
+                let of = |row: &Vec<f32>| maker.forget_after(stage * STAGE, row.clone(), &beginning);
+                let mirrored = self.mirrored.as_ref().filter(|_| mirroring.views).map(|rows| of(&rows[k]));
+                Some((answer(model, &of(&self.own[k]), mirrored.as_deref()), example.class))
+            };
+            let answers: Vec<(Pmf, usize)> = (0..self.own.len()).step_by(every).filter_map(answer).collect();
+            self.calibration(&answers).0
+        };
+        (1..STAGES).map(calibration).collect()
     }
 }
 
@@ -361,17 +425,18 @@ impl Tabular {
         fitting.check()?;
         let classifier = Classifier::of(kind, fitting);
         let tried = if grasps.mirrored.is_some() { kind.mirrorings() } else { &kind.mirrorings()[..1] };
-        let calibrated = |number: usize, mirroring: Mirroring| {
+        let held_out = |number: usize, mirroring: Mirroring| {
             let progress = |share: f64| (fitting.progress)(0.1 + 0.6 * (number as f64 + share) / tried.len() as f64);
-            grasps.calibrated((kind, &classifier), mirroring, fitting, &progress)
+            grasps.held_out((kind, &classifier), mirroring, fitting, &progress)
         };
-        let (mut mirroring, (mut calibration, mut least)) = (tried[0], calibrated(0, tried[0])?);
+        let (mut mirroring, mut best) = (tried[0], held_out(0, tried[0])?);
         for (number, other) in tried.iter().enumerate().skip(1) {
-            let (with_other, loss) = calibrated(number, *other)?;
-            if loss < least {
-                (mirroring, calibration, least) = (*other, with_other, loss);
+            let with_other = held_out(number, *other)?;
+            if with_other.loss < best.loss {
+                (mirroring, best) = (*other, with_other);
             }
         }
+        let so_far = grasps.so_far(&rows, &best, mirroring);
         fitting.check()?;
         let last = Fitting {
             progress: &|share| (fitting.progress)(0.7 + 0.3 * share),
@@ -386,10 +451,11 @@ impl Tabular {
             encoder: rows.encoder.as_ref().map(|own| own.encoder.settings()),
             scaling,
             model: description,
-            calibration: Some(calibration),
+            calibration: Some(best.calibration),
             both_views: mirroring.views && rows.features.has_mirror(),
+            so_far,
         };
-        Ok(Self { learned, rows, model, other: data.labels.other() })
+        Ok(Self(Arc::new(Fitted { learned, rows, model, other: data.labels.other() })))
     }
 
     /// Restores a recogniser from a model file.
@@ -405,7 +471,8 @@ impl Tabular {
         if !learned.features.is_sound(card.channels.len()) || !scaled {
             return Err(LoadError::Card { part: "the feature definition" });
         }
-        if learned.calibration.is_some_and(|own| !own.is_sound(&TEMPERATURES)) {
+        let in_stages = learned.so_far.is_empty() || learned.so_far.len() == STAGES - 1;
+        if !in_stages || learned.calibration.iter().chain(&learned.so_far).any(|own| !own.is_sound(&TEMPERATURES)) {
             return Err(LoadError::Card { part: "the calibration" });
         }
         let model: Box<dyn RowModel> = match learned.kind.classifier() {
@@ -415,7 +482,10 @@ impl Tabular {
             Classifier::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
             Classifier::Svm => Box::new(Svm::load(arrays, columns, classes)?),
         };
-        Ok(Self { learned, rows, model, other: card.labels.other() })
+        if !learned.so_far.is_empty() && !(model.answers_in_part() && learned.features.tell_beginnings()) {
+            return Err(LoadError::Card { part: "the calibration" });
+        }
+        Ok(Self(Arc::new(Fitted { learned, rows, model, other: card.labels.other() })))
     }
 }
 
@@ -448,7 +518,21 @@ macro_rules! row_models {
     };
 }
 
-row_models!(Forest, GradientBoosting, RusBoost);
+row_models!(GradientBoosting, RusBoost);
+
+impl RowModel for Forest {
+    fn predict(&self, row: &[f32]) -> Vec<f64> {
+        self.predict(row)
+    }
+
+    fn answers_in_part(&self) -> bool {
+        self.answers_in_part()
+    }
+
+    fn save(&self, arrays: &mut Arrays) {
+        self.save(arrays);
+    }
+}
 
 /// Mean and one over the standard deviation of each column; the factor of a constant column is zero.
 fn scaling(rows: &Rows) -> Vec<(f32, f32)> {
@@ -473,26 +557,43 @@ fn scale(row: &mut [f32], scaling: &[(f32, f32)]) {
     }
 }
 
-impl Recogniser for Tabular {
-    fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
+impl Fitted {
+    /// Answers on a grasp of which the first windows are over.
+    fn recognise(&self, grasp: &Sequence, windows: usize, before: Option<&Pmf>) -> Verdict {
         let scaled = |mut row: Vec<f32>| {
             scale(&mut row, &self.learned.scaling);
             row
         };
+        let known = |row| if windows < WINDOWS { self.rows.forget_after(windows, row, grasp) } else { row };
         let (own, mirrored) = self.rows.views(grasp);
-        let own = scaled(own);
-        let mirrored = mirrored.filter(|_| self.learned.both_views).map(scaled);
+        let own = scaled(known(own));
+        let mirrored = mirrored.filter(|_| self.learned.both_views).map(|row| scaled(known(row)));
         let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
-        let pmf = self.learned.calibration.map_or_else(|| pmf.clone(), |own| own.apply(&pmf));
+        // That of a stage is for its end: until then, less is known.
+        let so_far = (windows / STAGE).checked_sub(1).and_then(|stage| self.learned.so_far.get(stage).copied());
+        let first = self.learned.so_far.first().copied().filter(|_| windows < STAGE);
+        let calibration = so_far.or(first).or(self.learned.calibration);
+        let pmf = calibration.map_or_else(|| pmf.clone(), |own| own.apply(&pmf));
         let pmf = as_one_of_many(&pmf, self.other);
         let pmf = before.map_or_else(|| pmf.clone(), |before| before.times(&pmf));
         Verdict { pmf, properties: None }
     }
+}
+
+impl Recogniser for Tabular {
+    fn recognise(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
+        self.0.recognise(grasp, WINDOWS, before)
+    }
+
+    fn live(&self) -> Option<Box<dyn LiveRecogniser>> {
+        let live = || Live { model: Arc::clone(&self.0), before: None, readings: Sequence::default(), windows: 0 };
+        (!self.0.learned.so_far.is_empty()).then(|| Box::new(live()) as _)
+    }
 
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
-        self.model.save(&mut arrays);
-        if let Some(ReadEncoder { encoder, .. }) = &self.rows.encoder {
+        self.0.model.save(&mut arrays);
+        if let Some(ReadEncoder { encoder, .. }) = &self.0.rows.encoder {
             arrays.0.extend(encoder.arrays().0.into_iter().map(|(name, array)| (format!("{ENCODER}{name}"), array)));
         }
         arrays
@@ -503,7 +604,36 @@ impl Recogniser for Tabular {
     }
 
     fn settings(&self) -> serde_json::Value {
-        serde_json::to_value(&self.learned).unwrap_or_default()
+        serde_json::to_value(&self.0.learned).unwrap_or_default()
+    }
+}
+
+/// A grasp of which the first windows are over.
+struct Live {
+    model: Arc<Fitted>,
+    before: Option<Pmf>,
+    readings: Sequence,
+    /// Windows that were over at the last answer.
+    windows: usize,
+}
+
+impl LiveRecogniser for Live {
+    fn begin(&mut self, before: Option<&Pmf>) {
+        (self.before, self.readings, self.windows) = (before.cloned(), Sequence::default(), 0);
+    }
+
+    fn push(&mut self, t: f32, row: &[f32]) -> Option<Verdict> {
+        // The first reading of a window ends the one before.
+        let windows = self.model.rows.features.window_of(t);
+        let is_new = windows > std::mem::replace(&mut self.windows, windows) && !self.readings.is_empty();
+        let verdict = is_new.then(|| self.model.recognise(&self.readings, windows, self.before.as_ref()));
+        self.readings.t_s.push(t);
+        self.readings.values.extend_from_slice(row);
+        verdict
+    }
+
+    fn finish(&mut self) -> Option<Verdict> {
+        (!self.readings.is_empty()).then(|| self.model.recognise(&self.readings, WINDOWS, self.before.as_ref()))
     }
 }
 

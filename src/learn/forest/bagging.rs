@@ -7,7 +7,7 @@ use super::split::Target;
 use super::tree::{Cuts, FeatureSampling, Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_class_trees, save_trees};
 use super::{Examples, normalise, random_of};
-use crate::arrays::{ArrayError, Arrays};
+use crate::arrays::{ArrayError, Arrays, check_each};
 use crate::fitting::LearnError;
 use rand::RngExt;
 
@@ -71,6 +71,11 @@ pub(crate) struct Forest {
     columns: usize,
     classes: usize,
     trees: Vec<Tree>,
+    /// Weight of the training rows in each leaf, tree after tree; empty in files of versions that did not answer on parts of a
+    /// row.
+    leaf_weights: Vec<f32>,
+    /// Weights of all nodes of each tree.
+    node_weights: Vec<Vec<f32>>,
 }
 
 impl Forest {
@@ -82,20 +87,44 @@ impl Forest {
         examples.check()?;
         assert!(settings.trees > 0, "at least one tree");
         let bins = Bins::new(&examples.table);
-        let trees = (0..settings.trees).map(|number| grow_one(examples, &bins, settings, number)).collect();
-        Ok(Self { columns: examples.table.columns, classes: examples.classes, trees })
+        let mut leaf_weights = Vec::new();
+        let grow = |number| grow_one(examples, &bins, settings, number, &mut leaf_weights);
+        let trees = (0..settings.trees).map(grow).collect();
+        Ok(Self::new([examples.table.columns, examples.classes], trees, leaf_weights))
     }
 
-    /// Probability of each class: mean share over all trees.
+    fn new([columns, classes]: [usize; 2], trees: Vec<Tree>, leaf_weights: Vec<f32>) -> Self {
+        let mut rest = &leaf_weights[..];
+        let mut node_weights = Vec::new();
+        for tree in trees.iter().filter(|_| !leaf_weights.is_empty()) {
+            let (own, others) = rest.split_at(tree.values.len() / tree.width);
+            node_weights.push(tree.node_weights(own));
+            rest = others;
+        }
+        Self { columns, classes, trees, leaf_weights, node_weights }
+    }
+
+    /// True if it answers on rows of which some values are unknown.
+    pub(crate) fn answers_in_part(&self) -> bool {
+        !self.leaf_weights.is_empty()
+    }
+
+    /// Probability of each class: mean share over all trees. NaN stands for an unknown value: there, both sides of a cut count,
+    /// by the training rows that fell there.
     ///
     /// # Panics
     /// If the row has another number of features than the training rows.
     pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
         assert_eq!(row.len(), self.columns, "values of a row");
         let mut shares = vec![0.0; self.classes];
-        for tree in &self.trees {
-            for (share, of_leaf) in shares.iter_mut().zip(tree.leaf(row)) {
-                *share += f64::from(*of_leaf);
+        if self.answers_in_part() && row.iter().any(|x| x.is_nan()) {
+            let with_weights = self.trees.iter().zip(&self.node_weights);
+            with_weights.for_each(|(tree, weights)| tree.add_leaves(row, weights, &mut shares));
+        } else {
+            for tree in &self.trees {
+                for (share, of_leaf) in shares.iter_mut().zip(tree.leaf(row)) {
+                    *share += f64::from(*of_leaf);
+                }
             }
         }
         normalise(&mut shares);
@@ -105,15 +134,38 @@ impl Forest {
     /// Adds the trees to the arrays of a model file.
     pub(crate) fn save(&self, arrays: &mut Arrays) {
         save_trees(&self.trees, self.columns, self.classes, arrays);
+        if self.answers_in_part() {
+            arrays.put(LEAF_WEIGHTS, &[self.leaf_weights.len()], self.leaf_weights.clone());
+        }
     }
 
     /// Restores a forest from a model file.
     pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
-        Ok(Self { columns, classes, trees: load_class_trees(arrays, columns, classes)? })
+        let trees = load_class_trees(arrays, columns, classes)?;
+        let leaf_weights = match arrays.0.contains_key(LEAF_WEIGHTS) {
+            true => {
+                let leaves = trees.iter().map(|tree| tree.values.len() / tree.width).sum();
+                let weights = arrays.f32s(LEAF_WEIGHTS, &[leaves])?.to_vec();
+                check_each(LEAF_WEIGHTS, &weights, "a weight above 0", |x| x.is_finite() && *x > 0.0)?;
+                weights
+            }
+            false => Vec::new(),
+        };
+        Ok(Self::new([columns, classes], trees, leaf_weights))
     }
 }
 
-fn grow_one(examples: &Examples<'_>, bins: &Bins, settings: &ForestSettings, number: usize) -> Tree {
+/// Array of the weight of the training rows in each leaf.
+const LEAF_WEIGHTS: &str = "trees.leaf_weights";
+
+/// Grows a tree, and adds the weights of its leaves.
+fn grow_one(
+    examples: &Examples<'_>,
+    bins: &Bins,
+    settings: &ForestSettings,
+    number: usize,
+    leaf_weights: &mut Vec<f32>,
+) -> Tree {
     let mut random = random_of(settings.seed, number);
     let rows = examples.rows();
     let mut drawn = vec![u32::from(settings.rows == RowSampling::All); examples.labels.len()];
@@ -125,7 +177,11 @@ fn grow_one(examples: &Examples<'_>, bins: &Bins, settings: &ForestSettings, num
     let weight = |row: usize| f64::from(drawn[row]) * examples.weight(row);
     let target = Target::classes(examples.labels, examples.classes, weight);
     let rows = rows.into_iter().filter(|&row| drawn[row as usize] > 0).collect();
-    Ground { bins, target: &target, settings: &settings.tree }.grow_classes(rows, &mut random)
+    let ground = Ground { bins, target: &target, settings: &settings.tree };
+    ground.grow(rows, &mut random, &mut |rows, values| {
+        target.push_shares(rows, values);
+        leaf_weights.push(target.weight_of(rows) as f32);
+    })
 }
 
 #[cfg(test)]
@@ -173,6 +229,35 @@ mod tests {
         let forest = Forest::fit(&Examples { labels: &labels, ..train.examples() }, &settings)?;
         let recall = scikit_learn_tests::Data::new(360..1360).macro_recall(|row| forest.predict(row));
         assert!((recall - 1.0 / 6.0).abs() < 0.06, "{recall}");
+        Ok(())
+    }
+
+    #[test]
+    fn an_unknown_value_counts_as_either_side_by_the_weight_there() -> Result<(), LearnError> {
+        // The first column tells class 0 from the others, the second class 1 from class 2.
+        let values = [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0];
+        let weights = [1.0, 1.0, 1.0, 5.0];
+        let examples = Examples {
+            table: Table { values: &values, columns: 2 },
+            labels: &[0, 0, 1, 2],
+            classes: 3,
+            weights: Some(&weights),
+        };
+        let forest = Forest::fit(&examples, &ForestSettings::decision_tree())?;
+        let near = |row: &[f32], wanted: [f64; 3]| {
+            let found = forest.predict(row);
+            assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{row:?}: {found:?}");
+        };
+        near(&[1.0, 1.0], [0.0, 0.0, 1.0]);
+        near(&[f32::NAN, f32::NAN], [2.0 / 8.0, 1.0 / 8.0, 5.0 / 8.0]);
+        let mut arrays = Arrays::default();
+        forest.save(&mut arrays);
+        assert_eq!(Forest::load(&arrays, 2, 3).as_ref(), Ok(&forest));
+        arrays.put(LEAF_WEIGHTS, &[3], vec![1.0, -1.0, 1.0]);
+        assert!(Forest::load(&arrays, 2, 3).is_err());
+        // A file of an earlier version.
+        arrays.0.remove(LEAF_WEIGHTS);
+        assert!(!Forest::load(&arrays, 2, 3).expect("loads").answers_in_part());
         Ok(())
     }
 

@@ -50,6 +50,11 @@ impl Target {
         shares.extend(sums.totals.iter().map(|total| (total / sums.weight) as f32));
     }
 
+    /// Weight of some rows.
+    pub(super) fn weight_of(&self, rows: &[u32]) -> f64 {
+        rows.iter().map(|row| self.items[*row as usize].weight).sum()
+    }
+
     /// True if all these rows have the same target.
     pub(super) fn is_pure(&self, rows: &[u32]) -> bool {
         let first = self.items[rows[0] as usize];

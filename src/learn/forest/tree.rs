@@ -92,6 +92,47 @@ impl Tree {
     }
 }
 
+/// Paths of less weight than this follow the heavier side of a cut whose value is unknown: the number of paths stays small.
+const LIGHT: f32 = 1.0 / 8.0;
+
+impl Tree {
+    /// Adds the values of the leaves that a row may fall into, where NaN is a value that is not known. Each side of its cuts
+    /// counts by the training weight that fell there, which `weights` gives for each node.
+    pub(super) fn add_leaves(&self, row: &[f32], weights: &[f32], sums: &mut [f64]) {
+        let mut paths = vec![(0, 1.0)];
+        while let Some((at, share)) = paths.pop() {
+            match self.nodes[at] {
+                Node::Leaf(leaf) => {
+                    let values = &self.values[leaf as usize * self.width..][..self.width];
+                    sums.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(share * x));
+                }
+                Node::Cut { feature, threshold, right } => {
+                    let (x, right) = (row[feature as usize], right as usize);
+                    let to_left = weights[at + 1] / weights[at];
+                    if x.is_nan() && share >= LIGHT {
+                        paths.extend([(at + 1, share * to_left), (right, share * (1.0 - to_left))]);
+                    } else {
+                        let goes_left = if x.is_nan() { to_left >= 0.5 } else { x <= threshold };
+                        paths.push((if goes_left { at + 1 } else { right }, share));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Weight of each node from that of each leaf.
+    pub(super) fn node_weights(&self, leaves: &[f32]) -> Vec<f32> {
+        let mut weights = vec![0.0; self.nodes.len()];
+        for (at, node) in self.nodes.iter().enumerate().rev() {
+            weights[at] = match *node {
+                Node::Leaf(leaf) => leaves[leaf as usize],
+                Node::Cut { right, .. } => weights[at + 1] + weights[right as usize],
+            };
+        }
+        weights
+    }
+}
+
 /// Training data and settings of a tree.
 pub(super) struct Ground<'a> {
     pub(super) bins: &'a Bins,

@@ -9,6 +9,7 @@
 //! | `trees.threshold` | values up to it go to the next node; 0 for a leaf |
 //! | `trees.link` | node of the tree that larger values go to, always a later one; for a leaf its number in the tree |
 //! | `trees.leaf_values` | leaf after leaf, tree after tree: shares of the classes, or one score |
+//! | `trees.leaf_weights` | of forests: weight of the training rows in each leaf |
 
 use super::tree::{Node, Tree};
 use crate::arrays::{ArrayError, Arrays, check_each};

@@ -4,6 +4,7 @@
 mod actuation;
 mod auto;
 mod bend;
+mod build;
 mod finger;
 mod pad;
 mod programme;
@@ -14,6 +15,7 @@ mod taxels;
 pub use actuation::{Actuation, TorquePoint};
 pub use auto::Auto;
 pub use bend::{BentFinger, FingerPlane, SegmentPose, bend};
+pub use build::{BUILD, BuildSpread, FittedRanges};
 pub use finger::{Finger, Sideways};
 pub use pad::{Pad, PadLaw};
 pub use programme::{Phase, Programme};
@@ -79,6 +81,10 @@ pub struct GripperModel {
     pub strip: Strip,
     /// Line pressure to joint torque.
     pub actuation: Actuation,
+    /// How far its constants may be off, where they were fitted to a real gripper; [`crate::scene::PoseSpread::build`] draws
+    /// within these ranges. None where they are assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedRanges>,
 }
 
 impl GripperModel {

@@ -23,6 +23,14 @@ impl Ranges {
         }
     }
 
+    /// A range within another one.
+    fn between(&mut self, key: &str, [low, high]: [f64; 2], range: RangeInclusive<f64>) {
+        self.numbers(key, &[low, high], &range);
+        if low > high {
+            self.refuse(key, &format!("[{low}, {high}]"), "the smaller number first".to_owned());
+        }
+    }
+
     fn auto(&mut self, key: &str, value: Auto, range: RangeInclusive<f64>) {
         if let Auto::Value(x) = value {
             self.number(key, x, range);
@@ -116,6 +124,11 @@ impl Scene {
         ranges.numbers("gripper.mount.offset", &mount.offset, &(-1.0..=1.0));
         ranges.number("gripper.mount.yaw_deg", mount.yaw_deg, -360.0..=360.0);
         let finger = &self.gripper.finger;
+        if let Some(fitted) = &self.gripper.fitted {
+            ranges.between("gripper.fitted.stiffness", fitted.stiffness, 0.05..=20.0);
+            ranges.between("gripper.fitted.torque_per_stiffness", fitted.torque_per_stiffness, 0.05..=20.0);
+            ranges.between("gripper.fitted.filling_s", fitted.filling_s, -10.0..=10.0);
+        }
         ranges.number("gripper.finger.length", finger.length, 5e-3..=2.0);
         ranges.number("gripper.finger.width", finger.width, 1e-3..=1.0);
         ranges.number("gripper.finger.back", finger.back, 0.0..=1.0);

@@ -2,6 +2,7 @@
 //! leave the default in force in silence.
 
 use super::Scene;
+use crate::gripper::FittedRanges;
 use crate::objects::anchored;
 use std::path::{Path, PathBuf};
 
@@ -163,11 +164,13 @@ fn parse_value(text: &str) -> toml::Value {
     value.unwrap_or_else(|| toml::Value::String(text.to_owned()))
 }
 
-/// Sets a dotted key whose tables all exist.
+/// Sets a dotted key; an optional table begins with its defaults.
 fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), SceneError> {
+    let known = known_keys();
+    let beside =
+        |prefix: &str| prefix.split_terminator('.').try_fold(&known, |table, name| table.get(name)?.as_table());
     let unknown = |prefix: &str, last: &str| {
-        let known = known_keys();
-        let beside = prefix.split_terminator('.').try_fold(&known, |table, name| table.get(name)?.as_table());
+        let beside = beside(prefix);
         let nearest = nearest_key(last, beside.unwrap_or(&known), if beside.is_some() { prefix } else { "" });
         SceneError::UnknownKey { key: key.to_owned(), nearest }
     };
@@ -175,6 +178,9 @@ fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<
     let mut table = document;
     let mut prefix = String::new();
     for name in tables.split_terminator('.') {
+        if let Some(optional) = beside(&prefix).and_then(|own| own.get(name)).filter(|_| !table.contains_key(name)) {
+            table.insert(name.to_owned(), optional.clone());
+        }
         let inner = table.get_mut(name).and_then(toml::Value::as_table_mut);
         table = inner.ok_or_else(|| unknown(&prefix, name))?;
         prefix.push_str(name);
@@ -201,9 +207,11 @@ fn syntax(error: &toml::de::Error) -> SceneError {
     SceneError::Syntax(error.to_string().trim_end().to_owned())
 }
 
-/// The default scene as a table: its keys are the keys there are.
+/// The default scene with everything optional as a table: its keys are the keys there are.
 fn known_keys() -> toml::Table {
-    toml::Table::try_from(Scene::default()).expect("a scene is a table")
+    let mut scene = Scene::default();
+    scene.gripper.fitted = Some(FittedRanges::default());
+    toml::Table::try_from(scene).expect("a scene is a table")
 }
 
 fn check_keys(written: &toml::Table, known: &toml::Table, prefix: &str) -> Result<(), SceneError> {
@@ -312,7 +320,9 @@ mod tests {
         assert!(keys.len() > 40 && keys.iter().filter(|key| key.holds_fractions()).count() > 30);
         for key in &keys {
             let setting = format!("{}={}", key.name, key.default);
-            assert_eq!(Scene::default().with_settings(&[setting]), Ok(Scene::default()), "{}", key.name);
+            let mut same = Scene::default();
+            same.gripper.fitted = key.name.starts_with("gripper.fitted.").then(FittedRanges::default);
+            assert_eq!(Scene::default().with_settings(&[setting]), Ok(same), "{}", key.name);
         }
         let key = |name: &str| keys.iter().find(|key| key.name == name).expect("there");
         assert_eq!(key("object.rotation_deg").with("7"), "object.rotation_deg=[7, 0.0, 0.0]");

@@ -19,7 +19,7 @@ pub use effects::{Effect, EffectSettings, Setting};
 pub use engine::EngineKind;
 pub use file::{SceneError, SceneKey};
 pub use named::{NamedScene, SCENES};
-pub use poses::{BUILD, Between, BuildSpread, Faces, PRESETS, PosePreset, PoseSpread};
+pub use poses::{Between, Faces, PRESETS, PosePreset, PoseSpread};
 pub use shaking::{HandMotion, HandPlace, Shaking};
 pub use timing::{Clock, Timing};
 

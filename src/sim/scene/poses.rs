@@ -15,33 +15,9 @@ pub struct PoseSpread {
     pub faces: Faces,
     /// Pose of the object in the next of several grasps.
     pub between: Between,
-    /// How much the build of the gripper varies from grasp to grasp: 0 not at all, 1 as among any grippers of its kind. See
-    /// [`BUILD`].
+    /// How much the build of the gripper varies from grasp to grasp: 0 not at all, 1 as among any grippers of its kind, or as
+    /// far as a fit leaves it open. See [`crate::gripper::BUILD`] and [`crate::gripper::FittedRanges`].
     pub build: f64,
-}
-
-/// Ranges of the gripper's build at `pose.build = 1`, assumed: the scene's constants times or plus these, evenly drawn.
-pub const BUILD: BuildSpread = BuildSpread {
-    stiffness: [0.75, 1.25],
-    torque: [0.83, 1.17],
-    pad_modulus: [0.6, 1.7],
-    pad_friction: [0.6, 1.3],
-    filling_s: [0.0, 0.12],
-};
-
-/// Ranges in which grippers of one kind differ.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BuildSpread {
-    /// Factor on the bending stiffness of both fingers.
-    pub stiffness: [f64; 2],
-    /// Factor on the torque at any line pressure.
-    pub torque: [f64; 2],
-    /// Factor on the modulus of the pads.
-    pub pad_modulus: [f64; 2],
-    /// Factor on the friction of the pads.
-    pub pad_friction: [f64; 2],
-    /// Time constant of filling that is added (s).
-    pub filling_s: [f64; 2],
 }
 
 impl Default for PoseSpread {

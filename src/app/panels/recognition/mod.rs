@@ -22,7 +22,7 @@ use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::THRESHOLDS;
 use std::sync::Arc;
-use words::{FOREIGN, Headline, percent, reason, unlike_learned};
+use words::{FOREIGN, Headline, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -184,16 +184,10 @@ impl Part<'_, '_> {
         self.context.view.theme.colours()
     }
 
-    /// Why the model's answers are not to be trusted on this object; none where they are.
+    /// Why the model's answers are not to be trusted on this gripper; none where they are.
     fn distrust(&self) -> Option<&'static str> {
         let is_real = self.context.shown().board().is_some();
-        let simulates = self.context.source == ViewSource::Simulation;
-        if self.view.from_perfect_sensors && is_real {
-            return Some(FOREIGN);
-        }
-        let fixed = self.context.scene.holds_object();
-        let learned_other = self.view.learned_fixed.is_some_and(|learned| learned != fixed);
-        (simulates && learned_other).then(|| unlike_learned(fixed))
+        (self.view.from_perfect_sensors && is_real).then_some(FOREIGN)
     }
 
     /// Picture of a class, or a frame with a question mark.

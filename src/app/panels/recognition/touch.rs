@@ -35,7 +35,7 @@ pub(super) fn height(measures: &Measures, has_stage_one: bool) -> f32 {
 
 /// Draws the lines; false where nothing can be measured.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
-    // For a model from perfect sensors, the encoder knows those only.
+    // For a model from perfect sensors, the encoder knows those only; it knows free and fixed objects.
     if !part.view.measures_geometry || part.distrust().is_some() {
         return false;
     }

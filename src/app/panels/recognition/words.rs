@@ -12,15 +12,6 @@ const WORTH_NAMING: f64 = 0.4;
 /// Warning about a model on a gripper whose sensors it does not know.
 pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
 
-/// Warning about a model on an object that is fixed where it learned from free ones only, or the other way round.
-pub(super) fn unlike_learned(fixed: bool) -> &'static str {
-    if fixed {
-        "Not to be trusted: the object is fixed, and this model knows free objects only."
-    } else {
-        "Not to be trusted: the object is free, and this model knows fixed objects only."
-    }
-}
-
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Headline {
@@ -162,7 +153,6 @@ mod tests {
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
             from_perfect_sensors: false,
-            learned_fixed: None,
             signatures: None,
             last: None,
         }

@@ -31,7 +31,7 @@ use fitted_model::{
 };
 use least_squares::{Minimum, Prior, minimise};
 use palpate_geometry::units::three_digits;
-use palpate_sim::gripper::GripperModel;
+use palpate_sim::gripper::{BUILD, FittedRanges, GripperModel};
 use palpate_sim::physics::SimulationError;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
@@ -212,7 +212,8 @@ pub fn fit_finger_watched(
     let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
     let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)?;
-    let gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
+    let mut gripper = fitted.gripper(&first.scene.gripper, &minimum.x);
+    gripper.fitted = Some(ranges(&minimum, &knots));
     let estimates = estimates(&minimum, &knots);
     let remainders = remainders(observations, &fitted, &minimum);
     let remarks = remarks(first, &fitted, &minimum, &estimates, &remainders);
@@ -296,6 +297,18 @@ fn estimates(minimum: &Minimum, knots: &[f64]) -> Vec<Estimate> {
     let peak = knots.last().copied().unwrap_or(0.0);
     estimates.push(of(&format!("torque at {peak:.2} bar / bending stiffness"), "1/m", TORQUES + knots.len() - 1));
     estimates
+}
+
+/// What the fit leaves open: 95 % intervals, but none wider than the range of any gripper of this kind.
+fn ranges(minimum: &Minimum, knots: &[f64]) -> FittedRanges {
+    let half = |j: usize| HALF * minimum.covariance[j][j].max(0.0).sqrt();
+    let about = |half: f64, [low, high]: [f64; 2]| [(-half).exp().max(low), half.exp().min(high)];
+    let lag = half(LAG);
+    FittedRanges {
+        stiffness: about(half(STIFFNESS), BUILD.stiffness),
+        torque_per_stiffness: about(half(TORQUES + knots.len() - 1), BUILD.torque),
+        filling_s: [-lag.min(minimum.x[LAG].max(0.0)), lag.min(BUILD.filling_s[1])],
+    }
 }
 
 impl Known {

@@ -9,6 +9,7 @@ use super::super::refined_run::RefinedRun;
 use super::Session;
 use crate::grasping::{FrameReader, prepare};
 use crate::picture::Stage;
+use palpate_learn::{Model, Shipped};
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
@@ -30,10 +31,24 @@ impl Session {
     /// The first grasp of a round.
     pub(super) fn begin_round(&mut self) {
         self.status.grasp_of_round = 0;
+        self.choose_model();
         if let Some(listener) = &mut self.listener {
             listener.start_over();
         }
         self.begin_grasp();
+    }
+
+    /// The model of such grasps listens.
+    fn choose_model(&mut self) {
+        let model = self.models.of(Shipped::simulated(self.nominal.holds_object()));
+        let listens = |model: &Arc<Model>| self.listener.as_ref().is_some_and(|listener| listener.follows(model));
+        if model.is_some_and(listens) {
+            return;
+        }
+        self.listener = model.map(|model| Listener::new(Arc::clone(model), self.status.grasps));
+        if let (Some(listener), Some(threshold)) = (&mut self.listener, self.threshold) {
+            listener.set_threshold(threshold);
+        }
     }
 
     pub(super) fn begin_grasp(&mut self) {

@@ -18,6 +18,7 @@ use super::pace::Pace;
 use crate::datasets::SensorView;
 use crate::grasping::{Advisor, EndState, FrameReader, GraspSummary};
 use crate::recording::{Recorder, RecorderNotice};
+use palpate_learn::Models;
 use palpate_sim::objects::ObjectError;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
@@ -75,7 +76,10 @@ pub(super) struct Session {
     subject: Option<Subject>,
     /// Result of the checker that was taken last.
     checked: Option<Arc<CheckResult>>,
+    models: Models,
     listener: Option<Listener>,
+    /// Probability from which a class counts as certain, in place of the model's own.
+    threshold: Option<f64>,
     sensors: SensorView,
     nominal: Scene,
     object: Option<LoadedObject>,
@@ -134,7 +138,9 @@ impl Session {
             checker,
             subject: None,
             checked: None,
-            listener: setup.model.map(|model| Listener::new(model, grasps)),
+            models: setup.models,
+            listener: None,
+            threshold: None,
             sensors: setup.sensors,
             nominal: setup.scene,
             object: None,
@@ -253,6 +259,7 @@ impl Session {
                 self.reconsider();
             }
             Command::SetThreshold(threshold) => {
+                self.threshold = Some(threshold);
                 if let Some(listener) = &mut self.listener {
                     listener.set_threshold(threshold);
                 }
@@ -282,8 +289,8 @@ impl Session {
                     self.begin_round();
                 }
             }
-            Command::SetModel(model) => {
-                self.listener = model.map(|model| Listener::new(model, self.status.grasps));
+            Command::SetModels(models) => {
+                self.models = models;
                 self.own_pose_done = false;
                 self.begin_round();
             }

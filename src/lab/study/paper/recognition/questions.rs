@@ -133,6 +133,15 @@ pub(super) const QUESTIONS: [Question; 16] = [
         targets: [[Some(0.90), None], [Some(0.93), None]],
     },
     Question {
+        name: "shipped model, B fixed",
+        preset: "B",
+        fixed: true,
+        learns: Learns::Shipped(Shipped::FixedObjects),
+        reads: VIRTUAL,
+        methods: &["geometry-network"],
+        targets: [[None; 2]; 2],
+    },
+    Question {
         name: "no labels, physical-like B",
         preset: "B",
         fixed: false,
