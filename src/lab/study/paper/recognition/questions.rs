@@ -68,7 +68,7 @@ const FIFTY: Learns = Learns::Like { of_each: 50, draws: DRAWS };
 pub(in crate::study::paper) const UNLABELLED: &str = "no labels, unknown mechanics too, B";
 
 /// All rows.
-pub(super) const QUESTIONS: [Question; 16] = [
+pub(super) const QUESTIONS: [Question; 17] = [
     Question {
         name: "B free, 50 of each",
         preset: "B",
