@@ -12,6 +12,7 @@ struct Corner {
     @builtin(position) clip: vec4<f32>,
     @location(0) normal: vec3<f32>,
     @location(1) colour: vec3<f32>,
+    @location(2) world: vec3<f32>,
 }
 
 // The unit arrow runs along z from 0 to 1 with radii in units of the shaft's; its head keeps its length.
@@ -28,11 +29,15 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>, inst
     let along = min(position.z, 1.0) * (reach - head) + max(position.z - 1.0, 0.0) * head;
     let world = instance.origin.xyz + (x * position.x + y * position.y) * radius + z * along;
     let turned = x * normal.x + y * normal.y + z * normal.z;
-    return Corner(frame.clip_from_world * vec4<f32>(world, 1.0), turned, instance.colour.rgb);
+    return Corner(frame.clip_from_world * vec4<f32>(world, 1.0), turned, instance.colour.rgb, world);
 }
 
 fn lit(corner: Corner) -> vec3<f32> {
-    return corner.colour * (0.75 + 0.25 * max(dot(normalize(corner.normal), frame.key.xyz), 0.0));
+    let normal = normalize(corner.normal);
+    let colour = corner.colour * (0.75 + 0.25 * max(dot(normal, frame.key.xyz), 0.0));
+    // A dark outline, on any ground.
+    let edge = smoothstep(0.30, 0.45, abs(dot(normal, towards_eye(corner.world))));
+    return mix(vec3<f32>(0.01), colour, edge);
 }
 
 @fragment

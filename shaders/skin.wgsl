@@ -17,6 +17,8 @@ struct Skin {
     pad: vec4<f32>,
     // rows, columns, pressure of the brightest colour, finger length
     taxels: vec4<f32>,
+    // translucent stretch: shares of the length where it begins and ends, clearness
+    veil: vec4<f32>,
     // the pressure map, linear colours
     map: array<vec4<f32>, 17>,
 }
@@ -70,7 +72,10 @@ fn vertex(
     let across = cross(r.inward.xyz, r.along.xyz);
     let world = place_vertex(ring, offset, place);
     let turned = across * normal.x + r.inward.xyz * normal.y + r.along.xyz * normal.z;
-    return Corner(frame.clip_from_world * vec4<f32>(world, 1.0), world, turned, place);
+    // Behind a veil, the face of the pad is seen in front of what presses into it.
+    let ahead = 0.004 * skin.veil.z * place.z * smoothstep(0.002, 0.005, offset.y);
+    let seen = world + towards_eye(world) * ahead;
+    return Corner(frame.clip_from_world * vec4<f32>(seen, 1.0), world, turned, place);
 }
 
 @vertex
@@ -89,8 +94,33 @@ fn mapped(share: f32) -> vec3<f32> {
     return mix(skin.map[low].rgb, skin.map[low + 1u].rgb, at - f32(low));
 }
 
+// How clear the skin is at a place: all of it but the face of the pad.
+fn clearness(place: vec3<f32>) -> f32 {
+    if (place.z > 0.5 && abs(place.x - 0.5) < 0.44) {
+        return 0.0;
+    }
+    let within = smoothstep(skin.veil.x - 0.06, skin.veil.x, place.y) * (1.0 - smoothstep(skin.veil.y, skin.veil.y + 0.06, place.y));
+    return within * skin.veil.z;
+}
+
+// The translucent part: silicone with a clear middle and a visible edge.
+@fragment
+fn fragment_veil(corner: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let clear = clearness(corner.place);
+    if (clear <= 0.0 || !front) {
+        discard;
+    }
+    let outward = normalize(corner.normal);
+    let silicone = mix(skin.bellows.rgb, skin.pad.rgb, smoothstep(0.2, 0.8, corner.place.z));
+    let edge = 1.0 - abs(dot(outward, towards_eye(corner.world)));
+    return vec4<f32>(shade(silicone, corner.world, outward, 0.10), mix(1.0, 0.10 + 0.45 * edge * edge, clear));
+}
+
 @fragment
 fn fragment(corner: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    if (clearness(corner.place) > 0.0) {
+        discard;
+    }
     let outward = normalize(select(-corner.normal, corner.normal, front));
     let silicone = mix(skin.bellows.rgb, skin.pad.rgb, smoothstep(0.2, 0.8, corner.place.z));
     let matt = shade(silicone, corner.world, outward, 0.10);

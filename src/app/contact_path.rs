@@ -23,7 +23,7 @@ pub(super) fn path_colour(layer: PathLayer, grasp: &ShownGrasp<'_>) -> Option<Pa
     match layer {
         PathLayer::Off => None,
         PathLayer::Time => Some(PathColour::Time(grasp.span_s.map(|t| t as f32))),
-        PathLayer::Pressure => Some(PathColour::Pressure),
+        PathLayer::Pressure => Some(PathColour::Pressure(grasp.full_scale)),
     }
 }
 

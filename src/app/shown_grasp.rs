@@ -10,7 +10,8 @@ use egui::Ui;
 use palpate_geometry::units::three_digits;
 use palpate_lab::inspection::PhaseSpan;
 use palpate_lab::picture::{
-    BendUnit, LoadUnit, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at, whole_pads,
+    BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
+    pad_rows_over_time, pads_at, whole_pads,
 };
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
@@ -25,6 +26,8 @@ pub(super) struct ShownGrasp<'a> {
     gripper: &'a GripperModel,
     /// Simulated frames, in order; none of a real gripper.
     pub(super) frames: Vec<&'a Frame>,
+    /// Pressure on the pads that has the brightest colour (Pa).
+    pub(super) full_scale: f32,
     /// Frame at the time shown; none of a real gripper.
     frame: Option<&'a Frame>,
     trace: Option<&'a GraspTrace>,
@@ -76,9 +79,14 @@ impl<'a> ShownGrasp<'a> {
             channel.map(|channel| (k, channel.quantity, channel.side))
         };
         let span_s = shown.time_span();
+        let full_scale = match frames.as_slice() {
+            [] => PAD_FULL_SCALE,
+            frames => full_scale_of(gripper, frames.iter().copied()),
+        };
         Some(Self {
             gripper,
             frames,
+            full_scale,
             frame,
             trace,
             columns: shown.channels().into_iter().enumerate().filter_map(column).collect(),
@@ -194,7 +202,7 @@ pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, un
     };
     let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), most: [usize::MAX; 2] };
     shown_maps(ui, name, key, || match grasp.frame {
-        Some(frame) => pads_at(grasp.gripper, frame, unit),
+        Some(frame) => pads_at(grasp.gripper, frame, unit, grasp.full_scale),
         None => whole_pads(grasp.gripper, forces, PadPart::ACTIVE_AREA, unit),
     })
 }

@@ -122,16 +122,21 @@ impl Shot<'_> {
         let Self { gpu, renderer, open, arguments } = self;
         let OpenDrawable { stage, trial } = open;
         let (centre, radius) = stage.bounds();
+        let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
+        let mut camera = Camera::default().turned_to(arguments.view).framing(centre, radius);
+        if arguments.view == StandardView::Home {
+            camera = stage.nearer_to_touch(camera, now);
+        }
         let view = PictureView {
-            camera: Camera::default().turned_to(arguments.view).framing(centre, radius),
+            camera,
             theme: arguments.theme,
             size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
             forces: !arguments.no_forces,
             annotations: !arguments.bare,
+            full_scale: stage.full_scale_of(trial.frames.iter().map(AsRef::as_ref)),
             badge: (!arguments.bare).then(|| format!("{}, {t_s:.2} s", open.badge())),
             ..PictureView::default()
         };
-        let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
         Ok(Picture::draw(gpu, renderer, &stage.draw(now, &view), arguments.size, 1.0)?)
     }
 }

@@ -225,11 +225,12 @@ fn tempfile_folder() -> Result<TemporaryFolder, Failure> {
 
 /// The 3-D view alone.
 fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture, Failure> {
-    let (stage, frame, badge) = match arguments.trial {
+    let (stage, frames, badge) = match arguments.trial {
         Some(id) => stored(arguments, store, id)?,
         None => simulated(arguments, Engine::Own)?,
     };
-    let ghost = if arguments.ghost { Some(simulated(arguments, Engine::Other)?.1) } else { None };
+    let frame = frames.last().ok_or("there is nothing to draw")?;
+    let ghost = if arguments.ghost { simulated(arguments, Engine::Other)?.1.pop() } else { None };
     let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
         camera: Camera::default().turned_to(arguments.view),
@@ -238,11 +239,16 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
         forces: !arguments.no_forces,
         annotations: !arguments.bare,
         badge: Some(badge).filter(|_| !arguments.bare),
+        full_scale: stage.full_scale_of(&frames),
         ..PictureView::default()
     };
     let (centre, radius) = stage.bounds();
-    let view = PictureView { camera: view.camera.framing(centre, radius), ..view };
-    let mut list = stage.draw(&frame, &view);
+    let mut camera = view.camera.framing(centre, radius);
+    if arguments.view == StandardView::Home {
+        camera = stage.nearer_to_touch(camera, frame);
+    }
+    let view = PictureView { camera, ..view };
+    let mut list = stage.draw(frame, &view);
     if let Some(ghost) = &ghost {
         list.ghosts = stage.ghosts(ghost, view.theme);
     }
@@ -258,8 +264,8 @@ enum Engine {
     Other,
 }
 
-/// Simulates up to the time to draw.
-fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Frame, String), Failure> {
+/// Simulates up to the time to draw; returns all frames until then.
+fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Vec<Frame>, String), Failure> {
     let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
     if engine == Engine::Other {
         scene.solver.engine = scene.solver.engine.other();
@@ -268,25 +274,29 @@ fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Fr
     let object = scene.load_object()?;
     let mut run = prepare(&scene, object.as_ref(), 0);
     let stage = Stage::new(&scene, object.as_ref(), run.begun().data.world_from_gripper);
-    let mut frame = run.gripper_mut().run_mut().first_look();
-    while frame.t < at_s {
+    let mut frames = vec![run.gripper_mut().run_mut().first_look()];
+    while frames.last().is_some_and(|last| last.t < at_s) {
         match run.next_frame() {
-            Some(next) => frame = next.clone(),
+            Some(next) => frames.push(next.clone()),
             None => break,
         }
     }
-    Ok((stage, frame, "SIMULATED".to_owned()))
+    Ok((stage, frames, "SIMULATED".to_owned()))
 }
 
-/// A stored trial at the time to draw. The fingers of a trial that was not simulated are arcs.
-fn stored(arguments: &SnapshotArguments, store: Option<&Path>, id: TrialId) -> Result<(Stage, Frame, String), Failure> {
+/// A stored trial until the time to draw. The fingers of a trial that was not simulated are arcs.
+fn stored(
+    arguments: &SnapshotArguments,
+    store: Option<&Path>,
+    id: TrialId,
+) -> Result<(Stage, Vec<Frame>, String), Failure> {
     let open = open_drawable(&read_store(store)?, id)?;
     let OpenDrawable { stage, trial } = &open;
     trial.remarks.iter().for_each(|remark| note(remark));
     let at_s = chosen_time(arguments.at, trial.frames.last().map_or(0.0, |frame| frame.t), &format!("trial {id}"))?;
-    let now = trial.at(at_s).and_then(|now| now.frame);
-    let frame = now.ok_or_else(|| format!("trial {id} has no samples"))?;
-    Ok((stage.as_ref().clone(), frame.as_ref().clone(), open.badge()))
+    let now = trial.at(at_s).and_then(|now| now.frame).ok_or_else(|| format!("trial {id} has no samples"))?;
+    let until = trial.frames.iter().filter(|frame| frame.t <= now.t);
+    Ok((stage.as_ref().clone(), until.map(|frame| frame.as_ref().clone()).collect(), open.badge()))
 }
 
 /// A trial whose fingers can be drawn.

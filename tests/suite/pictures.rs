@@ -8,10 +8,10 @@ use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::Vec2;
 use image::RgbaImage;
 use palpate::app::{InspectAction, LibraryAction, ViewAction};
-use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::drawing::{Camera, DrawList, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
-use palpate_lab::picture::{PictureView, Stage};
+use palpate_lab::picture::{PictureView, Stage, full_scale_of};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Scene, SupportKind};
@@ -54,8 +54,12 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
     let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
     let (centre, radius) = stage.bounds();
+    let mut camera = Camera::default().turned_to(shot.view).framing(centre, radius);
+    if shot.view == StandardView::Home {
+        camera = stage.nearer_to_touch(camera, frame);
+    }
     let view = PictureView {
-        camera: Camera::default().turned_to(shot.view).framing(centre, radius),
+        camera,
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
@@ -104,6 +108,45 @@ fn the_sixteen_look_like_what_they_are() {
     };
     let pictures: Vec<RgbaImage> = catalogue().iter().map(|built_in| held(&built_in.name)).collect();
     compare("the_sixteen_held", &sheet(&pictures, 4), &gpu.driver);
+}
+
+/// Share of a picture that is pad coloured by its load: the pixels that change where the pads keep their shape and lose their
+/// pressure.
+fn coloured_share(gpu: &Gpu, renderer: &mut Renderer, list: &DrawList, size: [u32; 2]) -> f64 {
+    let mut without = list.clone();
+    let loads = without.fingers.iter_mut().flat_map(|finger| &mut finger.taxels.loads);
+    loads.for_each(|load| load[0] = 0.0);
+    let mut draw = |list: &DrawList| Picture::draw(gpu, renderer, list, size, 1.0).unwrap().rgba;
+    let (with, without) = (draw(list), draw(&without));
+    let pixels = with.chunks_exact(4).zip(without.chunks_exact(4));
+    let changed = pixels.filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 8)).count();
+    changed as f64 / f64::from(size[0] * size[1])
+}
+
+#[test]
+fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
+    let gpu = driver();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
+    let size = [640, 400];
+    let mut shares = Vec::new();
+    for built_in in catalogue() {
+        let mut scene = Scene::default();
+        built_in.name.clone_into(&mut scene.object.source);
+        let object = scene.load_object().unwrap();
+        let trial = grasp(&scene, object.as_ref(), 0);
+        let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
+        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
+        let (centre, radius) = stage.bounds();
+        let camera = stage.nearer_to_touch(Camera::default().framing(centre, radius), frame);
+        let size_points = Vec2::from(size.map(|side| side as f32));
+        let until = trial.frames().iter().take_while(|frame| frame.t <= HELD.at);
+        let full_scale = full_scale_of(&scene.gripper, until);
+        let (forces, annotations) = (false, false);
+        let view = PictureView { camera, size: size_points, forces, annotations, full_scale, ..PictureView::default() };
+        let share = coloured_share(&gpu, &mut renderer, &stage.draw(frame, &view), size);
+        shares.push((built_in.name.clone(), share));
+    }
+    assert!(shares.iter().all(|(_, share)| *share >= 0.01), "{shares:?}");
 }
 
 /// The window through the driver that the pictures above are drawn with.

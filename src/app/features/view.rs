@@ -5,7 +5,7 @@ use crate::app::modes::mode::Mode;
 use crate::app::theme;
 use crate::app::view_source::ViewSource;
 use egui_tiles::Tree;
-use palpate_geometry::drawing::Camera;
+use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{BendUnit, LoadUnit};
@@ -238,6 +238,13 @@ impl ViewState {
             }
             ViewAction::ResetLayout => self.layouts.clear(),
         }
+    }
+
+    /// True while the camera is where it begins, in the home view of the whole scene: it then comes nearer to what is touched.
+    pub(in crate::app) fn follows_touch(&self) -> bool {
+        let parallel = self.camera.parallel;
+        let is_as_framed = self.framed.is_some_and(|framed| Camera { parallel, ..framed } == self.camera);
+        is_as_framed && self.camera == self.camera.turned_to(StandardView::Home)
     }
 
     /// Shows the whole scene.

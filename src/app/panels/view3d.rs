@@ -16,7 +16,7 @@ use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Camera, DrawList, StandardView};
-use palpate_lab::picture::{PictureView, Stage};
+use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage};
 use palpate_lab::workers::Command;
 use palpate_sim::objects::object_title;
 
@@ -37,7 +37,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         message(ui, rect, context, "The 3-D view needs a graphics driver. Everything else works without.");
         return;
     }
-    steer(ui, &response, context, actions);
+    steer(ui, &response, context, moment, actions);
     let picture = paint(ui, rect, context, moment);
     small_pads(ui, rect, context, &picture);
     buttons(ui, rect, context, actions);
@@ -74,11 +74,11 @@ fn message(ui: &Ui, rect: Rect, context: &PanelContext<'_>, text: &str) {
 }
 
 /// Moves the camera or pulls at the object by the mouse.
-fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, actions: &mut Actions) {
+fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, moment: Moment<'_>, actions: &mut Actions) {
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
-    let camera = context.view.camera;
+    let camera = shown_camera(context, moment);
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
     // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
@@ -113,6 +113,12 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
+/// The camera of the view; the one that nobody has moved comes nearer to the touch.
+fn shown_camera(context: &PanelContext<'_>, moment: Moment<'_>) -> Camera {
+    let camera = context.view.camera;
+    if context.view.follows_touch() { moment.stage.nearer_to_touch(camera, moment.frame) } else { camera }
+}
+
 /// Draw list of a moment, and the view that it was made for.
 struct Drawn {
     list: DrawList,
@@ -126,13 +132,16 @@ struct Drawn {
 fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
     let Moment { stage, frame, .. } = moment;
     // Nothing is known of where a real gripper touched.
-    let course = ShownGrasp::of(context).filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
+    let shown = ShownGrasp::of(context);
+    let full_scale = shown.as_ref().map_or(PAD_FULL_SCALE, |shown| shown.full_scale);
+    let course = shown.filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
     let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
     let view = PictureView {
-        camera: context.view.camera,
+        camera: shown_camera(context, moment),
         theme: context.view.theme,
         size,
         forces: context.view.forces,
+        full_scale,
         path: grasp_path.as_ref().map(|(_, colour)| *colour),
         ..PictureView::default()
     };
@@ -216,7 +225,11 @@ fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Ac
         let menu = bar.menu_button("View", |ui| switches(ui, context, actions));
         menu.response.on_hover_text("Standard views, parallel projection, forces, ghost");
     } else {
+        // Legible on whatever comes near.
+        let behind = ui.painter().add(egui::Shape::Noop);
         switches(&mut bar, context, actions);
+        let ground = veil(context.view.theme.colours().background, 0.6);
+        ui.painter().set(behind, egui::Shape::rect_filled(bar.min_rect().expand(3.0), 4.0, ground));
     }
 }
 

@@ -78,6 +78,17 @@ pub struct SoftFinger {
     pub taxels: TaxelField,
     /// Pressure that has the brightest colour (Pa).
     pub full_scale: f32,
+    /// Stretch that is drawn translucent.
+    pub veil: Veil,
+}
+
+/// Translucent stretch of a finger, behind which the face of its pad is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Veil {
+    /// Where it begins and ends along the neutral axis (m).
+    pub stretch: [f32; 2],
+    /// 0: opaque, 1: as clear as it gets.
+    pub clearness: f32,
 }
 
 /// A place on the neutral axis of a finger.

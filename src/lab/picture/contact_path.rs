@@ -27,8 +27,8 @@ const LINE: f32 = 0.45e-3;
 pub enum PathColour {
     /// Time of the first touch, from the first to the second of these times (s).
     Time([f32; 2]),
-    /// Largest pressure, as on the pads.
-    Pressure,
+    /// Largest pressure, as on the pads: that of the brightest colour (Pa).
+    Pressure(f32),
 }
 
 /// Place on an object that was touched.
@@ -144,7 +144,7 @@ impl PathColour {
     fn of(self, place: &TouchedPlace) -> Rgb {
         pressure_colour(match self {
             Self::Time([from, to]) => (place.t - from) / (to - from),
-            Self::Pressure => place.pressure / PAD_FULL_SCALE,
+            Self::Pressure(full_scale) => place.pressure / full_scale,
         })
     }
 }
@@ -272,7 +272,7 @@ mod tests {
         assert_eq!(mesh.vertices[6].colour, [4, 5, 6, 255]);
         assert_eq!((mesh.vertices[7].colour, mesh.vertices[7].position[2]), ([7, 8, 9, 255], 3.0));
         let place = TouchedPlace { at: Vec3::ZERO, t: 3.0, pressure: PAD_FULL_SCALE };
-        assert_eq!(PathColour::Pressure.of(&place), pressure_colour(1.0));
+        assert_eq!(PathColour::Pressure(PAD_FULL_SCALE).of(&place), pressure_colour(1.0));
         assert_eq!(PathColour::Time([1.0, 5.0]).of(&place), pressure_colour(0.5));
     }
 

@@ -1,7 +1,7 @@
 //! Soft fingers of a frame: frames along the neutral axis, and taxel loads.
 
 use palpate_geometry::Pose;
-use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField};
+use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField, Veil};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, PlacedFinger, Side, TaxelGrid};
 
@@ -26,6 +26,7 @@ pub(super) fn soft_fingers(
             section,
             taxels: taxel_field(&grid, frame, side),
             full_scale,
+            veil: Veil::default(),
         })
         .collect()
 }

@@ -82,15 +82,17 @@ fn refined(frames: &[FingerFrame]) -> Vec<FingerFrame> {
 mod tests {
     use super::*;
     use glam::Vec3;
-    use palpate_geometry::drawing::TaxelField;
+    use palpate_geometry::drawing::{TaxelField, Veil};
 
     #[test]
     fn a_straight_finger_has_its_volume_and_faces_outward() {
         let section = Section { width: 0.02, pad: 0.008, crown_radius: 0.02, back: 0.012 };
         let frame = |arc: f32| FingerFrame { arc, position: -Vec3::Z * arc, along: -Vec3::Z, inward: Vec3::X };
         let frames = vec![frame(0.0), frame(0.04), frame(0.1)];
-        let surface =
-            finger(&SoftFinger { frames, section, taxels: TaxelField::default(), full_scale: 1.0 }, Rgb(9, 9, 9));
+        let surface = finger(
+            &SoftFinger { frames, section, taxels: TaxelField::default(), full_scale: 1.0, veil: Veil::default() },
+            Rgb(9, 9, 9),
+        );
         let corner = |i: u32| Vec3::from(surface.vertices[i as usize].position).as_dvec3();
         let six: f64 = surface.indices.chunks(3).map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum();
         // A box, less the segment that the crown leaves out: w^3 / 24 R of area, a little less for its chords.

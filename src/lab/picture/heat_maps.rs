@@ -1,7 +1,7 @@
 //! Tactile signatures as heat maps: a pad unrolled at one instant; joints, and rows of taxels, over time.
 //!
-//! Colours of loads stand for pressure with the limit of the 3-D view, [`PAD_FULL_SCALE`], whichever unit the numbers
-//! have. A row's pressure is its force over the area of all its taxels.
+//! Colours of loads stand for pressure, whichever unit the numbers have; on a pad at one instant, with the limit of the 3-D
+//! view. A row's pressure is its force over the area of all its taxels.
 
 use palpate_geometry::drawing::{CellAxis, ColourScale, HeatMap};
 use palpate_geometry::units::mm;
@@ -12,6 +12,17 @@ use std::borrow::Borrow;
 
 /// Pressure that has the brightest colour (Pa): taxel pressures of an ordinary hold reach some 30 kPa.
 pub const PAD_FULL_SCALE: f32 = 40e3;
+/// Pressures that may have the brightest colour (Pa).
+const FULL_SCALES: [f32; 8] = [5e3, 10e3, 20e3, 40e3, 100e3, 200e3, 500e3, 1000e3];
+
+/// Pressure that has the brightest colour (Pa) in pictures of these frames of a grasp: a round number that holds the highest
+/// pressure of any taxel.
+pub fn full_scale_of<'a>(gripper: &GripperModel, frames: impl IntoIterator<Item = &'a Frame>) -> f32 {
+    let area = gripper.taxels().area() as f32;
+    let highest = frames.into_iter().flat_map(|frame| &frame.taxels).map(|load| load.normal / area).fold(0.0, f32::max);
+    FULL_SCALES.into_iter().find(|full| highest <= *full).unwrap_or(FULL_SCALES[FULL_SCALES.len() - 1])
+}
+
 /// Curvature that has the strongest colour (1/m): a radius of 50 mm.
 const STRONGEST_BEND: f64 = 20.0;
 
@@ -61,8 +72,9 @@ impl LoadUnit {
         }
     }
 
-    fn scale(self, area: f64) -> ColourScale {
-        ColourScale::Load((f64::from(PAD_FULL_SCALE) * area * self.factor(area)) as f32)
+    /// Scale whose end is a pressure (Pa) on an area (m²).
+    fn scale(self, area: f64, full_scale: f32) -> ColourScale {
+        ColourScale::Load((f64::from(full_scale) * area * self.factor(area)) as f32)
     }
 }
 
@@ -91,8 +103,9 @@ impl BendUnit {
     }
 }
 
-/// Both pads unrolled, left and right: rows from the palm to the tip, columns from negative to positive y of the gripper.
-pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit) -> [HeatMap; 2] {
+/// Both pads unrolled, left and right: rows from the palm to the tip, columns from negative to positive y of the gripper. The
+/// brightest colour is that of a pressure of `full_scale` (Pa), as in [`full_scale_of`].
+pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit, full_scale: f32) -> [HeatMap; 2] {
     let grid = gripper.taxels();
     let half_width = 0.5 * mm(gripper.finger.width);
     Side::BOTH.map(|side| {
@@ -107,7 +120,7 @@ pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit) -> [HeatMa
             x: axis("across", "mm", grid.columns, [-half_width, half_width]),
             y: rows(gripper),
             values,
-            scale: unit.scale(grid.area()),
+            scale: unit.scale(grid.area(), full_scale),
         }
     })
 }
@@ -122,7 +135,7 @@ pub fn whole_pads(gripper: &GripperModel, force: [f64; 2], area: f64, unit: Load
         x: axis("across", "mm", 1, [-half_width, half_width]),
         y: axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)]),
         values: vec![(force[side.index()] * unit.factor(area)) as f32],
-        scale: unit.scale(area),
+        scale: unit.scale(area, PAD_FULL_SCALE),
     })
 }
 
@@ -165,7 +178,7 @@ pub fn pad_rows_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F]
             x: time_axis(frames),
             y: rows(gripper),
             values,
-            scale: unit.scale(area),
+            scale: unit.scale(area, PAD_FULL_SCALE),
         }
     })
 }
@@ -186,8 +199,8 @@ pub enum SensorRows {
 pub fn channels_over_time(t_s: &[f64], sides: [&[&[f32]]; 2], rows: SensorRows, most: usize) -> [HeatMap; 2] {
     let (quantity, unit, factor, scale) = match rows {
         SensorRows::Curvature => ("curvature", "1/m", 1.0, ColourScale::Signed(STRONGEST_BEND as f32)),
-        SensorRows::Pressure => ("pressure", "kPa", 1e-3, LoadUnit::Pressure.scale(1.0)),
-        SensorRows::Force(area) => ("force", "N", 1.0, LoadUnit::Force.scale(area)),
+        SensorRows::Pressure => ("pressure", "kPa", 1e-3, LoadUnit::Pressure.scale(1.0, PAD_FULL_SCALE)),
+        SensorRows::Force(area) => ("force", "N", 1.0, LoadUnit::Force.scale(area, PAD_FULL_SCALE)),
     };
     let range = [t_s.first(), t_s.last()].map(|t| t.copied().unwrap_or(0.0));
     let columns = most.min(t_s.len());
@@ -272,7 +285,7 @@ mod tests {
         let gripper = GripperModel::default();
         // Second row, third column of the left pad; last taxel of the right one.
         let frame = frame(0, vec![0.0; 20], &[(6, 0.25), (319, 0.1)]);
-        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force);
+        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force, PAD_FULL_SCALE);
         assert_eq!((left.y.count, left.x.count, left.value(1, 2), right.value(39, 3)), (40, 4, 0.25, 0.1));
         assert_eq!(left.values.iter().filter(|value| **value != 0.0).count(), 1);
         assert_eq!(
@@ -280,7 +293,7 @@ mod tests {
             ("from palm 3.75\u{2009}mm".into(), "across 2.50\u{2009}mm".into())
         );
         // 0.25 N on 2.5 mm by 5 mm.
-        let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure)[0];
+        let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure, PAD_FULL_SCALE)[0];
         assert!((pressure.value(1, 2) - 20.0).abs() < 1e-5, "{}", pressure.value(1, 2));
         // The colour does not depend on the unit.
         assert_eq!((left.scale, pressure.scale), (ColourScale::Load(0.5), ColourScale::Load(40.0)));
@@ -348,7 +361,7 @@ mod tests {
         let rows = pad_rows_over_time(gripper, frames, LoadUnit::Force);
         let mut largest = 0.0f64;
         for (k, frame) in frames.iter().enumerate() {
-            let pads = pads_at(gripper, frame, LoadUnit::Force);
+            let pads = pads_at(gripper, frame, LoadUnit::Force, PAD_FULL_SCALE);
             for side in Side::BOTH {
                 let force = frame.normal_force(side, grid.count());
                 let taxels: f64 = pads[side.index()].values.iter().map(|value| f64::from(*value)).sum();

@@ -10,12 +10,13 @@ mod gripper_model;
 mod heat_maps;
 mod portrait;
 mod reconstructed;
+mod touch;
 
 pub use annotations::{SCALE_STEPS, legend_room};
 pub use contact_path::{ContactPath, PathColour, TouchedPlace, contact_path};
 pub use heat_maps::{
-    BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, joints_over_time, pad_rows_over_time, pads_at,
-    whole_pads,
+    BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
+    pad_rows_over_time, pads_at, whole_pads,
 };
 pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
@@ -106,6 +107,11 @@ impl Stage {
         }
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        if view.forces && view.annotations {
+            forces::label(&mut overlay, &self.gripper, &world_from_gripper, frame, view);
+        }
+        let mut fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale);
+        fingers.iter_mut().for_each(|finger| touch::clear_the_view(finger, &view.camera));
         DrawList {
             camera: view.camera,
             backdrop: [colours.sky, colours.horizon],
@@ -118,8 +124,12 @@ impl Stage {
             }),
             solids: self.solids(frame),
             ghosts: Vec::new(),
-            fingers: fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale),
-            arrows: if view.forces { forces::arrows(&self.gripper, &world_from_gripper, frame) } else { Vec::new() },
+            fingers,
+            arrows: if view.forces {
+                forces::arrows(&self.gripper, &world_from_gripper, frame, view)
+            } else {
+                Vec::new()
+            },
             overlay,
         }
     }
@@ -180,6 +190,17 @@ impl Stage {
             solids.push(solid(mesh, pose, 0.10));
         }
         solids
+    }
+
+    /// Pressure that has the brightest colour (Pa) in pictures of these frames of a grasp, as [`full_scale_of`].
+    pub fn full_scale_of<'a>(&self, frames: impl IntoIterator<Item = &'a Frame>) -> f32 {
+        full_scale_of(&self.gripper, frames)
+    }
+
+    /// This camera, moved towards what the pads touch as the grip tightens.
+    pub fn nearer_to_touch(&self, camera: Camera, frame: &Frame) -> Camera {
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        touch::nearer(camera, &self.gripper, &world_from_gripper, frame)
     }
 
     /// A ball around what matters, to be framed by a camera: centre and radius (m).

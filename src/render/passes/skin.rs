@@ -40,6 +40,7 @@ struct SkinUniform {
     bellows: [f32; 4],
     pad: [f32; 4],
     taxels: [f32; 4],
+    veil: [f32; 4],
     map: [[f32; 4]; 17],
 }
 
@@ -73,10 +74,13 @@ struct FingerOnDevice {
     texels: Texture,
     size: [u32; 2],
     group: BindGroup,
+    /// A part of it is translucent.
+    veiled: bool,
 }
 
 struct SkinPass {
     pipeline: RenderPipeline,
+    veil: RenderPipeline,
     shadow: RenderPipeline,
     layout: BindGroupLayout,
     mesh: Option<SkinMesh>,
@@ -95,29 +99,27 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         step_mode: VertexStepMode::Vertex,
         attributes: &ATTRIBUTES,
     })];
-    let pipeline = picture_pipeline(
-        setup,
-        &PictureShape {
-            label: "skin",
-            shader: &shader,
-            fragment: "fragment",
-            buffers: &buffers,
-            groups: &[&layout],
-            topology: wgpu::PrimitiveTopology::TriangleList,
-            depth: Depth::Solid,
-            blends: false,
-        },
-    );
+    let pipeline = |label, fragment, depth| {
+        let (groups, topology) = (&[&layout][..], wgpu::PrimitiveTopology::TriangleList);
+        let blends = depth == Depth::Veil;
+        let buffers = &buffers;
+        picture_pipeline(
+            setup,
+            &PictureShape { label, shader: &shader, fragment, buffers, groups, topology, depth, blends },
+        )
+    };
+    let veil = pipeline("skin veil", "fragment_veil", Depth::Veil);
+    let pipeline = pipeline("skin", "fragment", Depth::Solid);
     let shadow = shadow_pipeline(setup, "skin shadow", &shader, &buffers, &[&layout]);
-    Box::new(SkinPass { pipeline, shadow, layout, mesh: None, fingers: Vec::new(), shown: 0 })
+    Box::new(SkinPass { pipeline, veil, shadow, layout, mesh: None, fingers: Vec::new(), shown: 0 })
 }
 
 impl SkinPass {
-    fn draw_all(&self, pass: &mut RenderPass<'_>) {
+    fn draw_those(&self, pass: &mut RenderPass<'_>, wanted: impl Fn(&FingerOnDevice) -> bool) {
         let Some(mesh) = &self.mesh else { return };
         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        for finger in &self.fingers[..self.shown] {
+        for finger in self.fingers[..self.shown].iter().filter(|finger| wanted(finger)) {
             pass.set_bind_group(1, &finger.group, &[]);
             pass.draw_indexed(0..mesh.count, 0, 0..1);
         }
@@ -153,17 +155,20 @@ impl Pass for SkinPass {
                 self.fingers.push(made);
             }
             self.fingers[k].write(prepare.queue, finger);
+            self.fingers[k].veiled = finger.veil.clearness > 0.0;
         }
     }
 
     fn draw_shadow(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.shadow);
-        self.draw_all(pass);
+        self.draw_those(pass, |_| true);
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.pipeline);
-        self.draw_all(pass);
+        self.draw_those(pass, |_| true);
+        pass.set_pipeline(&self.veil);
+        self.draw_those(pass, |finger| finger.veiled);
     }
 }
 
@@ -194,7 +199,7 @@ impl FingerOnDevice {
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(&view) },
             ],
         });
-        Self { uniform, texels, size, group }
+        Self { uniform, texels, size, group, veiled: false }
     }
 
     fn write(&self, queue: &Queue, finger: &SoftFinger) {
@@ -206,6 +211,7 @@ impl FingerOnDevice {
             bellows: linear(BELLOWS),
             pad: linear(SILICONE),
             taxels: [self.size[1] as f32, self.size[0] as f32, finger.full_scale, length],
+            veil: [finger.veil.stretch[0] / length, finger.veil.stretch[1] / length, finger.veil.clearness, 0.0],
             map: PRESSURE_MAP.map(linear),
         };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));

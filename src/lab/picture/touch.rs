@@ -1,0 +1,93 @@
+//! The touch in full view: the camera comes nearer as the grip tightens, and a finger that hides its own pad turns translucent
+//! there.
+
+use glam::{DVec3, Vec3};
+use palpate_geometry::Pose;
+use palpate_geometry::drawing::{Camera, SoftFinger, Veil};
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{GripperModel, Side};
+
+/// Force on both pads at which the camera is half way (N).
+const HALF_WAY: f32 = 0.05;
+/// Loaded area of both pads in the end, as a share of the square of the picture's height at its distance; and the least and
+/// the greatest of these heights (m).
+const SHARE: f32 = 0.026;
+const HEIGHTS: [f32; 2] = [0.045, 0.12];
+/// Least height of the eye (m).
+const ABOVE_GROUND: f32 = 0.006;
+/// Yaw and pitch in the end (rad): from the side, where the left pad is seen from behind, and low, as fingertips curl up.
+const ANGLES: [f32; 2] = [-1.2, -0.22];
+/// Pressure of a loaded taxel, as a share of the brightest colour.
+const LOADED: f32 = 0.02;
+/// Translucent stretch beyond the loaded taxels, towards the palm, whose bellows stand in the way, and the tip (m).
+const MARGINS: [f32; 2] = [0.016, 0.006];
+/// Force on a pad from which its finger is as clear as it gets (N).
+const CLEAR: f32 = 0.05;
+
+/// A camera moved towards the middle of what the pads touch.
+pub(super) fn nearer(camera: Camera, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Camera {
+    let grid = gripper.taxels();
+    let (mut moment, mut force, mut squares) = (DVec3::ZERO, 0.0, 0.0);
+    for side in Side::BOTH {
+        let placed = frame.placed(gripper, side);
+        for (taxel, load) in frame.loads(side, grid.count()) {
+            let (segment, along) = grid.place(taxel, &gripper.finger);
+            let normal = f64::from(load.normal).max(0.0);
+            moment += placed.point(segment, along, grid.across(taxel), grid.height(taxel)) * normal;
+            force += normal;
+            squares += normal * normal;
+        }
+    }
+    if force <= 0.0 {
+        return camera;
+    }
+    let touch = world_from_gripper.point(moment / force).as_vec3();
+    // Participation: the number of taxels if all bore the same load, without steps as taxels come and go.
+    let area = (grid.area() * force * force / squares) as f32;
+    let height = (area / SHARE).sqrt().clamp(HEIGHTS[0], HEIGHTS[1]);
+    let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
+    let tightness = (force as f32 / HALF_WAY).powf(1.5);
+    let share = tightness / (1.0 + tightness);
+    let target = camera.target.lerp(touch, share);
+    let distance = camera.distance * (nearest / camera.distance).powf(share);
+    // Not below the ground.
+    let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();
+    Camera {
+        target,
+        distance,
+        yaw: camera.yaw + share * (ANGLES[0] - camera.yaw),
+        pitch: (camera.pitch + share * (ANGLES[1] - camera.pitch)).max(lowest),
+        ..camera
+    }
+}
+
+/// Makes a finger translucent where its back hides its loaded pad from the camera.
+pub(super) fn clear_the_view(finger: &mut SoftFinger, camera: &Camera) {
+    let (rows, columns) = (finger.taxels.rows as usize, finger.taxels.columns as usize);
+    let Some(length) = finger.frames.last().map(|frame| frame.arc).filter(|_| rows > 0 && columns > 0) else { return };
+    let loads: Vec<f32> = finger
+        .taxels
+        .loads
+        .chunks_exact(columns)
+        .map(|row| row.iter().map(|load| load[0]).fold(0.0, f32::max))
+        .collect();
+    let loaded = |load: &f32| *load > LOADED * finger.full_scale;
+    let (Some(first), Some(last)) = (loads.iter().position(loaded), loads.iter().rposition(loaded)) else { return };
+    let arc = |row: usize| length * row as f32 / rows as f32;
+    let stretch = [arc(first) - MARGINS[0], arc(last + 1) + MARGINS[1]];
+    let middle = 0.5 * (arc(first) + arc(last + 1));
+    let near = |frame: &&palpate_geometry::drawing::FingerFrame| (frame.arc - middle).abs();
+    let Some(frame) = finger.frames.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else { return };
+    let towards_eye: Vec3 =
+        if camera.parallel { camera.axes()[2] } else { (camera.eye() - frame.position).normalize_or_zero() };
+    // From behind; seen from the side there is nothing to clear.
+    let behind = smoothstep(0.05, 0.25, -frame.inward.dot(towards_eye));
+    let area = finger.section.width * length / (rows * columns) as f32;
+    let force: f32 = finger.taxels.loads.iter().map(|load| load[0] * area).sum();
+    finger.veil = Veil { stretch, clearness: behind * smoothstep(0.0, CLEAR, force) };
+}
+
+fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
+    let share = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
+}
