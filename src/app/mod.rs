@@ -19,16 +19,16 @@
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
 //! | simulation | `features/simulation.rs` | simulated gripper and its scene |
 //! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
-//! | workflow | `features/labelling.rs` `features/library.rs` `features/recognition.rs` `features/studies.rs` | labelling session; trial library; recognition by both grippers; studies of the paper |
+//! | workflow | `features/labelling.rs` `features/library.rs` `features/recognition.rs` `features/presenter.rs` `features/studies.rs` | labelling session; trial library; recognition by both grippers; presenter mode; studies of the paper |
 //! | actions | `actions.rs` `features/` | actions of all features |
 //! | context | `context.rs` | read-only context of panels |
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
 //! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
-//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` | panels beside each other; command palette; file dialog inside the window |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter.rs` | panels beside each other; command palette; file dialog inside the window; presenter mode |
 //! | workbench | `workbench.rs` | owner of all features |
-//! | picture | `offscreen.rs` | the window as a picture, without a display |
+//! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |
 //!
 //! | to add | write | and register in |
@@ -58,6 +58,7 @@ mod panels;
 mod path_dialog;
 mod playback;
 mod plots;
+mod presenter;
 mod shown;
 mod shown_grasp;
 mod small_pads;
@@ -86,7 +87,7 @@ pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
 pub use features::view::{PathLayer, ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
-pub use offscreen::{OffscreenError, OffscreenWindow, window_picture};
+pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, frame_costs, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};

@@ -1,6 +1,7 @@
 //! The whole window as a picture, without a display: the same workbench, drawn into a texture.
 
 use crate::app::features::inspect::InspectAction;
+use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::view::{ViewAction, ViewState};
 use crate::app::modes::mode::Mode;
 use crate::app::playback::Seek;
@@ -10,9 +11,10 @@ use crate::app::workbench::{Workbench, WorkbenchSetup};
 use egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
-use palpate_render::{Picture, PictureError, wgpu};
+use palpate_render::{Picture, PictureError, describe_adapter, wgpu};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
+use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -71,6 +73,14 @@ const FRAME_S: f64 = 0.1;
 
 /// Draws the window once it shows the grasp at its time, or the trial.
 pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenError> {
+    let mut drawn = start(window)?;
+    drawn.show(window)?;
+    drawn.settle();
+    drawn.picture()
+}
+
+/// Starts the window, which stands still.
+fn start(window: &OffscreenWindow) -> Result<Drawn, OffscreenError> {
     let state = render_state(window.size)?;
     let ctx = egui::Context::default();
     let (wake, woken) = channel();
@@ -86,10 +96,69 @@ pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenErro
         ..WorkbenchSetup::new(window.scene.clone(), window.store.clone(), view, wake)
     };
     let workbench = Workbench::new(&ctx, setup)?;
-    let mut drawn = Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, shapes: Vec::new(), woken };
-    drawn.show(window)?;
+    Ok(Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, shapes: Vec::new(), woken })
+}
+
+/// What the frames of a window cost.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameCosts {
+    /// Driver that drew.
+    pub driver: String,
+    /// Width and height (pixels).
+    pub size: [u32; 2],
+    /// From the start to the first frame with the gripper (ms).
+    pub start_ms: f64,
+    /// CPU time of a frame outside the rasteriser while grasps run, 95th percentile (ms).
+    pub live_ms_p95: f64,
+    /// The same while nothing moves (ms).
+    pub paused_ms_p95: f64,
+    /// Frames drawn one after the other while grasps run, each until the rasteriser is done (1/s).
+    pub frames_per_s: f64,
+    /// Number of live frames.
+    pub frames: usize,
+}
+
+/// Frames that are drawn before any is measured, and paused ones that are.
+const WARM_UP: usize = 20;
+const PAUSED: usize = 100;
+
+/// Measures the frames of a window whose simulation runs for some seconds, and then stands still. `cpu_s` reads the CPU time of
+/// this thread (s).
+pub fn frame_costs(
+    window: &OffscreenWindow,
+    seconds: f64,
+    cpu_s: &dyn Fn() -> f64,
+) -> Result<FrameCosts, OffscreenError> {
+    let began = Instant::now();
+    let mut drawn = start(window)?;
+    let ctx = drawn.ctx.clone();
+    drawn.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
+    drawn.cost(cpu_s)?;
+    let start_ms = 1e3 * began.elapsed().as_secs_f64();
+    drawn.workbench.act(&ctx, Command::Play);
+    for _ in 0..WARM_UP {
+        drawn.cost(cpu_s)?;
+    }
+    let (mut live, began) = (Vec::new(), Instant::now());
+    while began.elapsed().as_secs_f64() < seconds {
+        // Another object once this one is decided.
+        if drawn.workbench.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
+            drawn.workbench.act(&ctx, RecognitionAction::NextObject);
+        }
+        live.push(drawn.cost(cpu_s)?);
+    }
+    let frames_per_s = live.len() as f64 / began.elapsed().as_secs_f64();
+    drawn.workbench.act(&ctx, Command::Pause);
     drawn.settle();
-    drawn.picture()
+    let paused = (0..PAUSED).map(|_| drawn.cost(cpu_s)).collect::<Result<Vec<f64>, _>>()?;
+    let (driver, size, frames) = (describe_adapter(&drawn.state.adapter.get_info()), drawn.size, live.len());
+    let [live_ms_p95, paused_ms_p95] = [live, paused].map(p95);
+    Ok(FrameCosts { driver, size, start_ms, live_ms_p95, paused_ms_p95, frames_per_s, frames })
+}
+
+fn p95(mut costs: Vec<f64>) -> f64 {
+    costs.sort_by(f64::total_cmp);
+    costs.get((costs.len() * 95).div_ceil(100).saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
 fn render_state(size: [u32; 2]) -> Result<RenderState, OffscreenError> {
@@ -204,9 +273,32 @@ impl Drawn {
         }
     }
 
+    /// Draws a frame until the rasteriser is done; returns the CPU time of this thread before that (ms).
+    fn cost(&mut self, cpu_s: &dyn Fn() -> f64) -> Result<f64, OffscreenError> {
+        let began_s = cpu_s();
+        self.frame();
+        let (encoder, texture) = self.record();
+        let commands = encoder.finish();
+        let cost_ms = 1e3 * (cpu_s() - began_s);
+        let Self { state, .. } = self;
+        state.queue.submit([commands]);
+        let done = state.device.poll(wgpu::PollType::wait_indefinitely());
+        done.map_err(|cause| OffscreenError::Driver(cause.to_string()))?;
+        drop(texture);
+        Ok(cost_ms)
+    }
+
     /// Draws the last frame into a texture and reads it back.
-    fn picture(self) -> Result<Picture, OffscreenError> {
-        let Self { ctx, state, size, shapes, .. } = self;
+    fn picture(mut self) -> Result<Picture, OffscreenError> {
+        let (encoder, texture) = self.record();
+        Ok(Picture::read_back(&self.state.device, &self.state.queue, encoder, &texture)?)
+    }
+
+    /// Records the drawing of the last frame into a texture.
+    fn record(&mut self) -> (wgpu::CommandEncoder, wgpu::Texture) {
+        let shapes = std::mem::take(&mut self.shapes);
+        let Self { ctx, state, size, .. } = self;
+        let size = *size;
         let screen = ScreenDescriptor { pixels_per_point: 1.0, size_in_pixels: size };
         let jobs = ctx.tessellate(shapes, 1.0);
         let (device, queue) = (&state.device, &state.queue);
@@ -241,6 +333,6 @@ impl Drawn {
             renderer.render(&mut pass.forget_lifetime(), &jobs, &screen);
         }
         queue.submit(before);
-        Ok(Picture::read_back(device, queue, encoder, &texture)?)
+        (encoder, texture)
     }
 }

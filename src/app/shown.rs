@@ -91,11 +91,18 @@ impl<'a> SourceData<'a> {
         let snapshot = self.snapshot?;
         let past = || {
             let trace = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp)?;
-            trace.frames.get(trace.sample_at(self.playback.cursor_s?)?)?.as_deref()
+            trace.frames.get(trace.sample_at(self.playback.cursor_s.or_else(|| self.held_s())?)?)?.as_deref()
         };
         let simulated = self.source == ViewSource::Simulation;
         let frame = past().filter(|_| simulated).unwrap_or(&snapshot.frame);
         Some(Moment { grasp: snapshot.grasp, stage: &snapshot.stage, frame })
+    }
+
+    /// Time at which the object of a finished round is shown: at the end of the hold (s), not fallen. None while grasps follow,
+    /// and where the user looks at another time.
+    pub(super) fn held_s(&self) -> Option<f64> {
+        let finished = self.source == ViewSource::Simulation && self.snapshot?.status.finished;
+        self.hold().filter(|_| finished && self.playback.cursor_s.is_none()).map(|[_, end]| end)
     }
 
     /// Answer of the recogniser in the past of a live gripper, where it is shown and has one.

@@ -9,6 +9,7 @@ use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::LibraryFeature;
+use crate::app::features::presenter::PresenterFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
 use crate::app::features::studies::Studies;
@@ -20,6 +21,7 @@ use crate::app::notices::{Notices, Remedy};
 use crate::app::palette;
 use crate::app::panels::{PanelKind, view3d};
 use crate::app::path_dialog::{Closed, PathDialog};
+use crate::app::presenter;
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
@@ -111,6 +113,7 @@ pub struct Workbench {
     inspect: InspectFeature,
     tools: GripperTools,
     studies: Studies,
+    presenter: PresenterFeature,
     files: FileFeature,
     path_dialog: Option<PathDialog>,
     thumbnails: Thumbnails,
@@ -207,6 +210,7 @@ impl Workbench {
             inspect,
             tools,
             studies,
+            presenter: PresenterFeature::default(),
             files: FileFeature::new(wake, setup.system_dialogs),
             path_dialog: None,
             thumbnails,
@@ -269,6 +273,14 @@ impl Workbench {
         let mut layout = self.view.layouts.remove(&mode).unwrap_or_else(|| modes::default_layout(mode));
         let context = self.context(&published);
         keys::pressed(&ctx, &context, &mut actions);
+        if self.view.presents {
+            presenter::ui(ui, &context, self.presenter.score());
+            self.view.layouts.insert(mode, layout);
+            for action in actions {
+                self.apply(&ctx, action);
+            }
+            return;
+        }
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
         Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, &context, &mut actions));
@@ -433,8 +445,9 @@ impl Workbench {
     /// Updates each feature once per frame.
     fn gather(&mut self, ctx: &egui::Context) {
         let Self { view, notices, simulation, gripper, labelling, library, .. } = self;
-        let Self { recognition, inspect, tools, studies, files, thumbnails, .. } = self;
+        let Self { recognition, inspect, tools, studies, files, thumbnails, presenter, .. } = self;
         simulation.gather(view, notices);
+        presenter.gather(ctx, simulation, view, notices);
         gripper.gather(simulation, view, notices);
         if let Some(action) = labelling.gather(gripper, simulation, view, notices) {
             // Opens or closes a trial; no change of one follows.
@@ -524,6 +537,9 @@ impl Workbench {
             Action::File(action) => files.apply(action, simulation),
             Action::Stop => {
                 (view.keys_shown, view.palette_shown) = (false, false);
+                if view.presents {
+                    view.apply(ctx, ViewAction::Present(false), None);
+                }
                 gripper.stop();
             }
             Action::Tell(message) => notices.tell(message),

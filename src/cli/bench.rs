@@ -1,8 +1,10 @@
 //! `palpate bench`: CPU time on this machine.
 
+mod frame;
 mod library;
 
 use super::Failure;
+use super::snapshot::parse_size;
 use super::terminal::{say, say_json, table};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{
@@ -17,7 +19,8 @@ use palpate_sim::scene::Accuracy;
   palpate bench physics
   palpate bench physics --reference --json
   palpate bench live --runs 1000
-  palpate bench library --trials 10000")]
+  palpate bench library --trials 10000
+  palpate bench frame --size 2560x1440")]
 pub(super) struct BenchArguments {
     #[command(subcommand)]
     benchmark: Benchmark,
@@ -59,6 +62,19 @@ enum Benchmark {
         #[arg(long)]
         json: bool,
     },
+    /// Measure frames of the whole window without a display: CPU time outside the rasteriser while grasps run and while
+    /// nothing moves, frames per second with it, and the time from the start to the first frame.
+    Frame {
+        /// Width and height (pixels).
+        #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
+        size: [u32; 2],
+        /// Seconds of grasps.
+        #[arg(long, default_value_t = 20.0, value_parser = parse_seconds)]
+        seconds: f64,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
     /// Measure a live step of the macro-layer: a sample in, probabilities out.
     Live {
         /// Sequences per row; the median is printed.
@@ -70,6 +86,11 @@ enum Benchmark {
     },
 }
 
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds| (1.0..=600.0).contains(seconds));
+    seconds.ok_or_else(|| "write 1 to 600 seconds".to_owned())
+}
+
 /// Tolerances in the table, beside the named accuracies.
 const TOLERANCES: [f64; 2] = [3e-4, 1e-5];
 
@@ -78,6 +99,7 @@ const FEW_AND_MANY: [usize; 2] = [4, 22];
 
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
     match &arguments.benchmark {
+        Benchmark::Frame { size, seconds, json } => frame::run(*size, *seconds, *json),
         Benchmark::Library { trials, runs, json } => library::run(*trials, *runs, *json),
         Benchmark::Physics { runs, reference, json } => physics(*runs, *reference, *json),
         Benchmark::Training { runs, json } => {

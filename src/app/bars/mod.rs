@@ -90,8 +90,9 @@ fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         if ui.button("Reset layout").on_hover_text("Restore the default layout of all modes").clicked() {
             actions.push(ViewAction::ResetLayout);
         }
-        if ui.button("Full screen  F11").clicked() {
-            actions.push(ViewAction::ToggleFullScreen);
+        let hint = "Full screen: object after object, with large letters and a score";
+        if ui.button("Presenter mode  F11").on_hover_text(hint).clicked() {
+            actions.push(ViewAction::Present(true));
         }
     });
     menu.response.on_hover_text("Actions, UI scale, layout");

@@ -6,6 +6,7 @@ pub(super) mod gripper;
 pub(super) mod inspect;
 pub(super) mod labelling;
 pub(super) mod library;
+pub(super) mod presenter;
 pub(super) mod recognition;
 pub(super) mod simulation;
 pub(super) mod studies;

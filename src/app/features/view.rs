@@ -26,6 +26,9 @@ pub struct ViewState {
     /// Camera as last framed; while the user leaves it there, it follows the objects.
     #[serde(skip)]
     pub framed: Option<Camera>,
+    /// Presenter mode is on.
+    #[serde(skip)]
+    pub presents: bool,
     /// Force arrows are drawn.
     pub forces: bool,
     /// Contact path on the object.
@@ -152,8 +155,8 @@ pub enum ViewAction {
     SetScale(f32),
     /// Bring a panel to the front, in a mode that has it.
     ShowPanel(&'static str),
-    /// Change between window and full screen.
-    ToggleFullScreen,
+    /// Begin or end presenter mode: full screen, object after object.
+    Present(bool),
     /// Restore the default layouts.
     ResetLayout,
 }
@@ -169,6 +172,7 @@ impl Default for ViewState {
         Self {
             theme: Theme::Dark,
             camera: Camera::default(),
+            presents: false,
             framed: None,
             forces: true,
             path: PathLayer::default(),
@@ -232,9 +236,9 @@ impl ViewState {
             }
             // The workbench knows which mode has it.
             ViewAction::ShowPanel(_) => {}
-            ViewAction::ToggleFullScreen => {
-                let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
-                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!full));
+            ViewAction::Present(on) => {
+                self.presents = on;
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
             }
             ViewAction::ResetLayout => self.layouts.clear(),
         }

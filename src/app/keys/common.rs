@@ -50,7 +50,7 @@ const GENERAL: &[Binding] = &[
     key(COMMAND, Key::Minus, "smaller texts and buttons", |c| scaled(c, -SCALE_STEP)),
     key(COMMAND, Key::Num0, "texts and buttons at 100 %", |_| Some(ViewAction::SetScale(1.0).into())),
     key(NONE, Key::F1, "show or hide the keys", |c| Some(ViewAction::ShowKeys(!c.view.keys_shown).into())),
-    key(NONE, Key::F11, "full screen", |_| Some(ViewAction::ToggleFullScreen.into())),
+    key(NONE, Key::F11, "presenter mode", |c| Some(ViewAction::Present(!c.view.presents).into())),
 ];
 
 const VIEW: &[Binding] = &[
@@ -106,7 +106,9 @@ const GRIPPER: &[Binding] = &[
     key(NONE, Key::D, "discard the trial", |_| Some(LabellingAction::Discard.into())),
     key(NONE, Key::T, "tare the sensors of the real gripper", |_| Some(GripperCommand::Tare.into())),
     key(COMMAND, Key::G, "connect or disconnect the real gripper", |_| Some(GripperAction::ToggleConnection.into())),
-    key(NONE, Key::Escape, "STOP: vent the real gripper and end the trial; close the keys", |_| Some(Action::Stop)),
+    key(NONE, Key::Escape, "STOP: vent the real gripper and end the trial; close the keys, end presenter mode", |_| {
+        Some(Action::Stop)
+    }),
 ];
 
 /// True in the mode whose changes are those of the scene.

@@ -22,7 +22,7 @@ mod objects;
 mod pads;
 mod plan;
 mod pressure;
-mod recognition;
+pub(super) mod recognition;
 mod scene;
 mod sensors;
 mod signature;

@@ -38,7 +38,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         return;
     }
     steer(ui, &response, context, moment, actions);
-    let picture = paint(ui, rect, context, moment);
+    let picture = paint(ui, rect, context, moment, 1.0);
     small_pads(ui, rect, context, &picture);
     buttons(ui, rect, context, actions);
     if let Some(loading) = context.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
@@ -177,11 +177,23 @@ pub(in crate::app) fn exported(ctx: &egui::Context, context: &PanelContext<'_>) 
     Some(ExportRequest::View3d(Box::new(list), EXPORTED))
 }
 
-/// Draws the picture; returns what it was drawn by.
-fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) -> PictureView {
-    let Drawn { list, view, ghost, real } = drawn(ui.ctx(), context, moment, Vec2::new(rect.width(), rect.height()));
-    let pixels_per_point = ui.ctx().pixels_per_point();
-    let pixels = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
+/// The picture alone, with letters of a size relative to the usual one; false where there is nothing to draw.
+pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, context: &PanelContext<'_>, letters: f32) -> bool {
+    match context.shown().moment().filter(|_| context.driver.is_some()) {
+        Some(moment) => {
+            paint(ui, rect, context, moment, letters);
+            true
+        }
+        None => false,
+    }
+}
+
+/// Draws the picture, with letters of a size relative to the usual one; returns what it was drawn by.
+fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, letters: f32) -> PictureView {
+    let size = Vec2::new(rect.width(), rect.height());
+    let Drawn { list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
+    let pixels = [rect.width(), rect.height()].map(|side| (side * ui.ctx().pixels_per_point()).round().max(1.0) as u32);
+    let pixels_per_point = ui.ctx().pixels_per_point() * letters;
     let (grasp, sample) = (moment.grasp, moment.frame.t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
     let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
@@ -189,7 +201,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>) ->
         None if key.real.is_some() => {
             "Translucent: real fingers, reconstructed from the flex strips. Solid: simulation.".to_owned()
         }
-        None => String::new(),
+        None => context.shown().held_s().map_or_else(String::new, |t| format!("In the hold, at {t:.1}\u{2009}s.")),
     };
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
     if !caption.is_empty() {

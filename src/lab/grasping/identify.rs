@@ -4,7 +4,7 @@
 use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use palpate_learn::{
-    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, Pmf, Sequence, Shipped, Signatures, StopReason,
+    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped, Signatures, StopReason,
     StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
@@ -139,6 +139,17 @@ impl IdentificationView {
             StopReason::Unknown => "unknown",
             StopReason::Sure | StopReason::GraspLimit => &self.labels.classes[belief.top().0].name,
         })
+    }
+
+    /// True where the decision is that the object is none of the known ones.
+    pub fn is_unknown(&self) -> bool {
+        self.decision == Some(StopReason::Unknown) || self.decided() == Some(OTHER)
+    }
+
+    /// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class.
+    pub fn is_right(&self, truth: &str) -> Option<bool> {
+        let decided = self.decided()?;
+        Some(if self.is_unknown() { self.labels.class(truth).is_none() } else { decided == truth })
     }
 }
 

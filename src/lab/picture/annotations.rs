@@ -99,6 +99,11 @@ fn add_legend(overlay: &mut Overlay, view: &PictureView, from_top: f32, title: &
     let colour = ink(view.theme);
     let left = view.size.x - MARGIN - WIDTH;
     let top = from_top + 16.0;
+    // Legible on whatever comes near.
+    let (min, max) =
+        (Vec2::new(left - 8.0, from_top - 6.0), Vec2::new(left + WIDTH + 8.0, from_top + LEGEND_HEIGHT - 6.0));
+    let ground = [view.theme.colours().background; 2];
+    overlay.shapes.push(Shape2::Rectangle { min, max, colours: ground, opacity: 0.55 });
     overlay.text(Vec2::new(left, from_top + 4.0), Align::Left, TEXT, colour, title);
     let steps = PRESSURE_MAP.len() - 1;
     for k in 0..steps {

@@ -22,6 +22,8 @@ const FULL_SCALE: f64 = 0.5;
 /// Height of the numbers (points), and their distance from the tips.
 const TEXT: f32 = 15.0;
 const GAP: f32 = 16.0;
+/// Least distance of a number from the left and the upper edge (points).
+const MARGIN: Vec2 = Vec2::new(60.0, 24.0);
 /// Least height of a picture with numbers (points).
 const LEAST_HEIGHT: f32 = 260.0;
 
@@ -83,8 +85,11 @@ pub(super) fn label(
         let text = format!("{} {:.2}\u{2009}N", force.name, force.vector.length());
         // Beside steep arrows, beyond level ones.
         let room = 0.5 * TEXT * 0.5 * text.chars().count() as f32 * along.x.abs();
-        let margin = Vec2::new(60.0, 24.0);
-        let place = (to + along * (GAP + room)).clamp(margin, (view.size - margin).max(margin));
+        let place = to + along * (GAP + room);
+        // Above the scale bar and, on the left, the axes.
+        let below = if place.x < 150.0 { 104.0 } else { 54.0 };
+        let most = (view.size - Vec2::new(60.0, below)).max(MARGIN);
+        let place = place.clamp(MARGIN, most);
         // The letters of this font are half as wide as high.
         let half = Vec2::new(0.26 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
         let plate =

@@ -6,6 +6,7 @@ use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Camera, SoftFinger, Veil};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Force on both pads at which the camera is half way (N).
 const HALF_WAY: f32 = 0.05;
@@ -15,7 +16,8 @@ const SHARE: f32 = 0.026;
 const HEIGHTS: [f32; 2] = [0.045, 0.12];
 /// Least height of the eye (m).
 const ABOVE_GROUND: f32 = 0.006;
-/// Yaw and pitch in the end (rad): from the side, where the left pad is seen from behind, and low, as fingertips curl up.
+/// Yaw against the gripper, and pitch, in the end (rad): from the side, where a pad is seen from behind, and low, as
+/// fingertips curl up.
 const ANGLES: [f32; 2] = [-1.2, -0.22];
 /// Pressure of a loaded taxel, as a share of the brightest colour.
 const LOADED: f32 = 0.02;
@@ -50,12 +52,16 @@ pub(super) fn nearer(camera: Camera, gripper: &GripperModel, world_from_gripper:
     let share = tightness / (1.0 + tightness);
     let target = camera.target.lerp(touch, share);
     let distance = camera.distance * (nearest / camera.distance).powf(share);
+    // One of the fingers is seen from behind, whichever is nearer.
+    let closing = world_from_gripper.direction(DVec3::X);
+    let from_side = closing.y.atan2(closing.x) as f32 + ANGLES[0];
+    let turn = (from_side - camera.yaw + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     // Not below the ground.
     let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();
     Camera {
         target,
         distance,
-        yaw: camera.yaw + share * (ANGLES[0] - camera.yaw),
+        yaw: camera.yaw + share * turn,
         pitch: (camera.pitch + share * (ANGLES[1] - camera.pitch)).max(lowest),
         ..camera
     }

@@ -41,6 +41,8 @@ pub enum Command {
     SetSensors(SensorView),
     /// Recogniser from now on; restarts the grasp.
     SetModels(Models),
+    /// Whether the first grasp of each object has a random pose too, instead of that of the scene; from the next scene on.
+    SetFirstDrawn(bool),
     /// Whether trials are stored.
     SetRecording(bool),
     /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.

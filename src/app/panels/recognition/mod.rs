@@ -7,7 +7,7 @@ mod lesson;
 mod properties;
 mod strip;
 mod touch;
-mod words;
+pub(in crate::app) mod words;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
@@ -244,7 +244,7 @@ impl Part<'_, '_> {
     fn truth_ui(&mut self, ui: &mut Ui, (truth, title): &(&str, String)) {
         let colours = self.colours();
         let shown = self.context.view.truth_shown;
-        let right = words::is_right(self.view, truth).filter(|_| shown);
+        let right = self.view.is_right(truth).filter(|_| shown);
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
@@ -320,7 +320,7 @@ impl Part<'_, '_> {
                         self.actions.push(ViewAction::ShowPanel("why"));
                     }
                     let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
-                    let is_unknown = words::is_unknown(self.view) && self.context.source == ViewSource::Gripper;
+                    let is_unknown = self.view.is_unknown() && self.context.source == ViewSource::Gripper;
                     if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
                         self.actions.push(ViewAction::ShowPanel("label"));
                     }
@@ -338,7 +338,7 @@ fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
 }
 
 /// Line of text, made smaller to fit the width and cut off with dots below the least size.
-fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+pub(in crate::app) fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
     let lay = |text: String, letters: f32| ui.painter().layout_no_wrap(text, FontId::proportional(letters), ink);
     let whole = lay(text.clone(), letters);
     if whole.size().x <= width {
@@ -358,7 +358,7 @@ fn eased(ui: &Ui, id: egui::Id, p: Option<f64>) -> f32 {
 }
 
 /// Paints a text aligned within a place.
-fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
+pub(in crate::app) fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
     let at = align.align_size_within_rect(text.size(), place).min;
     ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }

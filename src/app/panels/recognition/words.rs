@@ -2,7 +2,7 @@
 
 use crate::app::shown::Recognised;
 use palpate_lab::grasping::IdentificationView;
-pub(super) use palpate_lab::why::percent;
+pub(in crate::app) use palpate_lab::why::percent;
 use palpate_learn::{Labels, OTHER, Pmf, StopReason};
 use palpate_sim::objects::object_title;
 
@@ -14,7 +14,7 @@ pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect se
 
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Headline {
+pub(in crate::app) enum Headline {
     /// No answer yet.
     Waiting,
     /// Too early to say.
@@ -28,7 +28,7 @@ pub(super) enum Headline {
 }
 
 impl Headline {
-    pub(super) fn of(view: &IdentificationView) -> Self {
+    pub(in crate::app) fn of(view: &IdentificationView) -> Self {
         let Some((class, p)) = newest(view).map(Pmf::top) else { return Self::Waiting };
         match view.decision {
             Some(StopReason::Unknown) => Self::Unknown,
@@ -39,7 +39,7 @@ impl Headline {
     }
 
     /// Text and probability.
-    pub(super) fn text(self, labels: &Labels) -> (String, Option<f64>) {
+    pub(in crate::app) fn text(self, labels: &Labels) -> (String, Option<f64>) {
         match self {
             Self::Waiting => ("Ready".to_owned(), None),
             Self::Sensing => ("Sensing ..".to_owned(), None),
@@ -55,7 +55,7 @@ pub(super) fn newest(view: &IdentificationView) -> Option<&Pmf> {
 }
 
 /// Reason for another grasp, or for the decision.
-pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
+pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
         let failed = "grasp failed: no answer";
@@ -82,17 +82,6 @@ pub(super) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> 
         None if certain => format!("{}, but the grasps disagree: {}", percent(p), recognised.again),
         None => format!("{}: {}", recognised.again, leaders(&view.labels, now)),
     }
-}
-
-/// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class.
-pub(super) fn is_right(view: &IdentificationView, truth: &str) -> Option<bool> {
-    let decided = view.decided()?;
-    Some(if is_unknown(view) { view.labels.class(truth).is_none() } else { decided == truth })
-}
-
-/// True where the decision is that the object is none of the known ones.
-pub(super) fn is_unknown(view: &IdentificationView) -> bool {
-    view.decision == Some(StopReason::Unknown) || view.decided() == Some(OTHER)
 }
 
 /// Title of a class.
@@ -194,11 +183,11 @@ mod tests {
     #[test]
     fn unknown_is_right_for_an_object_that_is_no_class() {
         let decided = |reason| view(Some(0.95), &[0.95], Some(reason));
-        assert_eq!(is_right(&view(Some(0.95), &[], None), "lemon"), None);
-        assert_eq!(is_right(&decided(StopReason::Sure), "lemon"), Some(true));
-        assert_eq!(is_right(&decided(StopReason::GraspLimit), "tomato"), Some(false));
-        assert_eq!(is_right(&decided(StopReason::Unknown), "tomato"), Some(false));
-        assert_eq!(is_right(&decided(StopReason::Unknown), "part of my own"), Some(true));
+        assert_eq!(view(Some(0.95), &[], None).is_right("lemon"), None);
+        assert_eq!(decided(StopReason::Sure).is_right("lemon"), Some(true));
+        assert_eq!(decided(StopReason::GraspLimit).is_right("tomato"), Some(false));
+        assert_eq!(decided(StopReason::Unknown).is_right("tomato"), Some(false));
+        assert_eq!(decided(StopReason::Unknown).is_right("part of my own"), Some(true));
     }
 
     #[test]

@@ -80,6 +80,8 @@ pub(super) struct Session {
     listener: Option<Listener>,
     /// Probability from which a class counts as certain, in place of the model's own.
     threshold: Option<f64>,
+    /// The first grasp of each object has a random pose too.
+    first_drawn: bool,
     sensors: SensorView,
     nominal: Scene,
     object: Option<LoadedObject>,
@@ -141,6 +143,7 @@ impl Session {
             models: setup.models,
             listener: None,
             threshold: None,
+            first_drawn: false,
             sensors: setup.sensors,
             nominal: setup.scene,
             object: None,
@@ -265,6 +268,7 @@ impl Session {
                 }
                 self.reconsider();
             }
+            Command::SetFirstDrawn(drawn) => self.first_drawn = drawn,
             Command::SetRecording(recording) => {
                 self.status.recording = recording;
                 if !recording {
@@ -321,8 +325,10 @@ impl Session {
             listener.another_scene();
         }
         self.sampler = None;
-        self.own_pose_done = false;
-        self.poses_drawn = 0;
+        self.own_pose_done = self.first_drawn;
+        if !self.first_drawn {
+            self.poses_drawn = 0;
+        }
         // An object chosen after the last grasp is grasped at once.
         self.status.playing |= self.status.finished;
         self.begin_round();
