@@ -111,6 +111,13 @@ impl<'a> PanelContext<'a> {
         }
     }
 
+    /// True while the picture moves and no graphics card draws it: then it has fewer pixels.
+    pub(super) fn draws_coarsely(&self) -> bool {
+        let is_slow = self.driver.is_some_and(|driver| driver.contains("software rendering"));
+        let plays = self.playback.playing || self.snapshot.is_some_and(|snapshot| snapshot.status.playing);
+        is_slow && plays
+    }
+
     /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.
     pub(super) fn grasp_to_explain(&self) -> Result<ExplainRequest, String> {
         if let (ViewSource::Trial, Some(Inspected { trial, .. })) = (self.source, self.inspected) {

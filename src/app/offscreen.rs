@@ -73,15 +73,15 @@ const FRAME_S: f64 = 0.1;
 
 /// Draws the window once it shows the grasp at its time, or the trial.
 pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenError> {
-    let mut drawn = start(window)?;
+    let mut drawn = start(window, RendererOptions::PREDICTABLE)?;
     drawn.show(window)?;
     drawn.settle();
     drawn.picture()
 }
 
 /// Starts the window, which stands still.
-fn start(window: &OffscreenWindow) -> Result<Drawn, OffscreenError> {
-    let state = render_state(window.size)?;
+fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, OffscreenError> {
+    let state = render_state(window.size, drawing)?;
     let ctx = egui::Context::default();
     let (wake, woken) = channel();
     let wake = Arc::new(move || {
@@ -130,7 +130,8 @@ pub fn frame_costs(
     cpu_s: &dyn Fn() -> f64,
 ) -> Result<FrameCosts, OffscreenError> {
     let began = Instant::now();
-    let mut drawn = start(window)?;
+    // As in a window on a screen.
+    let mut drawn = start(window, RendererOptions::default())?;
     let ctx = drawn.ctx.clone();
     drawn.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
     drawn.cost(cpu_s)?;
@@ -161,12 +162,12 @@ fn p95(mut costs: Vec<f64>) -> f64 {
     costs.get((costs.len() * 95).div_ceil(100).saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
-fn render_state(size: [u32; 2]) -> Result<RenderState, OffscreenError> {
+fn render_state(size: [u32; 2], drawing: RendererOptions) -> Result<RenderState, OffscreenError> {
     let options = wgpu_options();
     let failed = |cause: &dyn std::fmt::Display| OffscreenError::Driver(cause.to_string());
     let create = async {
         let instance = options.wgpu_setup.new_instance().await;
-        RenderState::create(&options, &instance, None, RendererOptions::PREDICTABLE).await
+        RenderState::create(&options, &instance, None, drawing).await
     };
     let state = pollster::block_on(create).map_err(|e| failed(&e))?;
     let most = state.device.limits().max_texture_dimension_2d;

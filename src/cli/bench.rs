@@ -4,7 +4,6 @@ mod frame;
 mod library;
 
 use super::Failure;
-use super::snapshot::parse_size;
 use super::terminal::{say, say_json, table};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{
@@ -66,7 +65,7 @@ enum Benchmark {
     /// nothing moves, frames per second with it, and the time from the start to the first frame.
     Frame {
         /// Width and height (pixels).
-        #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
+        #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_window)]
         size: [u32; 2],
         /// Seconds of grasps.
         #[arg(long, default_value_t = 20.0, value_parser = parse_seconds)]
@@ -84,6 +83,12 @@ enum Benchmark {
         #[arg(long)]
         json: bool,
     },
+}
+
+fn parse_window(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (320..=4096).contains(side));
+    let sides = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    sides.ok_or_else(|| "write WIDTHxHEIGHT, each from 320 to 4096, as in 1280x800".to_owned())
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {

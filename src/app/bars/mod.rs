@@ -54,6 +54,11 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions
             let room = ui.available_width();
             if let Some(driver) = context.driver.filter(|_| room > 240.0) {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    let driver = if context.draws_coarsely() {
+                        format!("{driver}; half resolution while it moves")
+                    } else {
+                        driver.to_owned()
+                    };
                     let quiet = RichText::new(driver).small().color(colour(context.view.theme.colours().quiet_text));
                     ui.add(egui::Label::new(quiet).truncate());
                 });

@@ -161,6 +161,9 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
     Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
 }
 
+/// Share of the pixels along each side that a slow rasteriser draws while the picture moves.
+const COARSE: f32 = 0.5;
+
 /// Size of exported pictures (points).
 const EXPORTED: [u32; 2] = [800, 560];
 
@@ -192,8 +195,10 @@ pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, context: &PanelContext<'_>
 fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, letters: f32) -> PictureView {
     let size = Vec2::new(rect.width(), rect.height());
     let Drawn { list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
-    let pixels = [rect.width(), rect.height()].map(|side| (side * ui.ctx().pixels_per_point()).round().max(1.0) as u32);
-    let pixels_per_point = ui.ctx().pixels_per_point() * letters;
+    let share = if context.draws_coarsely() { COARSE } else { 1.0 };
+    let per_point = share * ui.ctx().pixels_per_point();
+    let pixels = [rect.width(), rect.height()].map(|side| (side * per_point).round().max(1.0) as u32);
+    let pixels_per_point = per_point * letters;
     let (grasp, sample) = (moment.grasp, moment.frame.t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
     let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {

@@ -482,7 +482,8 @@ impl Tabular {
             Classifier::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
             Classifier::Svm => Box::new(Svm::load(arrays, columns, classes)?),
         };
-        if !learned.so_far.is_empty() && !(model.answers_in_part() && learned.features.tell_beginnings()) {
+        let tells_beginnings = model.answers_in_part() && learned.features.tell_beginnings();
+        if !(learned.so_far.is_empty() || tells_beginnings) {
             return Err(LoadError::Card { part: "the calibration" });
         }
         Ok(Self(Arc::new(Fitted { learned, rows, model, other: card.labels.other() })))
