@@ -209,7 +209,8 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
         None => context.shown().held_s().map_or_else(String::new, |t| format!("In the hold, at {t:.1}\u{2009}s.")),
     };
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
-    if !caption.is_empty() {
+    // Presenter mode says it in its own words.
+    if !caption.is_empty() && letters == 1.0 {
         let ink = colour(context.view.theme.colours().text);
         let galley =
             ui.painter().layout(caption, egui::FontId::proportional(12.0), ink, (0.5 * rect.width()).max(80.0));
