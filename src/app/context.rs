@@ -114,8 +114,9 @@ impl<'a> PanelContext<'a> {
     /// True while the picture moves and no graphics card draws it: then it has fewer pixels.
     pub(super) fn draws_coarsely(&self) -> bool {
         let is_slow = self.driver.is_some_and(|driver| driver.contains("software rendering"));
-        let plays = self.playback.playing || self.snapshot.is_some_and(|snapshot| snapshot.status.playing);
-        is_slow && plays
+        let live = self.source == ViewSource::Simulation && !self.shown().looks_back();
+        let simulates = live && self.snapshot.is_some_and(|snapshot| snapshot.status.playing);
+        is_slow && (self.playback.playing || simulates)
     }
 
     /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.

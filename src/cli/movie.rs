@@ -7,7 +7,7 @@ use super::setup::{read_store, within};
 use super::snapshot::{OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
 use super::terminal::{note, say};
 use glam::Vec2;
-use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::OpenTrial;
 use palpate_lab::picture::PictureView;
@@ -72,7 +72,9 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let open = open_drawable(&store, id)?;
     let times = times(arguments, &open.trial)?;
     let gpu = Gpu::headless(DriverChoice::Any)?;
-    let mut shot = Shot { renderer: Renderer::new(&gpu.device, &gpu.queue), gpu, open: &open, arguments };
+    let full_scale = open.stage.full_scale_of(open.trial.frames.iter().map(AsRef::as_ref));
+    let renderer = Renderer::new(&gpu.device, &gpu.queue);
+    let mut shot = Shot { renderer, gpu, open: &open, full_scale, arguments };
     let stop = stop_flag()?;
     let mut writer = Writer::begin(&target, out, arguments, times.len())?;
     for (number, t_s) in times.iter().enumerate() {
@@ -114,26 +116,23 @@ struct Shot<'a> {
     gpu: Gpu,
     renderer: Renderer,
     open: &'a OpenDrawable,
+    /// Pressure that has the brightest colour (Pa).
+    full_scale: f32,
     arguments: &'a MovieArguments,
 }
 
 impl Shot<'_> {
     fn picture(&mut self, t_s: f64) -> Result<Picture, Failure> {
-        let Self { gpu, renderer, open, arguments } = self;
+        let Self { gpu, renderer, open, full_scale, arguments } = self;
         let OpenDrawable { stage, trial } = open;
-        let (centre, radius) = stage.bounds();
         let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
-        let mut camera = Camera::default().turned_to(arguments.view).framing(centre, radius);
-        if arguments.view == StandardView::Home {
-            camera = stage.nearer_to_touch(camera, now);
-        }
         let view = PictureView {
-            camera,
+            camera: stage.camera(arguments.view, now),
             theme: arguments.theme,
             size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
             forces: !arguments.no_forces,
             annotations: !arguments.bare,
-            full_scale: stage.full_scale_of(trial.frames.iter().map(AsRef::as_ref)),
+            full_scale: *full_scale,
             badge: (!arguments.bare).then(|| format!("{}, {t_s:.2} s", open.badge())),
             ..PictureView::default()
         };

@@ -6,7 +6,7 @@ use super::setup::{SceneArguments, read_store, store_path};
 use super::terminal::{note, say};
 use crate::app::{Mode, OffscreenWindow, window_picture};
 use glam::Vec2;
-use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::prepare;
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
@@ -233,7 +233,7 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
     let ghost = if arguments.ghost { simulated(arguments, Engine::Other)?.1.pop() } else { None };
     let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
-        camera: Camera::default().turned_to(arguments.view),
+        camera: stage.camera(arguments.view, frame),
         theme: arguments.theme,
         size: Vec2::new(size[0] as f32, size[1] as f32),
         forces: !arguments.no_forces,
@@ -242,12 +242,6 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
         full_scale: stage.full_scale_of(&frames),
         ..PictureView::default()
     };
-    let (centre, radius) = stage.bounds();
-    let mut camera = view.camera.framing(centre, radius);
-    if arguments.view == StandardView::Home {
-        camera = stage.nearer_to_touch(camera, frame);
-    }
-    let view = PictureView { camera, ..view };
     let mut list = stage.draw(frame, &view);
     if let Some(ghost) = &ghost {
         list.ghosts = stage.ghosts(ghost, view.theme);

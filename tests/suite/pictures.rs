@@ -8,7 +8,7 @@ use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::Vec2;
 use image::RgbaImage;
 use palpate::app::{InspectAction, LibraryAction, ViewAction};
-use palpate_geometry::drawing::{Camera, DrawList, StandardView};
+use palpate_geometry::drawing::{DrawList, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::picture::{PictureView, Stage, full_scale_of};
@@ -53,13 +53,8 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let trial = grasp(&scene, object.as_ref(), 0);
     let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
     let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-    let (centre, radius) = stage.bounds();
-    let mut camera = Camera::default().turned_to(shot.view).framing(centre, radius);
-    if shot.view == StandardView::Home {
-        camera = stage.nearer_to_touch(camera, frame);
-    }
     let view = PictureView {
-        camera,
+        camera: stage.camera(shot.view, frame),
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
@@ -136,8 +131,7 @@ fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
         let trial = grasp(&scene, object.as_ref(), 0);
         let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
         let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-        let (centre, radius) = stage.bounds();
-        let camera = stage.nearer_to_touch(Camera::default().framing(centre, radius), frame);
+        let camera = stage.camera(StandardView::Home, frame);
         let size_points = Vec2::from(size.map(|side| side as f32));
         let until = trial.frames().iter().take_while(|frame| frame.t <= HELD.at);
         let full_scale = full_scale_of(&scene.gripper, until);

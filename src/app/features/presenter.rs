@@ -71,7 +71,7 @@ impl PresenterFeature {
         if let Some(preset) = PosePreset::named(PRESET) {
             scene.pose = preset.poses();
         }
-        for command in [Command::SetFirstDrawn(true), Command::SetRecording(false), Command::SetSpeed(1.0)] {
+        for command in [Command::SetFirstDrawn(true), Command::SetRecording(false)] {
             simulation.send(command, notices);
         }
         simulation.apply(SimulationAction::SetScene(Box::new(scene)), view, notices);
@@ -103,6 +103,10 @@ impl PresenterFeature {
                 Some(false) => self.score.wrong += 1,
                 None => {}
             }
+        }
+        // Another object or another grasp was asked for meanwhile.
+        if !snapshot.status.finished {
+            self.next_at = None;
         }
         let Some(left) = self.next_at.map(|next_at| next_at - now) else { return };
         if left <= 0.0 {

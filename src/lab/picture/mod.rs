@@ -22,7 +22,7 @@ pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};
-use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid};
+use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
 use palpate_geometry::palette::{Rgb, Theme, Trace};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
@@ -195,6 +195,13 @@ impl Stage {
     /// Pressure that has the brightest colour (Pa) in pictures of these frames of a grasp, as [`full_scale_of`].
     pub fn full_scale_of<'a>(&self, frames: impl IntoIterator<Item = &'a Frame>) -> f32 {
         full_scale_of(&self.gripper, frames)
+    }
+
+    /// Camera of a picture of the whole scene; from the home view it comes nearer to what the pads touch.
+    pub fn camera(&self, view: StandardView, frame: &Frame) -> Camera {
+        let (centre, radius) = self.bounds();
+        let camera = Camera::default().turned_to(view).framing(centre, radius);
+        if view == StandardView::Home { self.nearer_to_touch(camera, frame) } else { camera }
     }
 
     /// This camera, moved towards what the pads touch as the grip tightens.

@@ -80,13 +80,9 @@ impl ReadEncoder {
 }
 
 impl RowMaker {
-    /// The row of a whole grasp or of its beginning as after the first windows; the encoder reads the beginning.
-    fn forget_after(&self, windows: usize, mut row: Vec<f32>, beginning: &Sequence) -> Vec<f32> {
-        let (own, encoded) = row.split_at_mut(self.features.width());
-        self.features.forget_after(windows, own);
-        if let Some(encoder) = &self.encoder {
-            encoded.copy_from_slice(&encoder.features(beginning));
-        }
+    /// The row of a beginning of a grasp, of which the first windows are over; what comes later is unknown.
+    fn known(&self, windows: usize, mut row: Vec<f32>) -> Vec<f32> {
+        self.features.forget_after(windows, &mut row[..self.features.width()]);
         row
     }
 
@@ -386,9 +382,10 @@ impl FeatureRows<'_> {
                 let model = held_out.models[held_out.part_of[k]].as_deref()?;
                 let example = &self.data.examples[k];
                 let beginning = example.grasp.until(maker.features.end_of_window(stage * STAGE));
-                let of = |row: &Vec<f32>| maker.forget_after(stage * STAGE, row.clone(), &beginning);
-                let mirrored = self.mirrored.as_ref().filter(|_| mirroring.views).map(|rows| of(&rows[k]));
-                Some((answer(model, &of(&self.own[k]), mirrored.as_deref()), example.class))
+                let (own, mirrored) = maker.views(&beginning);
+                let own = maker.known(stage * STAGE, own);
+                let mirrored = mirrored.filter(|_| mirroring.views).map(|row| maker.known(stage * STAGE, row));
+                Some((answer(model, &own, mirrored.as_deref()), example.class))
             };
             let answers: Vec<(Pmf, usize)> = (0..self.own.len()).step_by(every).filter_map(answer).collect();
             self.calibration(&answers).0
@@ -565,15 +562,14 @@ impl Fitted {
             scale(&mut row, &self.learned.scaling);
             row
         };
-        let known = |row| if windows < WINDOWS { self.rows.forget_after(windows, row, grasp) } else { row };
+        let known = |row| if windows < WINDOWS { self.rows.known(windows, row) } else { row };
         let (own, mirrored) = self.rows.views(grasp);
         let own = scaled(known(own));
         let mirrored = mirrored.filter(|_| self.learned.both_views).map(|row| scaled(known(row)));
         let pmf = answer(self.model.as_ref(), &own, mirrored.as_deref());
         // That of a stage is for its end: until then, less is known.
-        let so_far = (windows / STAGE).checked_sub(1).and_then(|stage| self.learned.so_far.get(stage).copied());
-        let first = self.learned.so_far.first().copied().filter(|_| windows < STAGE);
-        let calibration = so_far.or(first).or(self.learned.calibration);
+        let so_far = self.learned.so_far.get((windows / STAGE).max(1) - 1).copied();
+        let calibration = so_far.or(self.learned.calibration);
         let pmf = calibration.map_or_else(|| pmf.clone(), |own| own.apply(&pmf));
         let pmf = as_one_of_many(&pmf, self.other);
         let pmf = before.map_or_else(|| pmf.clone(), |before| before.times(&pmf));
