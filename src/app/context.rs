@@ -81,6 +81,8 @@ pub struct PanelContext<'a> {
     pub thumbnails: &'a BTreeMap<String, egui::TextureHandle>,
     /// Name of the graphics driver; absent when the 3-D view cannot be drawn.
     pub driver: Option<&'a str>,
+    /// True if the processor draws the 3-D view, not a graphics card.
+    pub draws_in_software: bool,
 }
 
 /// Trials beside the one that is shown.
@@ -113,10 +115,9 @@ impl<'a> PanelContext<'a> {
 
     /// True while the picture moves and no graphics card draws it: then it has fewer pixels.
     pub(super) fn draws_coarsely(&self) -> bool {
-        let is_slow = self.driver.is_some_and(|driver| driver.contains("software rendering"));
         let live = self.source == ViewSource::Simulation && !self.shown().looks_back();
         let simulates = live && self.snapshot.is_some_and(|snapshot| snapshot.status.playing);
-        is_slow && (self.playback.playing || simulates)
+        self.draws_in_software && (self.playback.playing || simulates)
     }
 
     /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.

@@ -41,7 +41,7 @@ use palpate_lab::workers::{
     Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
 use palpate_learn::{ModelError, Models, Shipped};
-use palpate_render::describe_adapter;
+use palpate_render::{describe_adapter, draws_in_software};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
@@ -118,6 +118,7 @@ pub struct Workbench {
     path_dialog: Option<PathDialog>,
     thumbnails: Thumbnails,
     driver: Option<String>,
+    draws_in_software: bool,
     store: PathBuf,
     /// Labels at the last look.
     labels_seen: Option<Arc<LabelView>>,
@@ -184,9 +185,9 @@ impl Workbench {
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
         let mut tools = GripperTools::start(tools, &store, &wake)?;
         let studies = Studies::start(&store, &wake)?;
-        let driver = setup.render_state.map(|state| {
+        let adapter = setup.render_state.map(|state| {
             Viewport::install(state);
-            describe_adapter(&state.adapter.get_info())
+            state.adapter.get_info()
         });
         // Layouts of other versions are forgotten.
         view.layouts.retain(|mode, layout| modes::is_complete(*mode, layout));
@@ -214,7 +215,8 @@ impl Workbench {
             files: FileFeature::new(wake, setup.system_dialogs),
             path_dialog: None,
             thumbnails,
-            driver,
+            driver: adapter.as_ref().map(describe_adapter),
+            draws_in_software: adapter.as_ref().is_some_and(draws_in_software),
             store,
             labels_seen: None,
             phases: Vec::new(),
@@ -367,6 +369,7 @@ impl Workbench {
             view: &self.view,
             thumbnails: self.thumbnails.textures(),
             driver: self.driver.as_deref(),
+            draws_in_software: self.draws_in_software,
         }
     }
 

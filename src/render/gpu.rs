@@ -93,13 +93,14 @@ fn preference(info: &AdapterInfo) -> u8 {
     }
 }
 
+/// True if the processor draws, not a graphics card.
+pub fn draws_in_software(info: &AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu || info.name.contains("llvmpipe")
+}
+
 /// A driver in a few words: its name, its interface, and whether it draws in software.
 pub fn describe_adapter(info: &AdapterInfo) -> String {
-    let software = if info.device_type == wgpu::DeviceType::Cpu || info.name.contains("llvmpipe") {
-        ", software rendering"
-    } else {
-        ""
-    };
+    let software = if draws_in_software(info) { ", software rendering" } else { "" };
     let name = info.name.split(" (").next().unwrap_or(&info.name);
     format!("{name} ({}{software})", info.backend)
 }

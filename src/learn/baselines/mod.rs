@@ -4,6 +4,7 @@
 
 mod candle_network;
 mod convolution;
+mod feature_rows;
 mod felt_steps;
 mod geometry;
 mod geometry_network;

@@ -3,8 +3,8 @@
 //! Probabilities are calibrated by a temperature and a share of doubt, fitted to the answers on held-out grasps: forests
 //! and boosted trees order the classes well, but are far too unsure or too sure of them.
 
-use super::felt_steps::Columns;
-use super::geometry::{GeometryEncoder, Shipped};
+use super::feature_rows::{ReadEncoder, RowMaker, scale, scaling};
+use super::geometry::Shipped;
 use super::neighbours::Neighbours;
 use super::other::{as_one_of_many, other_weight};
 use super::row_model::{RowModel, Rows};
@@ -54,57 +54,6 @@ struct Fitted {
     /// The class "other".
     other: Option<usize>,
 }
-
-/// Features of a grasp, with those of the geometry encoder for classifiers that read them.
-struct RowMaker {
-    features: Features,
-    encoder: Option<ReadEncoder>,
-}
-
-/// The geometry encoder with the columns of its channels.
-struct ReadEncoder {
-    encoder: Arc<GeometryEncoder>,
-    columns: Columns,
-}
-
-impl ReadEncoder {
-    /// The encoder on readings of these channels; none where they lack one of its own.
-    fn on(encoder: Arc<GeometryEncoder>, channels: &[String]) -> Option<Self> {
-        let columns = Columns::of(encoder.channels(), channels)?;
-        Some(Self { encoder, columns })
-    }
-
-    fn features(&self, grasp: &Sequence) -> Vec<f32> {
-        self.encoder.features(&self.columns.pick(grasp))
-    }
-}
-
-impl RowMaker {
-    /// The row of a beginning of a grasp, of which the first windows are over; what comes later is unknown.
-    fn known(&self, windows: usize, mut row: Vec<f32>) -> Vec<f32> {
-        self.features.forget_after(windows, &mut row[..self.features.width()]);
-        row
-    }
-
-    fn width(&self) -> usize {
-        self.features.width() + self.encoder.as_ref().map_or(0, |own| own.encoder.width())
-    }
-
-    /// Features of a grasp, and of its mirror image where it can be mirrored.
-    fn views(&self, grasp: &Sequence) -> (Vec<f32>, Option<Vec<f32>>) {
-        let (mut own, mut mirrored) = (self.features.row(grasp), self.features.mirrored(grasp));
-        if let Some(encoder) = &self.encoder {
-            // They are means over both views.
-            let encoded = encoder.features(grasp);
-            own.extend_from_slice(&encoded);
-            mirrored.iter_mut().for_each(|row| row.extend_from_slice(&encoded));
-        }
-        (own, mirrored)
-    }
-}
-
-/// Beginning of the names of the encoder's arrays in a model file.
-const ENCODER: &str = "encoder.";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Learned {
@@ -409,7 +358,7 @@ impl Tabular {
         check_enough(data, 2)?;
         fitting.refuse_settings()?;
         let features = Features::fit(kind.features(), data);
-        let encoder = kind.reads_geometry().then(|| encoder_of(data)).transpose()?;
+        let encoder = kind.reads_geometry().then(|| ReadEncoder::shipped_for(data)).transpose()?;
         let rows = RowMaker { features, encoder };
         let (own, mirrored): (Vec<_>, Vec<_>) = data.examples.iter().map(|e| rows.views(&e.grasp)).unzip();
         let mirrored = mirrored.into_iter().collect();
@@ -445,7 +394,7 @@ impl Tabular {
         let learned = Learned {
             kind,
             features: rows.features.clone(),
-            encoder: rows.encoder.as_ref().map(|own| own.encoder.settings()),
+            encoder: rows.encoder.as_ref().map(ReadEncoder::settings),
             scaling,
             model: description,
             calibration: Some(best.calibration),
@@ -458,7 +407,7 @@ impl Tabular {
     /// Restores a recogniser from a model file.
     pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
         let learned: Learned = card.settings_as()?;
-        let encoder = learned.encoder.as_ref().map(|settings| load_encoder(settings, &card.channels, arrays));
+        let encoder = learned.encoder.as_ref().map(|settings| ReadEncoder::load(settings, &card.channels, arrays));
         let rows = RowMaker { features: learned.features.clone(), encoder: encoder.transpose()? };
         if rows.encoder.is_some() != learned.kind.reads_geometry() {
             return Err(LoadError::Card { part: "the geometry encoder" });
@@ -485,20 +434,6 @@ impl Tabular {
         }
         Ok(Self(Arc::new(Fitted { learned, rows, model, other: card.labels.other() })))
     }
-}
-
-/// The shipped geometry encoder for such grasps.
-fn encoder_of(data: &Dataset) -> Result<ReadEncoder, LearnError> {
-    let encoder = Shipped::of(&data.about).encoder().map_err(LearnError::failed)?;
-    let needs = encoder.channels().join(", ");
-    let found = || data.channels.join(", ");
-    ReadEncoder::on(encoder, &data.channels).ok_or_else(|| LearnError::Encoder { needs, found: found() })
-}
-
-/// Restores the geometry encoder of a model file.
-fn load_encoder(settings: &serde_json::Value, channels: &[String], arrays: &Arrays) -> Result<ReadEncoder, LoadError> {
-    let encoder = Arc::new(GeometryEncoder::load_from(settings, arrays, ENCODER)?);
-    ReadEncoder::on(encoder, channels).ok_or(LoadError::Card { part: "the geometry encoder" })
 }
 
 /// The tree ensembles offer the methods of [`RowModel`] themselves, so that `forest` need not know this trait.
@@ -529,29 +464,6 @@ impl RowModel for Forest {
 
     fn save(&self, arrays: &mut Arrays) {
         self.save(arrays);
-    }
-}
-
-/// Mean and one over the standard deviation of each column; the factor of a constant column is zero.
-fn scaling(rows: &Rows) -> Vec<(f32, f32)> {
-    let count = rows.labels.len().max(1) as f64;
-    (0..rows.columns)
-        .map(|column| {
-            let values = || rows.values.iter().skip(column).step_by(rows.columns).map(|x| f64::from(*x));
-            let mean = values().sum::<f64>() / count;
-            let deviation = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
-            let factor = if deviation > 1e-6 * mean.abs().max(1e-30) { 1.0 / deviation } else { 0.0 };
-            (mean as f32, factor as f32)
-        })
-        .collect()
-}
-
-/// Bound of scaled features: one that hardly varied in training must not dominate later.
-const MOST_DEVIATIONS: f32 = 10.0;
-
-fn scale(row: &mut [f32], scaling: &[(f32, f32)]) {
-    for (x, (mean, factor)) in row.iter_mut().zip(scaling) {
-        *x = ((*x - mean) * factor).clamp(-MOST_DEVIATIONS, MOST_DEVIATIONS);
     }
 }
 
@@ -590,8 +502,8 @@ impl Recogniser for Tabular {
     fn arrays(&self) -> Arrays {
         let mut arrays = Arrays::default();
         self.0.model.save(&mut arrays);
-        if let Some(ReadEncoder { encoder, .. }) = &self.0.rows.encoder {
-            arrays.0.extend(encoder.arrays().0.into_iter().map(|(name, array)| (format!("{ENCODER}{name}"), array)));
+        if let Some(encoder) = &self.0.rows.encoder {
+            encoder.save(&mut arrays);
         }
         arrays
     }
