@@ -36,7 +36,7 @@ fn lit(corner: Corner) -> vec3<f32> {
     let normal = normalize(corner.normal);
     let colour = corner.colour * (0.75 + 0.25 * max(dot(normal, frame.key.xyz), 0.0));
     // A dark outline, on any ground.
-    let edge = smoothstep(0.30, 0.45, abs(dot(normal, towards_eye(corner.world))));
+    let edge = smoothstep(0.52, 0.70, abs(dot(normal, towards_eye(corner.world))));
     return mix(vec3<f32>(0.01), colour, edge);
 }
 

@@ -34,11 +34,11 @@ fn lines(at: vec2<f32>, spacing: f32, width: f32) -> f32 {
 @fragment
 fn fragment(corner: Corner, @builtin(front_facing) from_above: bool) -> @location(0) vec4<f32> {
     let at = corner.world.xy;
-    let minor = lines(at, 0.010, 1.0) * 0.35;
-    let major = lines(at, 0.050, 1.3) * 0.8;
+    let minor = lines(at, 0.010, 1.0) * 0.16;
+    let major = lines(at, 0.050, 1.2) * 0.42;
     let base = mix(ground.colour.rgb, ground.grid.rgb, max(minor, major));
     let share = lit_share(corner.world, vec3<f32>(0.0, 0.0, 1.0));
-    let colour = base * mix(0.52, 1.0, share);
+    let colour = base * mix(0.52, 1.0, share) * mix(0.35, 1.0, openness(corner.clip.xy));
     let away = length(at) / ground.grid.w;
     var opacity = 1.0 - smoothstep(0.30, 1.0, away);
     // Seen from below the ground is a veil, so that it hides nothing.
@@ -46,4 +46,12 @@ fn fragment(corner: Corner, @builtin(front_facing) from_above: bool) -> @locatio
         opacity *= 0.25;
     }
     return vec4<f32>(colour, opacity);
+}
+
+@fragment
+fn fragment_distance(corner: Corner, @builtin(front_facing) from_above: bool) -> @location(0) vec4<f32> {
+    if (!from_above) {
+        discard;
+    }
+    return distance_colour(corner.world);
 }

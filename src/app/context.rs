@@ -5,6 +5,7 @@ use crate::app::features::library::LibrarySelection;
 use crate::app::features::studies::Studies;
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
+use crate::app::frame_rate::FrameRate;
 use crate::app::playback::Playback;
 use crate::app::shown::SourceData;
 use crate::app::traces::TraceHistory;
@@ -81,8 +82,8 @@ pub struct PanelContext<'a> {
     pub thumbnails: &'a BTreeMap<String, egui::TextureHandle>,
     /// Name of the graphics driver; absent when the 3-D view cannot be drawn.
     pub driver: Option<&'a str>,
-    /// True if the processor draws the 3-D view, not a graphics card.
-    pub draws_in_software: bool,
+    /// Frame rate and resolution of the moving 3-D view.
+    pub(super) frame_rate: FrameRate,
 }
 
 /// Trials beside the one that is shown.
@@ -113,11 +114,16 @@ impl<'a> PanelContext<'a> {
         }
     }
 
-    /// True while the picture moves and no graphics card draws it: then it has fewer pixels.
-    pub(super) fn draws_coarsely(&self) -> bool {
+    /// True while the picture moves.
+    pub(super) fn moves(&self) -> bool {
         let live = self.source == ViewSource::Simulation && !self.shown().looks_back();
         let simulates = live && self.snapshot.is_some_and(|snapshot| snapshot.status.playing);
-        self.draws_in_software && (self.playback.playing || simulates)
+        self.playback.playing || simulates
+    }
+
+    /// Share of the pixels along each side that the 3-D view has now: all of them while it does not move.
+    pub(super) fn resolution(&self) -> f32 {
+        if self.moves() { self.frame_rate.share() } else { 1.0 }
     }
 
     /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.

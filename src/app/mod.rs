@@ -11,7 +11,7 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `frame_rate.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
 //! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
@@ -47,6 +47,7 @@ mod export;
 mod features;
 mod figure_plot;
 mod files;
+mod frame_rate;
 mod heat_map;
 mod icons;
 mod keys;
@@ -139,6 +140,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         let wake = Arc::new(move || wake_context.request_repaint());
         let setup = WorkbenchSetup {
             render_state: Some(render_state),
+            cleared: true,
             ..WorkbenchSetup::new(options.scene, options.store, view, wake)
         };
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
@@ -160,6 +162,10 @@ struct Window {
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.workbench.ui(ui);
+    }
+
+    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
+        theme::colour(self.workbench.view().theme.colours().background).to_normalized_gamma_f32()
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

@@ -93,6 +93,7 @@ fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, Of
         playing: false,
         system_dialogs: false,
         render_state: Some(&state),
+        cleared: true,
         ..WorkbenchSetup::new(window.scene.clone(), window.store.clone(), view, wake)
     };
     let workbench = Workbench::new(&ctx, setup)?;
@@ -298,8 +299,9 @@ impl Drawn {
     /// Records the drawing of the last frame into a texture.
     fn record(&mut self) -> (wgpu::CommandEncoder, wgpu::Texture) {
         let shapes = std::mem::take(&mut self.shapes);
-        let Self { ctx, state, size, .. } = self;
+        let Self { ctx, state, size, workbench, .. } = self;
         let size = *size;
+        let [r, g, b] = workbench.view().theme.colours().background.to_unit().map(f64::from);
         let screen = ScreenDescriptor { pixels_per_point: 1.0, size_in_pixels: size };
         let jobs = ctx.tessellate(shapes, 1.0);
         let (device, queue) = (&state.device, &state.queue);
@@ -324,7 +326,7 @@ impl Drawn {
                     view: &view,
                     resolve_target: None,
                     ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
                         store: wgpu::StoreOp::Store,
                     },
                     depth_slice: None,

@@ -26,7 +26,6 @@ pub(super) fn ui(ui: &Ui, context: &PanelContext<'_>, score: Score) {
     let strip = rect.with_min_y(rect.bottom() - 10.0 * unit);
     let picture = rect.with_max_y(strip.top());
     let colours = context.view.theme.colours();
-    ui.painter().rect_filled(rect, 0.0, colour(colours.background));
     if !view3d::picture_ui(ui, picture, context, 1.1 * unit / PICTURE_LETTERS) {
         let text = fitted(ui, "Loading the object ..".to_owned(), 1.5 * unit, picture.width(), colour(colours.text));
         put(ui, text, picture, Align2::CENTER_CENTER);

@@ -5,13 +5,13 @@ use crate::app::context::PanelContext;
 use crate::app::panels::{self, PanelKind};
 use crate::app::theme::colour;
 use egui::{Frame, Margin, Ui};
-use egui_tiles::{Behavior, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
+use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
 use palpate_geometry::palette::Theme;
 
-/// Background and margin of a panel.
-pub(super) fn panel_frame(panel: &PanelKind, theme: Theme) -> Frame {
+/// Margin of a panel. Its background is that of the window.
+pub(super) fn panel_frame(panel: &PanelKind) -> Frame {
     let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
-    Frame::new().fill(colour(theme.colours().background)).inner_margin(margin)
+    Frame::new().inner_margin(margin)
 }
 
 /// Drawing of all panels: their context, and where their actions go.
@@ -35,7 +35,7 @@ impl Behavior<String> for Tiling<'_, '_> {
 
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut String) -> UiResponse {
         let Some(panel) = panels::named(pane) else { return UiResponse::None };
-        panel_frame(panel, self.theme()).show(ui, |ui| {
+        panel_frame(panel).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
             (panel.ui)(ui, self.context, self.actions);
         });
@@ -89,6 +89,15 @@ impl Behavior<String> for Tiling<'_, '_> {
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
         26.0
+    }
+
+    fn resize_stroke(&self, style: &egui::Style, state: ResizeState) -> egui::Stroke {
+        let ink = match state {
+            ResizeState::Idle => colour(self.theme().colours().border),
+            ResizeState::Hovering => style.visuals.widgets.hovered.fg_stroke.color,
+            ResizeState::Dragging => style.visuals.widgets.active.fg_stroke.color,
+        };
+        egui::Stroke::new(self.gap_width(style), ink)
     }
 
     fn tab_bar_color(&self, _visuals: &egui::Visuals) -> egui::Color32 {

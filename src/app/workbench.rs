@@ -15,6 +15,7 @@ use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghos
 use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::{ViewAction, ViewState};
+use crate::app::frame_rate::FrameRate;
 use crate::app::keys;
 use crate::app::modes;
 use crate::app::notices::{Notices, Remedy};
@@ -47,6 +48,7 @@ use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Parts that a workbench is started with.
 pub struct WorkbenchSetup<'a> {
@@ -72,6 +74,9 @@ pub struct WorkbenchSetup<'a> {
     pub system_dialogs: bool,
     /// Device of the 3-D view; the rest works without.
     pub render_state: Option<&'a egui_wgpu::RenderState>,
+    /// Each frame begins in the background colour of the theme, which then need not be painted: fills of the whole window take
+    /// most of the time of a software rasteriser.
+    pub cleared: bool,
 }
 
 impl WorkbenchSetup<'_> {
@@ -94,6 +99,7 @@ impl WorkbenchSetup<'_> {
             wake,
             system_dialogs: true,
             render_state: None,
+            cleared: false,
         }
     }
 }
@@ -118,7 +124,8 @@ pub struct Workbench {
     path_dialog: Option<PathDialog>,
     thumbnails: Thumbnails,
     driver: Option<String>,
-    draws_in_software: bool,
+    frame_rate: FrameRate,
+    cleared: bool,
     store: PathBuf,
     /// Labels at the last look.
     labels_seen: Option<Arc<LabelView>>,
@@ -216,7 +223,8 @@ impl Workbench {
             path_dialog: None,
             thumbnails,
             driver: adapter.as_ref().map(describe_adapter),
-            draws_in_software: adapter.as_ref().is_some_and(draws_in_software),
+            frame_rate: FrameRate::new(adapter.as_ref().is_some_and(draws_in_software)),
+            cleared: setup.cleared,
             store,
             labels_seen: None,
             phases: Vec::new(),
@@ -269,6 +277,11 @@ impl Workbench {
             self.apply(&ctx, action);
         }
         let published = self.published();
+        let moves = self.context(&published).moves();
+        self.frame_rate.count(Instant::now(), moves);
+        if !self.cleared {
+            ui.painter().rect_filled(ui.max_rect(), 0.0, colour(self.view.theme.colours().background));
+        }
         let mut actions = Actions::default();
         // The layout changes while it is drawn, so it is taken out for that time.
         let mode = self.view.mode;
@@ -287,8 +300,7 @@ impl Workbench {
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
         Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, &context, &mut actions));
         Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, &context, &mut actions));
-        let ground = Frame::new().fill(colour(colours.border));
-        CentralPanel::default().frame(ground).show(ui, |ui| {
+        CentralPanel::default().frame(Frame::NONE).show(ui, |ui| {
             let mut tiling = Tiling { context: &context, actions: &mut actions, chosen: None };
             layout.ui(&mut tiling, ui);
             if let Some(chosen) = tiling.chosen {
@@ -311,7 +323,8 @@ impl Workbench {
         self.gather(&ctx);
         let published = self.published();
         let mut actions = Actions::default();
-        panel_frame(panel, self.view.theme).show(ui, |ui| {
+        let ground = colour(self.view.theme.colours().background);
+        panel_frame(panel).fill(ground).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
             (panel.ui)(ui, &self.context(&published), &mut actions);
         });
@@ -369,7 +382,7 @@ impl Workbench {
             view: &self.view,
             thumbnails: self.thumbnails.textures(),
             driver: self.driver.as_deref(),
-            draws_in_software: self.draws_in_software,
+            frame_rate: self.frame_rate,
         }
     }
 

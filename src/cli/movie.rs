@@ -126,10 +126,11 @@ impl Shot<'_> {
         let Self { gpu, renderer, open, full_scale, arguments } = self;
         let OpenDrawable { stage, trial } = open;
         let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
+        let [width, height] = arguments.size.map(|side| side as f32);
         let view = PictureView {
-            camera: stage.camera(arguments.view, now),
+            camera: stage.camera(arguments.view, now, width / height),
             theme: arguments.theme,
-            size: Vec2::new(arguments.size[0] as f32, arguments.size[1] as f32),
+            size: Vec2::new(width, height),
             forces: !arguments.no_forces,
             annotations: !arguments.bare,
             full_scale: *full_scale,

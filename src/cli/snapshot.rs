@@ -233,7 +233,7 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
     let ghost = if arguments.ghost { simulated(arguments, Engine::Other)?.1.pop() } else { None };
     let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
-        camera: stage.camera(arguments.view, frame),
+        camera: stage.camera(arguments.view, frame, size[0] as f32 / size[1] as f32),
         theme: arguments.theme,
         size: Vec2::new(size[0] as f32, size[1] as f32),
         forces: !arguments.no_forces,

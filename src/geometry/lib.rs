@@ -63,4 +63,4 @@ pub use pose::Pose;
 pub use primitive::{Primitive, lathe};
 pub use repair::{MeshError, Repaired, repair};
 pub use support_points::support_points;
-pub use surface::{SurfaceMesh, SurfaceVertex};
+pub use surface::{Finish, SurfaceMesh, SurfaceVertex};

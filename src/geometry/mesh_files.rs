@@ -1,6 +1,6 @@
 //! Meshes from and to files: OBJ with its materials through tobj, STL (binary or text) through stl_io.
 
-use super::TriMesh;
+use super::{Finish, TriMesh};
 use crate::palette::Rgb;
 use glam::DVec3;
 use std::io::Cursor;
@@ -19,6 +19,8 @@ pub struct ColouredPart {
     pub mesh: TriMesh,
     /// The material's diffuse colour where the file names one.
     pub colour: Option<Rgb>,
+    /// The material's finish, by its name.
+    pub finish: Finish,
 }
 
 /// Error of reading a mesh file.
@@ -79,7 +81,7 @@ pub fn read_mesh(
     let parts = if extension == "obj" {
         parse_obj(name, &bytes, read)?
     } else {
-        vec![ColouredPart { mesh: parse_stl(name, bytes)?, colour: None }]
+        vec![ColouredPart { mesh: parse_stl(name, bytes)?, colour: None, finish: Finish::default() }]
     };
     let triangles: usize = parts.iter().map(|p| p.mesh.triangles.len()).sum();
     if triangles > MOST_TRIANGLES {
@@ -124,13 +126,14 @@ fn parse_obj(
         if !mesh.indices.len().is_multiple_of(3) || !mesh.positions.len().is_multiple_of(3) {
             return Err(damaged(name, &"a face has fewer than three corners"));
         }
-        let colour = mesh.material_id.and_then(|id| materials.get(id)).and_then(|m| m.diffuse);
+        let material = mesh.material_id.and_then(|id| materials.get(id));
         Ok(ColouredPart {
             mesh: TriMesh {
                 points: mesh.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from_array(p.map(f64::from))).collect(),
                 triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
             },
-            colour: colour.map(Rgb::from_unit),
+            colour: material.and_then(|material| material.diffuse).map(Rgb::from_unit),
+            finish: material.map_or_else(Finish::default, |material| Finish::of_material(&material.name)),
         })
     };
     models.into_iter().map(part).collect()
@@ -223,7 +226,7 @@ mod tests {
     #[test]
     fn obj_and_materials_survive_a_round_trip() {
         let mesh = Primitive::Cuboid { half: DVec3::new(0.01, 0.02, 0.03) }.tessellate();
-        let part = ColouredPart { mesh: mesh.clone(), colour: Some(Rgb(255, 51, 0)) };
+        let part = ColouredPart { mesh: mesh.clone(), colour: Some(Rgb(255, 51, 0)), finish: Finish::default() };
         let (obj, mtl) = write_obj("cube", "cube.mtl", &[("red", part)]);
         let read = in_memory(vec![("d/cube.obj", obj.into_bytes()), ("d/cube.mtl", mtl.into_bytes())]);
         let parts = read_mesh("d/cube.obj", &read).expect("what we wrote");

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 /// An sRGB colour, 0-255 per channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rgb(pub u8, pub u8, pub u8);
 
 impl Rgb {

@@ -1,4 +1,4 @@
-//! Meshes to draw: single precision, a normal and a colour at every corner.
+//! Meshes to draw: single precision, a normal, a colour and a finish at every corner.
 
 use super::{ColouredPart, TriMesh};
 use crate::palette::Rgb;
@@ -14,8 +14,64 @@ pub struct SurfaceVertex {
     pub position: [f32; 3],
     /// Unit normal, outward.
     pub normal: [f32; 3],
-    /// sRGB colour and opacity, 0-255.
+    /// sRGB colour, 0-255, and the number of its [`Finish`].
     pub colour: [u8; 4],
+}
+
+/// Look of a surface beside its colour: highlight, grain, sheen.
+#[repr(u8)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// Smooth plastic or varnish, with a sharp highlight.
+    #[default]
+    Plastic,
+    /// No highlight, for colours that stand for data.
+    Matt,
+    /// Rubber, with a broad and weak highlight.
+    Rubber,
+    /// Brushed metal, which mirrors the light around it.
+    Metal,
+    /// Felt: rough, with bright fibres towards its outline.
+    Felt,
+    /// Peel of a citrus fruit: waxy, with pores.
+    Peel,
+    /// Cardboard and paper: dull, with fibres.
+    Cardboard,
+    /// Wood, with grain.
+    Wood,
+}
+
+/// Words in names of materials, and the finish that they mean.
+const FINISH_WORDS: [(&str, Finish); 18] = [
+    ("steel", Finish::Metal),
+    ("milled", Finish::Metal),
+    ("metal", Finish::Metal),
+    ("tin", Finish::Metal),
+    ("bezel", Finish::Metal),
+    ("aluminium", Finish::Metal),
+    ("brass", Finish::Metal),
+    ("chrome", Finish::Metal),
+    ("felt", Finish::Felt),
+    ("cloth", Finish::Felt),
+    ("skin", Finish::Peel),
+    ("peel", Finish::Peel),
+    ("cardboard", Finish::Cardboard),
+    ("paper", Finish::Cardboard),
+    ("label", Finish::Cardboard),
+    ("wood", Finish::Wood),
+    ("rubber", Finish::Rubber),
+    ("silicone", Finish::Rubber),
+];
+
+impl Finish {
+    /// Number of finishes.
+    pub const COUNT: usize = 8;
+
+    /// Finish of a material in a mesh file, by a word in its name; plastic where none is known.
+    pub fn of_material(name: &str) -> Self {
+        let holds = |word: &str| name.split(|c: char| !c.is_alphanumeric()).any(|part| part.eq_ignore_ascii_case(word));
+        FINISH_WORDS.iter().find(|(word, _)| holds(word)).map_or(Self::Plastic, |(_, finish)| *finish)
+    }
 }
 
 /// A mesh ready to be drawn.
@@ -35,29 +91,36 @@ impl SurfaceMesh {
     pub fn from_parts(parts: &[ColouredPart], default_colour: Rgb) -> Self {
         let mut surface = Self::default();
         for part in parts {
-            surface.add(&part.mesh, part.colour.unwrap_or(default_colour));
+            surface.add(&part.mesh, part.colour.unwrap_or(default_colour), part.finish);
         }
         surface
     }
 
-    /// Adds a mesh in one colour.
-    pub fn add(&mut self, mesh: &TriMesh, colour: Rgb) {
+    /// Adds a mesh in one colour and finish.
+    pub fn add(&mut self, mesh: &TriMesh, colour: Rgb, finish: Finish) {
         let normals = face_normals(mesh);
         let faces_at = faces_by_place(mesh);
+        // Corners that are alike are one: each is moved and projected several times per picture.
+        let mut known: HashMap<SurfaceKey, u32> = HashMap::new();
         for (face, t) in mesh.triangles.iter().enumerate() {
             for corner in t {
                 let place = place_key(mesh.points[*corner as usize]);
                 let normal = smoothed_normal(face, &faces_at[&place], &normals);
-                self.indices.push(self.vertices.len() as u32);
-                self.vertices.push(SurfaceVertex {
-                    position: mesh.points[*corner as usize].as_vec3().to_array(),
-                    normal: normal.as_vec3().to_array(),
-                    colour: [colour.0, colour.1, colour.2, 255],
+                let position = mesh.points[*corner as usize].as_vec3().to_array();
+                let normal = normal.as_vec3().to_array();
+                let index = *known.entry([position, normal].map(|v| v.map(f32::to_bits))).or_insert_with(|| {
+                    let colour = [colour.0, colour.1, colour.2, finish as u8];
+                    self.vertices.push(SurfaceVertex { position, normal, colour });
+                    self.vertices.len() as u32 - 1
                 });
+                self.indices.push(index);
             }
         }
     }
 }
+
+/// Bits of a corner's position and normal.
+type SurfaceKey = [[u32; 3]; 2];
 
 /// Area-weighted face normals; zero for a sliver.
 fn face_normals(mesh: &TriMesh) -> Vec<DVec3> {
@@ -96,16 +159,32 @@ mod tests {
     use crate::Primitive;
 
     #[test]
+    fn materials_get_their_finish_by_name() {
+        for (name, finish) in [
+            ("steel", Finish::Metal),
+            ("Wood dark", Finish::Wood),
+            ("tennis felt", Finish::Felt),
+            ("tinted", Finish::Plastic),
+            ("", Finish::Plastic),
+        ] {
+            assert_eq!(Finish::of_material(name), finish, "{name}");
+        }
+        assert_eq!(Finish::Wood as usize + 1, Finish::COUNT);
+    }
+
+    #[test]
     fn a_ball_is_smooth_and_a_box_is_not() {
         let grey = Rgb(128, 128, 128);
         let mut ball = SurfaceMesh::default();
-        ball.add(&Primitive::Sphere { radius: 1.0 }.tessellate(), grey);
+        ball.add(&Primitive::Sphere { radius: 1.0 }.tessellate(), grey, Finish::Plastic);
+        // Smooth corners are shared.
+        assert!(ball.vertices.len() < ball.indices.len() / 4, "{} corners", ball.vertices.len());
         for v in &ball.vertices {
             let along: f32 = (0..3).map(|i| v.position[i] * v.normal[i]).sum();
             assert!(along > 0.995, "{v:?}");
         }
         let mut cube = SurfaceMesh::default();
-        cube.add(&Primitive::Cuboid { half: DVec3::ONE }.tessellate(), grey);
+        cube.add(&Primitive::Cuboid { half: DVec3::ONE }.tessellate(), grey, Finish::Plastic);
         for v in &cube.vertices {
             assert_eq!(v.normal.iter().filter(|n| n.abs() > 0.999).count(), 1, "{v:?}");
         }

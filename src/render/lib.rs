@@ -13,12 +13,13 @@
 //! | 0 | `shaders`, `targets`, `text` | WGSL sources, render targets, glyph atlas |
 //! | 1 | `blit`, `shadow` | copy of a picture into another render pass ([`Blit`]), shadow map |
 //! | 2 | `frame` | uniforms shared by all passes |
-//! | 3 | `passes` | one file for each kind of item, beside its shader of the same name |
-//! | 4 | `renderer` | draws a list into its own texture ([`Renderer`]) |
-//! | 5 | `picture` | pixels in memory, PNG ([`Picture`]) |
-//! | 6 | `difference` | how two pictures differ ([`Picture::difference`]) |
-//! | 6 | `movie` | pictures one after the other as animated PNG or GIF ([`MovieWriter`]) |
-//! | 6 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), without a graphics card |
+//! | 3 | `ambient` | distances of a picture, and how much of its surroundings each place sees |
+//! | 4 | `passes` | one file for each kind of item, beside its shader of the same name |
+//! | 5 | `renderer` | draws a list into its own texture ([`Renderer`]) |
+//! | 6 | `picture` | pixels in memory, PNG ([`Picture`]) |
+//! | 7 | `difference` | how two pictures differ ([`Picture::difference`]) |
+//! | 7 | `movie` | pictures one after the other as animated PNG or GIF ([`MovieWriter`]) |
+//! | 7 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), without a graphics card |
 //!
 //! # Example
 //!
@@ -34,6 +35,7 @@
 //! }
 //! ```
 
+mod ambient;
 mod blit;
 mod difference;
 mod figure;

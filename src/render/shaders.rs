@@ -12,10 +12,11 @@ pub(crate) const SOLID: &str = shader!("common/frame.wgsl", "common/light.wgsl",
 pub(crate) const SKIN: &str = shader!("common/frame.wgsl", "common/light.wgsl", "skin.wgsl");
 pub(crate) const ARROW: &str = shader!("common/frame.wgsl", "arrow.wgsl");
 pub(crate) const OVERLAY: &str = shader!("common/frame.wgsl", "overlay.wgsl");
+pub(crate) const AMBIENT: &str = shader!("common/frame.wgsl", "ambient.wgsl");
 pub(crate) const BLIT: &str = shader!("blit.wgsl");
 
 /// Every shader by name, so that tests can check them all without a graphics card.
-pub fn all_shaders() -> [(&'static str, &'static str); 7] {
+pub fn all_shaders() -> [(&'static str, &'static str); 8] {
     [
         ("backdrop", BACKDROP),
         ("ground", GROUND),
@@ -23,6 +24,7 @@ pub fn all_shaders() -> [(&'static str, &'static str); 7] {
         ("skin", SKIN),
         ("arrow", ARROW),
         ("overlay", OVERLAY),
+        ("ambient", AMBIENT),
         ("blit", BLIT),
     ]
 }

@@ -3,10 +3,12 @@
 use super::targets::DEPTH;
 use glam::camera::rh::{proj::directx, view};
 use glam::{Mat4, Vec3};
+use palpate_geometry::drawing::Detail;
 use wgpu::{Device, Sampler, TextureView};
 
-/// Texels along each side: 0.3 mm in a scene 300 mm across.
-const SIZE: u32 = 1024;
+/// Texels along each side: 0.3 mm in a scene 300 mm across, and twice that where speed matters more.
+const FULL: u32 = 1024;
+const FAST: u32 = 512;
 
 #[derive(Debug)]
 pub(crate) struct ShadowMap {
@@ -15,10 +17,15 @@ pub(crate) struct ShadowMap {
 }
 
 impl ShadowMap {
-    pub(crate) fn new(device: &Device) -> Self {
+    /// The map for pictures of this detail.
+    pub(crate) fn new(device: &Device, detail: Detail) -> Self {
+        let side = match detail {
+            Detail::Full => FULL,
+            Detail::Fast => FAST,
+        };
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadow map"),
-            size: wgpu::Extent3d { width: SIZE, height: SIZE, depth_or_array_layers: 1 },
+            size: wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,

@@ -126,6 +126,17 @@ impl Sensors {
             .collect()
     }
 
+    /// Beginning and end of a channel's sensor, along the finger from the palm (m).
+    pub fn stretch(&self, channel: &Channel) -> [f64; 2] {
+        match channel.quantity {
+            Quantity::Curvature => self.strip_over(&channel.span),
+            Quantity::Pressure | Quantity::ContactPressure | Quantity::Force => {
+                let (from, to) = channel.span.ends();
+                [from, to].map(|share| share * self.finger.length)
+            }
+        }
+    }
+
     /// Reach of the strip of a stretch, from the palm (m): the gripper's own on a whole finger, else all of the stretch.
     fn strip_over(&self, span: &Span) -> [f64; 2] {
         let (from, to) = span.ends();

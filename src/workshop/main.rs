@@ -23,7 +23,7 @@ mod tools;
 
 use clap::{Parser, Subcommand};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::{ColouredPart, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
+use palpate_geometry::{ColouredPart, Finish, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
 use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
 use palpate_lab::study::generated_sections;
 use palpate_learn::Shipped;
@@ -212,7 +212,7 @@ fn files_of(thing: &Thing) -> Vec<MadeFile> {
         (format!("{name}/facts.toml"), facts_of(thing)),
     ];
     if let Body::Mesh(mesh) = &thing.body {
-        let part = ColouredPart { mesh: mesh.clone(), colour: None };
+        let part = ColouredPart { mesh: mesh.clone(), colour: None, finish: Finish::default() };
         let title = format!("{}: what is touched", thing.title);
         let (obj, _) = write_obj(&title, &format!("{name}.mtl"), &[("body", part)]);
         // The collision mesh has no look of its own.

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use glam::{Mat4, Vec3};
-use palpate_geometry::drawing::{DrawList, Ground, Overlay, Solid};
+use palpate_geometry::drawing::{Detail, DrawList, Ground, Overlay, Solid};
 use palpate_geometry::palette::Rgb;
 use palpate_lab::picture::{PORTRAIT_BACKDROP, portrait_camera};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
@@ -42,13 +42,10 @@ fn portrait(object: &ObjectModel) -> DrawList {
         shadow_bounds: (centre, 1.4 * radius),
         ground: Some(Ground { height: object.bounds.min.z as f32, colour: GROUND, grid: GROUND, radius: 6.0 * radius }),
         ghosts: Vec::new(),
-        solids: vec![Solid {
-            mesh: Arc::clone(&object.surface),
-            world_from_mesh: Mat4::from_translation(Vec3::ZERO),
-            gloss: 0.12,
-        }],
+        solids: vec![Solid { mesh: Arc::clone(&object.surface), world_from_mesh: Mat4::from_translation(Vec3::ZERO) }],
         fingers: Vec::new(),
         arrows: Vec::new(),
         overlay: Overlay::default(),
+        detail: Detail::Full,
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::{ColouredPart, Pose, TriMesh};
+use palpate_geometry::{ColouredPart, Finish, Pose, TriMesh};
 use std::f64::consts::{PI, TAU};
 
 /// Parts of an object as they are added, each with a material name.
@@ -15,7 +15,7 @@ impl Parts {
         if let Some((_, part)) = self.0.iter_mut().find(|(name, _)| name == material) {
             part.mesh.append(&mesh);
         } else {
-            let part = ColouredPart { mesh, colour: Some(colour) };
+            let part = ColouredPart { mesh, colour: Some(colour), finish: Finish::of_material(material) };
             self.0.push((material.to_owned(), part));
         }
     }

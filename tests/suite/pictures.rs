@@ -54,7 +54,7 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
     let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
     let view = PictureView {
-        camera: stage.camera(shot.view, frame),
+        camera: stage.camera(shot.view, frame, shot.size[0] as f32 / shot.size[1] as f32),
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
@@ -131,7 +131,7 @@ fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
         let trial = grasp(&scene, object.as_ref(), 0);
         let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
         let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-        let camera = stage.camera(StandardView::Home, frame);
+        let camera = stage.camera(StandardView::Home, frame, size[0] as f32 / size[1] as f32);
         let size_points = Vec2::from(size.map(|side| side as f32));
         let until = trial.frames().iter().take_while(|frame| frame.t <= HELD.at);
         let full_scale = full_scale_of(&scene.gripper, until);

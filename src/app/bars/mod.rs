@@ -54,17 +54,23 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions
             let room = ui.available_width();
             if let Some(driver) = context.driver.filter(|_| room > 240.0) {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let driver = if context.draws_coarsely() {
-                        format!("{driver}; half resolution while it moves")
-                    } else {
-                        driver.to_owned()
-                    };
-                    let quiet = RichText::new(driver).small().color(colour(context.view.theme.colours().quiet_text));
+                    let quiet = RichText::new(drawn_by(context, driver))
+                        .small()
+                        .color(colour(context.view.theme.colours().quiet_text));
                     ui.add(egui::Label::new(quiet).truncate());
                 });
             }
         });
     });
+}
+
+/// Driver that draws, and while the view moves how often and how finely.
+fn drawn_by(context: &PanelContext<'_>, driver: &str) -> String {
+    let Some(rate) = context.frame_rate.per_second() else { return driver.to_owned() };
+    let resolution = context.resolution();
+    let coarse =
+        if resolution < 1.0 { format!(", 3-D view at {:.0}\u{2009}%", 100.0 * resolution) } else { String::new() };
+    format!("{rate:.0}\u{2009}frames/s{coarse} \u{b7} {driver}")
 }
 
 /// Settings of the window.

@@ -31,6 +31,8 @@ pub struct ViewState {
     pub presents: bool,
     /// Force arrows are drawn.
     pub forces: bool,
+    /// The circle that each flex strip reads is drawn.
+    pub circles: bool,
     /// Contact path on the object.
     pub path: PathLayer,
     /// Unit of loads in heat maps.
@@ -129,6 +131,8 @@ pub enum ViewAction {
     SetTheme(Theme),
     /// Show or hide force arrows.
     SetForces(bool),
+    /// Show or hide the circles that flex strips read.
+    SetCircles(bool),
     /// Draw the contact path, or do not.
     SetPath(PathLayer),
     /// Unit of loads in heat maps.
@@ -175,6 +179,7 @@ impl Default for ViewState {
             presents: false,
             framed: None,
             forces: true,
+            circles: false,
             path: PathLayer::default(),
             load_unit: LoadUnit::default(),
             bend_unit: BendUnit::default(),
@@ -217,6 +222,7 @@ impl ViewState {
                 theme::apply(ctx, theme);
             }
             ViewAction::SetForces(forces) => self.forces = forces,
+            ViewAction::SetCircles(circles) => self.circles = circles,
             ViewAction::SetPath(path) => self.path = path,
             ViewAction::SetLoadUnit(unit) => self.load_unit = unit,
             ViewAction::SetBendUnit(unit) => self.bend_unit = unit,

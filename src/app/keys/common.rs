@@ -58,6 +58,7 @@ const VIEW: &[Binding] = &[
     key(NONE, Key::Z, "show the object", |c| Some(ViewAction::SetCamera(object_framed(c)?).into()))
         .otherwise("There is no object in the hand."),
     key(NONE, Key::F, "force arrows", |c| Some(ViewAction::SetForces(!c.view.forces).into())),
+    key(NONE, Key::O, "circles that the flex strips read", |c| Some(ViewAction::SetCircles(!c.view.circles).into())),
     key(NONE, Key::C, "contact path on the object: by time, by pressure, off", |c| {
         Some(ViewAction::SetPath(c.view.path.next()).into())
     }),

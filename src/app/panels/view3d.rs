@@ -15,10 +15,12 @@ use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
-use palpate_geometry::drawing::{Camera, DrawList, StandardView};
-use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage};
+use palpate_geometry::drawing::{Camera, Detail, DrawList, StandardView};
+use palpate_geometry::palette::{Rgb, Theme};
+use palpate_lab::picture::{GhostKind, PAD_FULL_SCALE, PictureView, Stage};
 use palpate_lab::workers::Command;
 use palpate_sim::objects::object_title;
+use palpate_tactile::SensorLayout;
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
@@ -78,7 +80,7 @@ fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, moment:
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
-    let camera = shown_camera(context, moment);
+    let camera = shown_camera(context, moment, Vec2::new(response.rect.width(), height));
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
     // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
@@ -113,10 +115,11 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-/// The camera of the view; the one that nobody has moved comes nearer to the touch.
-fn shown_camera(context: &PanelContext<'_>, moment: Moment<'_>) -> Camera {
+/// The camera of a view of this size; the one that nobody has moved comes nearer to the touch.
+fn shown_camera(context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Camera {
     let camera = context.view.camera;
-    if context.view.follows_touch() { moment.stage.nearer_to_touch(camera, moment.frame) } else { camera }
+    let aspect = size.x / size.y.max(1.0);
+    if context.view.follows_touch() { moment.stage.nearer_to_touch(camera, moment.frame, aspect) } else { camera }
 }
 
 /// Draw list of a moment, and the view that it was made for.
@@ -137,12 +140,14 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
     let course = shown.filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
     let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
     let view = PictureView {
-        camera: shown_camera(context, moment),
+        camera: shown_camera(context, moment, size),
         theme: context.view.theme,
         size,
         forces: context.view.forces,
         full_scale,
         path: grasp_path.as_ref().map(|(_, colour)| *colour),
+        layout: SensorLayout::named(&context.view.sensors.layout).ok(),
+        circles: context.view.circles,
         ..PictureView::default()
     };
     let ghost = context.ghost.filter(|_| context.source != ViewSource::Trial && !context.shown().looks_back());
@@ -160,9 +165,6 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
     }
     Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
 }
-
-/// Share of the pixels along each side that a slow rasteriser draws while the picture moves.
-const COARSE: f32 = 0.5;
 
 /// Size of exported pictures (points).
 const EXPORTED: [u32; 2] = [800, 560];
@@ -194,32 +196,55 @@ pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, context: &PanelContext<'_>
 /// Draws the picture, with letters of a size relative to the usual one; returns what it was drawn by.
 fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, letters: f32) -> PictureView {
     let size = Vec2::new(rect.width(), rect.height());
-    let Drawn { list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
-    let share = if context.draws_coarsely() { COARSE } else { 1.0 };
-    let per_point = share * ui.ctx().pixels_per_point();
+    let Drawn { mut list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
+    if context.resolution() < 1.0 {
+        list.detail = Detail::Fast;
+    }
+    let per_point = context.resolution() * ui.ctx().pixels_per_point();
     let pixels = [rect.width(), rect.height()].map(|side| (side * per_point).round().max(1.0) as u32);
     let pixels_per_point = per_point * letters;
     let (grasp, sample) = (moment.grasp, moment.frame.t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
-    let caption = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
-        Some(inspected) => inspected.trial.remarks.join(" "),
+    let theme = context.view.theme;
+    let (caption, ghosted) = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
+        Some(inspected) => (inspected.trial.remarks.join(" "), None),
         None if key.real.is_some() => {
-            "Translucent: real fingers, reconstructed from the flex strips. Solid: simulation.".to_owned()
+            ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
         }
-        None => context.shown().held_s().map_or_else(String::new, |t| format!("In the hold, at {t:.1}\u{2009}s.")),
+        None if key.ghost.is_some() => {
+            let text = format!("The same grasp by {}", context.scene.solver.engine.other().name());
+            (text, Some(GhostKind::Engine.colour(theme)))
+        }
+        None => {
+            (context.shown().held_s().map_or_else(String::new, |t| format!("In the hold, at {t:.1}\u{2009}s.")), None)
+        }
     };
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
     // Presenter mode says it in its own words.
     if !caption.is_empty() && letters == 1.0 {
-        let ink = colour(context.view.theme.colours().text);
-        let galley =
-            ui.painter().layout(caption, egui::FontId::proportional(12.0), ink, (0.5 * rect.width()).max(80.0));
-        let place = rect.left_top() + egui::vec2(14.0, 44.0);
-        let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
-        ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
-        ui.painter().galley(place, galley, ink);
+        caption_ui(ui, rect, theme, caption, ghosted);
     }
     view
+}
+
+/// Height of axes and scale bar at the foot of the picture (points).
+const FOOT: f32 = 26.0;
+
+/// A line at the foot of the picture, between axes and scale bar; of a ghost with its colour.
+fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb>) {
+    let ink = colour(theme.colours().text);
+    let swatch = if ghost.is_some() { 18.0 } else { 0.0 };
+    let width = (rect.width() - 300.0).max(80.0);
+    let galley = ui.painter().layout(text, egui::FontId::proportional(12.0), ink, width);
+    let size = galley.size() + egui::vec2(swatch, 0.0);
+    let middle = rect.center_bottom() - egui::vec2(0.0, FOOT.max(0.5 * size.y + 8.0));
+    let ground = Rect::from_center_size(middle, size).expand(4.0);
+    ui.painter().rect_filled(ground, 4.0, veil(theme.colours().background, 0.7));
+    if let Some(ghost) = ghost {
+        let square = Rect::from_min_size(ground.min + egui::vec2(4.0, 6.0), egui::vec2(12.0, 12.0));
+        ui.painter().rect_filled(square, 2.0, colour(ghost));
+    }
+    ui.painter().galley(ground.min + egui::vec2(4.0 + swatch, 4.0), galley, ink);
 }
 
 /// Curvature of the real fingers (1/m), while they are shown.
@@ -231,7 +256,7 @@ fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
 }
 
 /// Width of all buttons in a row, beside the legend (points).
-const BUTTONS: f32 = 660.0;
+const BUTTONS: f32 = 690.0;
 
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -274,6 +299,12 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if forces.clicked() {
         actions.push(ViewAction::SetForces(!context.view.forces));
     }
+    let circles = ui
+        .selectable_label(context.view.circles, "Circles")
+        .on_hover_text("The circle that each flex strip reads, with its curvature (O)");
+    if circles.clicked() {
+        actions.push(ViewAction::SetCircles(!context.view.circles));
+    }
     let path = ui
         .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
         .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
@@ -282,8 +313,8 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     let other = context.scene.solver.engine.other().name();
     let ghost = ui
-        .selectable_label(context.view.ghost, format!("Ghost: {other}"))
-        .on_hover_text("Result of the other engine, translucent (G)");
+        .selectable_label(context.view.ghost, "Ghost")
+        .on_hover_text(format!("Result of the other engine, {other}, translucent (G)"));
     if ghost.clicked() {
         actions.push(SimulationAction::SetGhost(!context.view.ghost));
     }

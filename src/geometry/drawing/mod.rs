@@ -41,6 +41,18 @@ pub struct DrawList {
     pub arrows: Vec<Arrow>,
     /// Flat shapes and text on top.
     pub overlay: Overlay,
+    /// How finely light is computed.
+    pub detail: Detail,
+}
+
+/// How finely the light of a picture is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// As finely as it is worth looking at.
+    #[default]
+    Full,
+    /// Shadows with harder edges, for pictures that move on a slow rasteriser.
+    Fast,
 }
 
 /// The ground, level with z = `height`.
@@ -63,8 +75,6 @@ pub struct Solid {
     pub mesh: Arc<SurfaceMesh>,
     /// Its place.
     pub world_from_mesh: Mat4,
-    /// Gloss, 0 (matt) to 1.
-    pub gloss: f32,
 }
 
 /// A soft finger as a smooth skin over a chain of frames.
@@ -80,6 +90,28 @@ pub struct SoftFinger {
     pub full_scale: f32,
     /// Stretch that is drawn translucent.
     pub veil: Veil,
+    /// Sensors that are drawn on it.
+    pub sensors: FingerSensors,
+}
+
+/// Sensors of a finger: strips along its back, and the outlines of its pads.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FingerSensors {
+    /// Flex strips; at most two are drawn.
+    pub strips: Vec<SensorStrip>,
+    /// Pads of equal length that divide the finger; none are drawn for zero.
+    pub pads: u32,
+    /// Colours of the pads on the half next to the palm, and on that with the tip.
+    pub pad_colours: [Rgb; 2],
+}
+
+/// Flex strip on the back of a finger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorStrip {
+    /// Where it begins and ends, along the neutral axis from the palm (m).
+    pub stretch: [f32; 2],
+    /// Its colour.
+    pub colour: Rgb,
 }
 
 /// Translucent stretch of a finger, behind which the face of its pad is seen.

@@ -8,7 +8,7 @@
 use super::heat_maps::PAD_FULL_SCALE;
 use glam::{DVec3, Vec3};
 use palpate_geometry::palette::{Rgb, pressure_colour};
-use palpate_geometry::{Pose, SurfaceMesh, SurfaceVertex};
+use palpate_geometry::{Finish, Pose, SurfaceMesh, SurfaceVertex};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, PlacedFinger, Side};
 use std::borrow::Borrow;
@@ -207,7 +207,7 @@ fn add_rod(mesh: &mut SurfaceMesh, [from, to]: [Vec3; 2], radius: f32, colours: 
 }
 
 fn vertex(at: Vec3, normal: Vec3, Rgb(r, g, b): Rgb) -> SurfaceVertex {
-    SurfaceVertex { position: at.to_array(), normal: normal.to_array(), colour: [r, g, b, 255] }
+    SurfaceVertex { position: at.to_array(), normal: normal.to_array(), colour: [r, g, b, Finish::Matt as u8] }
 }
 
 #[cfg(test)]
@@ -269,7 +269,7 @@ mod tests {
             let normal = (q - p).cross(r - p);
             assert!([a, b, c].iter().all(|vertex| normal.dot(Vec3::from(vertex.normal)) > 0.0), "{triangle:?}");
         }
-        assert_eq!(mesh.vertices[6].colour, [4, 5, 6, 255]);
+        assert_eq!(mesh.vertices[6].colour, [4, 5, 6, Finish::Matt as u8]);
         assert_eq!((mesh.vertices[7].colour, mesh.vertices[7].position[2]), ([7, 8, 9, 255], 3.0));
         let place = TouchedPlace { at: Vec3::ZERO, t: 3.0, pressure: PAD_FULL_SCALE };
         assert_eq!(PathColour::Pressure(PAD_FULL_SCALE).of(&place), pressure_colour(1.0));

@@ -1,7 +1,7 @@
 //! Soft fingers of a frame: frames along the neutral axis, and taxel loads.
 
 use palpate_geometry::Pose;
-use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, TaxelField, Veil};
+use palpate_geometry::drawing::{FingerFrame, FingerSensors, Section, SoftFinger, TaxelField, Veil};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, PlacedFinger, Side, TaxelGrid};
 
@@ -27,6 +27,7 @@ pub(super) fn soft_fingers(
             taxels: taxel_field(&grid, frame, side),
             full_scale,
             veil: Veil::default(),
+            sensors: FingerSensors::default(),
         })
         .collect()
 }

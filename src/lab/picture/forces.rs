@@ -19,17 +19,19 @@ const RADIUS: f64 = 0.0042;
 const FAINTEST: f64 = 0.01;
 /// Force that has the brightest colour (N).
 const FULL_SCALE: f64 = 0.5;
-/// Height of the numbers (points), and their distance from the tips.
-const TEXT: f32 = 15.0;
-const GAP: f32 = 16.0;
-/// Least distance of a number from the left and the upper edge (points).
-const MARGIN: Vec2 = Vec2::new(60.0, 24.0);
+/// Height of the numbers (points), of a line of them, and their distance from the tips.
+const TEXT: f32 = 14.0;
+const LINE: f32 = 18.0;
+const GAP: f32 = 14.0;
+/// Distance of the numbers from the edges (points), and height that is left to axes and scale bar below them.
+const MARGIN: f32 = 10.0;
+const FOOT: f32 = 50.0;
+/// Room of the axes in the lower left corner (points).
+const AXES: Vec2 = Vec2::new(96.0, 104.0);
+/// Height that is left to what stands above.
+const HEAD: f32 = 48.0;
 /// Least height of a picture with numbers (points).
 const LEAST_HEIGHT: f32 = 260.0;
-
-/// Names of the forces.
-const NORMAL: &str = "normal";
-const FRICTION: &str = "friction";
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
 fn friction_colour(theme: Theme) -> Rgb {
@@ -39,13 +41,21 @@ fn friction_colour(theme: Theme) -> Rgb {
     }
 }
 
-/// A force on a finger, from outside the finger on.
-struct Force {
+/// Forces on a finger, from a place outside of it on (N).
+struct Forces {
+    side: Side,
     from: DVec3,
-    /// In the world (N).
-    vector: DVec3,
-    colour: Rgb,
-    name: &'static str,
+    /// Across the pad.
+    normal: DVec3,
+    /// Along the pad; none where it is too small to be drawn.
+    friction: Option<DVec3>,
+}
+
+impl Forces {
+    /// The colour of the normal force: the lower third of the map is too dark for a thin line.
+    fn normal_colour(&self) -> Rgb {
+        pressure_colour(0.35 + 0.65 * (self.normal.length() / FULL_SCALE) as f32)
+    }
 }
 
 /// Arrows along the forces that the object exerts on the fingers.
@@ -56,16 +66,21 @@ pub(super) fn arrows(
     view: &PictureView,
 ) -> Vec<Arrow> {
     let height = f64::from(view.camera.height_at_target());
-    let arrow = |force: &Force| Arrow {
-        from: force.from.as_vec3(),
-        to: tip(force, height),
-        radius: (RADIUS * height) as f32,
-        colour: force.colour,
-    };
-    forces(gripper, world_from_gripper, frame, view.theme).iter().map(arrow).collect()
+    let mut arrows = Vec::new();
+    for forces in on_fingers(gripper, world_from_gripper, frame) {
+        let mut arrow = |vector: DVec3, colour: Rgb| {
+            let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, height));
+            arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
+        };
+        arrow(forces.normal, forces.normal_colour());
+        if let Some(friction) = forces.friction {
+            arrow(friction, friction_colour(view.theme));
+        }
+    }
+    arrows
 }
 
-/// Their numbers, beyond the tips.
+/// Their numbers, beyond the tips: a plate for each finger.
 pub(super) fn label(
     overlay: &mut Overlay,
     gripper: &GripperModel,
@@ -78,41 +93,62 @@ pub(super) fn label(
     }
     let height = f64::from(view.camera.height_at_target());
     let colours = view.theme.colours();
-    for force in forces(gripper, world_from_gripper, frame, view.theme) {
-        let [from, to] = [force.from.as_vec3(), tip(&force, height)].map(|point| view.camera.project(point, view.size));
-        let (Some(from), Some(to)) = (from, to) else { continue };
-        let along = (to - from).normalize_or(Vec2::Y);
-        let text = format!("{} {:.2}\u{2009}N", force.name, force.vector.length());
-        // Beside steep arrows, beyond level ones.
-        let room = 0.5 * TEXT * 0.5 * text.chars().count() as f32 * along.x.abs();
-        let place = to + along * (GAP + room);
-        // Above the scale bar and, on the left, the axes.
-        let below = if place.x < 150.0 { 104.0 } else { 54.0 };
-        let most = (view.size - Vec2::new(60.0, below)).max(MARGIN);
-        let place = place.clamp(MARGIN, most);
+    // Middle and half size of what they must not cover: the axes, and each other.
+    let mut plates = vec![[Vec2::new(0.5 * AXES.x, view.size.y - 0.5 * AXES.y), 0.5 * AXES]];
+    for forces in on_fingers(gripper, world_from_gripper, frame) {
+        let ends = [forces.from.as_vec3(), tip(forces.from, forces.normal, height)];
+        let [Some(from), Some(to)] = ends.map(|point| view.camera.project(point, view.size)) else { continue };
+        let letter = match forces.side {
+            Side::Left => "L",
+            Side::Right => "R",
+        };
+        let line = |name: &str, force: DVec3| format!("{letter}  {name} {:.2}\u{2009}N", force.length());
+        let mut lines = vec![(line("normal", forces.normal), colours.text)];
+        lines.extend(forces.friction.map(|force| (line("friction", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.
-        let half = Vec2::new(0.26 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
-        let plate =
-            Shape2::Rectangle { min: place - half, max: place + half, colours: [colours.background; 2], opacity: 0.7 };
-        overlay.shapes.push(plate);
-        let ink = if force.name == FRICTION { force.colour } else { colours.text };
-        overlay.text(place, Align::Centre, TEXT, ink, text);
+        let letters = lines.iter().map(|(text, _)| text.chars().count()).max().unwrap_or_default();
+        let half = Vec2::new(0.25 * TEXT * letters as f32 + 7.0, 0.5 * LINE * lines.len() as f32 + 2.0);
+        let along = (to - from).normalize_or(Vec2::Y);
+        let low = half + Vec2::new(MARGIN, HEAD);
+        let high = (view.size - half - Vec2::new(MARGIN, FOOT)).max(low);
+        // Beyond the tip, or else on either side of the arrow.
+        let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
+        let aside = |sign: f32| {
+            let edge = if sign < 0.0 { from.x.min(to.x) } else { from.x.max(to.x) };
+            Vec2::new(edge + sign * (GAP + half.x), 0.5 * (from.y + to.y))
+        };
+        let over = Vec2::new(0.0, -2.5 * half.y);
+        let places = [beyond, aside(-1.0), aside(1.0), aside(-1.0) + over, aside(1.0) + over];
+        let places = places.map(|place| place.clamp(low, high));
+        let is_free = |place: &&Vec2| {
+            let covers = |at: Vec2| ((at - **place).abs() - half).max_element() < 2.0;
+            let meets = |[other, theirs]: &[Vec2; 2]| ((**place - *other).abs() - half - *theirs).max_element() < 4.0;
+            !covers(from) && !covers(to) && !covers(0.5 * (from + to)) && !plates.iter().any(meets)
+        };
+        let place = places.iter().find(is_free).copied().unwrap_or(places[0]);
+        plates.push([place, half]);
+        let ground = [colours.background; 2];
+        overlay.shapes.push(Shape2::Rectangle { min: place - half, max: place + half, colours: ground, opacity: 0.72 });
+        for (k, (text, ink)) in lines.into_iter().enumerate() {
+            let at = Vec2::new(place.x - half.x + 7.0, place.y - half.y + 2.0 + LINE * (k as f32 + 0.5));
+            overlay.text(at, Align::Left, TEXT, ink, text);
+        }
     }
 }
 
 /// Point of the arrow of a force.
-fn tip(force: &Force, height: f64) -> Vec3 {
-    let size = force.vector.length();
+fn tip(from: DVec3, force: DVec3, height: f64) -> Vec3 {
+    let size = force.length();
     let length = height * (PER_NEWTON * size).clamp(SHORTEST, LONGEST);
-    (force.from + force.vector / size * length).as_vec3()
+    (from + force / size * length).as_vec3()
 }
 
-/// The force across the pad and the friction along it, of each finger.
-fn forces(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, theme: Theme) -> Vec<Force> {
+/// The force across the pad and the friction along it, of each finger that is touched.
+fn on_fingers(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Vec<Forces> {
     let grid = gripper.taxels();
-    let mut forces = Vec::new();
     // Outside the finger, so that the loaded pad is seen.
     let clear = gripper.pad.thickness + gripper.finger.back;
+    let mut all = Vec::new();
     for side in Side::BOTH {
         let placed = frame.placed(gripper, side);
         let (mut across, mut friction, mut moment, mut weight) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0.0);
@@ -129,15 +165,10 @@ fn forces(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, them
         if weight < FAINTEST || across.length() < FAINTEST {
             continue;
         }
-        let outwards = across.normalize();
-        let from = world_from_gripper.point(moment / weight + outwards * clear);
-        // The lower third of the map is too dark for a thin line.
-        let colour = pressure_colour(0.35 + 0.65 * (across.length() / FULL_SCALE) as f32);
-        forces.push(Force { from, vector: world_from_gripper.direction(across), colour, name: NORMAL });
-        if friction.length() >= FAINTEST {
-            let vector = world_from_gripper.direction(friction);
-            forces.push(Force { from, vector, colour: friction_colour(theme), name: FRICTION });
-        }
+        let from = world_from_gripper.point(moment / weight + across.normalize() * clear);
+        let friction = Some(friction).filter(|force| force.length() >= FAINTEST);
+        let friction = friction.map(|force| world_from_gripper.direction(force));
+        all.push(Forces { side, from, normal: world_from_gripper.direction(across), friction });
     }
-    forces
+    all
 }

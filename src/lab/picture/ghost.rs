@@ -2,7 +2,7 @@
 
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::{SurfaceMesh, TriMesh};
+use palpate_geometry::{Finish, SurfaceMesh, TriMesh};
 
 /// Points across the crown of the pad.
 const CROWN_POINTS: u32 = 7;
@@ -40,7 +40,7 @@ pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> SurfaceMesh {
         }
     }
     let mut surface = SurfaceMesh::default();
-    surface.add(&mesh, colour);
+    surface.add(&mesh, colour, Finish::Matt);
     surface
 }
 
@@ -82,17 +82,22 @@ fn refined(frames: &[FingerFrame]) -> Vec<FingerFrame> {
 mod tests {
     use super::*;
     use glam::Vec3;
-    use palpate_geometry::drawing::{TaxelField, Veil};
+    use palpate_geometry::drawing::{FingerSensors, TaxelField, Veil};
 
     #[test]
     fn a_straight_finger_has_its_volume_and_faces_outward() {
         let section = Section { width: 0.02, pad: 0.008, crown_radius: 0.02, back: 0.012 };
         let frame = |arc: f32| FingerFrame { arc, position: -Vec3::Z * arc, along: -Vec3::Z, inward: Vec3::X };
         let frames = vec![frame(0.0), frame(0.04), frame(0.1)];
-        let surface = finger(
-            &SoftFinger { frames, section, taxels: TaxelField::default(), full_scale: 1.0, veil: Veil::default() },
-            Rgb(9, 9, 9),
-        );
+        let soft = SoftFinger {
+            frames,
+            section,
+            taxels: TaxelField::default(),
+            full_scale: 1.0,
+            veil: Veil::default(),
+            sensors: FingerSensors::default(),
+        };
+        let surface = finger(&soft, Rgb(9, 9, 9));
         let corner = |i: u32| Vec3::from(surface.vertices[i as usize].position).as_dvec3();
         let six: f64 = surface.indices.chunks(3).map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum();
         // A box, less the segment that the crown leaves out: w^3 / 24 R of area, a little less for its chords.

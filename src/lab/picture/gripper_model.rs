@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::{Pose, Primitive, SurfaceMesh, TriMesh, rounded_box};
+use palpate_geometry::{Finish, Pose, Primitive, SurfaceMesh, TriMesh, rounded_box};
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::scene::Support;
 
@@ -12,7 +12,13 @@ const FITTING: Rgb = Rgb(184, 190, 198);
 const HOSE: Rgb = Rgb(70, 128, 178);
 /// Radius of the piece that the hoses lead into (m).
 const WRIST_RADIUS: f64 = 0.013;
-const PEDESTAL: Rgb = Rgb(176, 181, 188);
+const PEDESTAL: Rgb = Rgb(150, 155, 163);
+/// Letters on the palm that name the fingers.
+const LETTER: Rgb = Rgb(236, 238, 240);
+/// Height of a letter, width of its strokes, and how far it stands out (m).
+const LETTER_HEIGHT: f64 = 0.0086;
+const STROKE: f64 = 0.0016;
+const RELIEF: f64 = 0.0003;
 
 /// The palm in the gripper frame: z = 0 is where the fingers leave it.
 pub(super) fn palm(gripper: &GripperModel) -> SurfaceMesh {
@@ -22,25 +28,59 @@ pub(super) fn palm(gripper: &GripperModel) -> SurfaceMesh {
     let mut surface = SurfaceMesh::default();
     let outer = half_gap + finger.back;
     let plate = DVec3::new(outer + 0.006, half_width + 0.005, 0.007);
-    surface.add(&moved(rounded_box(plate, 0.003), DVec3::new(0.0, 0.0, 0.013)), BODY);
+    surface.add(&moved(rounded_box(plate, 0.003), DVec3::new(0.0, 0.0, 0.013)), BODY, Finish::Metal);
     // The flange to the robot's wrist.
     let flange = Primitive::Cylinder { radius: 0.018, half_length: 0.006 };
-    surface.add(&moved(flange.tessellate(), DVec3::new(0.0, 0.0, 0.025)), CLAMP);
+    surface.add(&moved(flange.tessellate(), DVec3::new(0.0, 0.0, 0.025)), CLAMP, Finish::Plastic);
     let wrist = Primitive::Cylinder { radius: WRIST_RADIUS, half_length: 0.010 };
-    surface.add(&moved(wrist.tessellate(), DVec3::new(0.0, 0.0, 0.039)), BODY);
+    surface.add(&moved(wrist.tessellate(), DVec3::new(0.0, 0.0, 0.039)), BODY, Finish::Metal);
     for side in Side::BOTH {
         let sign = side.closing_sign();
-        // The clamp holds the first millimetres of the finger, from the bellows to just short of the pad's skin.
-        let (back, front) = (finger.back + 0.003, 0.7 * gripper.pad.thickness);
+        // The clamp holds the first millimetres of the finger, pad and bellows.
+        let (back, front) = (finger.back + 0.003, gripper.pad.thickness + 0.002);
         let clamp = DVec3::new(0.5 * (back + front), half_width + 0.002, 0.006);
         let middle = -sign * (half_gap + 0.5 * (back - front));
-        surface.add(&moved(rounded_box(clamp, 0.0015), DVec3::new(middle, 0.0, 0.003)), CLAMP);
+        surface.add(&moved(rounded_box(clamp, 0.0015), DVec3::new(middle, 0.0, 0.003)), CLAMP, Finish::Plastic);
         let at = DVec3::new(-sign * half_gap, 0.0, 0.0);
         let nut = Primitive::Cylinder { radius: 0.0042, half_length: 0.004 };
-        surface.add(&moved(nut.tessellate(), at + DVec3::Z * 0.023), FITTING);
-        surface.add(&hose(at + DVec3::Z * 0.026, sign), HOSE);
+        surface.add(&moved(nut.tessellate(), at + DVec3::Z * 0.023), FITTING, Finish::Metal);
+        surface.add(&hose(at + DVec3::Z * 0.026, sign), HOSE, Finish::Plastic);
+        for facing in [-1.0, 1.0] {
+            let letter = letter(side, facing);
+            let place = DVec3::new(-sign * half_gap, facing * plate.y, 0.013);
+            surface.add(&moved(letter, place), LETTER, Finish::Matt);
+        }
     }
     surface
+}
+
+/// L or R in relief, in the plane y = 0 about the origin, legible from the side of y that `facing` names.
+fn letter(side: Side, facing: f64) -> TriMesh {
+    let strokes: &[[[f64; 2]; 2]] = match side {
+        Side::Left => &[[[-0.3, 0.5], [-0.3, -0.5]], [[-0.3, -0.5], [0.35, -0.5]]],
+        Side::Right => &[
+            [[-0.3, 0.5], [-0.3, -0.5]],
+            [[-0.3, 0.5], [0.15, 0.5]],
+            [[0.15, 0.5], [0.35, 0.3]],
+            [[0.35, 0.3], [0.35, 0.2]],
+            [[0.35, 0.2], [0.15, 0.0]],
+            [[0.15, 0.0], [-0.3, 0.0]],
+            [[0.0, 0.0], [0.35, -0.5]],
+        ],
+    };
+    let mut mesh = TriMesh::default();
+    for [from, to] in strokes {
+        // Right of the reader is +x from in front (facing -y), -x from behind.
+        let point = |[x, z]: [f64; 2]| DVec3::new(-facing * x, 0.0, z) * LETTER_HEIGHT;
+        let (from, to) = (point(*from), point(*to));
+        let along = to - from;
+        let half = DVec3::new(0.5 * (along.length() + STROKE), RELIEF, 0.5 * STROKE);
+        let mut bar = rounded_box(half, 0.8 * RELIEF);
+        let turn = glam::DQuat::from_rotation_arc(DVec3::X, along.normalize());
+        bar.transform(&Pose::new(0.5 * (from + to), turn));
+        mesh.append(&bar);
+    }
+    mesh
 }
 
 /// An air hose from a fitting up and in towards the wrist.
@@ -79,9 +119,9 @@ fn hose(from: DVec3, sign: f64) -> TriMesh {
 pub(super) fn pedestal(support: &Support) -> SurfaceMesh {
     let mut surface = SurfaceMesh::default();
     let column = Primitive::Cylinder { radius: support.radius, half_length: (0.5 * support.height).max(1e-4) };
-    surface.add(&moved(column.tessellate(), DVec3::Z * (0.5 * support.height)), PEDESTAL);
+    surface.add(&moved(column.tessellate(), DVec3::Z * (0.5 * support.height)), PEDESTAL, Finish::Plastic);
     let foot = Primitive::Cylinder { radius: support.radius * 1.9, half_length: 0.001 };
-    surface.add(&moved(foot.tessellate(), DVec3::Z * 0.001), PEDESTAL);
+    surface.add(&moved(foot.tessellate(), DVec3::Z * 0.001), PEDESTAL, Finish::Plastic);
     surface
 }
 

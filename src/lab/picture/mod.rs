@@ -2,6 +2,7 @@
 //! trial and a test all make their pictures here.
 
 mod annotations;
+mod circles;
 mod contact_path;
 mod fingers;
 mod forces;
@@ -10,6 +11,7 @@ mod gripper_model;
 mod heat_maps;
 mod portrait;
 mod reconstructed;
+mod sensors;
 mod touch;
 
 pub use annotations::{SCALE_STEPS, legend_room};
@@ -22,13 +24,14 @@ pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
 
 use glam::{Mat4, Vec2, Vec3};
-use palpate_geometry::drawing::{Camera, DrawList, Ground, Overlay, Solid, StandardView};
-use palpate_geometry::palette::{Rgb, Theme, Trace};
+use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, Overlay, Solid, StandardView};
+use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Scene, SupportKind};
+use palpate_tactile::{CATALOGUE, SensorLayout};
 use std::sync::Arc;
 
 /// View of a picture.
@@ -50,6 +53,10 @@ pub struct PictureView {
     pub badge: Option<String>,
     /// Colours of the contact path; none where it is not drawn.
     pub path: Option<PathColour>,
+    /// Sensors that are drawn on the fingers; none where they are not.
+    pub layout: Option<SensorLayout>,
+    /// Draw the circle that each flex strip reads.
+    pub circles: bool,
 }
 
 impl Default for PictureView {
@@ -63,6 +70,29 @@ impl Default for PictureView {
             full_scale: PAD_FULL_SCALE,
             badge: None,
             path: None,
+            layout: Some(CATALOGUE[0].clone()),
+            circles: false,
+        }
+    }
+}
+
+/// What a ghost stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GhostKind {
+    /// The same scene in the other engine.
+    Engine,
+    /// Fingers of the real gripper.
+    RealFingers,
+}
+
+impl GhostKind {
+    /// Its colour, which no sensor has.
+    pub const fn colour(self, theme: Theme) -> Rgb {
+        match (self, theme) {
+            (Self::Engine, Theme::Dark) => Rgb(226, 132, 214),
+            (Self::Engine, Theme::Light) => Rgb(164, 44, 152),
+            (Self::RealFingers, Theme::Dark) => Rgb(94, 214, 190),
+            (Self::RealFingers, Theme::Light) => Rgb(0, 122, 104),
         }
     }
 }
@@ -107,10 +137,17 @@ impl Stage {
         }
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        if let Some(layout) = view.layout.as_ref().filter(|_| view.circles) {
+            circles::add(&mut overlay, layout, &self.gripper, &world_from_gripper, frame, view);
+        }
         if view.forces && view.annotations {
             forces::label(&mut overlay, &self.gripper, &world_from_gripper, frame, view);
         }
         let mut fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale);
+        if let Some(layout) = &view.layout {
+            let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
+            fingers.iter_mut().for_each(|finger| finger.sensors = drawn.clone());
+        }
         fingers.iter_mut().for_each(|finger| touch::clear_the_view(finger, &view.camera));
         DrawList {
             camera: view.camera,
@@ -131,6 +168,7 @@ impl Stage {
                 Vec::new()
             },
             overlay,
+            detail: Detail::Full,
         }
     }
 
@@ -138,8 +176,8 @@ impl Stage {
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, 1.0);
-        let colour = theme.colours().accent;
-        let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh, gloss: 0.0 };
+        let colour = GhostKind::Engine.colour(theme);
+        let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh };
         let mut ghosts: Vec<Solid> =
             fingers.iter().map(|finger| solid(Arc::new(ghost::finger(finger, colour)), Mat4::IDENTITY)).collect();
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
@@ -156,7 +194,7 @@ impl Stage {
     /// Contact path on the object of a frame, for [`DrawList::solids`]; none for an empty hand.
     pub fn path(&self, mesh: &Arc<SurfaceMesh>, frame: &Frame) -> Option<Solid> {
         let pose = frame.world_from_object.as_ref()?;
-        Some(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose), gloss: 0.0 })
+        Some(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose) })
     }
 
     /// Draws the fingers of a picture translucent, so that what they cover is seen.
@@ -164,30 +202,27 @@ impl Stage {
         let colour = theme.colours().accent;
         let fingers = std::mem::take(&mut list.fingers);
         let veils = fingers.iter().map(|finger| Arc::new(ghost::finger(finger, colour)));
-        list.ghosts.extend(veils.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY, gloss: 0.0 }));
+        list.ghosts.extend(veils.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY }));
     }
 
     /// The real fingers from the curvature of their flex strips (1/m), left and right, for
     /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
     pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
         let frame = reconstructed::evenly_bent(&self.gripper, curvature);
-        let colour = Trace::Curvature.colour(theme);
+        let colour = GhostKind::RealFingers.colour(theme);
         let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, &frame, 1.0);
         let read = fingers.iter().zip(curvature).filter(|(_, kappa)| kappa.is_some());
         let mesh = read.map(|(finger, _)| Arc::new(ghost::finger(finger, colour)));
-        mesh.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY, gloss: 0.0 }).collect()
+        mesh.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY }).collect()
     }
 
     fn solids(&self, frame: &Frame) -> Vec<Solid> {
-        let solid = |mesh: &Arc<SurfaceMesh>, pose: &Pose, gloss: f32| Solid {
-            mesh: Arc::clone(mesh),
-            world_from_mesh: matrix(pose),
-            gloss,
-        };
-        let mut solids = vec![solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper), 0.12)];
-        solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY, 0.05)));
+        let solid =
+            |mesh: &Arc<SurfaceMesh>, pose: &Pose| Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose) };
+        let mut solids = vec![solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper))];
+        solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY)));
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
-            solids.push(solid(mesh, pose, 0.10));
+            solids.push(solid(mesh, pose));
         }
         solids
     }
@@ -197,17 +232,18 @@ impl Stage {
         full_scale_of(&self.gripper, frames)
     }
 
-    /// Camera of a picture of the whole scene; from the home view it comes nearer to what the pads touch.
-    pub fn camera(&self, view: StandardView, frame: &Frame) -> Camera {
+    /// Camera of a picture of the whole scene, of this width over height; from the home view it comes nearer to what the pads
+    /// touch.
+    pub fn camera(&self, view: StandardView, frame: &Frame, aspect: f32) -> Camera {
         let (centre, radius) = self.bounds();
         let camera = Camera::default().turned_to(view).framing(centre, radius);
-        if view == StandardView::Home { self.nearer_to_touch(camera, frame) } else { camera }
+        if view == StandardView::Home { self.nearer_to_touch(camera, frame, aspect) } else { camera }
     }
 
-    /// This camera, moved towards what the pads touch as the grip tightens.
-    pub fn nearer_to_touch(&self, camera: Camera, frame: &Frame) -> Camera {
+    /// This camera, moved towards what the pads touch as the grip tightens, for pictures of this width over height.
+    pub fn nearer_to_touch(&self, camera: Camera, frame: &Frame, aspect: f32) -> Camera {
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        touch::nearer(camera, &self.gripper, &world_from_gripper, frame)
+        touch::nearer(camera, &self.gripper, &world_from_gripper, frame, aspect)
     }
 
     /// A ball around what matters, to be framed by a camera: centre and radius (m).
@@ -226,4 +262,21 @@ fn matrix(pose: &Pose) -> Mat4 {
 /// The colour of text and marks over a picture.
 fn ink(theme: Theme) -> Rgb {
     theme.colours().text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_geometry::palette::Trace;
+
+    #[test]
+    fn ghosts_stand_out_and_have_the_colour_of_no_sensor() {
+        for theme in Theme::ALL {
+            for kind in [GhostKind::Engine, GhostKind::RealFingers] {
+                let colour = kind.colour(theme);
+                assert!(colour.contrast(theme.colours().horizon) >= 3.0, "{kind:?} {theme:?}");
+                assert!(Trace::ALL.iter().all(|trace| trace.colour(theme) != colour));
+            }
+        }
+    }
 }

@@ -135,12 +135,12 @@ impl Canvas {
 mod tests {
     use super::*;
     use glam::DVec3;
-    use palpate_geometry::{Primitive, TriMesh};
+    use palpate_geometry::{Finish, Primitive, TriMesh};
 
     /// Share of the pixels that differ from the backdrop, and the pixels.
     fn drawn(mesh: &TriMesh, colour: Rgb) -> (f64, Vec<u8>) {
         let mut surface = SurfaceMesh::default();
-        surface.add(mesh, colour);
+        surface.add(mesh, colour, Finish::Plastic);
         let [picture, backdrop] = [&surface, &SurfaceMesh::default()].map(|surface| portrait(surface, 32));
         let differ = picture.chunks(4).zip(backdrop.chunks(4)).filter(|(a, b)| a != b).count();
         (differ as f64 / 1024.0, picture)

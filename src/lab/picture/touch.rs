@@ -10,15 +10,19 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Force on both pads at which the camera is half way (N).
 const HALF_WAY: f32 = 0.05;
-/// Loaded area of both pads in the end, as a share of the square of the picture's height at its distance; and the least and
-/// the greatest of these heights (m).
-const SHARE: f32 = 0.026;
-const HEIGHTS: [f32; 2] = [0.045, 0.12];
+/// Share of the picture that is pad coloured by its load in the end; and the least and the greatest height of the picture at
+/// the distance of the touch (m).
+const SHARE: f32 = 0.0125;
+/// Area that is coloured over that of the coloured taxels, at least: colours are blended beyond them.
+const SPREAD: f32 = 2.1;
+const HEIGHTS: [f32; 2] = [0.05, 0.11];
+/// Pressures between which a taxel comes to count as coloured, as shares of the largest.
+const COLOURED: [f32; 2] = [0.015, 0.06];
 /// Least height of the eye (m).
 const ABOVE_GROUND: f32 = 0.006;
 /// Yaw against the gripper, and pitch, in the end (rad): from the side, where a pad is seen from behind, and low, as
 /// fingertips curl up.
-const ANGLES: [f32; 2] = [-1.2, -0.22];
+const ANGLES: [f32; 2] = [-1.05, -0.16];
 /// Pressure of a loaded taxel, as a share of the brightest colour.
 const LOADED: f32 = 0.02;
 /// Translucent stretch beyond the loaded taxels, towards the palm, whose bellows stand in the way, and the tip (m).
@@ -26,44 +30,76 @@ const MARGINS: [f32; 2] = [0.016, 0.006];
 /// Force on a pad from which its finger is as clear as it gets (N).
 const CLEAR: f32 = 0.05;
 
-/// A camera moved towards the middle of what the pads touch.
-pub(super) fn nearer(camera: Camera, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Camera {
-    let grid = gripper.taxels();
-    let (mut moment, mut force, mut squares) = (DVec3::ZERO, 0.0, 0.0);
-    for side in Side::BOTH {
-        let placed = frame.placed(gripper, side);
-        for (taxel, load) in frame.loads(side, grid.count()) {
-            let (segment, along) = grid.place(taxel, &gripper.finger);
-            let normal = f64::from(load.normal).max(0.0);
-            moment += placed.point(segment, along, grid.across(taxel), grid.height(taxel)) * normal;
-            force += normal;
-            squares += normal * normal;
-        }
-    }
+/// A camera moved towards the middle of what the pads touch, for pictures of this width over height.
+pub(super) fn nearer(
+    camera: Camera,
+    gripper: &GripperModel,
+    world_from_gripper: &Pose,
+    frame: &Frame,
+    aspect: f32,
+) -> Camera {
+    let pads = Side::BOTH.map(|side| LoadedPad::of(gripper, world_from_gripper, frame, side));
+    let force = pads[0].force + pads[1].force;
     if force <= 0.0 {
         return camera;
     }
-    let touch = world_from_gripper.point(moment / force).as_vec3();
-    // Participation: the number of taxels if all bore the same load, without steps as taxels come and go.
-    let area = (grid.area() * force * force / squares) as f32;
-    let height = (area / SHARE).sqrt().clamp(HEIGHTS[0], HEIGHTS[1]);
-    let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
-    let tightness = (force as f32 / HALF_WAY).powf(1.5);
+    let touch = (pads[0].moment + pads[1].moment) / force;
+    let tightness = (force / HALF_WAY).powf(1.5);
     let share = tightness / (1.0 + tightness);
-    let target = camera.target.lerp(touch, share);
-    let distance = camera.distance * (nearest / camera.distance).powf(share);
     // One of the fingers is seen from behind, whichever is nearer.
     let closing = world_from_gripper.direction(DVec3::X);
     let from_side = closing.y.atan2(closing.x) as f32 + ANGLES[0];
     let turn = (from_side - camera.yaw + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
+    let [yaw, pitch] = [camera.yaw + turn, ANGLES[1]];
+    // What its pad shows of colour there decides how near.
+    let towards_eye = Camera { yaw, pitch, ..camera }.axes()[2];
+    let shown = pads.iter().map(|pad| pad.area_from_behind(towards_eye)).fold(0.0, f32::max);
+    let height = (SPREAD * shown / (SHARE * aspect)).sqrt().clamp(HEIGHTS[0], HEIGHTS[1]);
+    let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
+    let target = camera.target.lerp(touch, share);
+    let distance = camera.distance * (nearest / camera.distance).powf(share);
     // Not below the ground.
     let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();
     Camera {
         target,
         distance,
         yaw: camera.yaw + share * turn,
-        pitch: (camera.pitch + share * (ANGLES[1] - camera.pitch)).max(lowest),
+        pitch: (camera.pitch + share * (pitch - camera.pitch)).max(lowest),
         ..camera
+    }
+}
+
+/// Load on a pad.
+struct LoadedPad {
+    /// Sum of the normal forces (N), and their moment about the origin of the world (N m).
+    force: f32,
+    moment: Vec3,
+    /// For each loaded taxel the area that is coloured (m²), and the direction out of the pad.
+    coloured: Vec<(f32, Vec3)>,
+}
+
+impl LoadedPad {
+    fn of(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, side: Side) -> Self {
+        let grid = gripper.taxels();
+        let placed = frame.placed(gripper, side);
+        let largest = frame.loads(side, grid.count()).map(|(_, load)| load.normal).fold(0.0, f32::max);
+        let mut pad = Self { force: 0.0, moment: Vec3::ZERO, coloured: Vec::new() };
+        for (taxel, load) in frame.loads(side, grid.count()) {
+            let (segment, along) = grid.place(taxel, &gripper.finger);
+            let normal = load.normal.max(0.0);
+            let at = placed.point(segment, along, grid.across(taxel), grid.height(taxel));
+            pad.force += normal;
+            pad.moment += world_from_gripper.point(at).as_vec3() * normal;
+            let coloured = smoothstep(COLOURED[0], COLOURED[1], normal / largest.max(f32::MIN_POSITIVE));
+            let outwards = world_from_gripper.direction(placed.axes(segment).z_axis).as_vec3();
+            pad.coloured.push((grid.area() as f32 * coloured, outwards));
+        }
+        pad
+    }
+
+    /// Coloured area as seen through the back of the finger (m²).
+    fn area_from_behind(&self, towards_eye: Vec3) -> f32 {
+        self.coloured.iter().map(|(area, outwards)| area * (-outwards.dot(towards_eye)).max(0.0)).sum()
     }
 }
 

@@ -54,12 +54,14 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         let shape = PictureShape {
             label,
             shader: &shader,
+            vertex: "vertex",
             fragment,
             buffers: &buffers,
             groups: &[],
             topology: wgpu::PrimitiveTopology::TriangleList,
             depth,
             blends,
+            culled: None,
         };
         picture_pipeline(setup, &shape)
     };

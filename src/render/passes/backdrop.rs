@@ -15,12 +15,14 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         &PictureShape {
             label: "backdrop",
             shader: &shader,
+            vertex: "vertex",
             fragment: "fragment",
             buffers: &[],
             groups: &[],
             topology: wgpu::PrimitiveTopology::TriangleList,
             depth: Depth::OnTop,
             blends: false,
+            culled: None,
         },
     );
     Box::new(Backdrop { pipeline })

@@ -1,6 +1,7 @@
 //! Building pipelines with what all passes have in common.
 
 use super::PassSetup;
+use crate::ambient::DISTANCE;
 use crate::targets::{COLOUR, DEPTH, SAMPLES};
 use wgpu::{BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPipeline, ShaderModule, VertexBufferLayout};
 
@@ -21,12 +22,15 @@ pub(super) enum Depth {
 pub(super) struct PictureShape<'a> {
     pub(super) label: &'a str,
     pub(super) shader: &'a ShaderModule,
+    pub(super) vertex: &'a str,
     pub(super) fragment: &'a str,
     pub(super) buffers: &'a [Option<VertexBufferLayout<'a>>],
     pub(super) groups: &'a [&'a BindGroupLayout],
     pub(super) topology: wgpu::PrimitiveTopology,
     pub(super) depth: Depth,
     pub(super) blends: bool,
+    /// Faces that are left out.
+    pub(super) culled: Option<wgpu::Face>,
 }
 
 pub(super) fn module(device: &Device, label: &str, source: &str) -> ShaderModule {
@@ -55,11 +59,11 @@ pub(super) fn picture_pipeline(setup: &PassSetup<'_>, shape: &PictureShape<'_>) 
         layout: Some(&layout),
         vertex: wgpu::VertexState {
             module: shape.shader,
-            entry_point: Some("vertex"),
+            entry_point: Some(shape.vertex),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: shape.buffers,
         },
-        primitive: wgpu::PrimitiveState { topology: shape.topology, ..Default::default() },
+        primitive: wgpu::PrimitiveState { topology: shape.topology, cull_mode: shape.culled, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(write),
@@ -83,31 +87,54 @@ pub(super) fn picture_pipeline(setup: &PassSetup<'_>, shape: &PictureShape<'_>) 
     })
 }
 
+/// Pipeline of what does not end in the picture itself.
+pub(super) struct UnlitShape<'a> {
+    pub(super) label: &'a str,
+    pub(super) shader: &'a ShaderModule,
+    pub(super) buffers: &'a [Option<VertexBufferLayout<'a>>],
+    pub(super) groups: &'a [&'a BindGroupLayout],
+    pub(super) topology: wgpu::PrimitiveTopology,
+}
+
 /// A pipeline that draws depth alone, seen from the light; its vertex entry is `vertex_shadow`.
-pub(super) fn shadow_pipeline(
+pub(super) fn shadow_pipeline(setup: &PassSetup<'_>, shape: &UnlitShape<'_>) -> RenderPipeline {
+    unlit_pipeline(setup, shape, "vertex_shadow", None)
+}
+
+/// A pipeline that draws the distance from the eye; its fragment entry is `fragment_distance`.
+pub(super) fn distance_pipeline(setup: &PassSetup<'_>, shape: &UnlitShape<'_>) -> RenderPipeline {
+    let fragment = wgpu::FragmentState {
+        module: shape.shader,
+        entry_point: Some("fragment_distance"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        targets: &[Some(DISTANCE.into())],
+    };
+    unlit_pipeline(setup, shape, "vertex", Some(fragment))
+}
+
+fn unlit_pipeline(
     setup: &PassSetup<'_>,
-    label: &str,
-    shader: &ShaderModule,
-    buffers: &[Option<VertexBufferLayout<'_>>],
-    groups: &[&BindGroupLayout],
+    shape: &UnlitShape<'_>,
+    vertex: &str,
+    fragment: Option<wgpu::FragmentState<'_>>,
 ) -> RenderPipeline {
     let groups: Vec<Option<&BindGroupLayout>> =
-        std::iter::once(&setup.frame.shadow_layout).chain(groups.iter().copied()).map(Some).collect();
+        std::iter::once(&setup.frame.unlit_layout).chain(shape.groups.iter().copied()).map(Some).collect();
     let layout = setup.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
+        label: Some(shape.label),
         bind_group_layouts: &groups,
         immediate_size: 0,
     });
     setup.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
+        label: Some(shape.label),
         layout: Some(&layout),
         vertex: wgpu::VertexState {
-            module: shader,
-            entry_point: Some("vertex_shadow"),
+            module: shape.shader,
+            entry_point: Some(vertex),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers,
+            buffers: shape.buffers,
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState { topology: shape.topology, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),
@@ -116,9 +143,24 @@ pub(super) fn shadow_pipeline(
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState::default(),
-        fragment: None,
+        fragment,
         multiview_mask: None,
         cache: None,
+    })
+}
+
+/// A uniform that both stages read, with what is bound to it.
+pub(super) fn fixed_uniform(
+    setup: &PassSetup<'_>,
+    label: &str,
+    layout: &BindGroupLayout,
+    bytes: &[u8],
+) -> wgpu::BindGroup {
+    let buffer = fixed_buffer(setup.device, setup.queue, label, BufferUsages::UNIFORM, bytes);
+    setup.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(label),
+        layout,
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
     })
 }
 

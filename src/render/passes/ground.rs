@@ -1,6 +1,6 @@
 //! The ground with its grid.
 
-use super::build::{Depth, PictureShape, module, picture_pipeline, uniform_layout};
+use super::build::{Depth, PictureShape, UnlitShape, distance_pipeline, module, picture_pipeline, uniform_layout};
 use super::{Pass, PassSetup, Prepare};
 use bytemuck::{Pod, Zeroable};
 use wgpu::{BindGroup, Buffer, RenderPass, RenderPipeline};
@@ -17,6 +17,7 @@ struct GroundUniform {
 
 struct GroundPass {
     pipeline: RenderPipeline,
+    distance: RenderPipeline,
     uniform: Buffer,
     group: BindGroup,
     visible: bool,
@@ -31,12 +32,24 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         &PictureShape {
             label: "ground",
             shader: &shader,
+            vertex: "vertex",
             fragment: "fragment",
             buffers: &[],
             groups: &[&layout],
             topology: wgpu::PrimitiveTopology::TriangleStrip,
             depth: Depth::Veil,
             blends: true,
+            culled: None,
+        },
+    );
+    let distance = distance_pipeline(
+        setup,
+        &UnlitShape {
+            label: "ground distance",
+            shader: &shader,
+            buffers: &[],
+            groups: &[&layout],
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
         },
     );
     let uniform = device.create_buffer(&wgpu::BufferDescriptor {
@@ -50,7 +63,7 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         layout: &layout,
         entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
     });
-    Box::new(GroundPass { pipeline, uniform, group, visible: false })
+    Box::new(GroundPass { pipeline, distance, uniform, group, visible: false })
 }
 
 impl Pass for GroundPass {
@@ -67,9 +80,19 @@ impl Pass for GroundPass {
         }
     }
 
+    fn draw_distance(&self, pass: &mut RenderPass<'_>) {
+        self.draw_by(&self.distance, pass);
+    }
+
     fn draw(&self, pass: &mut RenderPass<'_>) {
+        self.draw_by(&self.pipeline, pass);
+    }
+}
+
+impl GroundPass {
+    fn draw_by(&self, pipeline: &RenderPipeline, pass: &mut RenderPass<'_>) {
         if self.visible {
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(1, &self.group, &[]);
             pass.draw(0..4, 0..1);
         }

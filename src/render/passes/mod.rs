@@ -36,6 +36,9 @@ pub(crate) trait Pass: Send + Sync {
     /// Draws into the shadow map, where this kind casts a shadow.
     fn draw_shadow(&self, _pass: &mut RenderPass<'_>) {}
 
+    /// Draws its distance from the eye, where this kind takes light from its surroundings.
+    fn draw_distance(&self, _pass: &mut RenderPass<'_>) {}
+
     /// Draws into the picture.
     fn draw(&self, pass: &mut RenderPass<'_>);
 }

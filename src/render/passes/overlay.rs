@@ -47,12 +47,14 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         &PictureShape {
             label: "overlay",
             shader: &shader,
+            vertex: "vertex",
             fragment: "fragment",
             buffers: &buffers,
             groups: &[&layout],
             topology: wgpu::PrimitiveTopology::TriangleList,
             depth: Depth::OnTop,
             blends: true,
+            culled: None,
         },
     );
     let glyphs = Glyphs::new(device);

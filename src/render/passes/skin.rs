@@ -1,14 +1,16 @@
 //! Soft fingers as smooth skins: one mesh in the finger's own coordinates, bent by the vertex shader over 128 rings.
 
 use super::build::{
-    Depth, PictureShape, fixed_buffer, module, picture_pipeline, shadow_pipeline, texel_entry, uniform_entry,
+    Depth, PictureShape, UnlitShape, distance_pipeline, fixed_buffer, module, picture_pipeline, shadow_pipeline,
+    texel_entry, uniform_entry,
 };
 use super::{Pass, PassSetup, Prepare};
 use crate::text::upload_texels;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
+use palpate_geometry::drawing::{FingerFrame, Section, SensorStrip, SoftFinger};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, SILICONE};
+use std::ops::Range;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPass, RenderPipeline};
 use wgpu::{Texture, VertexBufferLayout, VertexStepMode};
 
@@ -22,6 +24,8 @@ const TIP_ROUNDING: f32 = 0.0022;
 const RIBS: f32 = 10.0;
 /// The silicone of the bellows.
 const BELLOWS: Rgb = Rgb(214, 216, 214);
+/// Width of a flex strip (m): that of Spectra Symbol's, 6.4 mm.
+const STRIP_WIDTH: f32 = 0.0064;
 
 /// Mirrors `Ring` in the shader.
 #[repr(C)]
@@ -41,6 +45,10 @@ struct SkinUniform {
     pad: [f32; 4],
     taxels: [f32; 4],
     veil: [f32; 4],
+    strips: [f32; 4],
+    strip_colours: [[f32; 4]; 2],
+    sensors: [f32; 4],
+    pad_colours: [[f32; 4]; 2],
     map: [[f32; 4]; 17],
 }
 
@@ -65,7 +73,23 @@ struct SkinMesh {
     length: f32,
     vertices: Buffer,
     indices: Buffer,
-    count: u32,
+    bellows: SkinPart,
+    pad: SkinPart,
+}
+
+/// Some indices of a skin: first those between each ring and the next, from the palm on.
+#[derive(Clone, Debug, PartialEq)]
+struct SkinPart {
+    indices: Range<u32>,
+    per_ring: u32,
+}
+
+impl SkinPart {
+    /// Indices between two rings.
+    fn between(&self, rings: &Range<u32>) -> Range<u32> {
+        let at = |ring: u32| (self.indices.start + ring * self.per_ring).min(self.indices.end);
+        at(rings.start)..at(rings.end)
+    }
 }
 
 /// Buffers of one finger.
@@ -74,18 +98,25 @@ struct FingerOnDevice {
     texels: Texture,
     size: [u32; 2],
     group: BindGroup,
-    /// A part of it is translucent.
-    veiled: bool,
+    /// Rings of its translucent part.
+    veiled: Range<u32>,
 }
 
 struct SkinPass {
-    pipeline: RenderPipeline,
-    veil: RenderPipeline,
+    opaque: Pipelines,
+    veil: Pipelines,
     shadow: RenderPipeline,
+    distance: RenderPipeline,
     layout: BindGroupLayout,
     mesh: Option<SkinMesh>,
     fingers: Vec<FingerOnDevice>,
     shown: usize,
+}
+
+/// Pipelines of both parts of a skin: bellows are seen from outside alone, a pad from both sides.
+struct Pipelines {
+    bellows: RenderPipeline,
+    pad: RenderPipeline,
 }
 
 pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
@@ -99,29 +130,39 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
         step_mode: VertexStepMode::Vertex,
         attributes: &ATTRIBUTES,
     })];
-    let pipeline = |label, fragment, depth| {
+    let pipeline = |label, fragment, depth, culled| {
         let (groups, topology) = (&[&layout][..], wgpu::PrimitiveTopology::TriangleList);
-        let blends = depth == Depth::Veil;
-        let buffers = &buffers;
-        picture_pipeline(
-            setup,
-            &PictureShape { label, shader: &shader, fragment, buffers, groups, topology, depth, blends },
-        )
+        let (shader, vertex, buffers, blends) = (&shader, "vertex", &buffers, depth == Depth::Veil);
+        let shape = PictureShape { label, shader, vertex, fragment, buffers, groups, topology, depth, blends, culled };
+        picture_pipeline(setup, &shape)
     };
-    let veil = pipeline("skin veil", "fragment_veil", Depth::Veil);
-    let pipeline = pipeline("skin", "fragment", Depth::Solid);
-    let shadow = shadow_pipeline(setup, "skin shadow", &shader, &buffers, &[&layout]);
-    Box::new(SkinPass { pipeline, veil, shadow, layout, mesh: None, fingers: Vec::new(), shown: 0 })
+    let outside = Some(wgpu::Face::Back);
+    let opaque = Pipelines {
+        bellows: pipeline("bellows", "fragment_bellows", Depth::Solid, outside),
+        pad: pipeline("pad", "fragment_pad", Depth::Solid, None),
+    };
+    let veil = Pipelines {
+        bellows: pipeline("bellows veil", "fragment_bellows_veil", Depth::Veil, outside),
+        pad: pipeline("pad veil", "fragment_pad_veil", Depth::Veil, None),
+    };
+    let topology = wgpu::PrimitiveTopology::TriangleList;
+    let unlit = UnlitShape { label: "skin, unlit", shader: &shader, buffers: &buffers, groups: &[&layout], topology };
+    let (shadow, distance) = (shadow_pipeline(setup, &unlit), distance_pipeline(setup, &unlit));
+    Box::new(SkinPass { opaque, veil, shadow, distance, layout, mesh: None, fingers: Vec::new(), shown: 0 })
 }
 
 impl SkinPass {
-    fn draw_those(&self, pass: &mut RenderPass<'_>, wanted: impl Fn(&FingerOnDevice) -> bool) {
+    /// Draws a part of each finger: some of its indices.
+    fn draw_part(&self, pass: &mut RenderPass<'_>, part: impl Fn(&FingerOnDevice, &SkinMesh) -> Range<u32>) {
         let Some(mesh) = &self.mesh else { return };
         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        for finger in self.fingers[..self.shown].iter().filter(|finger| wanted(finger)) {
-            pass.set_bind_group(1, &finger.group, &[]);
-            pass.draw_indexed(0..mesh.count, 0, 0..1);
+        for finger in &self.fingers[..self.shown] {
+            let indices = part(finger, mesh);
+            if !indices.is_empty() {
+                pass.set_bind_group(1, &finger.group, &[]);
+                pass.draw_indexed(indices, 0, 0..1);
+            }
         }
     }
 
@@ -130,15 +171,37 @@ impl SkinPass {
         if self.mesh.as_ref().is_some_and(|m| m.section == finger.section && m.length == length) {
             return;
         }
-        let (vertices, indices) = skin_mesh(&finger.section, length);
+        let (vertices, indices, [bellows, pad]) = skin_mesh(&finger.section, length);
         let (device, queue) = (prepare.device, prepare.queue);
         self.mesh = Some(SkinMesh {
             section: finger.section,
             length,
             vertices: fixed_buffer(device, queue, "skin", BufferUsages::VERTEX, bytemuck::cast_slice(&vertices)),
             indices: fixed_buffer(device, queue, "skin indices", BufferUsages::INDEX, bytemuck::cast_slice(&indices)),
-            count: indices.len() as u32,
+            bellows,
+            pad,
         });
+    }
+}
+
+/// All indices of a skin: its parts follow each other.
+fn whole(_finger: &FingerOnDevice, mesh: &SkinMesh) -> Range<u32> {
+    mesh.bellows.indices.start..mesh.pad.indices.end
+}
+
+/// Share of the length over which a veil begins and ends; as in the shader.
+const VEIL_EDGE: f32 = 0.06;
+
+/// Rings between which a finger is translucent.
+fn veiled_rings(finger: &SoftFinger) -> Range<u32> {
+    let length = finger.frames.last().map_or(0.0, |frame| frame.arc);
+    let [from, to] = finger.veil.stretch;
+    let reach = from - VEIL_EDGE * length..=to + VEIL_EDGE * length;
+    let within = |k: &usize| finger.veil.clearness > 0.0 && reach.contains(&ring_arc(*k, length));
+    let rings = (0..RINGS).filter(within);
+    match (rings.clone().next(), rings.last()) {
+        (Some(first), Some(last)) => first.saturating_sub(1) as u32..(last + 1).min(RINGS - 1) as u32,
+        _ => 0..0,
     }
 }
 
@@ -155,20 +218,30 @@ impl Pass for SkinPass {
                 self.fingers.push(made);
             }
             self.fingers[k].write(prepare.queue, finger);
-            self.fingers[k].veiled = finger.veil.clearness > 0.0;
+            self.fingers[k].veiled = veiled_rings(finger);
         }
     }
 
     fn draw_shadow(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.shadow);
-        self.draw_those(pass, |_| true);
+        self.draw_part(pass, whole);
+    }
+
+    fn draw_distance(&self, pass: &mut RenderPass<'_>) {
+        pass.set_pipeline(&self.distance);
+        self.draw_part(pass, whole);
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>) {
-        pass.set_pipeline(&self.pipeline);
-        self.draw_those(pass, |_| true);
-        pass.set_pipeline(&self.veil);
-        self.draw_those(pass, |finger| finger.veiled);
+        pass.set_pipeline(&self.opaque.bellows);
+        self.draw_part(pass, |_, mesh| mesh.bellows.indices.clone());
+        pass.set_pipeline(&self.opaque.pad);
+        self.draw_part(pass, |_, mesh| mesh.pad.indices.clone());
+        // The pad lies behind the bellows that are looked through.
+        pass.set_pipeline(&self.veil.pad);
+        self.draw_part(pass, |finger, mesh| mesh.pad.between(&finger.veiled));
+        pass.set_pipeline(&self.veil.bellows);
+        self.draw_part(pass, |finger, mesh| mesh.bellows.between(&finger.veiled));
     }
 }
 
@@ -199,19 +272,28 @@ impl FingerOnDevice {
                 wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::TextureView(&view) },
             ],
         });
-        Self { uniform, texels, size, group, veiled: false }
+        Self { uniform, texels, size, group, veiled: 0..0 }
     }
 
     fn write(&self, queue: &Queue, finger: &SoftFinger) {
         let length = finger.frames.last().map_or(0.0, |f| f.arc);
         let rings = std::array::from_fn(|k| ring_at(&finger.frames, ring_arc(k, length)));
         let linear = |colour: Rgb| Vec3::from(colour.to_linear()).extend(1.0).to_array();
+        // A strip without length is not seen.
+        let absent = SensorStrip { stretch: [-length; 2], colour: BELLOWS };
+        let strip = |k: usize| finger.sensors.strips.get(k).copied().unwrap_or(absent);
+        let [[a, b], [c, d]] = [0, 1].map(|k| strip(k).stretch);
+        let strips = [a, b, c, d].map(|arc| arc / length);
         let uniform = SkinUniform {
             rings,
             bellows: linear(BELLOWS),
             pad: linear(SILICONE),
             taxels: [self.size[1] as f32, self.size[0] as f32, finger.full_scale, length],
             veil: [finger.veil.stretch[0] / length, finger.veil.stretch[1] / length, finger.veil.clearness, 0.0],
+            strips,
+            strip_colours: [0, 1].map(|k| linear(strip(k).colour)),
+            sensors: [finger.sensors.pads as f32, finger.section.width, 0.5 * STRIP_WIDTH / finger.section.width, 0.0],
+            pad_colours: finger.sensors.pad_colours.map(linear),
             map: PRESSURE_MAP.map(linear),
         };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
@@ -315,8 +397,8 @@ fn section_points(section: &Section, k: usize, length: f32) -> Vec<(Vec2, f32)> 
     half.iter().copied().chain(mirrored).map(|(p, w)| (middle + (p - middle) * scale, w)).collect()
 }
 
-/// The skin in the coordinates of its rings, with a flat end.
-fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>) {
+/// The skin in the coordinates of its rings, with a flat end: corners, indices, and which of these are bellows and pad.
+fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>, [SkinPart; 2]) {
     let rings: Vec<Vec<(Vec2, f32)>> = (0..RINGS).map(|k| section_points(section, k, length)).collect();
     let around = rings[0].len();
     let place = |k: usize, i: usize| {
@@ -338,15 +420,24 @@ fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>) {
             });
         }
     }
-    let mut indices = Vec::new();
     let at = |k: usize, i: usize| (k * around + i % around) as u32;
-    for k in 0..RINGS - 1 {
-        for i in 0..around {
-            indices.extend([at(k, i), at(k + 1, i + 1), at(k, i + 1), at(k, i), at(k + 1, i), at(k + 1, i + 1)]);
+    let is_pad = |i: usize| rings[0][i % around].1 > 0.5 && rings[0][(i + 1) % around].1 > 0.5;
+    let mut indices = Vec::new();
+    let mut add = |wanted: bool| {
+        let start = indices.len() as u32;
+        let chosen: Vec<usize> = (0..around).filter(|i| is_pad(*i) == wanted).collect();
+        for k in 0..RINGS - 1 {
+            for i in chosen.iter().copied() {
+                indices.extend([at(k, i), at(k + 1, i + 1), at(k, i + 1), at(k, i), at(k + 1, i), at(k + 1, i + 1)]);
+            }
         }
-    }
-    close_tip(section, &rings[RINGS - 1], &mut vertices, &mut indices);
-    (vertices, indices)
+        if !wanted {
+            close_tip(section, &rings[RINGS - 1], &mut vertices, &mut indices);
+        }
+        SkinPart { indices: start..indices.len() as u32, per_ring: 6 * chosen.len() as u32 }
+    };
+    let parts = [add(false), add(true)];
+    (vertices, indices, parts)
 }
 
 /// The nearest neighbour on a ring that lies elsewhere: the seam has two points at one place.
@@ -386,7 +477,12 @@ mod tests {
 
     #[test]
     fn the_skin_is_closed_round_and_faces_outward() {
-        let (vertices, indices) = skin_mesh(&SECTION, 0.1);
+        let (vertices, indices, [bellows, pad]) = skin_mesh(&SECTION, 0.1);
+        assert_eq!(
+            (bellows.indices.start, bellows.indices.end, pad.indices.end),
+            (0, pad.indices.start, indices.len() as u32)
+        );
+        assert_eq!(pad.between(&(0..RINGS as u32 - 1)), pad.indices);
         assert!(indices.iter().all(|i| (*i as usize) < vertices.len()));
         for v in &vertices {
             let n = Vec3::from(v.normal);

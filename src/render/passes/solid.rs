@@ -1,15 +1,58 @@
 //! Rigid things, and ghosts of things, which are translucent and cast no shadow. A mesh is uploaded once and kept as
 //! long as pictures keep showing it.
 
-use super::build::{Depth, PictureShape, StreamBuffer, fixed_buffer, module, picture_pipeline, shadow_pipeline};
+use super::build::{
+    Depth, PictureShape, StreamBuffer, UnlitShape, distance_pipeline, fixed_buffer, fixed_uniform, module,
+    picture_pipeline, shadow_pipeline, uniform_layout,
+};
 use super::{Pass, PassSetup, Prepare};
 use bytemuck::{Pod, Zeroable};
 use palpate_geometry::drawing::{DrawList, Solid};
-use palpate_geometry::{SurfaceMesh, SurfaceVertex};
+use palpate_geometry::{Finish, SurfaceMesh, SurfaceVertex};
 use std::sync::Arc;
-use wgpu::{Buffer, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
+use wgpu::{BindGroup, Buffer, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
 
-/// Mirrors `Instance` in shaders/solid.wgsl: the columns of the matrix, the gloss in the last w.
+/// Mirrors `Finish` in shaders/solid.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct FinishUniform {
+    /// Grains per metre along each axis of the mesh, and how far they change the colour.
+    grain: [f32; 4],
+    /// How far grains tilt the surface, wrap, sheen, mirror.
+    relief: [f32; 4],
+    /// Gloss and power of the highlight.
+    highlight: [f32; 4],
+}
+
+/// How each finish answers to light; tuned by eye on the built-in objects.
+fn finish(finish: Finish) -> FinishUniform {
+    let (grain, relief, [gloss, power]) = match finish {
+        Finish::Plastic => ([0.0; 4], [0.0, 0.0, 0.0, 0.0], [0.34, 90.0]),
+        Finish::Matt => ([0.0; 4], [0.0, 0.2, 0.0, 0.0], [0.0, 1.0]),
+        Finish::Rubber => ([900.0, 900.0, 900.0, 0.03], [0.03, 0.2, 0.3, 0.0], [0.16, 12.0]),
+        // Brushed along y, the long side of the built-in objects.
+        Finish::Metal => ([2600.0, 40.0, 2600.0, 0.03], [0.025, 0.0, 0.0, 0.85], [0.5, 50.0]),
+        Finish::Felt => ([1500.0, 1500.0, 1500.0, 0.20], [0.22, 0.4, 1.6, 0.0], [0.0, 1.0]),
+        Finish::Peel => ([620.0, 620.0, 620.0, 0.04], [0.12, 0.15, 0.0, 0.0], [0.42, 28.0]),
+        Finish::Cardboard => ([260.0, 2600.0, 260.0, 0.11], [0.04, 0.1, 0.1, 0.0], [0.0, 1.0]),
+        Finish::Wood => ([900.0, 45.0, 900.0, 0.16], [0.04, 0.1, 0.0, 0.0], [0.08, 20.0]),
+    };
+    FinishUniform { grain, relief, highlight: [gloss, power, 0.0, 0.0] }
+}
+
+/// All finishes in the order of their numbers.
+const FINISHES: [Finish; Finish::COUNT] = [
+    Finish::Plastic,
+    Finish::Matt,
+    Finish::Rubber,
+    Finish::Metal,
+    Finish::Felt,
+    Finish::Peel,
+    Finish::Cardboard,
+    Finish::Wood,
+];
+
+/// Mirrors `Instance` in shaders/solid.wgsl: the columns of the matrix.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Instance {
@@ -25,8 +68,9 @@ struct Uploaded {
 
 struct SolidPass {
     pipeline: RenderPipeline,
-    /// Absent for ghosts.
-    shadow: Option<RenderPipeline>,
+    /// Shadow and distance; absent for ghosts.
+    unlit: Option<[RenderPipeline; 2]>,
+    finishes: BindGroup,
     /// Part of the draw list that is drawn.
     of: fn(&DrawList) -> &[Solid],
     meshes: Vec<Uploaded>,
@@ -62,22 +106,29 @@ fn make_kind(setup: &PassSetup<'_>, ghosts: bool) -> Box<dyn Pass> {
             attributes: &INSTANCE_ATTRIBUTES,
         }),
     ];
+    let layout = uniform_layout(setup.device, "finishes");
+    let finishes = FINISHES.map(finish);
+    let (groups, topology) = (&[&layout][..], wgpu::PrimitiveTopology::TriangleList);
     let pipeline = picture_pipeline(
         setup,
         &PictureShape {
             label: if ghosts { "ghost" } else { "solid" },
             shader: &shader,
+            vertex: if ghosts { "vertex_ghost" } else { "vertex" },
             fragment: if ghosts { "fragment_ghost" } else { "fragment" },
             buffers: &buffers,
-            groups: &[],
-            topology: wgpu::PrimitiveTopology::TriangleList,
+            groups,
+            topology,
             depth: if ghosts { Depth::Veil } else { Depth::Solid },
             blends: ghosts,
+            culled: None,
         },
     );
+    let unlit = UnlitShape { label: "solid, unlit", shader: &shader, buffers: &buffers, groups, topology };
     Box::new(SolidPass {
         pipeline,
-        shadow: (!ghosts).then(|| shadow_pipeline(setup, "solid shadow", &shader, &buffers, &[])),
+        unlit: (!ghosts).then(|| [shadow_pipeline(setup, &unlit), distance_pipeline(setup, &unlit)]),
+        finishes: fixed_uniform(setup, "finishes", &layout, bytemuck::cast_slice(&finishes)),
         of: if ghosts { |list| &list.ghosts } else { |list| &list.solids },
         meshes: Vec::new(),
         instances: StreamBuffer::new("solid instances", BufferUsages::VERTEX),
@@ -102,8 +153,10 @@ impl SolidPass {
         self.meshes.len() - 1
     }
 
-    fn draw_all(&self, pass: &mut RenderPass<'_>) {
+    fn draw_by(&self, pipeline: &RenderPipeline, pass: &mut RenderPass<'_>) {
         let Some(instances) = self.instances.get() else { return };
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(1, &self.finishes, &[]);
         for (k, mesh) in self.shown.iter().enumerate() {
             let mesh = &self.meshes[*mesh];
             // WebGL2 has no first instance, so each solid's instance is bound by itself.
@@ -121,26 +174,34 @@ impl Pass for SolidPass {
         let solids = (self.of)(prepare.list);
         self.meshes.retain(|m| solids.iter().any(|solid| Arc::ptr_eq(&m.mesh, &solid.mesh)));
         self.shown = solids.iter().map(|solid| self.index_of(prepare, solid)).collect();
-        let instances: Vec<Instance> = solids
-            .iter()
-            .map(|solid| {
-                let mut columns = solid.world_from_mesh.to_cols_array_2d();
-                columns[3][3] = solid.gloss;
-                Instance { columns }
-            })
-            .collect();
+        let instances: Vec<Instance> =
+            solids.iter().map(|solid| Instance { columns: solid.world_from_mesh.to_cols_array_2d() }).collect();
         self.instances.write(prepare.device, prepare.queue, bytemuck::cast_slice(&instances));
     }
 
     fn draw_shadow(&self, pass: &mut RenderPass<'_>) {
-        if let Some(shadow) = &self.shadow {
-            pass.set_pipeline(shadow);
-            self.draw_all(pass);
+        if let Some([shadow, _]) = &self.unlit {
+            self.draw_by(shadow, pass);
+        }
+    }
+
+    fn draw_distance(&self, pass: &mut RenderPass<'_>) {
+        if let Some([_, distance]) = &self.unlit {
+            self.draw_by(distance, pass);
         }
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>) {
-        pass.set_pipeline(&self.pipeline);
-        self.draw_all(pass);
+        self.draw_by(&self.pipeline, pass);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finishes_stand_at_their_numbers() {
+        assert!(FINISHES.iter().enumerate().all(|(k, finish)| *finish as usize == k));
     }
 }

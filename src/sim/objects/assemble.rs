@@ -4,8 +4,8 @@ use super::{CollisionShape, LoadOptions, ObjectError, ObjectModel, Resting};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::three_digits;
 use palpate_geometry::{
-    Bounds, ColouredPart, DistanceField, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh, TriMesh, bake,
-    choose_cell, mass_properties, repair, support_points,
+    Bounds, ColouredPart, DistanceField, Finish, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh, TriMesh,
+    bake, choose_cell, mass_properties, repair, support_points,
 };
 use std::sync::Arc;
 
@@ -84,14 +84,14 @@ impl Blueprint {
             ShapeSource::Primitive(primitive) => {
                 let mut mesh = primitive.tessellate();
                 mesh.transform(place);
-                self.visual.push(ColouredPart { mesh, colour });
+                self.visual.push(ColouredPart { mesh, colour, finish: Finish::default() });
                 self.visual_solids.push(SolidPart::Primitive(*primitive, *place));
             }
             ShapeSource::Mesh(parts) => {
                 for part in parts {
                     let mut mesh = part.mesh.clone();
                     mesh.transform(place);
-                    self.visual.push(ColouredPart { mesh, colour: colour.or(part.colour) });
+                    self.visual.push(ColouredPart { mesh, colour: colour.or(part.colour), finish: part.finish });
                 }
                 self.visual_solids.push(SolidPart::Mesh(joined(parts, place)));
             }
@@ -340,7 +340,7 @@ fn scale_solids(solids: &mut [SolidPart], scale: f64) {
 fn surface_of(solids: &[SolidPart]) -> SurfaceMesh {
     let mut surface = SurfaceMesh::default();
     for solid in solids {
-        surface.add(&mesh_of(solid), DEFAULT_COLOUR);
+        surface.add(&mesh_of(solid), DEFAULT_COLOUR, Finish::default());
     }
     surface
 }

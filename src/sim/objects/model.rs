@@ -1,7 +1,7 @@
 //! An object ready for simulation and drawing, whatever file it came from.
 
 use glam::{DVec2, DVec3};
-use palpate_geometry::{Bounds, DistanceField, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh};
+use palpate_geometry::{Bounds, DistanceField, Finish, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -152,7 +152,7 @@ impl ObjectModel {
     /// An object that is one primitive of even density (kg/m³), for tests and closed-form scenes.
     pub fn from_primitive(name: &str, shape: Primitive, density: f64, friction: f64) -> Self {
         let mut surface = SurfaceMesh::default();
-        surface.add(&shape.tessellate(), palpate_geometry::palette::Rgb(180, 180, 180));
+        surface.add(&shape.tessellate(), palpate_geometry::palette::Rgb(180, 180, 180), Finish::default());
         let unit = shape.mass_properties();
         Self {
             name: name.to_owned(),

@@ -5,7 +5,7 @@ use super::assemble::{Blueprint, ShapeSource};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, ShapeClass};
 use glam::DVec3;
-use palpate_geometry::{ColouredPart, Pose, Primitive, TriMesh, cube_sphere};
+use palpate_geometry::{ColouredPart, Finish, Pose, Primitive, TriMesh, cube_sphere};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::RangeInclusive;
@@ -129,7 +129,9 @@ impl Solid {
     fn source(&self) -> ShapeSource {
         match self {
             Self::Primitive(shape) => ShapeSource::Primitive(*shape),
-            Self::Superquadric { .. } => ShapeSource::Mesh(vec![ColouredPart { mesh: self.mesh(), colour: None }]),
+            Self::Superquadric { .. } => {
+                ShapeSource::Mesh(vec![ColouredPart { mesh: self.mesh(), colour: None, finish: Finish::default() }])
+            }
         }
     }
 

@@ -1,0 +1,118 @@
+//! The circle that each flex strip reads: one number, drawn through the middle of the strip along the finger.
+//!
+//! Curvature is 1 / radius (paper, section IV-A1). The finger follows the circle where it bends evenly; where it does not,
+//! the gap between them is what the strip cannot tell.
+
+use super::PictureView;
+use glam::{DVec3, Vec2};
+use palpate_geometry::Pose;
+use palpate_geometry::drawing::{Align, Overlay, Shape2};
+use palpate_geometry::palette::Trace;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{GripperModel, Side};
+use palpate_tactile::{Quantity, SensorLayout, Sensors, SignalDefinition};
+
+/// Curvature below which a circle is too large to be seen as one (1/m).
+const STRAIGHT: f64 = 0.5;
+/// Length of the arc beyond each end of its strip (m), and of its pieces.
+const BEYOND: f64 = 0.022;
+const PIECE: f64 = 0.0025;
+/// Width of the line and height of the number (points).
+const WIDTH: f32 = 2.0;
+const TEXT: f32 = 14.0;
+
+/// Draws the circle of each strip of a layout, dashed on the right finger as its curves are.
+pub(super) fn add(
+    overlay: &mut Overlay,
+    layout: &SensorLayout,
+    gripper: &GripperModel,
+    world_from_gripper: &Pose,
+    frame: &Frame,
+    view: &PictureView,
+) {
+    let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return };
+    let values = sensors.read(frame);
+    let strips = sensors.channels().iter().zip(values).filter(|(channel, _)| channel.quantity == Quantity::Curvature);
+    for (channel, value) in strips {
+        let Some(curvature) = value.filter(|kappa| kappa.is_finite() && kappa.abs() >= STRAIGHT) else { continue };
+        let stretch = sensors.stretch(channel);
+        let trace = if stretch[0] < 0.45 * gripper.finger.length { Trace::Curvature } else { Trace::CurvatureDistal };
+        let colour = trace.colour(view.theme);
+        let points: Vec<Option<Vec2>> = arc(gripper, frame, channel.side, stretch, curvature)
+            .into_iter()
+            .map(|point| view.camera.project(world_from_gripper.point(point).as_vec3(), view.size))
+            .collect();
+        for (k, pair) in points.windows(2).enumerate() {
+            let dashed = channel.side == Side::Right && k % 3 == 2;
+            if let ([Some(a), Some(b)], false) = (pair, dashed) {
+                overlay.line(*a, *b, WIDTH, colour);
+            }
+        }
+        if let Some(Some(end)) = points.last() {
+            number(overlay, view, *end, curvature, colour);
+        }
+    }
+}
+
+/// Points of the circle of a curvature (1/m) that touches the finger in the middle of a stretch, from the palm's side to
+/// the tip's and beyond (m).
+fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], curvature: f64) -> Vec<DVec3> {
+    let placed = frame.placed(gripper, side);
+    let middle = 0.5 * (from + to);
+    let (mut segment, mut begins) = (0, 0.0);
+    while segment + 1 < placed.lengths.len() && begins + placed.lengths[segment] < middle {
+        begins += placed.lengths[segment];
+        segment += 1;
+    }
+    let at = placed.point(segment, middle - begins, 0.0, 0.0);
+    let axes = placed.axes(segment);
+    let (along, inward) = (axes.x_axis, axes.z_axis);
+    let half = 0.5 * (to - from) + BEYOND;
+    let pieces = (2.0 * half / PIECE).ceil() as i32;
+    (0..=pieces)
+        .map(|k| {
+            let s = half * (2.0 * f64::from(k) / f64::from(pieces) - 1.0);
+            let angle = curvature * s;
+            at + along * (angle.sin() / curvature) + inward * ((1.0 - angle.cos()) / curvature)
+        })
+        .collect()
+}
+
+/// The curvature at the end of an arc, inside the picture.
+fn number(
+    overlay: &mut Overlay,
+    view: &PictureView,
+    end: Vec2,
+    curvature: f64,
+    colour: palpate_geometry::palette::Rgb,
+) {
+    let text = format!("{curvature:.2}\u{2009}1/m");
+    let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
+    let low = half + Vec2::splat(10.0);
+    let place = (end + Vec2::new(0.0, half.y + 4.0)).clamp(low, (view.size - low).max(low));
+    let ground = [view.theme.colours().background; 2];
+    overlay.shapes.push(Shape2::Rectangle { min: place - half, max: place + half, colours: ground, opacity: 0.72 });
+    overlay.text(place, Align::Centre, TEXT, colour, text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::evenly_bent;
+
+    #[test]
+    fn an_evenly_bent_finger_lies_on_its_circle() {
+        let gripper = GripperModel::default();
+        let frame = evenly_bent(&gripper, [Some(8.0), Some(8.0)]);
+        for side in Side::BOTH {
+            let arc = arc(&gripper, &frame, side, [0.022, 0.078], 8.0);
+            let placed = frame.placed(&gripper, side);
+            let far = (2..8).map(|segment| {
+                let joint = placed.point(segment, 0.5 * placed.lengths[segment], 0.0, 0.0);
+                arc.iter().map(|point| point.distance(joint)).fold(f64::INFINITY, f64::min)
+            });
+            // Half a piece of the arc, and the sag of a rigid segment.
+            assert!(far.fold(0.0, f64::max) < 1.6e-3);
+        }
+    }
+}
