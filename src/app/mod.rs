@@ -88,7 +88,7 @@ pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
 pub use features::view::{PathLayer, ViewAction, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
-pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, frame_costs, window_picture};
+pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, film_presentation, frame_costs, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};

@@ -79,6 +79,33 @@ pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenErro
     drawn.picture()
 }
 
+/// Films presenter mode: so many pictures, `step_s` of its time apart. `add` receives their number and each picture; an error
+/// of its own ends the film.
+pub fn film_presentation<E: From<OffscreenError>>(
+    window: &OffscreenWindow,
+    pictures: usize,
+    step_s: f64,
+    mut add: impl FnMut(usize, &Picture) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut drawn = start(window, RendererOptions::PREDICTABLE)?;
+    let ctx = drawn.ctx.clone();
+    drawn.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
+    drawn.workbench.act(&ctx, ViewAction::Present(true));
+    drawn.frame();
+    // It would run by the clock of the machine.
+    drawn.workbench.act(&ctx, Command::Pause);
+    drawn.settle();
+    drawn.frame_s = 0.0;
+    let mut due_s = 0.0;
+    for number in 0..pictures {
+        add(number, &drawn.picture()?)?;
+        drawn.time_s += step_s;
+        due_s = drawn.step_for(due_s + step_s)?;
+        drawn.frame();
+    }
+    Ok(())
+}
+
 /// Starts the window, which stands still.
 fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, OffscreenError> {
     let state = render_state(window.size, drawing)?;
@@ -97,7 +124,7 @@ fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, Of
         ..WorkbenchSetup::new(window.scene.clone(), window.store.clone(), view, wake)
     };
     let workbench = Workbench::new(&ctx, setup)?;
-    Ok(Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, shapes: Vec::new(), woken })
+    Ok(Drawn { ctx, state, workbench, size: window.size, time_s: 0.0, frame_s: FRAME_S, shapes: Vec::new(), woken })
 }
 
 /// What the frames of a window cost.
@@ -184,8 +211,9 @@ struct Drawn {
     state: RenderState,
     workbench: Workbench,
     size: [u32; 2],
-    /// Time on the window's own clock, so that animations do not depend on the machine.
+    /// Time on the window's own clock, so that animations do not depend on the machine, and from one frame to the next (s).
     time_s: f64,
+    frame_s: f64,
     shapes: Vec<egui::epaint::ClippedShape>,
     woken: Receiver<()>,
 }
@@ -201,7 +229,7 @@ impl Drawn {
             max_texture_side: Some(self.state.device.limits().max_texture_dimension_2d as usize),
             ..egui::RawInput::default()
         };
-        self.time_s += FRAME_S;
+        self.time_s += self.frame_s;
         let mut output = self.ctx.run_ui(input, |ui| self.workbench.ui(ui));
         let mut renderer = self.state.renderer.write();
         let mut set: Vec<_> = output.textures_delta.set.drain().collect();
@@ -261,6 +289,25 @@ impl Drawn {
         Ok(())
     }
 
+    /// Steps the simulated grasp for some time (s), while it is not decided; returns what is left of it.
+    fn step_for(&mut self, mut due_s: f64) -> Result<f64, OffscreenError> {
+        let ctx = self.ctx.clone();
+        self.until("the next object", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
+        while let Some(now) = self.workbench.snapshot().filter(|now| !now.status.finished) {
+            let sample_s = 1.0 / f64::from(now.scene.timing.sample_hz);
+            if due_s < sample_s {
+                return Ok(due_s);
+            }
+            self.workbench.act(&ctx, Command::Step);
+            let (grasp, before) = (now.grasp, now.frame.t);
+            self.until("the grasp", |workbench| {
+                workbench.snapshot().is_some_and(|s| (s.grasp, s.frame.t) != (grasp, before) || s.status.finished)
+            })?;
+            due_s -= sample_s;
+        }
+        Ok(0.0)
+    }
+
     /// Draws until all threads are quiet and animations have ended.
     fn settle(&mut self) {
         let began = Instant::now();
@@ -291,7 +338,7 @@ impl Drawn {
     }
 
     /// Draws the last frame into a texture and reads it back.
-    fn picture(mut self) -> Result<Picture, OffscreenError> {
+    fn picture(&mut self) -> Result<Picture, OffscreenError> {
         let (encoder, texture) = self.record();
         Ok(Picture::read_back(&self.state.device, &self.state.queue, encoder, &texture)?)
     }

@@ -1,17 +1,19 @@
-//! `palpate movie`: a stored trial as an animated picture, without a window.
+//! `palpate movie`: a stored trial, or presenter mode, as an animated picture, without a window.
 
 use super::Failure;
 use super::interrupt::stop_flag;
-use super::output::check_folder;
+use super::output::{TemporaryFolder, check_folder};
 use super::setup::{read_store, within};
 use super::snapshot::{OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
 use super::terminal::{note, say};
+use crate::app::{Mode, OffscreenWindow, film_presentation};
 use glam::Vec2;
 use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::OpenTrial;
 use palpate_lab::picture::PictureView;
 use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
+use palpate_sim::scene::Scene;
 use palpate_store::{NewFile, unfinished};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
@@ -24,11 +26,17 @@ use std::sync::atomic::Ordering;
   palpate movie 1 --view front --speed 0.25 --from 0.5 --to 1.5 --out contact.gif
   palpate movie 1 --size 1280x800 --fps 30 --out frames/
 
+  palpate movie --demo 60 --size 1280x800 --fps 10 --out demo/
+
 A folder gets a PNG file per picture, for any other encoder. Fingers of the real gripper are drawn as arcs of the
 curvature that their strips read.")]
 pub(super) struct MovieArguments {
     /// Trial number.
-    trial: TrialId,
+    #[arg(required_unless_present = "demo", conflicts_with = "demo")]
+    trial: Option<TrialId>,
+    /// Film so many seconds of presenter mode instead of a trial: object after object, recognised live.
+    #[arg(long, value_name = "SECONDS", value_parser = within(0.1..=600.0), conflicts_with_all = ["view", "from", "to", "no_forces", "bare"])]
+    demo: Option<f64>,
     /// View: home, front, back, left, right, top or bottom.
     #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
     view: StandardView,
@@ -67,8 +75,8 @@ const MOST_PICTURES: f64 = 15_000.0;
 pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<(), Failure> {
     let out = &arguments.out;
     let target = Target::of(out)?;
+    let Some(id) = arguments.trial else { return film(arguments, &target) };
     let store = read_store(store)?;
-    let id = arguments.trial;
     let open = open_drawable(&store, id)?;
     let times = times(arguments, &open.trial)?;
     let gpu = Gpu::headless(DriverChoice::Any)?;
@@ -84,8 +92,42 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
         }
         writer.add(number, &shot.picture(*t_s)?)?;
     }
+    end(writer, out, times.len())
+}
+
+/// Films presenter mode, with a store of its own.
+fn film(arguments: &MovieArguments, target: &Target) -> Result<(), Failure> {
+    let MovieArguments { out, size, theme, speed, fps, demo, .. } = arguments;
+    let step_s = speed / fps;
+    let pictures = (demo.unwrap_or_default() / step_s + 1e-9).floor() as usize + 1;
+    let folder = TemporaryFolder::new()?;
+    let window = OffscreenWindow {
+        scene: Scene::default(),
+        store: folder.path().join("trials.sqlite"),
+        mode: Mode::Demo,
+        theme: *theme,
+        size: *size,
+        trial: None,
+        at_s: 0.0,
+    };
+    let stop = stop_flag()?;
+    let mut writer = Writer::begin(target, out, arguments, pictures)?;
+    let filmed = film_presentation(&window, pictures, step_s, |number, picture| -> Result<(), Failure> {
+        if stop.load(Ordering::Relaxed) {
+            return Err("stopped; nothing was written".into());
+        }
+        writer.add(number, picture)
+    });
+    if let Err(cause) = filmed {
+        writer.give_up();
+        return Err(cause);
+    }
+    end(writer, out, pictures)
+}
+
+fn end(writer: Writer, out: &Path, pictures: usize) -> Result<(), Failure> {
     writer.finish(out)?;
-    note(&format!("{} pictures", times.len()));
+    note(&format!("{pictures} pictures"));
     say(out.display())
 }
 

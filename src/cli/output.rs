@@ -3,7 +3,7 @@
 use super::Failure;
 use palpate_store::NewFile;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes a file.
 pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
@@ -34,5 +34,27 @@ pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
                 .into())
         }
         None => Ok(()),
+    }
+}
+
+/// A folder in the system's place for temporary files, which is removed at the end.
+pub(super) struct TemporaryFolder(PathBuf);
+
+impl TemporaryFolder {
+    pub(super) fn new() -> Result<Self, Failure> {
+        let path = std::env::temp_dir().join(format!("palpate-window-{}", std::process::id()));
+        std::fs::create_dir_all(&path)?;
+        Ok(Self(path))
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        // The system removes what is left behind.
+        let _gone = std::fs::remove_dir_all(&self.0);
     }
 }

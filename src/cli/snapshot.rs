@@ -1,7 +1,7 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
 use super::Failure;
-use super::output::{check_folder, write_new};
+use super::output::{TemporaryFolder, check_folder, write_new};
 use super::setup::{SceneArguments, read_store, store_path};
 use super::terminal::{note, say};
 use crate::app::{Mode, OffscreenWindow, window_picture};
@@ -176,7 +176,7 @@ fn window(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture
         None => {}
     }
     // Panels must not leave a store behind, and the simulation nothing in one.
-    let empty = tempfile_folder()?;
+    let empty = TemporaryFolder::new()?;
     let path = store_path(store)?;
     let shown = if mode == Mode::Demo || !path.exists() { empty.path().join("trials.sqlite") } else { path };
     let size = arguments.size.unwrap_or(WINDOW);
@@ -200,28 +200,6 @@ fn chosen_time(asked: Option<f64>, end_s: f64, what: &str) -> Result<f64, Failur
 
 /// About a sample: the last one is a little before the end.
 const SAMPLE_S: f64 = 0.02;
-
-/// A folder in the system's place for temporary files, which is removed at the end.
-struct TemporaryFolder(PathBuf);
-
-impl TemporaryFolder {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl Drop for TemporaryFolder {
-    fn drop(&mut self) {
-        // The system removes what is left behind.
-        let _gone = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-fn tempfile_folder() -> Result<TemporaryFolder, Failure> {
-    let path = std::env::temp_dir().join(format!("palpate-window-{}", std::process::id()));
-    std::fs::create_dir_all(&path)?;
-    Ok(TemporaryFolder(path))
-}
 
 /// The 3-D view alone.
 fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture, Failure> {

@@ -1,6 +1,7 @@
 //! `palpate bench frame`: what a frame of the window costs.
 
 use super::super::Failure;
+use super::super::output::TemporaryFolder;
 use super::super::terminal::{say, say_json, table};
 use crate::app::{Mode, OffscreenWindow, frame_costs};
 use cpu_time::ThreadTime;
@@ -8,14 +9,11 @@ use palpate_geometry::palette::Theme;
 use palpate_sim::scene::Scene;
 
 pub(super) fn run(size: [u32; 2], seconds: f64, json: bool) -> Result<(), Failure> {
-    let folder = std::env::temp_dir().join(format!("palpate-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let (scene, store) = (Scene::default(), folder.join("trials.sqlite"));
+    let folder = TemporaryFolder::new()?;
+    let (scene, store) = (Scene::default(), folder.path().join("trials.sqlite"));
     let window = OffscreenWindow { scene, store, mode: Mode::Demo, theme: Theme::Dark, size, trial: None, at_s: 0.0 };
     let began = ThreadTime::now();
-    let measured = frame_costs(&window, seconds, &|| began.elapsed().as_secs_f64());
-    std::fs::remove_dir_all(&folder)?;
-    let costs = measured?;
+    let costs = frame_costs(&window, seconds, &|| began.elapsed().as_secs_f64())?;
     if json {
         return say_json(&costs);
     }
