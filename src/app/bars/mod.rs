@@ -329,7 +329,7 @@ fn keep_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         Some(LoggedGrasp { trial, kept: false }) => {
             format!("Move the last grasp, trial {trial}, from the demo log to the store (K)")
         }
-        None => "No finished grasp is in the demo log".to_owned(),
+        None => "The last grasp is not in the demo log".to_owned(),
     };
     let button = ui.add_enabled(waits.is_some(), egui::Button::new(if kept { "Kept" } else { "Keep" }));
     if button.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked()

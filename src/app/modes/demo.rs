@@ -26,14 +26,14 @@ pub(super) const KIND: ModeKind = ModeKind {
 
 const KEYS: &[Binding] = &[
     key(Modifiers::NONE, Key::N, "next object", |_| Some(RecognitionAction::NextObject.into())),
-    key(Modifiers::NONE, Key::M, "one more grasp of a decided object, after a higher threshold", |c| {
+    key(Modifiers::NONE, Key::M, "one more grasp, where the threshold is raised after a verdict", |c| {
         c.one_more().then(|| Command::GraspOnceMore.into())
     })
     .otherwise("One more grasp follows a higher threshold: raise it after a verdict, above the probability reached."),
-    key(Modifiers::NONE, Key::K, "keep the last grasp: move it from the demo log to the store", |c| {
+    key(Modifiers::NONE, Key::K, "keep the last grasp: from the demo log to the store", |c| {
         Some(LibraryAction::Keep(c.logged?.trial).into())
     })
-    .otherwise("No finished grasp is in the demo log."),
+    .otherwise("The last grasp is not in the demo log."),
     key(Modifiers::NONE, Key::ArrowUp, "higher threshold", |c| threshold(c, 1.0)).otherwise(OFF),
     key(Modifiers::NONE, Key::ArrowDown, "lower threshold", |c| threshold(c, -1.0)).otherwise(OFF),
     key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
@@ -46,7 +46,7 @@ const STEP: f64 = 0.01;
 
 fn threshold(context: &PanelContext<'_>, sign: f64) -> Option<Action> {
     let now = context.shown().recognised()?.view?.rule.threshold;
-    let fine = now + 0.5 * sign * STEP > 0.99;
+    let fine = now + 1e-6 * sign > 0.99;
     let next = now + sign * if fine { 0.1 * STEP } else { STEP };
     // Whole steps, also after many.
     let steps = if fine { 1e3 } else { 1e2 };

@@ -1,8 +1,7 @@
 //! What the program thinks: its guess, and a bar for each grasp of the round with the threshold across them, so that one
 //! sees the evidence add up.
 
-use super::letters::line;
-use super::{Page, put};
+use super::{Page, line, put};
 use crate::app::panels::recognition::words::{Headline, percent, title};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
@@ -11,9 +10,16 @@ use palpate_learn::Pmf;
 
 /// Most grasps shown; of more, the last ones.
 const MOST_ROWS: usize = 5;
-/// Height of the line with the threshold, and width of the number of a grasp (heights of the smallest letters).
+/// Height of the line with the threshold; width of the number of a grasp before its bar, and of the probability behind it
+/// (heights of the smallest letters).
 const HEAD: f32 = 1.6;
 const NUMBER: f32 = 1.5;
+const SHARE: f32 = 3.6;
+
+/// The bar in a row.
+fn bar_of(row: Rect, unit: f32) -> Rect {
+    Rect::from_x_y_ranges(row.left() + NUMBER * unit..=row.right() - SHARE * unit, row.y_range())
+}
 
 impl Page<'_, '_> {
     /// The newest answer and its probability.
@@ -48,7 +54,7 @@ impl Page<'_, '_> {
         let last = view.rule.most_grasps.min(MOST_ROWS).max(known);
         let first = last.saturating_sub(MOST_ROWS);
         let height = rows.height() / (last - first).max(4) as f32;
-        let bars = rows.with_min_x(rows.left() + NUMBER * unit);
+        let bars = bar_of(rows, unit);
         for number in first..last {
             let top = rows.top() + height * (number - first) as f32;
             let row = Rect::from_min_max(pos2(rows.left(), top), pos2(rows.right(), top + height - 0.3 * unit));
@@ -56,13 +62,14 @@ impl Page<'_, '_> {
         }
         // The threshold, and what it is.
         let x = bars.left() + view.rule.threshold.clamp(0.0, 1.0) as f32 * bars.width();
-        let foot = rows.top() + height * (last - first) as f32 - 0.3 * unit;
+        let drawn = if view.decision.is_some() { known.min(MOST_ROWS) } else { last - first };
+        let foot = rows.top() + height * drawn as f32 - 0.3 * unit;
         let stroke = Stroke::new(0.16 * unit, colour(colours.text));
         ui.painter().vline(x, head.bottom() - 0.3 * unit..=foot, stroke);
         let text = format!("decides at {}", percent(view.rule.threshold));
         let ink = colour(colours.quiet_text);
         let label = line(ui, &text, unit, 0.6 * head.width(), ink, unit);
-        let right = (x + 0.3 * label.size().x).min(head.right());
+        let right = (x + 0.5 * label.size().x).min(head.right());
         put(ui, label, head.with_max_x(right), Align2::RIGHT_TOP);
         put(ui, line(ui, "Grasp", unit, 0.3 * head.width(), ink, unit), head, Align2::LEFT_TOP);
     }
@@ -76,7 +83,7 @@ impl Page<'_, '_> {
             None => view.verdict.as_ref().filter(|_| runs).map(|verdict| &verdict.pmf),
         };
         let needed = pmf.is_some() || runs || view.decision.is_none();
-        let bar = row.with_min_x(row.left() + NUMBER * unit);
+        let bar = bar_of(row, unit);
         let ink = colour(if needed { colours.text } else { colours.border });
         if needed {
             put(
@@ -92,10 +99,8 @@ impl Page<'_, '_> {
             ui.painter().rect_filled(fill, 0.25 * unit, veil(colours.accent, 0.45));
             let inside = bar.shrink2(vec2(0.5 * unit, 0.0));
             let name = title(&view.labels, class);
-            let share = line(ui, &percent(p), 1.1 * unit, 0.4 * inside.width(), ink, unit);
-            let room = inside.width() - share.size().x - 0.5 * unit;
-            put(ui, line(ui, &name, 1.1 * unit, room, ink, unit), inside, Align2::LEFT_CENTER);
-            put(ui, share, inside, Align2::RIGHT_CENTER);
+            put(ui, line(ui, &name, 1.1 * unit, inside.width(), ink, unit), inside, Align2::LEFT_CENTER);
+            put(ui, line(ui, &percent(p), 1.1 * unit, (SHARE - 0.4) * unit, ink, unit), row, Align2::RIGHT_CENTER);
             let running = if runs { ", running" } else { "" };
             let spoken = format!("Grasp {}{running}: {name} {}", number + 1, percent(p));
             self.speak(ui, &format!("grasp {number}"), row, &spoken);

@@ -2,7 +2,6 @@
 //! each grasp and why, and at last the true object. Nothing is smaller than a 36th of the window's height.
 
 mod beliefs;
-mod letters;
 mod verdict;
 mod words;
 
@@ -10,26 +9,28 @@ use crate::app::context::PanelContext;
 use crate::app::features::presenter::Score;
 use crate::app::panels::view3d;
 use crate::app::theme::{colour, veil};
-use egui::{Align2, Rect, Role, Ui, WidgetInfo, vec2};
-use letters::{line, paragraph};
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Align2, Color32, FontId, Galley, Rect, Role, Ui, WidgetInfo, vec2};
 use palpate_lab::grasping::{IdentificationView, Presentation};
+use std::sync::Arc;
 
 /// Smallest letters: a share of the window's height.
 const LETTERS: f32 = 1.0 / 36.0;
 /// Letters of the annotations of a picture (points).
 const PICTURE_LETTERS: f32 = 14.0;
 /// Width of the column: a share of the window's, within limits in heights of the smallest letters.
-const COLUMN: f32 = 0.385;
+const COLUMN: f32 = 0.36;
 const NARROWEST: f32 = 20.0;
-const WIDEST: f32 = 26.0;
+const WIDEST: f32 = 24.0;
 
-/// Heights of the parts of the column from above, and the gap between them (heights of the smallest letters). The verdict
-/// stands at the bottom.
-const STORY: f32 = 4.2;
+/// Heights of the parts of the column from above, and the gap between them (heights of the smallest letters). Score and
+/// verdict stand at the bottom.
+const STORY: f32 = 3.5;
 const GUESS: f32 = 4.6;
 const BELIEFS: f32 = 10.4;
-const REASON: f32 = 6.0;
-const VERDICT: f32 = 5.4;
+const REASON: f32 = 5.6;
+const SCORE: f32 = 1.9;
+const VERDICT: f32 = 5.2;
 const GAP: f32 = 0.6;
 
 /// Draws the window; `message` is news for the user.
@@ -46,14 +47,34 @@ pub(super) fn ui(ui: &Ui, context: &PanelContext<'_>, score: Score, message: Opt
     }
     ui.painter().rect_filled(column, 0.0, colour(colours.raised));
     let page = Page { context, unit };
-    page.picture_ui(ui, picture, score, message);
-    page.column_ui(ui, column.shrink(unit));
+    page.picture_ui(ui, picture, message);
+    page.column_ui(ui, column.shrink(unit), score);
+}
+
+/// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
+fn line(ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32, least: f32) -> Arc<Galley> {
+    let whole = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(letters), ink);
+    if whole.size().x <= width {
+        return whole;
+    }
+    let smaller = (0.98 * letters * width / whole.size().x).clamp(least.min(letters), letters);
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(smaller), ink);
+    job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
+    ui.painter().layout_job(job)
+}
+
+/// At most so many rows; numbers keep their units.
+fn paragraph(ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32, rows: usize) -> Arc<Galley> {
+    let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm").replace(" N", "\u{a0}N");
+    let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
+    job.wrap.max_rows = rows;
+    ui.painter().layout_job(job)
 }
 
 /// Paints a text aligned within a place.
-fn put(ui: &Ui, text: std::sync::Arc<egui::Galley>, place: Rect, align: Align2) {
+fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
     let at = align.align_size_within_rect(text.size(), place).min;
-    ui.painter().galley(at, text, egui::Color32::PLACEHOLDER);
+    ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }
 
 struct Page<'a, 'b> {
@@ -73,36 +94,25 @@ impl Page<'_, '_> {
             .widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
     }
 
-    /// Text on a plate at a corner of the picture, no wider than a share of it.
-    fn plate(&self, ui: &Ui, text: &str, (picture, share): (Rect, f32), align: Align2) {
-        let colours = self.context.view.theme.colours();
-        let place = picture.shrink(self.unit);
-        let rows = paragraph(ui, text, 1.1 * self.unit, share * place.width(), colour(colours.text), 2);
-        let ground = align.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
-        self.speak(ui, text, ground, text);
-        ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));
-        put(ui, rows, place, align);
-    }
-
-    /// What there is to say about the picture: that the pose is hard, what colours and arrows mean, news, and the score.
-    fn picture_ui(&self, ui: &Ui, picture: Rect, score: Score, message: Option<&str>) {
+    /// What there is to say about the picture, beside its legend: news, that the pose is hard, what colours and arrows mean.
+    fn picture_ui(&self, ui: &Ui, picture: Rect, message: Option<&str>) {
         let Some(snapshot) = self.context.snapshot else { return };
-        if Presentation::is_hard(&snapshot.scene.pose) {
-            self.plate(ui, &words::hard_pose(&snapshot.scene.gripper.mount), (picture, 0.6), Align2::LEFT_TOP);
-        }
-        let touches = !snapshot.frame.taxels.is_empty();
-        match message {
-            Some(message) => self.plate(ui, message, (picture, 0.55), Align2::LEFT_BOTTOM),
-            None if touches => self.plate(ui, words::ENCODING, (picture, 0.55), Align2::LEFT_BOTTOM),
-            None => {}
-        }
-        if score != Score::default() {
-            let text = format!("{} right, {} wrong", score.right, score.wrong);
-            self.plate(ui, &text, (picture, 0.4), Align2::RIGHT_BOTTOM);
+        let hard = Presentation::is_hard(&snapshot.scene.pose);
+        let hard = hard.then(|| words::hard_pose(&snapshot.scene.gripper.mount));
+        let encoding = (!snapshot.frame.taxels.is_empty()).then(|| words::ENCODING.to_owned());
+        let colours = self.context.view.theme.colours();
+        let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
+        for text in message.map(str::to_owned).into_iter().chain(hard).chain(encoding) {
+            let rows = paragraph(ui, &text, self.unit, place.width(), colour(colours.text), 3);
+            let ground = Align2::LEFT_TOP.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
+            self.speak(ui, &text, ground, &text);
+            ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));
+            put(ui, rows, place, Align2::LEFT_TOP);
+            place.set_top(ground.bottom() + 0.8 * self.unit);
         }
     }
 
-    fn column_ui(&self, ui: &Ui, column: Rect) {
+    fn column_ui(&self, ui: &Ui, column: Rect, score: Score) {
         let Some(snapshot) = self.context.snapshot else { return };
         let colours = self.context.view.theme.colours();
         let mut top = column.top();
@@ -114,7 +124,7 @@ impl Page<'_, '_> {
         let [story, guess, beliefs, reason] = [STORY, GUESS, BELIEFS, REASON].map(&mut part);
         let text = words::story(snapshot);
         self.speak(ui, "story", story, text);
-        let rows = paragraph(ui, text, 1.5 * self.unit, story.width(), colour(colours.text), 2);
+        let rows = paragraph(ui, text, 1.35 * self.unit, story.width(), colour(colours.text), 2);
         put(ui, rows, story, Align2::LEFT_TOP);
         if let Some(view) = self.answer() {
             self.guess_ui(ui, view, guess);
@@ -124,7 +134,15 @@ impl Page<'_, '_> {
             let rows = paragraph(ui, &text, 1.1 * self.unit, reason.width(), colour(colours.text), 4);
             put(ui, rows, reason, Align2::LEFT_TOP);
         }
-        self.verdict_ui(ui, column.with_min_y(column.bottom() - VERDICT * self.unit));
+        let (column, verdict) = column.split_top_bottom_at_y(column.bottom() - VERDICT * self.unit);
+        self.verdict_ui(ui, verdict);
+        if score != Score::default() {
+            let text = format!("{} right, {} wrong", score.right, score.wrong);
+            let place = column.with_min_y(column.bottom() - SCORE * self.unit);
+            self.speak(ui, "score", place, &text);
+            let text = line(ui, &text, 1.1 * self.unit, place.width(), colour(colours.text), self.unit);
+            put(ui, text, place, Align2::LEFT_TOP);
+        }
     }
 
     /// Picture of a class, or a frame with a question mark.

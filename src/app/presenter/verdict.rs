@@ -1,7 +1,6 @@
 //! The true object, and whether the program was right: by a tick or cross, a word and a colour.
 
-use super::letters::line;
-use super::{Page, put};
+use super::{Page, line, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Ui, pos2, vec2};
 use palpate_sim::objects::object_title;

@@ -16,10 +16,10 @@ pub(super) fn story(snapshot: &Snapshot) -> &'static str {
     let again = snapshot.status.grasp_of_round > 1;
     match (snapshot.status.finished, snapshot.frame.phase) {
         (true, _) => "This is where the fingers felt it.",
-        (false, Phase::Close) if !touches && again => "Not sure yet: it grasps again, from another side.",
-        (false, Phase::Close) if !touches => "It cannot see. Two soft fingers close on something.",
-        (false, Phase::Close) => "Touch! The fingers bend around it, the pads feel it press.",
-        (false, Phase::Hold) => "It holds: the bend tells the size, the pressure the shape.",
+        (false, Phase::Close) if !touches && again => "Not sure yet: another grasp, from another side.",
+        (false, Phase::Close) if !touches => "It cannot see. Its soft fingers close on something.",
+        (false, Phase::Close) => "Touch! The fingers bend, the pads feel it press.",
+        (false, Phase::Hold) => "It holds: bend tells size, pressure tells shape.",
         (false, _) => "It lets go.",
     }
 }
@@ -72,7 +72,11 @@ fn rival(view: &IdentificationView) -> String {
     if p < WORTH_NAMING {
         return String::new();
     }
-    format!("It may also be: {}, {}.", title(&view.labels, second), percent(p))
+    let name = match view.labels.other() == Some(second) {
+        true => "something it does not know".to_owned(),
+        false => title(&view.labels, second),
+    };
+    format!("Or: {name}, {}.", percent(p))
 }
 
 /// That the pose is a hard one, and why.

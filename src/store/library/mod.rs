@@ -121,18 +121,17 @@ impl Library {
         rows.extend(store.rows("WHERE id IN (SELECT value FROM json_each(?1))", [json(&stale)])?);
         let read: BTreeSet<TrialId> = rows.iter().map(|row| row.id).collect();
         let mut changed = self.take(rows);
-        changed |= self.forget(store, |id| left.contains(&id) && !read.contains(&id))?;
+        changed |= self.forget(store, &left.difference(&read).copied().collect())?;
         if self.complete && count(store)? != self.trials.len() {
             let kept = ids(store)?;
-            changed |= self.forget(store, |id| !kept.contains(&id))?;
+            changed |= self.forget(store, &self.trials.keys().copied().filter(|id| !kept.contains(id)).collect())?;
         }
         Ok(changed)
     }
 
     /// Forgets trials that are no longer in the store, and reads the other copies of their grasps again; true where there were
     /// any.
-    fn forget(&mut self, store: &Store, is_gone: impl Fn(TrialId) -> bool) -> Result<bool, StoreError> {
-        let gone: BTreeSet<TrialId> = self.trials.keys().copied().filter(|id| is_gone(*id)).collect();
+    fn forget(&mut self, store: &Store, gone: &BTreeSet<TrialId>) -> Result<bool, StoreError> {
         let identities: Vec<String> =
             gone.iter().filter_map(|id| self.trials.remove(id).and_then(|trial| trial.row.identity.clone())).collect();
         self.recording.retain(|id| !gone.contains(id));
