@@ -526,7 +526,7 @@ impl Workbench {
             }
             // Presenter mode has a sequence of its own.
             Action::Recognition(RecognitionAction::NextObject) if view.presents => {
-                presenter.bring_next(simulation, notices)
+                presenter.bring_next(simulation, notices);
             }
             Action::Recognition(action) => {
                 recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);

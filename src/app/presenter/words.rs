@@ -28,7 +28,7 @@ pub(super) fn story(snapshot: &Snapshot) -> &'static str {
 pub(super) fn reason(view: &IdentificationView) -> String {
     let threshold = percent(view.rule.threshold);
     let grasps = match view.beliefs.len() {
-        1 => "1 grasp".to_owned(),
+        1 => "one grasp".to_owned(),
         many => format!("{many} grasps"),
     };
     let p = newest(view).map(|pmf| pmf.top().1);
@@ -49,9 +49,7 @@ pub(super) fn reason(view: &IdentificationView) -> String {
         (None, _) if !view.beliefs.is_empty() => {
             format!("It adds this grasp to the {grasps} before, until one name reaches {threshold}.")
         }
-        (None, _) => {
-            format!("It compares this touch with grasps that it has learned from, until one name reaches {threshold}.")
-        }
+        (None, _) => "It compares this touch with the grasps that it has learned from.".to_owned(),
     };
     [felt(view), rival(view), follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
@@ -73,10 +71,10 @@ fn rival(view: &IdentificationView) -> String {
         return String::new();
     }
     let name = match view.labels.other() == Some(second) {
-        true => "something it does not know".to_owned(),
+        true => "something unknown".to_owned(),
         false => title(&view.labels, second),
     };
-    format!("Or: {name}, {}.", percent(p))
+    format!("It may also be {name} ({}).", percent(p))
 }
 
 /// That the pose is a hard one, and why.

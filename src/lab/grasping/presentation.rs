@@ -127,11 +127,4 @@ mod tests {
             assert!(rounds.iter().any(|(_, grasps, _)| *grasps > 1), "presentation {seed}: {rounds:?}");
         }
     }
-
-    #[test]
-    fn tmp_many() {
-        let model = Arc::new(Shipped::PerfectSensors.model().expect("is shipped"));
-        let out: Vec<String> = (1..=40).map(|s| format!("{s}: {:?}", first_minute(&model, s, 100 * s))).collect();
-        std::fs::write("/tmp/minutes2.txt", out.join("\n")).unwrap();
-    }
 }
