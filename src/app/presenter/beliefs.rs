@@ -1,7 +1,7 @@
 //! What the program thinks: its guess, and a bar for each grasp of the round with the threshold across them, so that one
 //! sees the evidence add up.
 
-use super::{Page, line, put};
+use super::{Page, put};
 use crate::app::panels::recognition::words::{Headline, percent, title};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
@@ -37,10 +37,10 @@ impl Page<'_, '_> {
         let lines = place.with_min_x(place.left() + side + unit);
         let (said, large) = lines.split_top_bottom_at_y(lines.top() + 1.5 * unit);
         let about = if view.decision.is_some() { "It says" } else { "It thinks" };
-        put(ui, line(ui, about, unit, said.width(), quiet, unit), said, Align2::LEFT_CENTER);
-        let number = line(ui, &p.map_or_else(String::new, percent), 2.0 * unit, 0.4 * large.width(), ink, unit);
+        put(ui, self.line(ui, about, unit, said.width(), quiet), said, Align2::LEFT_CENTER);
+        let number = self.line(ui, &p.map_or_else(String::new, percent), 2.0 * unit, 0.4 * large.width(), ink);
         let room = large.width() - number.size().x - 0.5 * unit;
-        put(ui, line(ui, &text, 2.0 * unit, room, ink, unit), large, Align2::LEFT_CENTER);
+        put(ui, self.line(ui, &text, 2.0 * unit, room, ink), large, Align2::LEFT_CENTER);
         put(ui, number, large, Align2::RIGHT_CENTER);
         let spoken = p.map_or_else(|| format!("{about}: {text}"), |p| format!("{about}: {text}, {}", percent(p)));
         self.speak(ui, "guess", place, &spoken);
@@ -68,10 +68,10 @@ impl Page<'_, '_> {
         ui.painter().vline(x, head.bottom() - 0.3 * unit..=foot, stroke);
         let text = format!("decides at {}", percent(view.rule.threshold));
         let ink = colour(colours.quiet_text);
-        let label = line(ui, &text, unit, 0.6 * head.width(), ink, unit);
+        let label = self.line(ui, &text, unit, 0.6 * head.width(), ink);
         let right = (x + 0.5 * label.size().x).min(head.right());
         put(ui, label, head.with_max_x(right), Align2::RIGHT_TOP);
-        put(ui, line(ui, "Grasp", unit, 0.3 * head.width(), ink, unit), head, Align2::LEFT_TOP);
+        put(ui, self.line(ui, "Grasp", unit, 0.3 * head.width(), ink), head, Align2::LEFT_TOP);
     }
 
     fn belief_ui(&self, ui: &Ui, view: &IdentificationView, number: usize, row: Rect) {
@@ -86,12 +86,7 @@ impl Page<'_, '_> {
         let bar = bar_of(row, unit);
         let ink = colour(if needed { colours.text } else { colours.border });
         if needed {
-            put(
-                ui,
-                line(ui, &(number + 1).to_string(), 1.1 * unit, NUMBER * unit, ink, unit),
-                row,
-                Align2::LEFT_CENTER,
-            );
+            put(ui, self.line(ui, &(number + 1).to_string(), 1.1 * unit, NUMBER * unit, ink), row, Align2::LEFT_CENTER);
             ui.painter().rect_filled(bar, 0.25 * unit, colour(colours.background));
         }
         if let Some((class, p)) = pmf.map(Pmf::top) {
@@ -99,8 +94,8 @@ impl Page<'_, '_> {
             ui.painter().rect_filled(fill, 0.25 * unit, veil(colours.accent, 0.45));
             let inside = bar.shrink2(vec2(0.5 * unit, 0.0));
             let name = title(&view.labels, class);
-            put(ui, line(ui, &name, 1.1 * unit, inside.width(), ink, unit), inside, Align2::LEFT_CENTER);
-            put(ui, line(ui, &percent(p), 1.1 * unit, (SHARE - 0.4) * unit, ink, unit), row, Align2::RIGHT_CENTER);
+            put(ui, self.line(ui, &name, 1.1 * unit, inside.width(), ink), inside, Align2::LEFT_CENTER);
+            put(ui, self.line(ui, &percent(p), 1.1 * unit, (SHARE - 0.4) * unit, ink), row, Align2::RIGHT_CENTER);
             let running = if runs { ", running" } else { "" };
             let spoken = format!("Grasp {}{running}: {name} {}", number + 1, percent(p));
             self.speak(ui, &format!("grasp {number}"), row, &spoken);

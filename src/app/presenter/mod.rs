@@ -41,34 +41,14 @@ pub(super) fn ui(ui: &Ui, context: &PanelContext<'_>, score: Score, message: Opt
     let (picture, column) = rect.split_left_right_at_x(rect.right() - width);
     let colours = context.view.theme.colours();
     ui.painter().rect_filled(rect, 0.0, colour(colours.background));
+    let page = Page { context, unit };
     if !view3d::picture_ui(ui, picture, context, 1.1 * unit / PICTURE_LETTERS) {
-        let text = line(ui, "Loading the object ..", 1.5 * unit, picture.width(), colour(colours.text), unit);
+        let text = page.line(ui, "Loading the object ..", 1.5 * unit, picture.width(), colour(colours.text));
         put(ui, text, picture, Align2::CENTER_CENTER);
     }
     ui.painter().rect_filled(column, 0.0, colour(colours.raised));
-    let page = Page { context, unit };
     page.picture_ui(ui, picture, message);
     page.column_ui(ui, column.shrink(unit), score);
-}
-
-/// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
-fn line(ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32, least: f32) -> Arc<Galley> {
-    let whole = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(letters), ink);
-    if whole.size().x <= width {
-        return whole;
-    }
-    let smaller = (0.98 * letters * width / whole.size().x).clamp(least.min(letters), letters);
-    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(smaller), ink);
-    job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
-    ui.painter().layout_job(job)
-}
-
-/// At most so many rows; numbers keep their units.
-fn paragraph(ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32, rows: usize) -> Arc<Galley> {
-    let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm").replace(" N", "\u{a0}N");
-    let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
-    job.wrap.max_rows = rows;
-    ui.painter().layout_job(job)
 }
 
 /// Paints a text aligned within a place.
@@ -88,6 +68,27 @@ impl Page<'_, '_> {
         self.context.snapshot?.identification.as_deref()
     }
 
+    /// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
+    fn line(&self, ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+        let whole = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(letters), ink);
+        if whole.size().x <= width {
+            return whole;
+        }
+        let smaller = (0.98 * letters * width / whole.size().x).clamp(self.unit, letters.max(self.unit));
+        let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(smaller), ink);
+        job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
+        ui.painter().layout_job(job)
+    }
+
+    /// At most so many rows; numbers keep their units.
+    fn paragraph(&self, ui: &Ui, (text, rows): (&str, usize), letters: f32, width: f32) -> Arc<Galley> {
+        let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm");
+        let ink = colour(self.context.view.theme.colours().text);
+        let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
+        job.wrap.max_rows = rows;
+        ui.painter().layout_job(job)
+    }
+
     /// Text for screen readers.
     fn speak(&self, ui: &Ui, name: &str, place: Rect, text: &str) {
         ui.interact(place, ui.scope_id().with(("presenter", name)), egui::Sense::hover())
@@ -103,7 +104,7 @@ impl Page<'_, '_> {
         let colours = self.context.view.theme.colours();
         let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
         for text in message.map(str::to_owned).into_iter().chain(hard).chain(encoding) {
-            let rows = paragraph(ui, &text, self.unit, place.width(), colour(colours.text), 3);
+            let rows = self.paragraph(ui, (&text, 3), self.unit, place.width());
             let ground = Align2::LEFT_TOP.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
             self.speak(ui, &text, ground, &text);
             ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));
@@ -124,14 +125,14 @@ impl Page<'_, '_> {
         let [story, guess, beliefs, reason] = [STORY, GUESS, BELIEFS, REASON].map(&mut part);
         let text = words::story(snapshot);
         self.speak(ui, "story", story, text);
-        let rows = paragraph(ui, text, 1.35 * self.unit, story.width(), colour(colours.text), 2);
+        let rows = self.paragraph(ui, (text, 2), 1.35 * self.unit, story.width());
         put(ui, rows, story, Align2::LEFT_TOP);
         if let Some(view) = self.answer() {
             self.guess_ui(ui, view, guess);
             self.beliefs_ui(ui, view, beliefs);
             let text = words::reason(view);
             self.speak(ui, "reason", reason, &text);
-            let rows = paragraph(ui, &text, 1.1 * self.unit, reason.width(), colour(colours.text), 4);
+            let rows = self.paragraph(ui, (&text, 4), 1.1 * self.unit, reason.width());
             put(ui, rows, reason, Align2::LEFT_TOP);
         }
         let (column, verdict) = column.split_top_bottom_at_y(column.bottom() - VERDICT * self.unit);
@@ -140,7 +141,7 @@ impl Page<'_, '_> {
             let text = format!("{} right, {} wrong", score.right, score.wrong);
             let place = column.with_min_y(column.bottom() - SCORE * self.unit);
             self.speak(ui, "score", place, &text);
-            let text = line(ui, &text, 1.1 * self.unit, place.width(), colour(colours.text), self.unit);
+            let text = self.line(ui, &text, 1.1 * self.unit, place.width(), colour(colours.text));
             put(ui, text, place, Align2::LEFT_TOP);
         }
     }
@@ -154,7 +155,7 @@ impl Page<'_, '_> {
                 let stroke = egui::Stroke::new(2.0, colour(colours.border));
                 ui.painter().rect_stroke(place, 0.3 * self.unit, stroke, egui::StrokeKind::Inside);
                 let letters = (0.6 * place.height()).max(self.unit);
-                let mark = line(ui, "?", letters, place.width(), colour(colours.quiet_text), self.unit);
+                let mark = self.line(ui, "?", letters, place.width(), colour(colours.quiet_text));
                 put(ui, mark, place, Align2::CENTER_CENTER);
             }
         }

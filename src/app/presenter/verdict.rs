@@ -1,6 +1,6 @@
 //! The true object, and whether the program was right: by a tick or cross, a word and a colour.
 
-use super::{Page, line, put};
+use super::{Page, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Ui, pos2, vec2};
 use palpate_sim::objects::object_title;
@@ -34,10 +34,10 @@ impl Page<'_, '_> {
             mark(ui, right, middle, unit, colour(colours.background));
             words = head.with_min_x(head.left() + 3.4 * unit);
         }
-        put(ui, line(ui, word, 2.2 * unit, words.width(), colour(ink), unit), words, Align2::LEFT_CENTER);
+        put(ui, self.line(ui, word, 2.2 * unit, words.width(), colour(ink)), words, Align2::LEFT_CENTER);
         let name = if finished { format!("It is: {title}") } else { "Shown once it decides.".to_owned() };
         let quiet = colour(if finished { colours.text } else { colours.quiet_text });
-        put(ui, line(ui, &name, 1.4 * unit, below.width(), quiet, unit), below, Align2::LEFT_CENTER);
+        put(ui, self.line(ui, &name, 1.4 * unit, below.width(), quiet), below, Align2::LEFT_CENTER);
         let spoken = if finished { format!("{word}: it is {title}") } else { word.to_owned() };
         self.speak(ui, "truth", lines, &spoken);
     }
