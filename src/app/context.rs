@@ -20,7 +20,7 @@ use palpate_lab::workers::{
 use palpate_learn::Model;
 use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
-use palpate_tactile::trial::TrialSource;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::BTreeMap;
 
 /// Probability from which on the likeliest class of a running grasp has a band: before, it changes with every answer.
@@ -38,6 +38,8 @@ pub struct PanelContext<'a> {
     pub stored_accuracy: Option<&'a AccuracyStudy>,
     /// Scene as set by the user.
     pub scene: &'a Scene,
+    /// The last grasp of the simulation, while it is in the demo log.
+    pub logged: Option<LoggedGrasp>,
     /// Measurement of the effects.
     pub effects: &'a EffectsWorker,
     /// Frame of the other engine at the same time, where it is drawn.
@@ -86,6 +88,15 @@ pub struct PanelContext<'a> {
     pub(super) frame_rate: FrameRate,
 }
 
+/// A grasp in the demo log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoggedGrasp {
+    /// Its trial.
+    pub trial: TrialId,
+    /// It has been moved to the store.
+    pub kept: bool,
+}
+
 /// Trials beside the one that is shown.
 #[derive(Clone, Copy)]
 pub struct ComparedTrials<'a> {
@@ -112,6 +123,12 @@ impl<'a> PanelContext<'a> {
             Alignment::Closing => Alignment::Contact,
             Alignment::Contact => Alignment::Closing,
         }
+    }
+
+    /// True where a raised threshold asks for one more grasp of the simulated object.
+    pub(super) fn one_more(&self) -> bool {
+        let finished = self.snapshot.filter(|snapshot| snapshot.status.finished);
+        finished.and_then(|snapshot| snapshot.identification.as_ref()).is_some_and(|view| view.asks_for_more)
     }
 
     /// True while the picture moves.

@@ -26,7 +26,7 @@
 //! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
-//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter.rs` | panels beside each other; command palette; file dialog inside the window; presenter mode |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter/` | panels beside each other; command palette; file dialog inside the window; presenter mode |
 //! | workbench | `workbench.rs` | owner of all features |
 //! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |

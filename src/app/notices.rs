@@ -117,21 +117,30 @@ impl Notices {
         &self.messages
     }
 
-    /// Draws the line; returns the remedy that was chosen.
-    pub(super) fn line(&mut self, ui: &mut Ui, theme: Theme) -> Option<Remedy> {
+    /// The message to show now: the most urgent, and among those the newest.
+    fn first(&mut self, ctx: &egui::Context) -> Option<usize> {
         let now = Instant::now();
         self.shown.retain(|shown| shown.until > now);
         if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
-            ui.request_repaint_after(next - now);
+            ctx.request_repaint_after(next - now);
         }
+        (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level, *k))
+    }
+
+    /// The message to show now, for a window without the line.
+    pub(super) fn current(&mut self, ctx: &egui::Context) -> Option<&str> {
+        self.first(ctx).map(|first| self.shown[first].text.as_str())
+    }
+
+    /// Draws the line; returns the remedy that was chosen.
+    pub(super) fn line(&mut self, ui: &mut Ui, theme: Theme) -> Option<Remedy> {
+        let first = self.first(ui.ctx());
         let colours = theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 2));
         let mut chosen = None;
         Panel::bottom("messages").frame(bar).show_separator_line(false).show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.set_min_height(LINE);
-                // The most urgent, and among those the newest.
-                let first = (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level, *k));
                 let Some(first) = first else {
                     return quiet_line(ui, colours.quiet_text, self.messages.back());
                 };

@@ -17,6 +17,7 @@ use egui::{Align2, FontId, Key, ScrollArea, Sense, TextEdit, Ui, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, GripperCommand};
 use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_store::TrialPlace;
 
 /// Entry of the palette.
 struct Entry {
@@ -197,7 +198,10 @@ fn commands(context: &PanelContext<'_>) -> Vec<(String, Action)> {
     ];
     if let Some(snapshot) = context.snapshot {
         let status = &snapshot.status;
-        all.push((text("Record simulated trials, or not"), Command::SetRecording(!status.recording).into()));
+        for place in TrialPlace::ALL {
+            let title = format!("Record simulated grasps into the {}", place.title());
+            all.push((title, Command::SetRecording(Some(place)).into()));
+        }
         all.push((text("Error band, on or off"), Command::SetErrorBand(!status.error_band).into()));
     }
     all.extend(SPEEDS.iter().map(|speed| (format!("Speed {speed}×"), Command::SetSpeed(*speed).into())));

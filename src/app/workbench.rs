@@ -2,7 +2,7 @@
 
 use crate::app::actions::{Action, Actions};
 use crate::app::bars;
-use crate::app::context::{ComparedTrials, PanelContext};
+use crate::app::context::{ComparedTrials, LoggedGrasp, PanelContext};
 use crate::app::export::ExportRequest;
 use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
@@ -10,7 +10,7 @@ use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::LibraryFeature;
 use crate::app::features::presenter::PresenterFeature;
-use crate::app::features::recognition::{Recognisers, RecognitionFeature};
+use crate::app::features::recognition::{Recognisers, RecognitionAction, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
 use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
@@ -44,6 +44,7 @@ use palpate_lab::workers::{
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
 use palpate_sim::scene::Scene;
+use palpate_store::TrialPlace;
 use palpate_tactile::trial::TrialId;
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -165,7 +166,7 @@ impl Workbench {
             scene: scene.clone(),
             sensors: view.sensors.clone(),
             store: store.clone(),
-            recording: true,
+            recording: Some(TrialPlace::DemoLog),
             grasps: GRASPS,
             models: models.clone(),
             playing,
@@ -272,6 +273,9 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
+        if self.view.presents {
+            return self.present(ui);
+        }
         let remedy = self.notices.line(ui, self.view.theme);
         if let Some(action) = remedy.map(action_of) {
             self.apply(&ctx, action);
@@ -288,14 +292,6 @@ impl Workbench {
         let mut layout = self.view.layouts.remove(&mode).unwrap_or_else(|| modes::default_layout(mode));
         let context = self.context(&published);
         keys::pressed(&ctx, &context, &mut actions);
-        if self.view.presents {
-            presenter::ui(ui, &context, self.presenter.score());
-            self.view.layouts.insert(mode, layout);
-            for action in actions {
-                self.apply(&ctx, action);
-            }
-            return;
-        }
         let colours = self.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
         Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, &context, &mut actions));
@@ -315,6 +311,19 @@ impl Workbench {
             self.apply(&ctx, action);
         }
         self.ask_inside(&ctx);
+    }
+
+    /// Draws presenter mode.
+    fn present(&mut self, ui: &Ui) {
+        let message = self.notices.current(ui.ctx()).map(str::to_owned);
+        let published = self.published();
+        let mut actions = Actions::default();
+        let context = self.context(&published);
+        keys::pressed(ui.ctx(), &context, &mut actions);
+        presenter::ui(ui, &context, self.presenter.score(), message.as_deref());
+        for action in actions {
+            self.apply(ui.ctx(), action);
+        }
     }
 
     /// Draws one panel alone, as large as there is room.
@@ -355,6 +364,7 @@ impl Workbench {
             scene_accuracy: self.simulation.scene_accuracy(),
             stored_accuracy: self.simulation.stored_accuracy(),
             scene: self.simulation.scene(),
+            logged: self.logged(),
             effects: self.simulation.effects(),
             ghost: ghost_frame(snapshot, ghost.as_deref()),
             gripper,
@@ -384,6 +394,11 @@ impl Workbench {
             driver: self.driver.as_deref(),
             frame_rate: self.frame_rate,
         }
+    }
+
+    fn logged(&self) -> Option<LoggedGrasp> {
+        let trial = self.simulation.logged_trial()?;
+        Some(LoggedGrasp { trial, kept: self.library.kept() == Some(trial) })
     }
 
     /// Traces of the source that is shown.
@@ -512,7 +527,7 @@ impl Workbench {
             _ => Vec::new(),
         };
         let Self { view, notices, simulation, gripper, labelling, library, .. } = self;
-        let Self { recognition, inspect, tools, studies, files, .. } = self;
+        let Self { recognition, inspect, tools, studies, files, presenter, .. } = self;
         match action {
             Action::Simulation(action) => simulation.apply(action, view, notices),
             Action::Gripper(action) => gripper.apply(action, view, notices),
@@ -521,6 +536,10 @@ impl Workbench {
                 for action in library.apply(action) {
                     inspect.apply(action, &times, view, notices);
                 }
+            }
+            // Presenter mode has a sequence of its own.
+            Action::Recognition(RecognitionAction::NextObject) if view.presents => {
+                presenter.bring_next(simulation, notices);
             }
             Action::Recognition(action) => {
                 recognition.apply(action, &mut Recognisers { simulation, gripper, tools, inspect }, view, notices);

@@ -11,7 +11,7 @@ use super::terminal::{note, say, say_json, table, warn};
 use labels::LabelCommand;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
-use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialQuery, TrialRow, export_trial};
+use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{SensorLayout, SignalDefinition};
 use selection::{Filters, Numbers, chosen};
@@ -29,6 +29,7 @@ use std::path::{Path, PathBuf};
   palpate trials label 7 lemon
   palpate trials tag matching wet --add --search slipped
   palpate trials discard 7-9
+  palpate trials keep 12
   palpate trials undo
   palpate trials merge part1.sqlite part2.sqlite --store set.sqlite
 
@@ -255,6 +256,9 @@ fn remark(row: &TrialRow) -> String {
     let mut remarks = Vec::new();
     if row.deleted.is_some() {
         remarks.push("deleted".to_owned());
+    }
+    if row.place == TrialPlace::DemoLog {
+        remarks.push(row.place.title().to_owned());
     }
     if row.state != "complete" {
         remarks.push("interrupted or still recording".to_owned());

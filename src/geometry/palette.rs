@@ -319,7 +319,7 @@ mod tests {
             for behind in [c.background, c.raised] {
                 assert!(c.text.contrast(behind) >= 4.5, "{theme:?} text");
                 assert!(c.quiet_text.contrast(behind) >= 4.5, "{theme:?} quiet text");
-                for sign in [c.accent, c.warning, c.error] {
+                for sign in [c.accent, c.good, c.warning, c.error] {
                     assert!(
                         sign.contrast(behind) >= 4.5,
                         "{theme:?} {sign:?} on {behind:?}: {}",

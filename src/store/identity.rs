@@ -15,13 +15,15 @@ pub enum Stored {
     New(TrialId),
     /// This trial holds the same grasp; nothing was stored.
     Known(TrialId),
+    /// The same, and it moved from the demo log to the store.
+    Kept(TrialId),
 }
 
 impl Stored {
     /// Number of the trial that holds the grasp.
     pub fn id(self) -> TrialId {
         match self {
-            Self::New(id) | Self::Known(id) => id,
+            Self::New(id) | Self::Known(id) | Self::Kept(id) => id,
         }
     }
 

@@ -1,4 +1,4 @@
-//! The journal: every change of a label, note, tag, deletion or plan. Entries are only ever added, in the transaction
+//! The journal: every change of a label, note, tag, deletion or plan, and every trial that a person keeps. Entries are only ever added, in the transaction
 //! of their change; undoing adds one as well. SQLite triggers refuse to alter or remove them.
 //!
 //! Undo and redo are read from the journal, so that they work after a restart. Programs that share a store share its
@@ -27,6 +27,10 @@ pub enum Change {
     Discarded,
     /// The trial was restored.
     Restored,
+    /// The trial was moved from the demo log to the store.
+    Kept,
+    /// That was undone.
+    ReturnedToLog,
     /// The note.
     Note {
         /// Before.
@@ -78,6 +82,8 @@ impl Change {
             Self::Label { from, to } => Self::Label { from: to, to: from },
             Self::Discarded => Self::Restored,
             Self::Restored => Self::Discarded,
+            Self::Kept => Self::ReturnedToLog,
+            Self::ReturnedToLog => Self::Kept,
             Self::Note { from, to } => Self::Note { from: to, to: from },
             Self::Tags { from, to } => Self::Tags { from: to, to: from },
             Self::Unsure { from, to } => Self::Unsure { from: to, to: from },
@@ -98,6 +104,8 @@ impl Change {
             Self::Label { from, to } => format!("label {} -> {}", name(from), name(to)),
             Self::Discarded => "discarded".to_owned(),
             Self::Restored => "restored".to_owned(),
+            Self::Kept => "kept in the store".to_owned(),
+            Self::ReturnedToLog => "back in the demo log".to_owned(),
             Self::Note { to, .. } if to.is_empty() => "note removed".to_owned(),
             Self::Note { to, .. } => format!("note \"{to}\""),
             Self::Tags { from, to } => format!("tags [{}] -> [{}]", from.join(", "), to.join(", ")),
@@ -422,7 +430,9 @@ pub(super) fn change(
 
 fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusqlite::Result<usize> {
     let set = |column: &str, from: &dyn rusqlite::ToSql, to: &dyn rusqlite::ToSql| {
-        let sql = format!("UPDATE trials SET {column} = ?3 WHERE id = ?1 AND {column} = ?2 AND deleted IS NULL");
+        // What a person has worked on leaves the demo log, where it would be lost.
+        let sql =
+            format!("UPDATE trials SET {column} = ?3, demo = 0 WHERE id = ?1 AND {column} = ?2 AND deleted IS NULL");
         transaction.prepare_cached(&sql)?.execute(params![trial, from, to])
     };
     match change {
@@ -442,6 +452,17 @@ fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusq
         }
         Change::Restored => {
             let sql = "UPDATE trials SET deleted = NULL WHERE id = ?1 AND deleted IS NOT NULL";
+            transaction.prepare_cached(sql)?.execute([trial])
+        }
+        Change::Kept => {
+            let sql = "UPDATE trials SET demo = 0 WHERE id = ?1 AND demo = 1 AND deleted IS NULL";
+            transaction.prepare_cached(sql)?.execute([trial])
+        }
+        Change::ReturnedToLog => {
+            // One that has joined a collection since stays in the store.
+            let sql =
+                "UPDATE trials SET demo = NOT EXISTS (SELECT 1 FROM memberships WHERE memberships.trial = trials.id)
+                       WHERE id = ?1 AND demo = 0 AND deleted IS NULL";
             transaction.prepare_cached(sql)?.execute([trial])
         }
         Change::Guess { guess } => {

@@ -280,8 +280,8 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
-         DROP TABLE memberships; DROP INDEX trials_by_identity;
-         ALTER TABLE trials DROP COLUMN identity; ALTER TABLE trials DROP COLUMN origin;
+         DROP TABLE memberships; DROP INDEX trials_by_identity; DROP INDEX trials_of_demo_log;
+         ALTER TABLE trials DROP COLUMN demo; ALTER TABLE trials DROP COLUMN identity; ALTER TABLE trials DROP COLUMN origin;
          ALTER TABLE trials DROP COLUMN earlier; ALTER TABLE trials DROP COLUMN phases;
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",

@@ -1,6 +1,7 @@
 //! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
 //! entry to the journal in the same transaction.
 
+use super::demo_log::TrialPlace;
 use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
 use super::store_error::StoreError;
@@ -47,13 +48,15 @@ struct LabelState {
     unsure: bool,
     reviewed: bool,
     phases: Option<CorrectedPhases>,
+    place: TrialPlace,
 }
 
 fn state_of(row: &Row<'_>) -> rusqlite::Result<LabelState> {
     let tags = serde_json::from_str(&row.get::<_, String>(3)?).unwrap_or_default();
     let (unsure, reviewed) = (row.get(4)?, row.get(5)?);
     let phases = serde_json::from_str(&row.get::<_, String>(6)?).unwrap_or_default();
-    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed, phases })
+    let place = TrialPlace::of_column(row.get(7)?);
+    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed, phases, place })
 }
 
 impl LabelRepository<'_> {
@@ -93,6 +96,9 @@ impl LabelRepository<'_> {
             }
             TrialEdit::Discard => self.change_deletion(ids, &Change::Discarded),
             TrialEdit::Restore => self.change_deletion(ids, &Change::Restored),
+            TrialEdit::Keep => {
+                self.change_trials(ids, |_, state| Ok((state.place == TrialPlace::DemoLog).then_some(Change::Kept)))
+            }
         }
     }
 
@@ -186,8 +192,7 @@ impl LabelRepository<'_> {
         let batch = new_batch(&transaction, ids.len()).map_err(fault)?;
         let links = Links { undoes: None, batch: batch.as_deref() };
         let mut edited = Edited::default();
-        let sql =
-            "SELECT rig, object, note, tags, unsure, reviewed, phases FROM trials WHERE id = ?1 AND deleted IS NULL";
+        let sql = "SELECT rig, object, note, tags, unsure, reviewed, phases, demo FROM trials WHERE id = ?1 AND deleted IS NULL";
         for id in ids {
             let state =
                 transaction.prepare_cached(sql).and_then(|mut found| found.query_row([id], state_of).optional());

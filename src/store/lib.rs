@@ -3,8 +3,8 @@
 //! # Terms
 //!
 //! A **store** is one SQLite file of **trials**, raw and append-only. A trial of a real gripper may have **labels**:
-//! class, note, tags and **flags**; each change of them is an entry of the **journal**, and can be undone. The **plan**
-//! says what to record next. **Calibrations** and **tares** belong to the parts of a board.
+//! class, note, tags and **flags**; each change of them is an entry of the **journal**, and can be undone. The last simulated
+//! grasps of the window that nobody keeps are in the **demo log**. The **plan** says what to record next. **Calibrations** and **tares** belong to the parts of a board.
 //!
 //! # Modules, lowest layer first
 //!
@@ -17,7 +17,7 @@
 //! | 0 | `new_file` | files that appear whole or not at all |
 //! | 1 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
-//! | 1 | `identity` | which trials are the same grasp |
+//! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
 //! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
 //! | 4 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
@@ -51,6 +51,9 @@ mod csv_export;
 mod csv_import;
 #[cfg(test)]
 mod damage_tests;
+mod demo_log;
+#[cfg(test)]
+mod demo_log_tests;
 mod frame_blob;
 mod free_space;
 mod identity;
@@ -88,6 +91,7 @@ pub use board_trials::{BoardChunk, BoardInfo};
 pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCalibration};
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
+pub use demo_log::{DEMO_LOG_TRIALS, TrialPlace};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use identity::Stored;

@@ -21,7 +21,7 @@ pub struct Merged {
 
 const CHOOSE_INCOMING: &str = "
     CREATE TEMP TABLE incoming AS SELECT theirs.id, theirs.uid FROM other.trials AS theirs
-    WHERE NOT EXISTS (
+    WHERE theirs.demo = 0 AND NOT EXISTS (
         SELECT 1 FROM main.trials AS ours WHERE ours.uid = theirs.uid OR (
             ours.collection = theirs.collection AND ours.object = theirs.object AND ours.seed = theirs.seed) OR (
             ours.identity = theirs.identity AND ours.state = 'complete' AND ours.deleted IS NULL));
@@ -42,6 +42,13 @@ const ADD_MEMBERSHIPS: &str = "
         WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)) AS known
     JOIN main.trials AS holder ON holder.id = known.id
     WHERE holder.collection IS NOT known.collection;
+";
+
+/// A grasp of our demo log that the other store keeps is kept here too.
+const KEEP_KNOWN: &str = "
+    UPDATE main.trials SET demo = 0 WHERE demo = 1 AND EXISTS (
+        SELECT 1 FROM other.trials AS theirs WHERE theirs.demo = 0 AND theirs.deleted IS NULL
+            AND (theirs.uid = main.trials.uid OR theirs.identity = main.trials.identity));
 ";
 
 /// Calibrations come along, so that signals can be derived here too. Mountings and the plan stay with each store.
@@ -78,6 +85,7 @@ fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<(u64, i64)> {
         transaction.execute(&sql, [])?;
     }
     transaction.execute_batch(ADD_MEMBERSHIPS)?;
+    transaction.execute_batch(KEEP_KNOWN)?;
     transaction.execute_batch(COPY_CALIBRATIONS)?;
     transaction.execute_batch(COPY_JOURNAL)?;
     let annotated = transaction.query_row(COUNT_ANNOTATED, [], |row| row.get(0))?;
@@ -102,7 +110,7 @@ fn columns_of(transaction: &Transaction<'_>, table: &str, key: &str) -> rusqlite
 }
 
 impl Store {
-    /// Copies the trials of another store that this one does not have. Trials keep their identity, so that merging
+    /// Copies the trials of another store that this one does not have, but for those of its demo log. Trials keep their identity, so that merging
     /// twice adds nothing the second time; they get new numbers.
     pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
         if !other.is_file() {
@@ -114,7 +122,7 @@ impl Store {
         let fault = |e: rusqlite::Error| self.fault(&e);
         self.connection.execute("ATTACH DATABASE ?1 AS other", [other.to_string_lossy()]).map_err(fault)?;
         let merged = self.write().and_then(|transaction| {
-            let count = "SELECT count(*) FROM other.trials";
+            let count = "SELECT count(*) FROM other.trials WHERE demo = 0";
             let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
             let (added, annotated) = copy(&transaction).map_err(fault)?;
             transaction.commit().map_err(fault)?;

@@ -13,7 +13,7 @@
 //! guesses      prediction of a model for a trial, made when its label was given
 //! label_plan   how many trials of each object are wanted: one row, or none for the default plan
 //! memberships  further collections of a trial, whose grasp they share
-//! journal      every change of a label, note, tag, deletion or plan; only ever added to
+//! journal      every change of a label, note, tag, deletion, place or plan; only ever added to
 //! ```
 //!
 //! Blobs carry a CRC-32 in a column beside them; rows from before version 10 have none.
@@ -30,7 +30,7 @@ pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
 pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 
 /// Each makes the next version out of the one before; the first makes the tables.
-pub(super) const MIGRATIONS: [&str; 13] = [
+pub(super) const MIGRATIONS: [&str; 14] = [
     "CREATE TABLE trials (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
@@ -163,6 +163,9 @@ pub(super) const MIGRATIONS: [&str; 13] = [
         PRIMARY KEY (trial, collection)
      ) WITHOUT ROWID;
      CREATE INDEX memberships_by_collection ON memberships (collection);",
+    // 1 for a trial of the demo log; see the module `demo_log`.
+    "ALTER TABLE trials ADD COLUMN demo INTEGER NOT NULL DEFAULT 0;
+     CREATE INDEX trials_of_demo_log ON trials (demo) WHERE demo = 1;",
 ];
 
 /// The first version with identities of grasps.
@@ -197,7 +200,7 @@ pub(super) fn migrate(transaction: &Transaction<'_>, store: &Path) -> Result<Opt
     Ok(copy)
 }
 
-/// `trials.before-v13.sqlite` beside the store, or with a number where such a file exists.
+/// `trials.before-v14.sqlite` beside the store, or with a number where such a file exists.
 fn free_name(store: &Path) -> PathBuf {
     let name = |suffix: String| store.with_extension(format!("before-v{SCHEMA_VERSION}{suffix}.sqlite"));
     let numbered = (2..).map(|number| name(format!("-{number}")));

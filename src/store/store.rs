@@ -7,6 +7,7 @@
 //! Deleting marks a trial; purging removes it. Chunks are only ever added.
 
 use super::checksum::{checksum, is_intact};
+use super::demo_log::{TrialPlace, keep, log, place_of};
 use super::frame_blob::{decode_frames, encode_frames};
 use super::identity::{Stored, add_to, known};
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
@@ -171,13 +172,33 @@ impl Store {
         version.map_err(|e| self.fault(&e))
     }
 
-    /// Begins a simulated trial, without its frames: they follow with [`Store::append`].
+    /// Begins a simulated trial in the store, without its frames: they follow with [`Store::append`].
     pub fn begin(&mut self, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
+        self.begin_in(TrialPlace::Store, trial)
+    }
+
+    /// Begins a simulated trial in the store or in the demo log.
+    pub fn begin_in(&mut self, place: TrialPlace, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        let id = insert_simulated(&transaction, trial).map_err(|e| fault(&path, &e))?;
+        let id = insert_simulated(&transaction, trial, place).map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
         Ok(id)
+    }
+
+    /// Place of a trial.
+    pub fn place(&self, id: TrialId) -> Result<TrialPlace, StoreError> {
+        place_of(&self.connection, id).map_err(|e| self.fault(&e))?.ok_or_else(|| self.no_trial(id))
+    }
+
+    /// Gives up a trial that is being recorded, or that another replaces: one of the demo log is removed, any other marked as
+    /// deleted.
+    pub fn give_up(&mut self, id: TrialId) -> Result<(), StoreError> {
+        let removed = self.connection.execute("DELETE FROM trials WHERE id = ?1 AND demo = 1", [id]);
+        if removed.map_err(|e| self.fault(&e))? == 0 {
+            self.delete(&[id])?;
+        }
+        Ok(())
     }
 
     /// Adds frames to a trial that is being recorded; once this returns, a kill cannot lose them.
@@ -192,7 +213,8 @@ impl Store {
     }
 
     /// Ends a trial, whose quality, warnings and pulls are now known. It is removed where another trial holds the same
-    /// grasp, unless it has a note, tag or other change by a person.
+    /// grasp, unless it has a note, tag or other change by a person. A trial of the demo log that holds a grasp recorded into
+    /// the store is kept.
     pub fn finish(&mut self, id: TrialId, quality: &Quality, header: &TrialHeader) -> Result<Stored, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
@@ -203,13 +225,18 @@ impl Store {
 
     /// Stores a whole simulated trial, all or nothing, unless another trial holds the same grasp.
     pub fn insert(&mut self, trial: &SimulatedTrial) -> Result<Stored, StoreError> {
+        self.insert_in(TrialPlace::Store, trial)
+    }
+
+    /// The same in the store or in the demo log.
+    pub fn insert_in(&mut self, place: TrialPlace, trial: &SimulatedTrial) -> Result<Stored, StoreError> {
         let path = self.path.clone();
         let transaction = self.write()?;
-        let known = known(&transaction, &trial.header, 0).map_err(|e| fault(&path, &e))?;
-        let stored = match known {
-            Some(id) => Stored::Known(id),
-            None => Stored::New(insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?),
+        let insert = || match known(&transaction, &trial.header, 0)? {
+            Some(id) => held(&transaction, id, place),
+            None => insert_whole(&transaction, trial, place).map(Stored::New),
         };
+        let stored = insert().map_err(|e| fault(&path, &e))?;
         transaction.commit().map_err(|e| fault(&path, &e))?;
         Ok(stored)
     }
@@ -230,10 +257,12 @@ impl Store {
             }
             match known(&transaction, header, 0).map_err(|e| fault(&path, &e))? {
                 Some(id) => {
-                    add_to(&transaction, id, header.collection.as_deref()).map_err(|e| fault(&path, &e))?;
+                    add_to(&transaction, id, header.collection.as_deref())
+                        .and_then(|()| keep(&transaction, id))
+                        .map_err(|e| fault(&path, &e))?;
                 }
                 None => {
-                    insert_whole(&transaction, trial).map_err(|e| fault(&path, &e))?;
+                    insert_whole(&transaction, trial, TrialPlace::Store).map_err(|e| fault(&path, &e))?;
                     stored += 1;
                 }
             }
@@ -352,8 +381,14 @@ impl Store {
     }
 }
 
-fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqlite::Result<TrialId> {
-    let id = insert_simulated(transaction, trial)?;
+/// Outcome for a place whose grasp this trial holds already.
+fn held(transaction: &Transaction<'_>, id: TrialId, place: TrialPlace) -> rusqlite::Result<Stored> {
+    let kept = place == TrialPlace::Store && keep(transaction, id)?;
+    Ok(if kept { Stored::Kept(id) } else { Stored::Known(id) })
+}
+
+fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial, place: TrialPlace) -> rusqlite::Result<TrialId> {
+    let id = insert_simulated(transaction, trial, place)?;
     for frames in trial.frames().chunks(FRAMES_PER_CHUNK) {
         insert_chunk(transaction, id, frames)?;
     }
@@ -385,9 +420,17 @@ pub(super) fn source_named(id: TrialId, name: &str) -> Result<TrialSource, Store
     name.parse().map_err(|UnknownSource(name)| StoreError::UnknownSource { id, name })
 }
 
-fn insert_simulated(transaction: &Transaction<'_>, trial: &SimulatedTrial) -> rusqlite::Result<TrialId> {
+fn insert_simulated(
+    transaction: &Transaction<'_>,
+    trial: &SimulatedTrial,
+    place: TrialPlace,
+) -> rusqlite::Result<TrialId> {
     let SimulatedData { world_from_gripper, plan, quality, frames: _ } = &trial.data;
-    insert_header(transaction, TrialSource::Simulated, &trial.header, (world_from_gripper, quality, plan))
+    let id = insert_header(transaction, TrialSource::Simulated, &trial.header, (world_from_gripper, quality, plan))?;
+    if place == TrialPlace::DemoLog {
+        log(transaction, id)?;
+    }
+    Ok(id)
 }
 
 /// Begins a recorded trial. Columns that only simulated trials use get neutral values.
@@ -450,8 +493,9 @@ fn end(
     if let Some(other) = known(transaction, header, id)?
         && !is_annotated(transaction, id)?
     {
+        let place = place_of(transaction, id)?.unwrap_or_default();
         transaction.execute("DELETE FROM trials WHERE id = ?1", [id])?;
-        return Ok(Stored::Known(other));
+        return held(transaction, other, place);
     }
     set_complete(transaction, id, quality, &header.warnings)?;
     transaction.execute(

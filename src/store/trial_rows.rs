@@ -1,5 +1,6 @@
 //! The list of trials: what is known of each without its data.
 
+use super::demo_log::TrialPlace;
 use super::store::{Store, source_named};
 use super::store_error::StoreError;
 use crate::labels::{Flag, FlagRemark, flaws};
@@ -24,6 +25,8 @@ pub struct TrialRow {
     /// Origin.
     #[serde(rename = "rig")]
     pub source: TrialSource,
+    /// In the store, or in the demo log.
+    pub place: TrialPlace,
     /// Name of the object; empty while unlabelled.
     pub object: String,
     /// Seed of the pose.
@@ -95,7 +98,7 @@ const ROWS: &str =
     CASE WHEN identity IS NOT NULL AND state = 'complete' THEN (SELECT min(first.id) FROM trials AS first
         WHERE first.identity = trials.identity AND first.state = 'complete' AND first.deleted IS NULL
         AND first.id < trials.id) END,
-    rig = 'serial' AND earlier IS NOT NULL
+    rig = 'serial' AND earlier IS NOT NULL, demo
     FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id";
 
 /// Reads rows; presets are looked up once per text.
@@ -147,6 +150,7 @@ impl RowReader {
             identity: row.get(22)?,
             duplicate_of,
             follows: row.get(24)?,
+            place: TrialPlace::of_column(row.get(25)?),
             pulled,
             deleted: row.get(9)?,
             object,

@@ -4,7 +4,8 @@ use crate::program::{json, refused, run};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::grasp;
 use palpate_sim::scene::Scene;
-use palpate_store::Store;
+use palpate_store::labels::TrialEdit;
+use palpate_store::{Store, TrialPlace};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -228,4 +229,25 @@ fn foreign_grasps_without_sizes_get_a_table_without_a_flag() {
     assert!(rows.as_array().unwrap().iter().all(|row| row["macro_accuracy"].as_f64().unwrap() > 0.8), "{rows}");
     // Only a method that these data cannot train: an error, not an empty table.
     refused(at, &["evaluate", "--models", "ds-lstm", "--quick"], &["ds-lstm", "size"]);
+}
+
+#[test]
+fn grasps_of_the_demo_log_are_counted_and_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = trials(folder.path());
+    for (object, place) in [("ball", TrialPlace::Store), ("box", TrialPlace::DemoLog)] {
+        let scene = scene_of(object);
+        store.insert_in(place, &grasp(&scene, scene.load_object().unwrap().as_ref(), 0)).unwrap();
+    }
+    let read = |store: &Store, objects: &[&str]| {
+        let objects = objects.iter().map(|name| (*name).to_owned()).collect();
+        let query = DatasetQuery { objects, ..DatasetQuery::default() };
+        query.read(store, &SensorView::default(), &mut |_, _| ())
+    };
+    let data = read(&store, &[]).unwrap();
+    assert_eq!((data.examples.len(), data.about.left_out), (1, 1));
+    let none = read(&store, &["box"]).unwrap_err().to_string();
+    assert!(none.contains("in the demo log") && none.contains("palpate trials keep"), "{none}");
+    store.labels().edit(&[2], &TrialEdit::Keep).unwrap();
+    assert_eq!(read(&store, &[]).unwrap().examples.len(), 2);
 }

@@ -12,7 +12,7 @@ use palpate_lab::picture::PictureView;
 use palpate_lab::workers::{Command, Notice, SimWorker, SimWorkerSetup, TraceRow};
 use palpate_learn::Models;
 use palpate_sim::scene::Scene;
-use palpate_store::Store;
+use palpate_store::{Store, TrialPlace};
 use rand::{RngExt, SeedableRng};
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,7 +31,7 @@ fn a_stored_grasp_opens_as_it_was_live() {
         scene,
         sensors: SensorView::default(),
         store: store.clone(),
-        recording: true,
+        recording: Some(TrialPlace::Store),
         grasps: 3,
         models: Models::all(&model),
         playing: false,
@@ -315,7 +315,7 @@ fn resident() -> u64 {
 #[ignore = "takes minutes"]
 fn hours_of_samples_take_no_more_memory_than_the_first() {
     let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
-    for command in [Command::SetRecording(false), Command::SetGrasps(1000), Command::SetSpeed(64.0)] {
+    for command in [Command::SetRecording(None), Command::SetGrasps(1000), Command::SetSpeed(64.0)] {
         bench.tell(command);
     }
     let mut grasps_until = |many: u64| {

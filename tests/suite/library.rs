@@ -12,7 +12,7 @@ use palpate_lab::grasping::grasp;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::TrialEdit;
-use palpate_store::{BoardInfo, ImportedTrial, Store, TrialQuery};
+use palpate_store::{BoardInfo, ImportedTrial, Store, TrialPlace, TrialQuery};
 use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialHeader, TrialId};
 
@@ -268,4 +268,57 @@ fn keys_walk_through_the_library_and_open_trials() {
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until_told("undone: trial 2: discarded");
     until_rows(&mut bench, &["2"]);
+}
+
+#[test]
+fn the_terminal_lists_and_keeps_grasps_of_the_demo_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
+    for (seed, place) in [(1, TrialPlace::Store), (2, TrialPlace::DemoLog), (3, TrialPlace::DemoLog)] {
+        store.insert_in(place, &grasp(&Scene::default(), None, seed)).unwrap();
+    }
+    let list = |filters: &[&str]| -> Vec<i64> {
+        let rows = json(at, &[&["trials", "list", "--json"], filters].concat());
+        rows.as_array().unwrap().iter().map(|row| row["id"].as_i64().unwrap()).collect()
+    };
+    assert_eq!((list(&[]), list(&["--place", "demo-log"])), (vec![1, 2, 3], vec![2, 3]));
+    assert_eq!(json(at, &["trials", "list", "--json"])[1]["place"], "demo-log");
+    assert!(run(at, &["trials", "list"]).out.lines().filter(|line| line.contains("demo log")).count() == 2);
+    assert!(run(at, &["trials", "show", "2"]).out.contains("in the demo log"));
+    let out = run(at, &["trials", "keep", "1-3"]);
+    assert!(out.out.contains("2 trials kept in the store"), "{out:?}");
+    assert!(run(at, &["trials", "undo"]).out.contains("undone: trials 2, 3: kept in the store"));
+    assert_eq!(list(&["--place", "demo-log"]), [2, 3]);
+    // A note keeps.
+    assert_eq!(run(at, &["trials", "note", "3", "slipped"]).code, Some(0));
+    assert_eq!((list(&["--place", "store"]), list(&["--place", "demo-log"])), (vec![1, 3], vec![2]));
+    assert!(run(at, &["trials", "keep", "3"]).out.contains("In the store already"));
+    assert_eq!(run(at, &["trials", "list", "--place", "shelf"]).code, Some(2));
+}
+
+/// A lemon in the store and a tomato in the demo log.
+fn fill_demo(store: &mut Store) {
+    for (name, place) in [("lemon", TrialPlace::Store), ("tomato", TrialPlace::DemoLog)] {
+        let mut scene = Scene::default();
+        name.clone_into(&mut scene.object.source);
+        store.insert_in(place, &grasp(&scene, scene.load_object().unwrap().as_ref(), 1)).unwrap();
+    }
+}
+
+#[test]
+fn the_library_marks_the_demo_log_and_keeps_the_selection() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "library");
+    let setup = BenchSetup { panel, size: [900.0, 600.0], fill: fill_demo, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.until_shown(true, "Trial 2, Tomato");
+    assert!(bench.harness.query_by_label("Trial 1, Lemon").is_some(), "both are listed");
+    bench.harness.get_by_label("demo log 1").click();
+    bench.until_shown(false, "Trial 1, Lemon");
+    bench.harness.get_by_label("Trial 2, Tomato").click();
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("Keep").click();
+    bench.until_told("1 trial kept in the store");
+    bench.until_shown(false, "Trial 2, Tomato");
+    assert!(bench.store().list(false).unwrap().iter().all(|row| row.place == TrialPlace::Store));
 }

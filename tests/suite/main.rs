@@ -66,6 +66,7 @@ mod panels;
 mod peers;
 mod physics;
 mod pictures;
+mod presenter;
 mod program;
 mod recognition_panel;
 mod scripted;

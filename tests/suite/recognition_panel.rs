@@ -260,3 +260,37 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.harness.run_steps(5);
     assert!(bench.harness.query_by_label_contains("Learning carton").is_none());
 }
+
+#[test]
+fn a_raised_threshold_offers_one_more_grasp_beyond_the_limit_too() {
+    // The script says 61, 86, 95 and 98 %.
+    let mut bench = alone(Theme::Dark);
+    let raise = |bench: &mut Bench, threshold: f64| {
+        bench.tell(RecognitionAction::SetThreshold(threshold));
+        bench.until(|s| s.identification.as_ref().is_some_and(|view| view.rule.threshold == threshold));
+        bench.harness.run_steps(2);
+    };
+    run_out(&mut bench);
+    assert!(says(&bench, "Lemon, 95 %") && !says(&bench, "One more grasp"));
+    raise(&mut bench, 0.92);
+    assert!(!says(&bench, "One more grasp"), "the verdict stands");
+    raise(&mut bench, 0.97);
+    bench.harness.get_by_label("One more grasp").click();
+    bench.harness.run_steps(2);
+    let more = bench.until(|s| s.status.finished && s.status.grasp_of_round == 4);
+    assert_eq!(beliefs(&more), 4, "all grasps count");
+    bench.harness.run_steps(3);
+    assert!(says(&bench, "Lemon, 98 %") && !says(&bench, "One more grasp"));
+    // At the limit there is one more too; the limit stays.
+    bench.tell(Command::SetGrasps(2));
+    bench.tell(Command::Play);
+    bench.until(|s| s.status.finished && s.grasp == more.grasp + 2);
+    raise(&mut bench, 0.98);
+    bench.harness.get_by_label("One more grasp").click();
+    bench.harness.run_steps(2);
+    let more = bench.until(|s| s.status.finished && s.status.grasp_of_round == 3);
+    assert_eq!((beliefs(&more), more.status.grasps), (3, 2));
+    bench.tell(Command::Play);
+    let next = bench.until(|s| s.status.finished && s.grasp > more.grasp);
+    assert_eq!(next.status.grasp_of_round, 2);
+}

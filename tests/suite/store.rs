@@ -149,7 +149,7 @@ fn a_store_of_version_0_1_0_is_copied_updated_listed_and_exported() {
     let list = run(folder.path(), &["trials", "list"]);
     assert_eq!(list.code, Some(0), "{list:?}");
     assert!(
-        list.err.contains("trials.before-v") && folder.path().join("trials.before-v13.sqlite").is_file(),
+        list.err.contains("trials.before-v") && folder.path().join("trials.before-v14.sqlite").is_file(),
         "{list:?}"
     );
     for row in ["Lemon", "mug", "Rubber ball (ball)", "slipped a little", "[wet, late]", "unsure"] {

@@ -76,7 +76,7 @@ fn panel() -> &'static PanelKind {
 }
 
 fn run_out(bench: &mut Bench) {
-    bench.tell(Command::SetRecording(false));
+    bench.tell(Command::SetRecording(None));
     bench.tell(Command::SetGrasps(1));
     bench.tell(Command::SetSpeed(64.0));
     bench.tell(Command::Play);

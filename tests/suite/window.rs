@@ -264,35 +264,3 @@ fn a_warning_carries_the_button_that_helps() {
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until(|s| s.truth() == "lemon");
 }
-
-#[test]
-fn presenter_mode_shows_object_after_object_and_counts_verdicts() {
-    let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
-    bench.harness.key_press(egui::Key::F11);
-    bench.harness.run_steps(2);
-    assert!(bench.workbench().view().presents);
-    assert!(bench.harness.query_by_label("Recognition").is_none(), "no panels");
-    bench.tell(Command::SetSpeed(64.0));
-    let first = bench.until(|s| s.status.finished);
-    assert_ne!(first.scene.gripper.mount.yaw_deg, 0.0, "a random pose");
-    assert!(!first.status.recording, "nothing is stored");
-    bench.harness.run_steps(2);
-    // The script says lemon, which is the first object.
-    assert!(bench.harness.query_by_label("Right: it is Lemon").is_some());
-    assert!(bench.harness.query_by_label("1 right, 0 wrong").is_some());
-    // The window's clock moves with its frames.
-    for _ in 0..400 {
-        bench.harness.run_steps(1);
-    }
-    let second = bench.until(|s| s.truth() != "lemon" && s.status.finished);
-    bench.harness.run_steps(2);
-    let title = second.object.as_ref().map_or_else(|| "Empty hand".to_owned(), |object| object.title.clone());
-    assert!(bench.harness.query_by_label(&format!("Wrong: it is {title}")).is_some());
-    assert!(bench.harness.query_by_label("1 right, 1 wrong").is_some());
-    bench.harness.key_press(egui::Key::Escape);
-    bench.harness.run_steps(3);
-    assert!(!bench.workbench().view().presents);
-    assert!(bench.harness.query_by_label("Recognition").is_some());
-    let back = bench.until(|s| s.status.recording);
-    assert_eq!(back.scene.pose, Scene::default().pose, "poses are as before");
-}

@@ -5,8 +5,9 @@ mod timeline;
 mod trial;
 
 use crate::app::actions::{Action, Actions};
-use crate::app::context::PanelContext;
+use crate::app::context::{LoggedGrasp, PanelContext};
 use crate::app::features::inspect::InspectAction;
+use crate::app::features::library::LibraryAction;
 use crate::app::features::view::ViewAction;
 use crate::app::icons::{self, Icon};
 use crate::app::modes;
@@ -19,6 +20,7 @@ use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::workers::{Command, GripperView, Status};
+use palpate_store::TrialPlace;
 
 /// A speed: ¼× is 0.25×.
 fn speed_text(speed: f64) -> String {
@@ -178,7 +180,8 @@ fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
         let status = &snapshot.status;
         // With a model, grasping ends as soon as the object is recognised.
         let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
-        ui.weak(format!("grasp {} {of} {}", status.grasp_of_round.max(1), status.grasps));
+        let grasp = status.grasp_of_round.max(1);
+        ui.weak(format!("grasp {grasp} {of} {}", status.grasps.max(grasp)));
     }
 }
 
@@ -211,7 +214,7 @@ pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Acti
         speeds(ui, context, &status, actions);
         ui.separator();
         if context.source == ViewSource::Simulation && ui.available_width() > 420.0 {
-            recording(ui, &status, actions);
+            recording(ui, context, &status, actions);
             ui.separator();
         }
         let [first, last] = shown.time_span();
@@ -298,15 +301,47 @@ fn speeds(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mu
         .on_hover_text("Actual speed, as a multiple of real time");
 }
 
-fn recording(ui: &mut Ui, status: &Status, actions: &mut Actions) {
-    let mut on = status.recording;
-    if ui.checkbox(&mut on, "Record").on_hover_text("Store every finished grasp").changed() {
-        actions.push(Command::SetRecording(on));
+/// Width that the name of the choice of a place needs beside everything else (points).
+const NAMED: f32 = 620.0;
+
+/// Where grasps are recorded, a button that keeps the last one, and how many grasps there are at most.
+fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mut Actions) {
+    if ui.available_width() > NAMED {
+        ui.weak("Record into");
     }
+    for (place, name, hint) in [
+        (TrialPlace::DemoLog, "Demo log", "Keep the last 1000 grasps. They can be looked at, but are in no data set"),
+        (TrialPlace::Store, "Store", "Store every finished grasp as a trial, which data sets use"),
+    ] {
+        let chosen = status.recording == Some(place);
+        if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
+            actions.push(Command::SetRecording(Some(place)));
+        }
+    }
+    keep_ui(ui, context, actions);
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
     if ui.add(drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
         actions.push(Command::SetGrasps(grasps));
+    }
+}
+
+/// Button that moves the last grasp from the demo log to the store.
+fn keep_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+    let kept = context.logged.is_some_and(|logged| logged.kept);
+    let waits = context.logged.filter(|logged| !logged.kept);
+    let hint = match context.logged {
+        Some(LoggedGrasp { trial, kept: true }) => format!("Trial {trial} is in the store"),
+        Some(LoggedGrasp { trial, kept: false }) => {
+            format!("Move the last grasp, trial {trial}, from the demo log to the store (K)")
+        }
+        None => "The last grasp is not in the demo log".to_owned(),
+    };
+    let button = ui.add_enabled(waits.is_some(), egui::Button::new(if kept { "Kept" } else { "Keep" }));
+    if button.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked()
+        && let Some(LoggedGrasp { trial, .. }) = waits
+    {
+        actions.push(LibraryAction::Keep(trial));
     }
 }
 

@@ -10,6 +10,7 @@ use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{Command, GripperCommand, GripperWorker, Notice, TrialView};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
+use palpate_store::TrialPlace;
 use palpate_tactile::trial::Control;
 
 /// Action on the real gripper.
@@ -35,7 +36,7 @@ pub(in crate::app) struct GripperFeature {
     /// Part of the trial at the last look.
     part: Option<GraspStage>,
     /// Recording and number of grasps of the simulation before it began to follow the gripper.
-    before_following: Option<(bool, u32)>,
+    before_following: Option<(Option<TrialPlace>, u32)>,
     /// Scene that the gripper's thread has.
     scene: Scene,
 }
@@ -140,7 +141,7 @@ impl GripperFeature {
             let snapshot = simulation.worker().snapshot();
             let status = snapshot.map(|snapshot| snapshot.status.clone()).unwrap_or_default();
             self.before_following = Some((status.recording, status.grasps));
-            vec![Command::SetRecording(false), Command::SetGrasps(1), Command::Reset, Command::Pause]
+            vec![Command::SetRecording(None), Command::SetGrasps(1), Command::Reset, Command::Pause]
         } else {
             let before = self.before_following.take();
             before.map_or_else(Vec::new, |(recording, grasps)| {

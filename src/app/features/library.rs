@@ -39,6 +39,8 @@ pub enum LibraryAction {
     Draw(Vec<TrialId>),
     /// Change the selected trials.
     Edit(TrialEdit),
+    /// Move this trial from the demo log to the store.
+    Keep(TrialId),
     /// Export the selected trials as CSV, into a folder beside the store.
     Export,
     /// Open the trial selected last.
@@ -115,11 +117,13 @@ pub(in crate::app) struct LibraryFeature {
     seen: Option<Arc<[Arc<LibraryTrial>]>>,
     /// Outcomes up to this number have been shown.
     reported: u64,
+    /// Trial kept last.
+    kept: Option<TrialId>,
 }
 
 impl LibraryFeature {
     pub(in crate::app) fn new(librarian: Librarian) -> Self {
-        Self { librarian, selection: LibrarySelection::default(), seen: None, reported: 0 }
+        Self { librarian, selection: LibrarySelection::default(), seen: None, reported: 0, kept: None }
     }
 
     pub(in crate::app) fn view(&self) -> Option<Arc<LibraryView>> {
@@ -129,6 +133,11 @@ impl LibraryFeature {
     /// Changes a trial.
     pub(in crate::app) fn edit(&self, id: TrialId, edit: TrialEdit) {
         self.librarian.ask(LibraryCommand::Edit(vec![id], edit));
+    }
+
+    /// Trial that was moved from the demo log to the store last.
+    pub(in crate::app) fn kept(&self) -> Option<TrialId> {
+        self.kept
     }
 
     pub(in crate::app) fn selection(&self) -> &LibrarySelection {
@@ -177,6 +186,10 @@ impl LibraryFeature {
                 if !self.selection.selected.is_empty() {
                     self.librarian.ask(LibraryCommand::Edit(selected, edit));
                 }
+            }
+            LibraryAction::Keep(id) => {
+                self.edit(id, TrialEdit::Keep);
+                self.kept = Some(id);
             }
             LibraryAction::Export => self.librarian.ask(LibraryCommand::Export(selected)),
             LibraryAction::Open => return self.selection.cursor.map(InspectAction::Open).into_iter().collect(),

@@ -11,7 +11,9 @@ use palpate_lab::workers::{
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Auto;
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{PoseSpread, Scene};
+use palpate_store::TrialPlace;
+use palpate_tactile::trial::TrialId;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -62,6 +64,8 @@ pub(in crate::app) struct SimulationFeature {
     changes: SceneChanges,
     /// Scene that was refused last.
     refused: Option<Scene>,
+    /// Trial that holds the last grasp, and where it was when the grasp ended.
+    last_trial: Option<(TrialId, TrialPlace)>,
 }
 
 impl SimulationFeature {
@@ -83,6 +87,7 @@ impl SimulationFeature {
             shuffled: ShuffledObjects::new(DECK_SEED),
             changes: SceneChanges::default(),
             refused: None,
+            last_trial: None,
         }
     }
 
@@ -118,6 +123,11 @@ impl SimulationFeature {
         self.worker.ghost().filter(|_| view.ghost)
     }
 
+    /// Trial of the demo log that holds the last grasp.
+    pub(in crate::app) fn logged_trial(&self) -> Option<TrialId> {
+        self.last_trial.filter(|(_, place)| *place == TrialPlace::DemoLog).map(|(id, _)| id)
+    }
+
     /// Takes in rows and notices since the last frame.
     pub(in crate::app) fn gather(&mut self, view: &mut ViewState, notices: &mut Notices) {
         if self.worker.take_rows_lost() {
@@ -130,6 +140,12 @@ impl SimulationFeature {
         for notice in news {
             match notice {
                 Notice::SceneRefused(refusal) => self.take_refusal(*refusal, notices),
+                // The bar offers to keep it.
+                Notice::Logged(id, place) => self.last_trial = Some((id, place)),
+                Notice::Stored(id) | Notice::Known(id) | Notice::Kept(id) => {
+                    self.last_trial = Some((id, TrialPlace::Store));
+                    show_notice(notice, notices);
+                }
                 other => show_notice(other, notices),
             }
         }
@@ -193,6 +209,11 @@ impl SimulationFeature {
             }
             return;
         }
+        self.set_scene(self.scene_with(source), notices);
+    }
+
+    /// The scene with another object: a built-in name or a file.
+    fn scene_with(&self, source: &str) -> Scene {
         let mut scene = self.scene.clone();
         scene.object.source = anchored(source);
         // Mass and size belong to the object before.
@@ -202,7 +223,13 @@ impl SimulationFeature {
         scene.object.scale = fresh.scale;
         scene.object.collision = fresh.collision;
         scene.object.rotation_deg = fresh.rotation_deg;
-        self.set_scene(scene, notices);
+        scene
+    }
+
+    /// Grasps a built-in object in random poses.
+    pub(in crate::app) fn open_in(&mut self, object: &str, pose: PoseSpread, notices: &mut Notices) {
+        self.set_scene(Scene { pose, ..self.scene_with(object) }, notices);
+        self.send(Command::Play, notices);
     }
 
     /// Grasps another built-in object, drawn at random.
@@ -321,6 +348,8 @@ pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
         Notice::SceneRefused(refusal) => notices.error(refusal.cause),
         Notice::Stored(id) => notices.info(format!("Trial {id} stored.")),
         Notice::Known(id) => notices.info(format!("Not stored again: trial {id} is the same grasp.")),
+        Notice::Kept(id) => notices.info(format!("Trial {id} of the demo log is the same grasp: kept in the store.")),
+        Notice::Logged(..) => {}
     }
 }
 

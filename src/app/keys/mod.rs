@@ -43,7 +43,8 @@ pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>, actions: 
     if ctx.text_edit_focused() || context.view.palette_shown || dialog {
         return stop(ctx, actions);
     }
-    let mode = context.view.mode;
+    // Presenter mode demonstrates, whatever mode is behind it.
+    let mode = if context.view.presents { Mode::Demo } else { context.view.mode };
     if let Some(action) = (modes::kind(mode).typed)(ctx, context) {
         actions.push(action);
         return stop(ctx, actions);

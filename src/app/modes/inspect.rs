@@ -33,6 +33,9 @@ const KEYS: &[Binding] = &[
     key(Modifiers::COMMAND, Key::A, "select all trials found", |_| Some(LibraryAction::SelectAll.into())),
     key(Modifiers::NONE, Key::Enter, "open the trial", |_| Some(LibraryAction::Open.into())),
     key(Modifiers::NONE, Key::P, "compare the selected trials, or no longer", |_| Some(LibraryAction::Pin.into())),
+    key(Modifiers::NONE, Key::K, "keep the selected trials: from the demo log to the store", |_| {
+        Some(LibraryAction::Edit(TrialEdit::Keep).into())
+    }),
     key(Modifiers::NONE, Key::Delete, "discard the selected trials", |_| {
         Some(LibraryAction::Edit(TrialEdit::Discard).into())
     }),

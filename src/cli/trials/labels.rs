@@ -52,7 +52,15 @@ pub(super) enum LabelCommand {
         #[command(flatten)]
         filters: Filters,
     },
-    /// Undo the last change of a label, note or tag, or the last deletion; what was changed together is undone together.
+    /// Move trials from the demo log to the store, where newer grasps do not push them out.
+    Keep {
+        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
+        #[arg(required = true, value_name = "TRIALS")]
+        ids: Vec<Numbers>,
+        #[command(flatten)]
+        filters: Filters,
+    },
+    /// Undo the last change of a label, note or tag, the last deletion, or the last `keep`; what was changed together is undone together.
     Undo,
     /// Redo the last undone change.
     Redo,
@@ -90,6 +98,10 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
                 "tags"
             };
             edit(store, &of(store, ids, filters)?, &change, &format!("{what} [{}]", tags.join(", ")))
+        }
+        LabelCommand::Keep { ids, filters } => {
+            let ids = chosen(store, ids, filters, Shown::Kept)?;
+            say(store.labels().edit(&ids, &TrialEdit::Keep)?.sentence(&TrialEdit::Keep))
         }
         LabelCommand::Undo => match store.journal().undo()? {
             Some(entry) => say(format!("undone: {}", entry.sentence())),

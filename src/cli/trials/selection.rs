@@ -4,7 +4,7 @@ use super::super::Failure;
 use super::super::origin::OriginFilters;
 use super::super::terminal::note;
 use palpate_store::labels::Flag;
-use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 use std::str::FromStr;
@@ -27,6 +27,9 @@ pub(super) struct Filters {
     /// With this flag: no-contact, saturated, interrupted, cadence or duplicate.
     #[arg(long, value_name = "FLAG")]
     flag: Option<Flag>,
+    /// Place: store or demo-log.
+    #[arg(long, value_name = "NAME")]
+    place: Option<TrialPlace>,
     /// Quality: sound, warned or unsound.
     #[arg(long, value_name = "NAME")]
     quality: Option<TrialQuality>,
@@ -38,13 +41,14 @@ pub(super) struct Filters {
 impl Filters {
     /// The query for the library, oldest first.
     pub(super) fn query(&self, shown: Shown) -> TrialQuery {
-        let Self { search, object, unlabelled, origin, flag, quality, sensors } = self.clone();
+        let Self { search, object, unlabelled, origin, flag, place, quality, sensors } = self.clone();
         let OriginFilters { source, preset, collection, tag, since, until } = origin;
         TrialQuery {
             search: search.unwrap_or_default(),
             object,
             unlabelled,
             source,
+            place,
             tag,
             flag,
             quality,

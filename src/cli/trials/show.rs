@@ -5,7 +5,7 @@ use super::super::terminal::{say, say_json, warn};
 use palpate_lab::grasping::GraspSummary;
 use palpate_sim::frame::Plan;
 use palpate_store::labels::{LabelledTrial, cadence_line, shown_title};
-use palpate_store::{BoardInfo, Store};
+use palpate_store::{BoardInfo, Store, TrialPlace};
 use palpate_tactile::Signals;
 use palpate_tactile::board::Gap;
 use palpate_tactile::trial::{BoardLog, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
@@ -16,6 +16,7 @@ use serde::Serialize;
 struct SimulatedReport {
     id: TrialId,
     rig: TrialSource,
+    place: TrialPlace,
     seed: u64,
     version: String,
     /// Version of the physics; null for trials of early versions.
@@ -136,15 +137,16 @@ pub(super) fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure
     match data {
         TrialData::Recorded(log) => show_board(store, id, header, log, json),
         TrialData::Imported(signals) => show_import(id, header, signals, json),
-        TrialData::Simulated(data) => show_simulated(id, SimulatedTrial { header, data }, json),
+        TrialData::Simulated(data) => show_simulated(id, store.place(id)?, SimulatedTrial { header, data }, json),
     }
 }
 
-fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), Failure> {
+fn show_simulated(id: TrialId, place: TrialPlace, trial: SimulatedTrial, json: bool) -> Result<(), Failure> {
     let summary = GraspSummary::new(&trial, &trial.header.scene);
     let report = SimulatedReport {
         id,
         rig: TrialSource::Simulated,
+        place,
         seed: trial.header.seed,
         samples: trial.frames().len(),
         version: trial.header.version,
@@ -162,6 +164,9 @@ fn show_simulated(id: TrialId, trial: SimulatedTrial, json: bool) -> Result<(), 
     say(format!("trial {id}: {} ({}, seed {})", shown_title(&report.summary.object), report.rig, report.seed))?;
     let physics = report.physics.map_or_else(|| "unknown".to_owned(), |version| version.to_string());
     say(format!("{} samples, recorded by Palpate {}, physics {physics}", report.samples, report.version))?;
+    if report.place == TrialPlace::DemoLog {
+        say(format!("in the demo log: data sets exclude it; `palpate trials keep {id}` moves it to the store"))?;
+    }
     match report.summary.contact_onset_s {
         Some(onset) => say(format!("first contact at {onset:.3} s"))?,
         None => say("no contact")?,

@@ -139,7 +139,7 @@ pub enum DatasetError {
     /// Trials match, but none is sound.
     #[error(
         "no matching trial{about} is usable: {reasons}; `palpate trials show` says why, --include-flagged keeps flagged \
-         trials"
+         trials, `palpate trials keep` takes trials out of the demo log"
     )]
     Unsound {
         /// The query.

@@ -6,7 +6,7 @@ use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels,
 use palpate_learn::{Dataset, Example, OTHER, Sequence};
 use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
 use palpate_store::labels::Flag;
-use palpate_store::{Library, Store, TrialRow};
+use palpate_store::{Library, Store, TrialPlace, TrialRow};
 use palpate_tactile::trial::TrialId;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,8 +16,8 @@ use std::sync::Arc;
 type LeftOut = BTreeMap<String, usize>;
 
 impl DatasetQuery {
-    /// Reads the data set of all labelled trials that match. Trials that diverged, did not converge or did not come to
-    /// rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
+    /// Reads the data set of all labelled trials that match. Trials of the demo log, trials that diverged, did not converge or
+    /// did not come to rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
     /// out and counted, but not those after the last one that `most_of_each` allows. `progress` gets the number of trials
     /// read and their total.
     pub fn read(
@@ -91,7 +91,9 @@ impl DatasetQuery {
 
     /// Reason why a trial that matches is left out.
     pub(crate) fn refused(&self, row: &TrialRow) -> Option<&'static str> {
-        if !row.sound {
+        if row.place == TrialPlace::DemoLog {
+            Some("in the demo log")
+        } else if !row.sound {
             Some(NOT_SOUND)
         } else if row.pulled {
             Some("pulled by hand")

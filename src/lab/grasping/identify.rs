@@ -94,6 +94,8 @@ pub struct Identification {
     /// The hold has ended; later rows are ignored.
     closed: bool,
     decision: Option<StopReason>,
+    /// Threshold at the decision.
+    decided_at: f64,
 }
 
 impl std::fmt::Debug for Identification {
@@ -123,6 +125,8 @@ pub struct IdentificationView {
     pub beliefs: Vec<Pmf>,
     /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
+    /// The threshold has been raised since beyond what the grasps reach: one more may decide anew.
+    pub asks_for_more: bool,
     /// True where the model learned from perfect sensors, which no real gripper has.
     pub from_perfect_sensors: bool,
     /// Class signatures of the model, where its file has them.
@@ -173,6 +177,7 @@ impl Identification {
             geometry: FeltGeometry::default(),
             closed: true,
             decision: None,
+            decided_at: 0.0,
         }
     }
 
@@ -210,7 +215,26 @@ impl Identification {
     pub fn set_rule(&mut self, rule: StopRule) {
         self.rule = rule;
         if self.closed && self.decision.is_none() {
-            self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+            self.decide();
+        }
+    }
+
+    fn decide(&mut self) {
+        self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+        self.decided_at = self.rule.threshold;
+    }
+
+    /// True where the threshold has been raised since the decision, beyond what the grasps reach.
+    pub fn asks_for_more(&self) -> bool {
+        let reaches = |belief: &Pmf| belief.top().1 >= self.rule.threshold;
+        let raised = self.decision.is_some() && self.rule.threshold > self.decided_at;
+        raised && self.belief.now().is_some_and(|belief| !reaches(belief))
+    }
+
+    /// Takes the decision back: another grasp of the same object follows, beyond the limit where that was reached.
+    pub fn go_on(&mut self) {
+        if self.decision.take().is_some() {
+            self.rule.most_grasps = self.rule.most_grasps.max(self.belief.grasps() + 1);
         }
     }
 
@@ -293,7 +317,7 @@ impl Identification {
             hold_s: self.hold_s,
             belief: self.belief.clone(),
         }));
-        self.decision = self.rule.judge(&self.belief, self.model.card.rejection.as_ref());
+        self.decide();
     }
 
     /// Reason to stop, once there is one.
@@ -328,6 +352,7 @@ impl Identification {
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
+            asks_for_more: self.asks_for_more(),
             from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
             signatures: self.model.signatures.clone(),
             last: self.last.clone(),

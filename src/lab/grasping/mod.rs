@@ -1,6 +1,6 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, identification of
 //! an object by successive grasps, and advice on the next one. Adapting to a real gripper by one close of its empty hand.
-//! Lessons: grasps by which a model learns new objects.
+//! Lessons: grasps by which a model learns new objects. Presentations: the objects and poses of a demo.
 
 mod adaptation;
 mod agreement;
@@ -12,6 +12,7 @@ mod guidance;
 mod identify;
 mod known_geometry;
 mod lessons;
+mod presentation;
 mod row;
 mod run;
 mod shuffled_objects;
@@ -29,6 +30,7 @@ pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
+pub use presentation::Presentation;
 pub use row::{FrameReader, Row};
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

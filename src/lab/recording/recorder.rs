@@ -5,7 +5,7 @@
 use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
 use palpate_device::serial::{LinkEvent, LinkStatus};
 use palpate_sim::frame::{Frame, Quality};
-use palpate_store::{Store, StoreError, Stored};
+use palpate_store::{Store, StoreError, Stored, TrialPlace};
 use palpate_tactile::trial::{PhaseMark, SimulatedTrial, TrialHeader, TrialId};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -28,6 +28,10 @@ pub enum RecorderNotice {
     Stored(TrialId),
     /// A simulated grasp was not stored again: this trial holds it.
     Known(TrialId),
+    /// The same; the trial moved from the demo log to the store.
+    Kept(TrialId),
+    /// A simulated grasp for the demo log: the trial that holds it, and where that is.
+    Logged(TrialId, TrialPlace),
     /// A trial of the real gripper is complete in the store.
     Recorded(Box<RecordedTrial>),
     /// A trial was discarded.
@@ -52,7 +56,7 @@ pub struct BoardTrialEnd {
 }
 
 enum Message {
-    Begin(Box<SimulatedTrial>),
+    Begin(TrialPlace, Box<SimulatedTrial>),
     Frame(Box<Frame>),
     Finish(Box<Quality>, Box<TrialHeader>),
     Discard,
@@ -76,8 +80,8 @@ impl Recorder {
     pub fn start(store: PathBuf, notify: impl Fn(RecorderNotice) + Send + 'static) -> std::io::Result<Self> {
         let (messages, inbox) = channel();
         let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
-            let mut writer =
-                Writer { path: store, store: None, trial: OpenTrial::None, last: None, notify: Box::new(notify) };
+            let (trial, place, notify) = (OpenTrial::None, TrialPlace::default(), Box::new(notify));
+            let mut writer = Writer { path: store, store: None, trial, place, last: None, notify };
             writer.work(&inbox);
         })?;
         Ok(Self { messages: Some(messages), thread: Some(thread) })
@@ -90,9 +94,9 @@ impl Recorder {
         }
     }
 
-    /// Begins a simulated trial, without its frames.
-    pub fn begin(&self, trial: SimulatedTrial) {
-        self.send(Message::Begin(Box::new(trial)));
+    /// Begins a simulated trial in the store or in the demo log, without its frames.
+    pub fn begin(&self, place: TrialPlace, trial: SimulatedTrial) {
+        self.send(Message::Begin(place, Box::new(trial)));
     }
 
     /// Records the next frame of a simulated trial.
@@ -105,12 +109,12 @@ impl Recorder {
         self.send(Message::Finish(Box::new(quality.clone()), Box::new(header.clone())));
     }
 
-    /// Gives a simulated trial up: it is marked as deleted.
+    /// Gives a simulated trial up: in the store it is marked as deleted, from the demo log it is removed.
     pub fn discard(&self) {
         self.send(Message::Discard);
     }
 
-    /// Stores a simulated trial in place of the last finished one, which is marked as deleted.
+    /// Stores a simulated trial in place of the last finished one, which is given up.
     pub fn replace(&self, trial: SimulatedTrial) {
         self.send(Message::Replace(Box::new(trial)));
     }
@@ -155,6 +159,8 @@ struct Writer {
     path: PathBuf,
     store: Option<Store>,
     trial: OpenTrial,
+    /// Where the last simulated trial was begun.
+    place: TrialPlace,
     /// The last simulated trial that was finished.
     last: Option<TrialId>,
     notify: Box<dyn Fn(RecorderNotice) + Send>,
@@ -186,7 +192,10 @@ impl Writer {
 
     fn take(&mut self, message: Message) -> Result<(), StoreError> {
         match message {
-            Message::Begin(trial) => self.trial = OpenTrial::Announced(trial, Vec::new()),
+            Message::Begin(place, trial) => {
+                self.place = place;
+                self.trial = OpenTrial::Announced(trial, Vec::new());
+            }
             Message::Frame(frame) => {
                 if let OpenTrial::Announced(_, waiting) | OpenTrial::Simulated(_, waiting) = &mut self.trial {
                     waiting.push(*frame);
@@ -200,20 +209,25 @@ impl Writer {
                     self.trial = OpenTrial::None;
                     let stored = self.with_store(|store| store.finish(id, &quality, &header))?;
                     self.last = Some(id).filter(|_| stored.is_new());
-                    self.report(stored);
+                    self.report(stored)?;
                 }
             }
             Message::Discard => {
                 if let OpenTrial::Simulated(id, _) = std::mem::replace(&mut self.trial, OpenTrial::None) {
-                    self.with_store(|store| store.delete(&[id]))?;
+                    self.with_store(|store| store.give_up(id))?;
                 }
             }
             Message::Replace(trial) => {
-                let stored = self.with_store(|store| store.insert(&trial))?;
-                if let Some(old) = std::mem::replace(&mut self.last, Some(stored.id()).filter(|_| stored.is_new())) {
-                    self.with_store(|store| store.delete(&[old]))?;
+                // The one before may have been kept since.
+                if let Some(old) = self.last {
+                    self.place = self.with_store(|store| store.place(old))?;
                 }
-                self.report(stored);
+                let place = self.place;
+                let stored = self.with_store(|store| store.insert_in(place, &trial))?;
+                if let Some(old) = std::mem::replace(&mut self.last, Some(stored.id()).filter(|_| stored.is_new())) {
+                    self.with_store(|store| store.give_up(old))?;
+                }
+                self.report(stored)?;
             }
             Message::BeginBoard(plan) => {
                 let writer = self.with_store(|store| BoardWriter::begin(store, &plan))?;
@@ -228,11 +242,18 @@ impl Writer {
         Ok(())
     }
 
-    fn report(&self, stored: Stored) {
-        (self.notify)(match stored {
-            Stored::New(id) => RecorderNotice::Stored(id),
-            Stored::Known(id) => RecorderNotice::Known(id),
-        });
+    fn report(&mut self, stored: Stored) -> Result<(), StoreError> {
+        let notice = match (self.place, stored) {
+            (TrialPlace::DemoLog, stored) => {
+                let id = stored.id();
+                RecorderNotice::Logged(id, self.with_store(|store| store.place(id))?)
+            }
+            (TrialPlace::Store, Stored::New(id)) => RecorderNotice::Stored(id),
+            (TrialPlace::Store, Stored::Known(id)) => RecorderNotice::Known(id),
+            (TrialPlace::Store, Stored::Kept(id)) => RecorderNotice::Kept(id),
+        };
+        (self.notify)(notice);
+        Ok(())
     }
 
     fn with_board(&mut self, change: impl FnOnce(&mut BoardWriter)) {
@@ -277,7 +298,10 @@ impl Writer {
     /// Writes the frames that wait, beginning the trial where it has not begun; its number, where there is one.
     fn write_frames(&mut self) -> Result<Option<TrialId>, StoreError> {
         let (id, waiting) = match std::mem::replace(&mut self.trial, OpenTrial::None) {
-            OpenTrial::Announced(trial, waiting) => (self.with_store(|store| store.begin(&trial))?, waiting),
+            OpenTrial::Announced(trial, waiting) => {
+                let place = self.place;
+                (self.with_store(|store| store.begin_in(place, &trial))?, waiting)
+            }
             OpenTrial::Simulated(id, waiting) => (id, waiting),
             other @ (OpenTrial::None | OpenTrial::Board(..)) => {
                 self.trial = other;
@@ -325,7 +349,7 @@ mod tests {
             Recorder::start(path.clone(), move |notice| sender.send(notice).expect("heard")).expect("starts");
         let trial = grasp(&Scene::default(), None, 3);
         for keep in [true, false] {
-            recorder.begin(trial.clone());
+            recorder.begin(TrialPlace::Store, trial.clone());
             trial.frames().iter().for_each(|frame| recorder.frame(frame));
             if keep {
                 recorder.finish(&trial.data.quality, &trial.header);
@@ -347,7 +371,7 @@ mod tests {
         let recorder = Recorder::start(path.clone(), |_| ()).expect("starts");
         let trials = [3, 4].map(|seed| grasp(&Scene::default(), None, seed));
         for trial in &trials {
-            recorder.begin(trial.clone());
+            recorder.begin(TrialPlace::Store, trial.clone());
             trial.frames().iter().for_each(|frame| recorder.frame(frame));
             recorder.finish(&trial.data.quality, &trial.header);
         }
@@ -370,7 +394,7 @@ mod tests {
         let mut pulled = same.clone();
         pulled.header.origin.as_mut().expect("simulated").pulls = 7;
         for trial in [&same, &same, &pulled] {
-            recorder.begin(same.clone());
+            recorder.begin(TrialPlace::Store, same.clone());
             trial.frames().iter().for_each(|frame| recorder.frame(frame));
             recorder.finish(&trial.data.quality, &trial.header);
         }
@@ -393,7 +417,7 @@ mod tests {
         let (sender, notices) = channel();
         let recorder = Recorder::start(path, move |notice| sender.send(notice).expect("heard")).expect("starts");
         let trial = grasp(&Scene::default(), None, 0);
-        recorder.begin(trial.clone());
+        recorder.begin(TrialPlace::Store, trial.clone());
         trial.frames().iter().for_each(|frame| recorder.frame(frame));
         recorder.finish(&trial.data.quality, &trial.header);
         drop(recorder);

@@ -358,7 +358,7 @@ mod tests {
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
         librarian.ask(LibraryCommand::Export(vec![1, 2, 4]));
         let view = until(&librarian, &woken, |view| view.outcomes.len() == 2);
-        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v13")));
+        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v14")));
         let done = |text: &str| text.starts_with("3 of 3 trials exported");
         assert!(matches!(&view.outcomes[1], (2, LabelOutcome::Done(text)) if done(text)), "{:?}", view.outcomes);
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {

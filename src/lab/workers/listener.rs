@@ -46,7 +46,18 @@ impl Listener {
     /// Forgets the grasps so far.
     pub(super) fn start_over(&mut self) {
         self.identification.start_over();
-        self.refresh();
+        // A round that went on beyond the limit has raised it.
+        self.apply_rule();
+    }
+
+    /// Takes the decision back, where a raised threshold asks for another grasp; true where it does.
+    pub(super) fn go_on(&mut self) -> bool {
+        let asked = self.off.is_none() && self.identification.asks_for_more();
+        if asked {
+            self.identification.go_on();
+            self.refresh();
+        }
+        asked
     }
 
     /// The channels that the model reads on this gripper; none where it cannot.

@@ -9,6 +9,7 @@ use palpate_learn::Models;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::{Accuracy, Scene};
+use palpate_store::TrialPlace;
 use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
@@ -36,15 +37,18 @@ pub enum Command {
     SetGrasps(u32),
     /// Probability from which a class counts as certain; clamped to [`super::THRESHOLDS`].
     SetThreshold(f64),
+    /// Continue a round that was decided, where the threshold has been raised beyond what its grasps reach.
+    GraspOnceMore,
     /// Sensors that are read from now on; restarts the grasp. Ideal ones only: a model of real sensors reads finished
     /// trials.
     SetSensors(SensorView),
     /// Recogniser from now on; restarts the grasp.
     SetModels(Models),
-    /// Whether the first grasp of each object has a random pose too, instead of that of the scene; from the next scene on.
+    /// Whether the first grasp of each object has a random pose too, instead of that of the scene; from the next scene on,
+    /// whose poses are those of the first seeds.
     SetFirstDrawn(bool),
-    /// Whether trials are stored.
-    SetRecording(bool),
+    /// Where trials are recorded from now on; nowhere without a place.
+    SetRecording(Option<TrialPlace>),
     /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.
     SetErrorBand(bool),
     /// Whether the other engine computes each grasp too, for [`super::SimWorker::ghost`].
@@ -73,6 +77,10 @@ pub enum Notice {
     Stored(TrialId),
     /// A grasp was not stored again: this trial holds it.
     Known(TrialId),
+    /// The same; the trial moved from the demo log to the store.
+    Kept(TrialId),
+    /// A grasp for the demo log: the trial that holds it, and where that is.
+    Logged(TrialId, TrialPlace),
 }
 
 /// A scene that could not be set up.
@@ -178,8 +186,8 @@ pub struct Status {
     pub grasps: u32,
     /// Length of a trial (s).
     pub duration: f64,
-    /// Trials are being stored.
-    pub recording: bool,
+    /// Where trials are recorded.
+    pub recording: Option<TrialPlace>,
     /// A refined run computes the numerical error band.
     pub error_band: bool,
     /// What is being done to check the last finished grasp.
@@ -257,8 +265,8 @@ pub struct SimWorkerSetup {
     pub sensors: SensorView,
     /// Trial store.
     pub store: PathBuf,
-    /// Whether trials are stored from the start.
-    pub recording: bool,
+    /// Where trials are recorded from the start.
+    pub recording: Option<TrialPlace>,
     /// Grasps in a round. With a model this is the limit: a round ends once the object is recognised.
     pub grasps: u32,
     /// Recognition models; without one, such grasps are not recognised.

@@ -8,7 +8,7 @@ use palpate_learn::{Model, Models};
 use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
-use palpate_store::Store;
+use palpate_store::{Store, TrialPlace};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -31,7 +31,16 @@ pub(super) fn start_with(model: Option<Model>, scene: Scene, store: PathBuf, gra
     });
     let sensors = SensorView { layout: "C1".to_owned(), ..SensorView::default() };
     let models = model.map(Arc::new).map_or_else(Models::default, |model| Models::all(&model));
-    let setup = SimWorkerSetup { scene, sensors, store, recording: true, grasps, models, playing: true, wake };
+    let setup = SimWorkerSetup {
+        scene,
+        sensors,
+        store,
+        recording: Some(TrialPlace::Store),
+        grasps,
+        models,
+        playing: true,
+        wake,
+    };
     Watched { worker: SimWorker::start(setup).expect("starts"), woken }
 }
 

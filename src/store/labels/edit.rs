@@ -23,6 +23,8 @@ pub enum TrialEdit {
     Discard,
     /// Restore deleted trials.
     Restore,
+    /// Move trials from the demo log to the store.
+    Keep,
 }
 
 /// Result of an edit.
@@ -51,6 +53,8 @@ impl Edited {
             TrialEdit::Phases(None) => "with phases as measured now".to_owned(),
             TrialEdit::Discard => "discarded".to_owned(),
             TrialEdit::Restore => "restored".to_owned(),
+            TrialEdit::Keep if changed == 0 => return "In the store already".to_owned(),
+            TrialEdit::Keep => "kept in the store".to_owned(),
         };
         let keep = match known {
             0 => String::new(),

@@ -1,6 +1,6 @@
 //! What the filters of the library offer, and how many trials each would show.
 
-use super::LibraryTrial;
+use super::{LibraryTrial, TrialPlace};
 use std::collections::BTreeMap;
 
 /// A value and the number of trials that have it.
@@ -15,6 +15,8 @@ pub struct LibraryCounts {
     pub unlabelled: usize,
     /// Deleted trials.
     pub discarded: usize,
+    /// Trials of the demo log.
+    pub demo_log: usize,
     /// Names of objects, most frequent first.
     pub objects: Vec<Counted>,
     /// Tags, most frequent first.
@@ -33,6 +35,7 @@ impl LibraryCounts {
                 continue;
             }
             counts.kept += 1;
+            counts.demo_log += usize::from(row.place == TrialPlace::DemoLog);
             if row.object.is_empty() {
                 counts.unlabelled += 1;
             } else {

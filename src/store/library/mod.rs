@@ -3,7 +3,7 @@
 //!
 //! New trials have higher numbers, and most other changes of a row have an entry in the journal, so that few rows are
 //! read again. Read again too are trials that were being recorded at the last look, the other copies of a changed
-//! grasp, whose flag depends on it, and trials that have joined a collection.
+//! grasp, whose flag depends on it, trials that have joined a collection, and trials that have left the demo log.
 
 mod counts;
 mod order;
@@ -15,6 +15,7 @@ pub use order::{TrialColumn, TrialOrder};
 pub use quality::TrialQuality;
 pub use query::{Day, Shown, TrialQuery};
 
+use super::demo_log::TrialPlace;
 use super::store::{Store, json};
 use super::store_error::StoreError;
 use super::trial_rows::TrialRow;
@@ -47,7 +48,8 @@ impl LibraryTrial {
         };
         let collection = row.collections().map(String::as_str).collect::<Vec<_>>().join(" ");
         let (id, tags) = (row.id.to_string(), row.tags.join(" "));
-        let words = [&*title, &row.object, &id, &row.note, &tags, &collection, &row.sensors].join("\n");
+        let place = if row.place == TrialPlace::DemoLog { row.place.title() } else { "" };
+        let words = [&*title, &row.object, &id, &row.note, &tags, &collection, &row.sensors, place].join("\n");
         Self { words: words.to_lowercase().into(), title, row }
     }
 
@@ -69,6 +71,8 @@ pub struct Library {
     titles: BTreeMap<String, Arc<str>>,
     /// Trials that were being recorded at the last look.
     recording: BTreeSet<TrialId>,
+    /// Trials that were in the demo log at the last look.
+    demo_log: BTreeSet<TrialId>,
     /// Last entry of the journal that is contained.
     journal: Option<i64>,
     /// Everything is read.
@@ -110,22 +114,42 @@ impl Library {
         stale.extend(&self.recording);
         stale.extend(copies_of(store, &stale)?);
         stale.extend(self.joined(store)?);
+        let left = self.left_demo_log(store)?;
+        stale.extend(&left);
         stale.retain(|id| (oldest..=newest).contains(id));
         let mut rows = store.rows("WHERE id > ?1 ORDER BY id", [newest])?;
         rows.extend(store.rows("WHERE id IN (SELECT value FROM json_each(?1))", [json(&stale)])?);
+        let read: BTreeSet<TrialId> = rows.iter().map(|row| row.id).collect();
         let mut changed = self.take(rows);
+        changed |= self.forget(store, &left.difference(&read).copied().collect())?;
         if self.complete && count(store)? != self.trials.len() {
             let kept = ids(store)?;
-            let gone = self.trials.iter().filter(|(id, _)| !kept.contains(id));
-            let identities: Vec<String> = gone.filter_map(|(_, trial)| trial.row.identity.clone()).collect();
-            self.trials.retain(|id, _| kept.contains(id));
-            self.recording.retain(|id| kept.contains(id));
+            changed |= self.forget(store, &self.trials.keys().copied().filter(|id| !kept.contains(id)).collect())?;
+        }
+        Ok(changed)
+    }
+
+    /// Forgets trials that are no longer in the store, and reads the other copies of their grasps again; true where there were
+    /// any.
+    fn forget(&mut self, store: &Store, gone: &BTreeSet<TrialId>) -> Result<bool, StoreError> {
+        let identities: Vec<String> =
+            gone.iter().filter_map(|id| self.trials.remove(id).and_then(|trial| trial.row.identity.clone())).collect();
+        self.recording.retain(|id| !gone.contains(id));
+        self.demo_log.retain(|id| !gone.contains(id));
+        if !identities.is_empty() {
             let mut copies = store.rows("WHERE identity IN (SELECT value FROM json_each(?1))", [json(&identities)])?;
             copies.retain(|row| self.trials.contains_key(&row.id));
             self.take(copies);
-            changed = true;
         }
-        Ok(changed)
+        Ok(!gone.is_empty())
+    }
+
+    /// Trials that have left the demo log since they were read: kept, or pushed out by newer ones.
+    fn left_demo_log(&self, store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
+        let found = store.connection.prepare_cached("SELECT id FROM trials WHERE demo = 1");
+        let found = found.and_then(|mut statement| statement.query_map([], |row| row.get(0))?.collect());
+        let logged: BTreeSet<TrialId> = found.map_err(|e| store.fault(&e))?;
+        Ok(self.demo_log.difference(&logged).copied().collect())
     }
 
     /// Trials that have joined a further collection since they were read.
@@ -152,6 +176,10 @@ impl Library {
             } else {
                 self.recording.insert(id);
             }
+            match row.place {
+                TrialPlace::DemoLog => self.demo_log.insert(id),
+                TrialPlace::Store => self.demo_log.remove(&id),
+            };
             if self.trials.get(&id).is_none_or(|known| known.row != row) {
                 self.trials.insert(id, Arc::new(LibraryTrial::new(row, &mut self.titles)));
                 changed = true;

@@ -97,7 +97,7 @@ fn ranks(trials: &[Arc<LibraryTrial>], column: TrialColumn) -> Vec<u64> {
         // `sorted` orders them by date and number.
         TrialColumn::Id | TrialColumn::Date => vec![0; trials.len()],
         TrialColumn::Object => ranks_of(trials.iter().map(|trial| trial.lower_title())),
-        TrialColumn::Source => ranks_of(trials.iter().map(|trial| trial.row.source.name())),
+        TrialColumn::Source => ranks_of(trials.iter().map(|trial| (trial.row.source.name(), trial.row.place.name()))),
         TrialColumn::Preset => ranks_of(trials.iter().map(|trial| trial.row.preset.unwrap_or_default())),
         TrialColumn::Sensors => ranks_of(trials.iter().map(|trial| trial.row.sensors.as_str())),
         TrialColumn::Quality => trials.iter().map(|trial| TrialQuality::of(&trial.row) as u64).collect(),

@@ -2,7 +2,7 @@
 
 use super::order::TrialOrder;
 use super::quality::TrialQuality;
-use super::{LibraryTrial, Store, StoreError};
+use super::{LibraryTrial, Store, StoreError, TrialPlace};
 use crate::labels::{Flag, UnknownWord};
 use palpate_tactile::trial::TrialSource;
 use std::str::FromStr;
@@ -86,6 +86,8 @@ pub struct TrialQuery {
     pub unlabelled: bool,
     /// Origin.
     pub source: Option<TrialSource>,
+    /// In the store, or in the demo log.
+    pub place: Option<TrialPlace>,
     /// Has this tag.
     pub tag: Option<String>,
     /// Has this flag.
@@ -156,6 +158,7 @@ impl Matcher<'_> {
         shown
             && (!query.unlabelled || row.object.is_empty())
             && query.source.is_none_or(|source| row.source == source)
+            && query.place.is_none_or(|place| row.place == place)
             && query.quality.is_none_or(|quality| TrialQuality::of(row) == quality)
             && query.flag.is_none_or(|flag| row.flags.iter().any(|found| found.flag == flag))
             && query.tag.as_ref().is_none_or(|tag| row.tags.contains(tag))

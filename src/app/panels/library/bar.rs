@@ -9,8 +9,8 @@ use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
-use palpate_store::LibraryTrial;
 use palpate_store::labels::TrialEdit;
+use palpate_store::{LibraryTrial, TrialPlace};
 use palpate_tactile::trial::TrialSource;
 use std::sync::Arc;
 
@@ -38,6 +38,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
         }
         if ui.button("Compare").on_hover_text("Pin for comparison (P)").clicked() {
             actions.push(LibraryAction::Pin);
+        }
+        let logged = trials.iter().any(|trial| trial.row.place == TrialPlace::DemoLog);
+        let hint = "Move from the demo log to the store (K)";
+        if logged && ui.button("Keep").on_hover_text(hint).clicked() {
+            actions.push(LibraryAction::Edit(TrialEdit::Keep));
         }
         if ui.available_width() < WHOLE {
             menu(ui, "Edit", |ui| edits_ui(ui, context, view, actions));

@@ -1,7 +1,7 @@
 //! Columns of the library: which fit, and the text of each.
 
 use palpate_lab::workers::LibraryView;
-use palpate_store::{LibraryTrial, TrialColumn, TrialQuality};
+use palpate_store::{LibraryTrial, TrialColumn, TrialPlace, TrialQuality};
 use palpate_tactile::trial::TrialSource;
 
 /// A column: what it holds, its width (points), and its rank: the lowest stay where there is little room.
@@ -76,6 +76,7 @@ pub(super) fn cell(view: &LibraryView, trial: &LibraryTrial, column: TrialColumn
         TrialColumn::Id => row.id.to_string(),
         TrialColumn::Object => format!("{}{}", trial.title, if row.unsure { "?" } else { "" }),
         TrialColumn::Date => date(&row.local, &view.days),
+        TrialColumn::Source if row.place == TrialPlace::DemoLog => row.place.title().to_owned(),
         TrialColumn::Source => source(row.source).to_owned(),
         TrialColumn::Preset => row.preset.unwrap_or_default().to_owned(),
         TrialColumn::Sensors => row.sensors.clone(),

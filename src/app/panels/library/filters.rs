@@ -9,7 +9,7 @@ use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
 use palpate_sim::scene::PRESETS;
 use palpate_store::labels::Flag;
-use palpate_store::{Counted, Day, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_store::{Counted, Day, Shown, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
 use palpate_tactile::trial::TrialSource;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
@@ -33,6 +33,14 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
             let text = format!("unlabelled {}", counts.unlabelled);
             if ui.selectable_label(query.unlabelled, small(&text)).clicked() {
                 wanted.unlabelled = !query.unlabelled;
+            }
+        }
+        let logged = query.place == Some(TrialPlace::DemoLog);
+        if logged || counts.demo_log > 0 {
+            let text = format!("demo log {}", counts.demo_log);
+            let hint = "Grasps of demos; newer ones push them out. K keeps the selected ones";
+            if ui.selectable_label(logged, small(&text)).on_hover_text(hint).clicked() {
+                wanted.place = (!logged).then_some(TrialPlace::DemoLog);
             }
         }
         let gone = query.shown == Shown::Discarded;
@@ -72,6 +80,11 @@ fn set_ui(ui: &mut Ui, query: &mut TrialQuery) {
         query.object = None;
     }
     query.source = query.source.filter(|source| chip(columns::source(*source).to_owned()).is_some());
+    // That of the demo log has a chip of its own.
+    let place = query.place.filter(|place| *place == TrialPlace::Store);
+    if place.is_some_and(|place| chip(format!("in the {}", place.title())).is_none()) {
+        query.place = None;
+    }
     query.quality = query.quality.filter(|quality| chip(quality.name().to_owned()).is_some());
     query.flag = query.flag.filter(|flag| chip(flag.label().to_owned()).is_some());
     keep(&mut query.tag, "tag", &mut chip);
@@ -85,6 +98,7 @@ fn menu_ui(ui: &mut Ui, view: &LibraryView, query: &mut TrialQuery) {
     let counts = &view.counts;
     counted_ui(ui, "Object", &counts.objects, object_title, &mut query.object);
     choice_ui(ui, "Source", TrialSource::ALL.map(|source| (columns::source(source), source)), &mut query.source);
+    choice_ui(ui, "Place", TrialPlace::ALL.map(|place| (place.title(), place)), &mut query.place);
     choice_ui(ui, "Quality", TrialQuality::ALL.map(|quality| (quality.name(), quality)), &mut query.quality);
     choice_ui(ui, "Flag", Flag::ALL.map(|flag| (flag.label(), flag)), &mut query.flag);
     choice_ui(ui, "Preset of poses", PRESETS.map(|p| (p.name, p.name.to_owned())), &mut query.preset);

@@ -11,7 +11,7 @@ use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2,
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::workers::LibraryView;
 use palpate_store::labels::TrialEdit;
-use palpate_store::{LibraryTrial, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
+use palpate_store::{LibraryTrial, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
 use palpate_tactile::trial::TrialId;
 use std::ops::Range;
 
@@ -177,8 +177,10 @@ fn answer(ui: &Ui, response: &Response, trial: &LibraryTrial, selected: bool, ac
     response.context_menu(|ui| {
         let gone = trial.row.deleted.is_some();
         let discard = if gone { ("Restore", TrialEdit::Restore) } else { ("Discard", TrialEdit::Discard) };
+        let keep = ("Keep", LibraryAction::Edit(TrialEdit::Keep));
+        let keep = Some(keep).filter(|_| trial.row.place == TrialPlace::DemoLog);
         let choices = [("Open", LibraryAction::Open), ("Compare", LibraryAction::Pin)];
-        let choices = choices.into_iter().filter(|_| !gone);
+        let choices = choices.into_iter().chain(keep).filter(|_| !gone);
         for (name, action) in choices.chain([(discard.0, LibraryAction::Edit(discard.1))]) {
             if ui.button(name).clicked() {
                 actions.push(action);
@@ -213,6 +215,9 @@ fn hint_ui(ui: &mut Ui, view: &LibraryView, trial: &LibraryTrial) {
     }
     if !row.sound {
         ui.label("unsound: data sets exclude it");
+    }
+    if row.place == TrialPlace::DemoLog {
+        ui.label("in the demo log: data sets exclude it, and newer grasps push it out; K keeps it");
     }
 }
 

@@ -20,7 +20,7 @@ use crate::app::view_source::ViewSource;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
-use palpate_lab::workers::THRESHOLDS;
+use palpate_lab::workers::{Command, THRESHOLDS};
 use std::sync::Arc;
 use words::{FOREIGN, Headline, percent, reason};
 
@@ -132,8 +132,21 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
             None => off_ui(ui, recognised.off),
         }
+        more_ui(ui, context, measures, actions);
         next_ui(ui, context, measures, actions);
     });
+}
+
+/// Button for one more grasp, where a raised threshold asks for it.
+fn more_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
+    if context.source != ViewSource::Simulation || !context.one_more() {
+        return;
+    }
+    let hint = "The threshold is above the probability reached: grasp the same object again (M)";
+    let more = egui::Button::new("One more grasp").fill(accented(context.view.theme));
+    if ui.add_sized([ui.available_width(), measures.button], more).on_hover_text(hint).clicked() {
+        actions.push(Command::GraspOnceMore);
+    }
 }
 
 /// Button for another object.
@@ -338,7 +351,7 @@ fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
 }
 
 /// Line of text, made smaller to fit the width and cut off with dots below the least size.
-pub(in crate::app) fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
     let lay = |text: String, letters: f32| ui.painter().layout_no_wrap(text, FontId::proportional(letters), ink);
     let whole = lay(text.clone(), letters);
     if whole.size().x <= width {
@@ -358,7 +371,7 @@ fn eased(ui: &Ui, id: egui::Id, p: Option<f64>) -> f32 {
 }
 
 /// Paints a text aligned within a place.
-pub(in crate::app) fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
+fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
     let at = align.align_size_within_rect(text.size(), place).min;
     ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }

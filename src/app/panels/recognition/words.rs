@@ -50,7 +50,7 @@ impl Headline {
 }
 
 /// Newest answer: of the running grasp or, before its first one, of the grasp before.
-pub(super) fn newest(view: &IdentificationView) -> Option<&Pmf> {
+pub(in crate::app) fn newest(view: &IdentificationView) -> Option<&Pmf> {
     view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())
 }
 
@@ -85,7 +85,7 @@ pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<
 }
 
 /// Title of a class.
-pub(super) fn title(labels: &Labels, class: usize) -> String {
+pub(in crate::app) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| match class.name.as_str() {
         OTHER => "Other object".to_owned(),
         name => object_title(name),
@@ -107,7 +107,7 @@ fn leaders(labels: &Labels, pmf: &Pmf) -> String {
 }
 
 /// Classes from the most likely to the least.
-pub(super) fn ranked(pmf: &Pmf) -> Vec<usize> {
+pub(in crate::app) fn ranked(pmf: &Pmf) -> Vec<usize> {
     let mut order: Vec<usize> = (0..pmf.classes()).collect();
     order.sort_by(|a, b| pmf.probabilities()[*b].total_cmp(&pmf.probabilities()[*a]));
     order
@@ -141,6 +141,7 @@ mod tests {
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
+            asks_for_more: false,
             from_perfect_sensors: false,
             signatures: None,
             last: None,

@@ -105,10 +105,8 @@ impl Session {
                 self.outlets.notify(Notice::Warning(warning.clone()));
             }
         }
-        if self.status.recording
-            && let Some(recorder) = &self.recorder
-        {
-            recorder.begin(begun.clone());
+        if let (Some(place), Some(recorder)) = (self.status.recording, &self.recorder) {
+            recorder.begin(place, begun.clone());
             self.recorder_busy = true;
         }
         if let Some(warning) = self.listener.as_mut().and_then(|listener| {

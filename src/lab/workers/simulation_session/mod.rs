@@ -116,6 +116,8 @@ impl Session {
             let notice = match notice {
                 RecorderNotice::Stored(id) => Notice::Stored(id),
                 RecorderNotice::Known(id) => Notice::Known(id),
+                RecorderNotice::Kept(id) => Notice::Kept(id),
+                RecorderNotice::Logged(id, place) => Notice::Logged(id, place),
                 RecorderNotice::Warning(text) => Notice::Warning(text),
                 RecorderNotice::Failed(text) => Notice::Failed(text),
                 // Only the real gripper's trials say so.
@@ -268,10 +270,15 @@ impl Session {
                 }
                 self.reconsider();
             }
-            Command::SetFirstDrawn(drawn) => self.first_drawn = drawn,
+            Command::GraspOnceMore => self.grasp_once_more(),
+            Command::SetFirstDrawn(drawn) => {
+                self.first_drawn = drawn;
+                self.poses_drawn = 0;
+            }
             Command::SetRecording(recording) => {
+                // A trial that is being recorded ends where it began.
                 self.status.recording = recording;
-                if !recording {
+                if recording.is_none() {
                     self.drop_recording();
                 }
             }
@@ -452,6 +459,14 @@ impl Session {
         let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
         if self.next_grasp_at.is_some() && (decided || self.status.grasp_of_round >= self.status.grasps) {
             self.end_round();
+        }
+    }
+
+    /// Continues a round that has ended, where a raised threshold asks for it.
+    fn grasp_once_more(&mut self) {
+        if self.status.finished && self.listener.as_mut().is_some_and(Listener::go_on) {
+            self.status.playing = true;
+            self.begin_grasp();
         }
     }
 

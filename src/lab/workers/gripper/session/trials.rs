@@ -161,7 +161,11 @@ impl GripperSession {
                 }
                 RecorderNotice::Warning(text) => self.outlets.notify(Notice::Warning(text)),
                 RecorderNotice::Failed(cause) => self.stop_recording(&cause),
-                RecorderNotice::Stored(_) | RecorderNotice::Known(_) | RecorderNotice::Discarded(_) => {}
+                RecorderNotice::Stored(_)
+                | RecorderNotice::Known(_)
+                | RecorderNotice::Kept(_)
+                | RecorderNotice::Logged(..)
+                | RecorderNotice::Discarded(_) => {}
             }
         }
     }

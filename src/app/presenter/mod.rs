@@ -1,0 +1,162 @@
+//! Presenter mode: the touch fills the window, beside it a column that tells what happens, what the program thinks after
+//! each grasp and why, and at last the true object. Nothing is smaller than a 36th of the window's height.
+
+mod beliefs;
+mod verdict;
+mod words;
+
+use crate::app::context::PanelContext;
+use crate::app::features::presenter::Score;
+use crate::app::panels::view3d;
+use crate::app::theme::{colour, veil};
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Align2, Color32, FontId, Galley, Rect, Role, Ui, WidgetInfo, vec2};
+use palpate_lab::grasping::{IdentificationView, Presentation};
+use std::sync::Arc;
+
+/// Smallest letters: a share of the window's height.
+const LETTERS: f32 = 1.0 / 36.0;
+/// Letters of the annotations of a picture (points).
+const PICTURE_LETTERS: f32 = 14.0;
+/// Width of the column: a share of the window's, within limits in heights of the smallest letters.
+const COLUMN: f32 = 0.36;
+const NARROWEST: f32 = 20.0;
+const WIDEST: f32 = 24.0;
+
+/// Heights of the parts of the column from above, and the gap between them (heights of the smallest letters). Score and
+/// verdict stand at the bottom.
+const STORY: f32 = 3.5;
+const GUESS: f32 = 4.6;
+const BELIEFS: f32 = 10.4;
+const REASON: f32 = 5.6;
+const SCORE: f32 = 1.9;
+const VERDICT: f32 = 5.2;
+const GAP: f32 = 0.6;
+
+/// Draws the window; `message` is news for the user.
+pub(super) fn ui(ui: &Ui, context: &PanelContext<'_>, score: Score, message: Option<&str>) {
+    let rect = ui.max_rect();
+    let unit = LETTERS * rect.height();
+    let width = (COLUMN * rect.width()).clamp(NARROWEST * unit, WIDEST * unit);
+    let (picture, column) = rect.split_left_right_at_x(rect.right() - width);
+    let colours = context.view.theme.colours();
+    let page = Page { context, unit };
+    if !view3d::picture_ui(ui, picture, context, 1.1 * unit / PICTURE_LETTERS) {
+        let text = page.line(ui, "Loading the object ..", 1.5 * unit, picture.width(), colour(colours.text));
+        put(ui, text, picture, Align2::CENTER_CENTER);
+    }
+    ui.painter().rect_filled(column, 0.0, colour(colours.raised));
+    page.picture_ui(ui, picture, message);
+    page.column_ui(ui, column.shrink(unit), score);
+}
+
+/// Paints a text aligned within a place.
+fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
+    let at = align.align_size_within_rect(text.size(), place).min;
+    ui.painter().galley(at, text, Color32::PLACEHOLDER);
+}
+
+struct Page<'a, 'b> {
+    context: &'a PanelContext<'b>,
+    /// Height of the smallest letters (points).
+    unit: f32,
+}
+
+impl Page<'_, '_> {
+    fn answer(&self) -> Option<&IdentificationView> {
+        self.context.snapshot?.identification.as_deref()
+    }
+
+    /// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
+    fn line(&self, ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+        let whole = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(letters), ink);
+        if whole.size().x <= width {
+            return whole;
+        }
+        let smaller = (0.98 * letters * width / whole.size().x).clamp(self.unit, letters.max(self.unit));
+        let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(smaller), ink);
+        job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
+        ui.painter().layout_job(job)
+    }
+
+    /// At most so many rows; numbers keep their units.
+    fn paragraph(&self, ui: &Ui, (text, rows): (&str, usize), letters: f32, width: f32) -> Arc<Galley> {
+        let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm");
+        let ink = colour(self.context.view.theme.colours().text);
+        let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
+        job.wrap.max_rows = rows;
+        ui.painter().layout_job(job)
+    }
+
+    /// Text for screen readers.
+    fn speak(&self, ui: &Ui, name: &str, place: Rect, text: &str) {
+        ui.interact(place, ui.scope_id().with(("presenter", name)), egui::Sense::hover())
+            .widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
+    }
+
+    /// What there is to say about the picture, beside its legend: news, that the pose is hard, what colours and arrows mean.
+    fn picture_ui(&self, ui: &Ui, picture: Rect, message: Option<&str>) {
+        let Some(snapshot) = self.context.snapshot else { return };
+        let hard = Presentation::is_hard(&snapshot.scene.pose);
+        let hard = hard.then(|| words::hard_pose(&snapshot.scene.gripper.mount));
+        let encoding = (!snapshot.frame.taxels.is_empty()).then(|| words::ENCODING.to_owned());
+        let colours = self.context.view.theme.colours();
+        let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
+        for text in message.map(str::to_owned).into_iter().chain(hard).chain(encoding) {
+            let rows = self.paragraph(ui, (&text, 3), self.unit, place.width());
+            let ground = Align2::LEFT_TOP.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
+            self.speak(ui, &text, ground, &text);
+            ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));
+            put(ui, rows, place, Align2::LEFT_TOP);
+            place.set_top(ground.bottom() + 0.8 * self.unit);
+        }
+    }
+
+    fn column_ui(&self, ui: &Ui, column: Rect, score: Score) {
+        let Some(snapshot) = self.context.snapshot else { return };
+        let colours = self.context.view.theme.colours();
+        let mut top = column.top();
+        let mut part = |height: f32| {
+            let place = Rect::from_min_size(egui::pos2(column.left(), top), vec2(column.width(), height * self.unit));
+            top = place.bottom() + GAP * self.unit;
+            place
+        };
+        let [story, guess, beliefs, reason] = [STORY, GUESS, BELIEFS, REASON].map(&mut part);
+        let text = words::story(snapshot);
+        self.speak(ui, "story", story, text);
+        let rows = self.paragraph(ui, (text, 2), 1.35 * self.unit, story.width());
+        put(ui, rows, story, Align2::LEFT_TOP);
+        if let Some(view) = self.answer() {
+            self.guess_ui(ui, view, guess);
+            self.beliefs_ui(ui, view, beliefs);
+            let text = words::reason(view);
+            self.speak(ui, "reason", reason, &text);
+            let rows = self.paragraph(ui, (&text, 4), 1.1 * self.unit, reason.width());
+            put(ui, rows, reason, Align2::LEFT_TOP);
+        }
+        let (column, verdict) = column.split_top_bottom_at_y(column.bottom() - VERDICT * self.unit);
+        self.verdict_ui(ui, verdict);
+        if score != Score::default() {
+            let text = format!("{} right, {} wrong", score.right, score.wrong);
+            let place = column.with_min_y(column.bottom() - SCORE * self.unit);
+            self.speak(ui, "score", place, &text);
+            let text = self.line(ui, &text, 1.1 * self.unit, place.width(), colour(colours.text));
+            put(ui, text, place, Align2::LEFT_TOP);
+        }
+    }
+
+    /// Picture of a class, or a frame with a question mark.
+    fn portrait(&self, ui: &Ui, class: Option<&str>, place: Rect) {
+        let colours = self.context.view.theme.colours();
+        match class.and_then(|class| self.context.thumbnails.get(class)) {
+            Some(texture) => egui::Image::new(texture).corner_radius(0.3 * self.unit).paint_at(ui, place),
+            None => {
+                let stroke = egui::Stroke::new(2.0, colour(colours.border));
+                ui.painter().rect_stroke(place, 0.3 * self.unit, stroke, egui::StrokeKind::Inside);
+                let letters = (0.6 * place.height()).max(self.unit);
+                let mark = self.line(ui, "?", letters, place.width(), colour(colours.quiet_text));
+                put(ui, mark, place, Align2::CENTER_CENTER);
+            }
+        }
+    }
+}

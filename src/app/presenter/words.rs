@@ -1,0 +1,84 @@
+//! Sentences of presenter mode, for people who have never heard of the project.
+
+use crate::app::panels::recognition::words::{newest, percent, ranked, title};
+use palpate_geometry::units::mm;
+use palpate_lab::grasping::IdentificationView;
+use palpate_lab::workers::Snapshot;
+use palpate_learn::{Measure, StopReason};
+use palpate_sim::gripper::{Mount, Phase};
+
+/// What the picture shows.
+pub(super) const ENCODING: &str = "Colour: how hard each spot presses. Arrows: the force.";
+
+/// What happens now.
+pub(super) fn story(snapshot: &Snapshot) -> &'static str {
+    let touches = !snapshot.frame.taxels.is_empty();
+    let again = snapshot.status.grasp_of_round > 1;
+    match (snapshot.status.finished, snapshot.frame.phase) {
+        (true, _) => "This is where the fingers felt it.",
+        (false, Phase::Close) if !touches && again => "Not sure yet: another grasp, from another side.",
+        (false, Phase::Close) if !touches => "It cannot see. Its soft fingers close on something.",
+        (false, Phase::Close) => "Touch! The fingers bend, the pads feel it press.",
+        (false, Phase::Hold) => "It holds: bend tells size, pressure tells shape.",
+        (false, _) => "It lets go.",
+    }
+}
+
+/// Why this answer, and what follows from it.
+pub(super) fn reason(view: &IdentificationView) -> String {
+    let threshold = percent(view.rule.threshold);
+    let grasps = match view.beliefs.len() {
+        1 => "one grasp".to_owned(),
+        many => format!("{many} grasps"),
+    };
+    let p = newest(view).map(|pmf| pmf.top().1);
+    let follows = match (view.decision, p) {
+        (Some(_), _) if view.asks_for_more => format!("Now {threshold} is asked for. Press M: one more grasp."),
+        (Some(StopReason::Sure), Some(p)) if p >= view.rule.threshold => {
+            format!("{} is enough after {grasps}: it decides.", percent(p))
+        }
+        (Some(StopReason::Sure), _) => format!("That was enough after {grasps}: it decided."),
+        (Some(StopReason::GraspLimit), _) => format!("Still not sure after {grasps}: this is its best guess."),
+        (Some(StopReason::Unknown), _) => "Its grasps fit nothing that it knows.".to_owned(),
+        (None, Some(p)) if !view.listening && p >= view.rule.threshold => {
+            "Likely, but its grasps do not fit together: it grasps again.".to_owned()
+        }
+        (None, Some(p)) if !view.listening => {
+            format!("{} is less than {threshold}: it grasps again and adds up what it feels.", percent(p))
+        }
+        (None, _) if !view.beliefs.is_empty() => {
+            format!("It adds this grasp to the {grasps} before, until one name reaches {threshold}.")
+        }
+        (None, _) => "It compares this touch with the grasps that it has learned from.".to_owned(),
+    };
+    [felt(view), rival(view), follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+/// The width that it has measured.
+fn felt(view: &IdentificationView) -> String {
+    let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));
+    width.map_or_else(String::new, |width| format!("It feels about {:.0} mm wide.", mm(width.value)))
+}
+
+/// What else it may be, where that is worth a word.
+fn rival(view: &IdentificationView) -> String {
+    /// Least probability worth a word.
+    const WORTH_NAMING: f64 = 0.05;
+    let Some(pmf) = newest(view).filter(|_| view.decision.is_none()) else { return String::new() };
+    let Some(second) = ranked(pmf).get(1).copied() else { return String::new() };
+    let p = pmf.probabilities()[second];
+    if p < WORTH_NAMING {
+        return String::new();
+    }
+    let name = match view.labels.other() == Some(second) {
+        true => "something unknown".to_owned(),
+        false => title(&view.labels, second),
+    };
+    format!("It may also be {name} ({}).", percent(p))
+}
+
+/// That the pose is a hard one, and why.
+pub(super) fn hard_pose(mount: &Mount) -> String {
+    let [x, y, _] = mount.offset;
+    format!("A hard one: the hand is {:.0} mm off centre, turned by {:.0}\u{b0}.", mm(x.hypot(y)), mount.yaw_deg.abs())
+}
