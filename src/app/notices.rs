@@ -127,9 +127,11 @@ impl Notices {
         (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level, *k))
     }
 
-    /// The message to show now, for a window without the line.
+    /// The message to show now where there is no line: warnings about single grasps are left out.
     pub(super) fn current(&mut self, ctx: &egui::Context) -> Option<&str> {
-        self.first(ctx).map(|first| self.shown[first].text.as_str())
+        self.first(ctx)?;
+        let shown = self.shown.iter().filter(|shown| shown.level != Level::Warning);
+        shown.max_by_key(|shown| shown.level).map(|shown| shown.text.as_str())
     }
 
     /// Draws the line; returns the remedy that was chosen.

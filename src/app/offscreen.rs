@@ -102,6 +102,10 @@ pub fn film_presentation<E: From<OffscreenError>>(
         drawn.time_s += step_s;
         due_s = drawn.step_for(due_s + step_s)?;
         drawn.frame();
+        // The next object would be grasped by that clock, too.
+        if drawn.workbench.snapshot().is_some_and(|now| now.status.playing || now.status.finished) {
+            drawn.workbench.act(&ctx, Command::Pause);
+        }
     }
     Ok(())
 }
@@ -299,10 +303,8 @@ impl Drawn {
                 return Ok(due_s);
             }
             self.workbench.act(&ctx, Command::Step);
-            let (grasp, before) = (now.grasp, now.frame.t);
-            self.until("the grasp", |workbench| {
-                workbench.snapshot().is_some_and(|s| (s.grasp, s.frame.t) != (grasp, before) || s.status.finished)
-            })?;
+            // The last step ends the grasp, without another sample.
+            self.until("the grasp", |workbench| workbench.snapshot().is_some_and(|s| s.revision > now.revision))?;
             due_s -= sample_s;
         }
         Ok(0.0)

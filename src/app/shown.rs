@@ -98,11 +98,19 @@ impl<'a> SourceData<'a> {
         Some(Moment { grasp: snapshot.grasp, stage: &snapshot.stage, frame })
     }
 
-    /// Time at which the object of a finished round is shown: at the end of the hold (s), not fallen. None while grasps follow,
-    /// and where the user looks at another time.
+    /// Time at which the object of a finished round is shown: at the end of the hold (s), not fallen; where it has slipped out of
+    /// the hand by then, when it was held most firmly. None while grasps follow, and where the user looks at another time.
     pub(super) fn held_s(&self) -> Option<f64> {
-        let finished = self.source == ViewSource::Simulation && self.snapshot?.status.finished;
-        self.hold().filter(|_| finished && self.playback.cursor_s.is_none()).map(|[_, end]| end)
+        let snapshot = self.snapshot.filter(|now| self.source == ViewSource::Simulation && now.status.finished)?;
+        let [_, end] = self.hold().filter(|_| self.playback.cursor_s.is_none())?;
+        let trace = self.traces.current()?;
+        let force = |frame: &Frame| snapshot.stage.force_on_object(frame);
+        let before = || trace.frames.iter().flatten().take_while(|frame| frame.t <= end + 1e-9);
+        if before().last().is_none_or(|frame| force(frame).is_some()) {
+            return Some(end);
+        }
+        let firmest = before().filter_map(|frame| Some((frame.t, force(frame)?))).max_by(|a, b| a.1.total_cmp(&b.1));
+        Some(firmest.map_or(end, |(t, _)| t))
     }
 
     /// Answer of the recogniser in the past of a live gripper, where it is shown and has one.

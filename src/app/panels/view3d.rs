@@ -216,7 +216,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
             (text, Some(GhostKind::Engine.colour(theme)))
         }
         None => {
-            (context.shown().held_s().map_or_else(String::new, |t| format!("In the hold, at {t:.1}\u{2009}s.")), None)
+            (context.shown().held_s().map_or_else(String::new, |t| format!("As it was held, at {t:.1}\u{2009}s")), None)
         }
     };
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));

@@ -103,8 +103,9 @@ pub struct Stage {
     gripper: GripperModel,
     world_from_gripper: Pose,
     object: Option<Arc<SurfaceMesh>>,
-    /// Radius of a ball that holds the object (m); zero for an empty hand.
+    /// Radius of a ball that holds the object, and its largest side (m); zero for an empty hand.
     object_radius: f32,
+    object_extent: f32,
     pedestal: Option<Arc<SurfaceMesh>>,
     has_table: bool,
     palm: Arc<SurfaceMesh>,
@@ -122,6 +123,7 @@ impl Stage {
             world_from_gripper,
             object: object.map(|o| Arc::clone(&o.surface)),
             object_radius: object.map_or(0.0, |o| 0.5 * o.bounds.size().length() as f32),
+            object_extent: object.map_or(0.0, |o| o.bounds.size().max_element() as f32),
             pedestal: (support.kind == SupportKind::Pedestal).then(|| Arc::new(gripper_model::pedestal(support))),
             has_table: support.kind != SupportKind::None,
             palm: Arc::new(gripper_model::palm(&scene.gripper)),
@@ -242,8 +244,20 @@ impl Stage {
 
     /// This camera, moved towards what the pads touch as the grip tightens, for pictures of this width over height.
     pub fn nearer_to_touch(&self, camera: Camera, frame: &Frame, aspect: f32) -> Camera {
-        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        touch::nearer(camera, &self.gripper, &world_from_gripper, frame, aspect)
+        match self.touch(frame) {
+            Some(touch) => touch::nearer(camera, &touch, self.object_extent, aspect),
+            None => camera,
+        }
+    }
+
+    /// Force of both pads on the object (N); none where they do not touch it.
+    pub fn force_on_object(&self, frame: &Frame) -> Option<f32> {
+        let object = frame.world_from_object.as_ref()?.position.as_vec3();
+        self.touch(frame)?.force_on(object, self.object_radius)
+    }
+
+    fn touch(&self, frame: &Frame) -> Option<touch::Touch> {
+        touch::Touch::of(&self.gripper, &frame.world_from_gripper(&self.world_from_gripper), frame)
     }
 
     /// A ball around what matters, to be framed by a camera: centre and radius (m).

@@ -10,12 +10,15 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Force on both pads at which the camera is half way (N).
 const HALF_WAY: f32 = 0.05;
-/// Share of the picture that is pad coloured by its load in the end; and the least and the greatest height of the picture at
-/// the distance of the touch (m).
-const SHARE: f32 = 0.0125;
+/// Share of the picture that is pad coloured by its load in the end; less where a large object would be cut, down to the
+/// second.
+const SHARES: [f32; 2] = [0.016, 0.0118];
 /// Area that is coloured over that of the coloured taxels, at least: colours are blended beyond them.
 const SPREAD: f32 = 2.1;
-const HEIGHTS: [f32; 2] = [0.05, 0.11];
+/// Least and greatest height of the picture at the distance of the touch (m), and that of a large object as a share of its
+/// largest side.
+const HEIGHTS: [f32; 2] = [0.04, 0.11];
+const OF_OBJECT: f32 = 0.95;
 /// Pressures between which a taxel comes to count as coloured, as shares of the largest.
 const COLOURED: [f32; 2] = [0.015, 0.06];
 /// Least height of the eye (m).
@@ -28,35 +31,54 @@ const LOADED: f32 = 0.02;
 /// Translucent stretch beyond the loaded taxels, towards the palm, whose bellows stand in the way, and the tip (m).
 const MARGINS: [f32; 2] = [0.016, 0.006];
 /// Force on a pad from which its finger is as clear as it gets (N).
-const CLEAR: f32 = 0.05;
+const CLEAR: f32 = 0.012;
+/// Distance of the touch from the ball around an object at which it is still the object's (m).
+const NEAR_OBJECT: f32 = 0.006;
 
-/// A camera moved towards the middle of what the pads touch, for pictures of this width over height.
-pub(super) fn nearer(
-    camera: Camera,
-    gripper: &GripperModel,
-    world_from_gripper: &Pose,
-    frame: &Frame,
-    aspect: f32,
-) -> Camera {
-    let pads = Side::BOTH.map(|side| LoadedPad::of(gripper, world_from_gripper, frame, side));
-    let force = pads[0].force + pads[1].force;
-    if force <= 0.0 {
-        return camera;
+/// What both pads touch in a frame.
+pub(super) struct Touch {
+    pads: [LoadedPad; 2],
+    /// Sum of the normal forces (N), and their middle (m).
+    force: f32,
+    middle: Vec3,
+    /// Direction in which the left finger closes.
+    closing: Vec3,
+}
+
+impl Touch {
+    /// None where nothing is touched.
+    pub(super) fn of(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Option<Self> {
+        let pads = Side::BOTH.map(|side| LoadedPad::of(gripper, world_from_gripper, frame, side));
+        let force = pads[0].force + pads[1].force;
+        let middle = (pads[0].moment + pads[1].moment) / force;
+        let closing = world_from_gripper.direction(DVec3::X).as_vec3();
+        (force > 0.0).then_some(Self { pads, force, middle, closing })
     }
-    let touch = (pads[0].moment + pads[1].moment) / force;
+
+    /// Force on an object (N) that a ball about this place holds; none where the fingers touch something else, such as each
+    /// other.
+    pub(super) fn force_on(&self, object: Vec3, radius: f32) -> Option<f32> {
+        (self.middle.distance(object) <= radius + NEAR_OBJECT).then_some(self.force)
+    }
+}
+
+/// A camera moved towards the middle of what the pads touch, for pictures of this width over height, of an object whose
+/// largest side is `extent` (m).
+pub(super) fn nearer(camera: Camera, touch: &Touch, extent: f32, aspect: f32) -> Camera {
+    let Touch { pads, force, middle, closing } = touch;
     let tightness = (force / HALF_WAY).powf(1.5);
     let share = tightness / (1.0 + tightness);
     // One of the fingers is seen from behind, whichever is nearer.
-    let closing = world_from_gripper.direction(DVec3::X);
-    let from_side = closing.y.atan2(closing.x) as f32 + ANGLES[0];
+    let from_side = closing.y.atan2(closing.x) + ANGLES[0];
     let turn = (from_side - camera.yaw + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     let [yaw, pitch] = [camera.yaw + turn, ANGLES[1]];
     // What its pad shows of colour there decides how near.
     let towards_eye = Camera { yaw, pitch, ..camera }.axes()[2];
     let shown = pads.iter().map(|pad| pad.area_from_behind(towards_eye)).fold(0.0, f32::max);
-    let height = (SPREAD * shown / (SHARE * aspect)).sqrt().clamp(HEIGHTS[0], HEIGHTS[1]);
+    let [usual, farthest] = SHARES.map(|share| (SPREAD * shown / (share * aspect)).sqrt());
+    let height = usual.max(OF_OBJECT * extent).min(farthest).clamp(HEIGHTS[0], HEIGHTS[1]);
     let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
-    let target = camera.target.lerp(touch, share);
+    let target = camera.target.lerp(*middle, share);
     let distance = camera.distance * (nearest / camera.distance).powf(share);
     // Not below the ground.
     let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();

@@ -246,7 +246,12 @@ impl Session {
             Command::Step => {
                 self.status.playing = false;
                 self.status.actual_speed = 0.0;
-                self.take_frame();
+                // From the end of a grasp a step leads to the next one of its round.
+                if self.next_grasp_at.take().is_some() {
+                    self.begin_grasp();
+                } else {
+                    self.take_frame();
+                }
             }
             Command::Reset => {
                 self.own_pose_done = false;
