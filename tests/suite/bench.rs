@@ -108,6 +108,7 @@ impl Bench {
                         let _heard = wake.send(());
                     }),
                     render_state: render_state.as_ref(),
+                    cleared: false,
                 };
                 Workbench::new(&ctx, setup).unwrap()
             });

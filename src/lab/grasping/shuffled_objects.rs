@@ -9,30 +9,34 @@ use rand_chacha::ChaCha8Rng;
 #[derive(Clone, Debug)]
 pub struct ShuffledObjects {
     random: ChaCha8Rng,
-    /// Indices into the catalogue still to come, the next one last.
-    left: Vec<usize>,
+    /// Indices into the catalogue still to come, the next one last; none before the first is dealt.
+    left: Option<Vec<usize>>,
 }
 
 impl ShuffledObjects {
     /// Starts a sequence.
     pub fn new(seed: u64) -> Self {
-        Self { random: ChaCha8Rng::seed_from_u64(seed), left: Vec::new() }
+        Self { random: ChaCha8Rng::seed_from_u64(seed), left: None }
     }
 
-    /// The next object's name, never that of the one in the hand.
+    /// The next object's name, never that of the one in the hand. The one in the hand at the beginning has had its turn.
     pub fn next(&mut self, in_hand: &str) -> &'static str {
         let all = catalogue();
-        if self.left.is_empty() {
-            self.left.extend(0..all.len());
-            self.left.shuffle(&mut self.random);
+        let mut left = self.left.take().unwrap_or_else(|| self.shuffled(|k| all[k].name != in_hand));
+        // Where only the one in the hand is left, the next round is drawn.
+        if left.iter().all(|k| all[*k].name == in_hand) {
+            left = self.shuffled(|_| true);
         }
-        let other = self.left.iter().rposition(|k| all[*k].name != in_hand);
-        // Only the one in the hand is left: the next round is drawn.
-        let Some(at) = other else {
-            self.left.clear();
-            return self.next(in_hand);
-        };
-        &all[self.left.remove(at)].name
+        let at = left.iter().rposition(|k| all[*k].name != in_hand).unwrap_or_default();
+        let next = &all[left.remove(at)].name;
+        self.left = Some(left);
+        next
+    }
+
+    fn shuffled(&mut self, wanted: impl Fn(usize) -> bool) -> Vec<usize> {
+        let mut left: Vec<usize> = (0..catalogue().len()).filter(|k| wanted(*k)).collect();
+        left.shuffle(&mut self.random);
+        left
     }
 }
 
@@ -53,7 +57,7 @@ mod tests {
         };
         let dealt = deal(1);
         assert!(dealt.windows(2).all(|pair| pair[0] != pair[1]));
-        assert_eq!(dealt[1..=16].iter().collect::<BTreeSet<_>>().len(), 16, "one turn each");
+        assert_eq!(dealt[..16].iter().collect::<BTreeSet<_>>().len(), 16, "one turn each, the first one too");
         assert_eq!(dealt, deal(1));
         assert_ne!(dealt, deal(2));
     }

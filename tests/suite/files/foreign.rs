@@ -2,7 +2,7 @@
 //! shapes of thousands of triangles.
 
 use glam::{DQuat, DVec2, DVec3};
-use palpate_geometry::{ColouredPart, Pose, Primitive, TriMesh, lathe, write_obj};
+use palpate_geometry::{ColouredPart, Finish, Pose, Primitive, TriMesh, lathe, write_obj};
 use palpate_lab::grasping::{GraspSummary, grasp};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
@@ -27,7 +27,12 @@ fn grasped(path: &Path) -> ObjectModel {
 }
 
 fn obj_text(mesh: &TriMesh) -> String {
-    write_obj("test", "test.mtl", &[("body", ColouredPart { mesh: mesh.clone(), colour: None })]).0
+    write_obj(
+        "test",
+        "test.mtl",
+        &[("body", ColouredPart { mesh: mesh.clone(), colour: None, finish: Finish::default() })],
+    )
+    .0
 }
 
 /// A ring lying flat (m).

@@ -2,7 +2,7 @@
 //! time and without a panic.
 
 use glam::DVec3;
-use palpate_geometry::{ColouredPart, Primitive, TriMesh, write_obj};
+use palpate_geometry::{ColouredPart, Finish, Primitive, TriMesh, write_obj};
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::{LoadOptions, ObjectModel, load};
 use palpate_sim::scene::Scene;
@@ -83,7 +83,7 @@ fn cube() -> TriMesh {
 }
 
 fn obj() -> String {
-    write_obj("cube", "cube.mtl", &[("body", ColouredPart { mesh: cube(), colour: None })]).0
+    write_obj("cube", "cube.mtl", &[("body", ColouredPart { mesh: cube(), colour: None, finish: Finish::default() })]).0
 }
 
 fn binary_stl() -> Vec<u8> {
