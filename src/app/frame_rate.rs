@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 /// Frames per second below which a view has fewer pixels, and above which it has more again. Between them it stays, so
 /// that it does not swing.
-const WANTED: [f64; 2] = [18.0, 34.0];
+const WANTED: [f64; 2] = [16.5, 30.0];
 /// Share of the pixels along each side: at first in software, the least, and the steps between.
 const FIRST: f32 = 0.5;
 const LEAST: f32 = 0.35;
@@ -91,7 +91,7 @@ mod tests {
         let then = run(&mut slow, start, 6.0, 9.0);
         assert!((slow.per_second().expect("moves") - 9.0).abs() < 1.0);
         assert_eq!(slow.share(), LEAST);
-        let then = run(&mut slow, then, 3.0, 25.0);
+        let then = run(&mut slow, then, 3.0, 22.0);
         assert_eq!(slow.share(), LEAST, "fast enough, not fast enough for more");
         let then = run(&mut slow, then, 9.0, 60.0);
         assert_eq!(slow.share(), 1.0);

@@ -106,8 +106,8 @@ pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
         Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?])
     };
     match parsed() {
-        Some(size) if size.iter().all(|s| (16..=2048).contains(s)) => Ok(size),
-        _ => Err("write WIDTHxHEIGHT, each from 16 to 2048, as in 1280x800".to_owned()),
+        Some(size) if size.iter().all(|s| (16..=4096).contains(s)) => Ok(size),
+        _ => Err("write WIDTHxHEIGHT, each from 16 to 4096, as in 1280x800".to_owned()),
     }
 }
 

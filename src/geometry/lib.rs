@@ -9,6 +9,7 @@
 //! | 0 | [`units`] | conversions to and from SI units |
 //! | 0 | [`palette`] | colours, themes and colour maps |
 //! | 0 | `circle`, `hull` | curvature of tracked points; area of a planar hull |
+//! | 0 | `finish` | looks of surfaces beside their colour |
 //! | 0 | `pose` | position and orientation of a frame |
 //! | 1 | `mesh` | triangle meshes and bounds |
 //! | 2 | `mesh_files` | OBJ and STL in, OBJ out |
@@ -37,6 +38,7 @@ mod circle;
 mod convex;
 mod distance;
 pub mod drawing;
+mod finish;
 mod hull;
 mod mass;
 mod mesh;
@@ -54,6 +56,7 @@ pub use bake::{BakeError, SolidPart, bake, choose_cell};
 pub use circle::signed_curvature;
 pub use convex::convex_hull;
 pub use distance::{DistanceField, DistanceGrid};
+pub use finish::Finish;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
@@ -63,4 +66,4 @@ pub use pose::Pose;
 pub use primitive::{Primitive, lathe};
 pub use repair::{MeshError, Repaired, repair};
 pub use support_points::support_points;
-pub use surface::{Finish, SurfaceMesh, SurfaceVertex};
+pub use surface::{SurfaceMesh, SurfaceVertex};

@@ -1,4 +1,5 @@
 //! Movies of pictures: animated PNG and GIF, written picture by picture, so that memory does not grow with their length.
+//! Of each picture only the rectangle is written that differs from the one before.
 
 use crate::Picture;
 use std::io::Write;
@@ -42,6 +43,41 @@ pub struct MovieWriter<W: Write> {
     shown: (u64, f64),
     /// Time of each picture (s).
     each_s: f64,
+    /// Pixels of the picture before; empty before the first.
+    before: Vec<u8>,
+}
+
+/// Rectangle of a picture (pixels).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Region {
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+}
+
+impl Region {
+    /// The smallest one around all pixels that differ; one pixel where none does. All of the picture if there was none before.
+    fn changed(before: &[u8], now: &[u8], [width, height]: [u32; 2]) -> Self {
+        if before.len() != now.len() {
+            return Self { x: 0, y: 0, width, height };
+        }
+        let pixels = before.chunks_exact(4).zip(now.chunks_exact(4)).enumerate();
+        let differing = pixels.filter(|(_, (a, b))| a != b).map(|(k, _)| [k as u32 % width, k as u32 / width]);
+        let (low, high) = differing.fold(([width, height], [0; 2]), |(low, high), at| {
+            ([0, 1].map(|k: usize| at[k].min(low[k])), [0, 1].map(|k: usize| at[k].max(high[k])))
+        });
+        if low[0] > high[0] {
+            return Self { x: 0, y: 0, width: 1, height: 1 };
+        }
+        Self { x: low[0], y: low[1], width: high[0] - low[0] + 1, height: high[1] - low[1] + 1 }
+    }
+
+    /// Places of its pixels in a picture so wide, row by row.
+    fn places(self, width: u32) -> impl Iterator<Item = usize> {
+        let rows = self.y..self.y + self.height;
+        rows.flat_map(move |y| (self.x..self.x + self.width).map(move |x| (y * width + x) as usize))
+    }
 }
 
 enum Encoder<W: Write> {
@@ -79,7 +115,7 @@ impl<W: Write> MovieWriter<W> {
                 Encoder::Gif(encoder)
             }
         };
-        Ok(Self { encoder, size, shown: (0, 0.0), each_s: 1.0 / pictures_per_s })
+        Ok(Self { encoder, size, shown: (0, 0.0), each_s: 1.0 / pictures_per_s, before: Vec::new() })
     }
 
     /// Adds a picture, without its opacity.
@@ -88,19 +124,38 @@ impl<W: Write> MovieWriter<W> {
         if found != self.size {
             return Err(MovieError::Size { found, wanted: self.size });
         }
-        let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]).copied().collect();
+        let region = Region::changed(&self.before, &picture.rgba, self.size);
+        let pixel = |at: usize| &picture.rgba[4 * at..4 * at + 4];
         match &mut self.encoder {
-            Encoder::Apng(writer) => writer.write_image_data(&rgb).map_err(failed),
+            Encoder::Apng(writer) => {
+                let rgb: Vec<u8> = region.places(self.size[0]).flat_map(|at| &pixel(at)[..3]).copied().collect();
+                // The first picture is whole, and says so itself.
+                if !self.before.is_empty() {
+                    writer.reset_frame_position().map_err(failed)?;
+                    writer.set_frame_dimension(region.width, region.height).map_err(failed)?;
+                    writer.set_frame_position(region.x, region.y).map_err(failed)?;
+                }
+                writer.write_image_data(&rgb).map_err(failed)?;
+            }
             Encoder::Gif(encoder) => {
-                let mut frame = gif::Frame::from_rgb_speed(self.size[0] as u16, self.size[1] as u16, &rgb, SPEED);
+                let known = |at: usize| self.before.get(4 * at..4 * at + 4) == Some(pixel(at));
+                // A pixel that stays is clear, which packs well.
+                let clear =
+                    |at: usize| if known(at) { [0; 4] } else { [pixel(at)[0], pixel(at)[1], pixel(at)[2], 255] };
+                let mut rgba: Vec<u8> = region.places(self.size[0]).flat_map(clear).collect();
+                let [x, y, width, height] = [region.x, region.y, region.width, region.height].map(|side| side as u16);
+                let mut frame = gif::Frame::from_rgba_speed(width, height, &mut rgba, SPEED);
+                (frame.left, frame.top, frame.dispose) = (x, y, gif::DisposalMethod::Keep);
                 // Rounding errors do not add up over the movie.
                 self.shown.1 += 100.0 * self.each_s;
                 let delay = (self.shown.1.round() as u64).saturating_sub(self.shown.0).max(1);
                 self.shown.0 += delay;
                 frame.delay = delay.min(65535) as u16;
-                encoder.write_frame(&frame).map_err(failed)
+                encoder.write_frame(&frame).map_err(failed)?;
             }
         }
+        self.before.clone_from(&picture.rgba);
+        Ok(())
     }
 
     /// Ends the movie.
@@ -144,6 +199,49 @@ mod tests {
             assert_eq!(rgb, wanted);
             let frame = reader.info().frame_control.ok_or("no times")?;
             assert_eq!((frame.delay_num, frame.delay_den), (40, 1000));
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn only_what_changed_is_written() -> Result<(), Box<dyn std::error::Error>> {
+        let mut moved = picture(10);
+        for (x, y) in [(5, 7), (9, 8)] {
+            moved.rgba[4 * (40 * y + x)] = 99;
+        }
+        let (first, size) = (picture(10), [40, 30]);
+        assert_eq!(Region::changed(&[], &first.rgba, size), Region { x: 0, y: 0, width: 40, height: 30 });
+        let part = Region { x: 5, y: 7, width: 5, height: 2 };
+        assert_eq!(Region::changed(&first.rgba, &moved.rgba, size), part);
+        assert_eq!(Region::changed(&moved.rgba, &moved.rgba, size), Region { x: 0, y: 0, width: 1, height: 1 });
+        for format in [MovieFormat::Apng, MovieFormat::Gif] {
+            let mut bytes = Vec::new();
+            let mut movie = MovieWriter::new(&mut bytes, format, size, 4, 10.0)?;
+            for picture in [&first, &moved, &moved, &first] {
+                movie.add(picture)?;
+            }
+            movie.finish()?;
+            let places = match format {
+                MovieFormat::Apng => {
+                    let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info()?;
+                    let mut places = Vec::new();
+                    for _ in 0..4 {
+                        reader.next_frame(&mut vec![0; 40 * 30 * 3])?;
+                        let frame = reader.info().frame_control.ok_or("no place")?;
+                        places.push([frame.x_offset, frame.y_offset, frame.width, frame.height]);
+                    }
+                    places
+                }
+                MovieFormat::Gif => {
+                    let mut decoder = gif::DecodeOptions::new().read_info(&bytes[..])?;
+                    let mut places = Vec::new();
+                    while let Some(frame) = decoder.read_next_frame()? {
+                        places.push([frame.left, frame.top, frame.width, frame.height].map(u32::from));
+                    }
+                    places
+                }
+            };
+            assert_eq!(places, [[0, 0, 40, 30], [5, 7, 5, 2], [0, 0, 1, 1], [5, 7, 5, 2]], "{format:?}");
         }
         Ok(())
     }

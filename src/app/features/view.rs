@@ -179,7 +179,7 @@ impl Default for ViewState {
             presents: false,
             framed: None,
             forces: true,
-            circles: false,
+            circles: true,
             path: PathLayer::default(),
             load_unit: LoadUnit::default(),
             bend_unit: BendUnit::default(),

@@ -13,9 +13,9 @@ use crate::app::small_pads::small_pads;
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use crate::app::viewport::{Paint, PictureKey};
-use egui::{PointerButton, Rect, Sense, Ui};
+use egui::{PointerButton, Pos2, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
-use palpate_geometry::drawing::{Camera, Detail, DrawList, StandardView};
+use palpate_geometry::drawing::{Align, Camera, Detail, DrawList, Overlay, Shape2, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::picture::{GhostKind, PAD_FULL_SCALE, PictureView, Stage};
 use palpate_lab::workers::Command;
@@ -219,12 +219,48 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
             (context.shown().held_s().map_or_else(String::new, |t| format!("As it was held, at {t:.1}\u{2009}s")), None)
         }
     };
+    // Texts keep their sharpness where the picture has fewer pixels.
+    let overlay = std::mem::take(&mut list.overlay);
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
+    overlay_ui(&ui.painter().with_clip_rect(rect), rect.min, &overlay, letters);
     // Presenter mode says it in its own words.
     if !caption.is_empty() && letters == 1.0 {
         caption_ui(ui, rect, theme, caption, ghosted);
     }
     view
+}
+
+/// Paints annotations over the picture, with letters of a size relative to the usual one.
+fn overlay_ui(painter: &egui::Painter, corner: Pos2, overlay: &Overlay, letters: f32) {
+    let at = |place: Vec2| corner + letters * egui::vec2(place.x, place.y);
+    for shape in &overlay.shapes {
+        match shape {
+            Shape2::Line { from, to, width, colour, opacity } => {
+                painter.line_segment([at(*from), at(*to)], (letters * width, veil(*colour, *opacity)));
+            }
+            Shape2::Rectangle { min, max, colours, opacity } => {
+                let [left, right] = colours.map(|colour| veil(colour, *opacity));
+                let place = Rect::from_min_max(at(*min), at(*max));
+                let mut mesh = egui::Mesh::default();
+                let corners = [place.left_top(), place.left_bottom(), place.right_top(), place.right_bottom()];
+                corners.into_iter().zip([left, left, right, right]).for_each(|(at, ink)| mesh.colored_vertex(at, ink));
+                mesh.add_triangle(0, 1, 2);
+                mesh.add_triangle(2, 1, 3);
+                painter.add(mesh);
+            }
+            Shape2::Disc { centre, radius, colour: ink } => {
+                painter.circle_filled(at(*centre), letters * radius, colour(*ink));
+            }
+            Shape2::Text { at: place, align, size, colour: ink, text } => {
+                let align = match align {
+                    Align::Left => egui::Align2::LEFT_CENTER,
+                    Align::Centre => egui::Align2::CENTER_CENTER,
+                    Align::Right => egui::Align2::RIGHT_CENTER,
+                };
+                painter.text(at(*place), align, text, egui::FontId::proportional(letters * size), colour(*ink));
+            }
+        }
+    }
 }
 
 /// Height of axes and scale bar at the foot of the picture (points).

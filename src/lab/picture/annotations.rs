@@ -19,8 +19,70 @@ const LEGEND_HEIGHT: f32 = 50.0;
 /// Lengths that the scale bar may stand for (mm).
 pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
+/// Part of a picture that numbers must not cover (points).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plate {
+    pub(super) middle: Vec2,
+    pub(super) half: Vec2,
+}
+
+/// Room of the axes in the lower left corner (points).
+const AXES: Vec2 = Vec2::new(96.0, 104.0);
+
+impl Plate {
+    fn between(low: Vec2, high: Vec2) -> Self {
+        Self { middle: 0.5 * (low + high), half: 0.5 * (high - low) }
+    }
+
+    /// True where it comes within 4 points of another.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        ((self.middle - other.middle).abs() - self.half - other.half).max_element() < 4.0
+    }
+
+    /// True where it covers a place.
+    pub(super) fn covers(&self, place: Vec2) -> bool {
+        ((place - self.middle).abs() - self.half).max_element() < 2.0
+    }
+}
+
+/// Annotations of a picture as they are added.
+pub(super) struct Annotator<'a> {
+    pub(super) view: &'a PictureView,
+    pub(super) overlay: Overlay,
+    /// What is taken already.
+    plates: Vec<Plate>,
+}
+
+impl<'a> Annotator<'a> {
+    /// Begins with axes, scale bar, legends and badge, where the view has annotations.
+    pub(super) fn new(view: &'a PictureView) -> Self {
+        let mut overlay = Overlay::default();
+        if view.annotations {
+            add(&mut overlay, view);
+        }
+        let (size, legends) = (view.size, legend_room(view));
+        let axes = Plate::between(Vec2::new(0.0, size.y - AXES.y), Vec2::new(AXES.x, size.y));
+        let legends = Plate::between(Vec2::new(size.x - legends.x, 0.0), Vec2::new(size.x, legends.y));
+        Self { view, overlay, plates: vec![axes, legends] }
+    }
+
+    /// True where a plate would cover nothing.
+    pub(super) fn is_free(&self, plate: &Plate) -> bool {
+        !self.plates.iter().any(|taken| plate.meets(taken))
+    }
+
+    /// Adds the ground of a text.
+    pub(super) fn add_plate(&mut self, plate: Plate) {
+        let Plate { middle, half } = plate;
+        let colours = [self.view.theme.colours().background; 2];
+        let (min, max) = (middle - half, middle + half);
+        self.overlay.shapes.push(Shape2::Rectangle { min, max, colours, opacity: 0.72 });
+        self.plates.push(plate);
+    }
+}
+
 /// Adds everything that fits; small pictures get less.
-pub(super) fn add(overlay: &mut Overlay, view: &PictureView) {
+fn add(overlay: &mut Overlay, view: &PictureView) {
     let size = view.size;
     if size.x >= 160.0 && size.y >= 120.0 {
         add_gizmo(overlay, &view.camera, Vec2::new(MARGIN + 26.0, size.y - MARGIN - 26.0), view.theme);

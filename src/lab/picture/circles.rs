@@ -3,11 +3,11 @@
 //! Curvature is 1 / radius (paper, section IV-A1). The finger follows the circle where it bends evenly; where it does not,
 //! the gap between them is what the strip cannot tell.
 
-use super::PictureView;
+use super::annotations::{Annotator, Plate};
 use glam::{DVec3, Vec2};
 use palpate_geometry::Pose;
-use palpate_geometry::drawing::{Align, Overlay, Shape2};
-use palpate_geometry::palette::Trace;
+use palpate_geometry::drawing::Align;
+use palpate_geometry::palette::{Rgb, Trace};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_tactile::{Quantity, SensorLayout, Sensors, SignalDefinition};
@@ -23,14 +23,14 @@ const TEXT: f32 = 14.0;
 
 /// Draws the circle of each strip of a layout, dashed on the right finger as its curves are.
 pub(super) fn add(
-    overlay: &mut Overlay,
+    annotator: &mut Annotator<'_>,
     layout: &SensorLayout,
     gripper: &GripperModel,
     world_from_gripper: &Pose,
     frame: &Frame,
-    view: &PictureView,
 ) {
     let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return };
+    let view = annotator.view;
     let values = sensors.read(frame);
     let strips = sensors.channels().iter().zip(values).filter(|(channel, _)| channel.quantity == Quantity::Curvature);
     for (channel, value) in strips {
@@ -45,11 +45,11 @@ pub(super) fn add(
         for (k, pair) in points.windows(2).enumerate() {
             let dashed = channel.side == Side::Right && k % 3 == 2;
             if let ([Some(a), Some(b)], false) = (pair, dashed) {
-                overlay.line(*a, *b, WIDTH, colour);
+                annotator.overlay.line(*a, *b, WIDTH, colour);
             }
         }
         if let Some(Some(end)) = points.last() {
-            number(overlay, view, *end, curvature, colour);
+            number(annotator, *end, curvature, colour);
         }
     }
 }
@@ -78,21 +78,17 @@ fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], 
         .collect()
 }
 
-/// The curvature at the end of an arc, inside the picture.
-fn number(
-    overlay: &mut Overlay,
-    view: &PictureView,
-    end: Vec2,
-    curvature: f64,
-    colour: palpate_geometry::palette::Rgb,
-) {
+/// Writes the curvature at the end of an arc, inside the picture, where it covers nothing.
+fn number(annotator: &mut Annotator<'_>, end: Vec2, curvature: f64, colour: Rgb) {
     let text = format!("{curvature:.2}\u{2009}1/m");
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
     let low = half + Vec2::splat(10.0);
-    let place = (end + Vec2::new(0.0, half.y + 4.0)).clamp(low, (view.size - low).max(low));
-    let ground = [view.theme.colours().background; 2];
-    overlay.shapes.push(Shape2::Rectangle { min: place - half, max: place + half, colours: ground, opacity: 0.72 });
-    overlay.text(place, Align::Centre, TEXT, colour, text);
+    let middle = (end + Vec2::new(0.0, half.y + 4.0)).clamp(low, (annotator.view.size - low).max(low));
+    let plate = Plate { middle, half };
+    if annotator.is_free(&plate) {
+        annotator.add_plate(plate);
+        annotator.overlay.text(middle, Align::Centre, TEXT, colour, text);
+    }
 }
 
 #[cfg(test)]

@@ -270,7 +270,7 @@ mod tests {
             assert!([a, b, c].iter().all(|vertex| normal.dot(Vec3::from(vertex.normal)) > 0.0), "{triangle:?}");
         }
         assert_eq!(mesh.vertices[6].colour, [4, 5, 6, Finish::Matt as u8]);
-        assert_eq!((mesh.vertices[7].colour, mesh.vertices[7].position[2]), ([7, 8, 9, 255], 3.0));
+        assert_eq!((mesh.vertices[7].colour, mesh.vertices[7].position[2]), ([7, 8, 9, Finish::Matt as u8], 3.0));
         let place = TouchedPlace { at: Vec3::ZERO, t: 3.0, pressure: PAD_FULL_SCALE };
         assert_eq!(PathColour::Pressure(PAD_FULL_SCALE).of(&place), pressure_colour(1.0));
         assert_eq!(PathColour::Time([1.0, 5.0]).of(&place), pressure_colour(0.5));

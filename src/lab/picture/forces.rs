@@ -1,9 +1,10 @@
 //! Contact forces on each finger, as arrows with numbers: the force across the pad, and the friction along it.
 
 use super::PictureView;
+use super::annotations::{Annotator, Plate};
 use glam::{DVec3, Vec2, Vec3};
 use palpate_geometry::Pose;
-use palpate_geometry::drawing::{Align, Arrow, Overlay, Shape2};
+use palpate_geometry::drawing::{Align, Arrow};
 use palpate_geometry::palette::{Rgb, Theme, pressure_colour};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
@@ -26,8 +27,6 @@ const GAP: f32 = 14.0;
 /// Distance of the numbers from the edges (points), and height that is left to axes and scale bar below them.
 const MARGIN: f32 = 10.0;
 const FOOT: f32 = 50.0;
-/// Room of the axes in the lower left corner (points).
-const AXES: Vec2 = Vec2::new(96.0, 104.0);
 /// Height that is left to what stands above.
 const HEAD: f32 = 48.0;
 /// Least height of a picture with numbers (points).
@@ -81,20 +80,13 @@ pub(super) fn arrows(
 }
 
 /// Their numbers, beyond the tips: a plate for each finger.
-pub(super) fn label(
-    overlay: &mut Overlay,
-    gripper: &GripperModel,
-    world_from_gripper: &Pose,
-    frame: &Frame,
-    view: &PictureView,
-) {
+pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) {
+    let view = annotator.view;
     if view.size.y < LEAST_HEIGHT {
         return;
     }
     let height = f64::from(view.camera.height_at_target());
     let colours = view.theme.colours();
-    // Middle and half size of what they must not cover: the axes, and each other.
-    let mut plates = vec![[Vec2::new(0.5 * AXES.x, view.size.y - 0.5 * AXES.y), 0.5 * AXES]];
     for forces in on_fingers(gripper, world_from_gripper, frame) {
         let ends = [forces.from.as_vec3(), tip(forces.from, forces.normal, height)];
         let [Some(from), Some(to)] = ends.map(|point| view.camera.project(point, view.size)) else { continue };
@@ -119,19 +111,15 @@ pub(super) fn label(
         };
         let over = Vec2::new(0.0, -2.5 * half.y);
         let places = [beyond, aside(-1.0), aside(1.0), aside(-1.0) + over, aside(1.0) + over];
-        let places = places.map(|place| place.clamp(low, high));
-        let is_free = |place: &&Vec2| {
-            let covers = |at: Vec2| ((at - **place).abs() - half).max_element() < 2.0;
-            let meets = |[other, theirs]: &[Vec2; 2]| ((**place - *other).abs() - half - *theirs).max_element() < 4.0;
-            !covers(from) && !covers(to) && !covers(0.5 * (from + to)) && !plates.iter().any(meets)
-        };
-        let place = places.iter().find(is_free).copied().unwrap_or(places[0]);
-        plates.push([place, half]);
-        let ground = [colours.background; 2];
-        overlay.shapes.push(Shape2::Rectangle { min: place - half, max: place + half, colours: ground, opacity: 0.72 });
+        let plates = places.map(|place| Plate { middle: place.clamp(low, high), half });
+        let on_arrow = [from, to, 0.5 * (from + to)];
+        let suits = |plate: &&Plate| annotator.is_free(plate) && !on_arrow.iter().any(|place| plate.covers(*place));
+        let plate = plates.iter().find(suits).copied().unwrap_or(plates[0]);
+        let place = plate.middle;
+        annotator.add_plate(plate);
         for (k, (text, ink)) in lines.into_iter().enumerate() {
             let at = Vec2::new(place.x - half.x + 7.0, place.y - half.y + 2.0 + LINE * (k as f32 + 0.5));
-            overlay.text(at, Align::Left, TEXT, ink, text);
+            annotator.overlay.text(at, Align::Left, TEXT, ink, text);
         }
     }
 }

@@ -23,8 +23,9 @@ pub use heat_maps::{
 pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
 
+use annotations::Annotator;
 use glam::{Mat4, Vec2, Vec3};
-use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, Overlay, Solid, StandardView};
+use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, Solid, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
@@ -71,7 +72,7 @@ impl Default for PictureView {
             badge: None,
             path: None,
             layout: Some(CATALOGUE[0].clone()),
-            circles: false,
+            circles: true,
         }
     }
 }
@@ -133,17 +134,14 @@ impl Stage {
     /// Everything in one picture of a frame.
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
-        let mut overlay = Overlay::default();
-        if view.annotations {
-            annotations::add(&mut overlay, view);
-        }
+        let mut annotator = Annotator::new(view);
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        if let Some(layout) = view.layout.as_ref().filter(|_| view.circles) {
-            circles::add(&mut overlay, layout, &self.gripper, &world_from_gripper, frame, view);
+        if let Some(layout) = view.layout.as_ref().filter(|_| view.circles && view.annotations) {
+            circles::add(&mut annotator, layout, &self.gripper, &world_from_gripper, frame);
         }
         if view.forces && view.annotations {
-            forces::label(&mut overlay, &self.gripper, &world_from_gripper, frame, view);
+            forces::label(&mut annotator, &self.gripper, &world_from_gripper, frame);
         }
         let mut fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale);
         if let Some(layout) = &view.layout {
@@ -169,7 +167,7 @@ impl Stage {
             } else {
                 Vec::new()
             },
-            overlay,
+            overlay: annotator.overlay,
             detail: Detail::Full,
         }
     }
