@@ -292,7 +292,7 @@ fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
 }
 
 /// Width of all buttons in a row, beside the legend (points).
-const BUTTONS: f32 = 690.0;
+const BUTTONS: f32 = 680.0;
 
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {

@@ -12,14 +12,16 @@ use std::f32::consts::{FRAC_PI_2, PI};
 const HALF_WAY: f32 = 0.05;
 /// Share of the picture that is pad coloured by its load in the end; less where a large object would be cut, down to the
 /// second.
-const SHARES: [f32; 2] = [0.0145, 0.0118];
+const SHARES: [f32; 2] = [0.0150, 0.0128];
 /// Area that is coloured over that of the coloured taxels, at least: colours are blended beyond them.
 const SPREAD: f32 = 2.1;
-/// Least and greatest height of the picture at the distance of the touch (m), and that of a large object as a share of its
-/// largest side, in pictures that are at least so much wider than high.
+/// Least and greatest height of the picture at the distance of the touch (m). The width is at least this share of the
+/// object's largest side; so is the height, where that costs no colour, in pictures at least so much wider than high.
 const HEIGHTS: [f32; 2] = [0.04, 0.11];
 const OF_OBJECT: f32 = 0.95;
 const WIDE: f32 = 1.5;
+/// Forces on both pads between which the camera gives up the whole object for the load (N).
+const FIRM: [f32; 2] = [0.12, 0.38];
 /// Pressures between which a taxel comes to count as coloured, as shares of the largest.
 const COLOURED: [f32; 2] = [0.015, 0.06];
 /// Least height of the eye (m).
@@ -77,7 +79,10 @@ pub(super) fn nearer(camera: Camera, touch: &Touch, extent: f32, aspect: f32) ->
     let towards_eye = Camera { yaw, pitch, ..camera }.axes()[2];
     let shown = pads.iter().map(|pad| pad.area_from_behind(towards_eye)).fold(0.0, f32::max);
     let [usual, farthest] = SHARES.map(|share| (SPREAD * shown / (share * aspect)).sqrt());
-    let height = usual.max(OF_OBJECT * extent * (WIDE / aspect).max(1.0)).min(farthest).clamp(HEIGHTS[0], HEIGHTS[1]);
+    let whole = usual.max(OF_OBJECT * extent * (WIDE / aspect).max(1.0)).clamp(HEIGHTS[0], HEIGHTS[1]);
+    let near = whole.min(farthest).max(OF_OBJECT * extent / aspect).clamp(HEIGHTS[0], HEIGHTS[1]);
+    // A light touch loads little of a pad: it is no reason to come nearer than the grip will.
+    let height = whole * (near / whole).powf(smoothstep(FIRM[0], FIRM[1], *force));
     let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
     let target = camera.target.lerp(*middle, share);
     let distance = camera.distance * (nearest / camera.distance).powf(share);
