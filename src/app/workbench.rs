@@ -273,6 +273,11 @@ impl Workbench {
     pub fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         self.gather(&ctx);
+        let moves = self.context(&self.published()).moves();
+        self.frame_rate.count(Instant::now(), moves);
+        if !self.cleared {
+            ui.painter().rect_filled(ui.max_rect(), 0.0, colour(self.view.theme.colours().background));
+        }
         if self.view.presents {
             return self.present(ui);
         }
@@ -281,11 +286,6 @@ impl Workbench {
             self.apply(&ctx, action);
         }
         let published = self.published();
-        let moves = self.context(&published).moves();
-        self.frame_rate.count(Instant::now(), moves);
-        if !self.cleared {
-            ui.painter().rect_filled(ui.max_rect(), 0.0, colour(self.view.theme.colours().background));
-        }
         let mut actions = Actions::default();
         // The layout changes while it is drawn, so it is taken out for that time.
         let mode = self.view.mode;

@@ -168,7 +168,7 @@ impl<W: Write> MovieWriter<W> {
 }
 
 /// Thoroughness of choosing a GIF's colours: 1 is best, 30 fastest.
-const SPEED: i32 = 10;
+const SPEED: i32 = 3;
 
 #[cfg(test)]
 mod tests {

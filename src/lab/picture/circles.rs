@@ -20,6 +20,8 @@ const PIECE: f64 = 0.0025;
 /// Width of the line and height of the number (points).
 const WIDTH: f32 = 2.0;
 const TEXT: f32 = 14.0;
+/// Least height of a picture with numbers (points).
+const LEAST_HEIGHT: f32 = 240.0;
 
 /// Draws the circle of each strip of a layout, dashed on the right finger as its curves are.
 pub(super) fn add(
@@ -85,7 +87,7 @@ fn number(annotator: &mut Annotator<'_>, end: Vec2, curvature: f64, colour: Rgb)
     let low = half + Vec2::splat(10.0);
     let middle = (end + Vec2::new(0.0, half.y + 4.0)).clamp(low, (annotator.view.size - low).max(low));
     let plate = Plate { middle, half };
-    if annotator.is_free(&plate) {
+    if annotator.view.size.y >= LEAST_HEIGHT && annotator.is_free(&plate) {
         annotator.add_plate(plate);
         annotator.overlay.text(middle, Align::Centre, TEXT, colour, text);
     }

@@ -198,8 +198,8 @@ fn veiled_rings(finger: &SoftFinger) -> Range<u32> {
     let [from, to] = finger.veil.stretch;
     let reach = from - VEIL_EDGE * length..=to + VEIL_EDGE * length;
     let within = |k: &usize| finger.veil.clearness > 0.0 && reach.contains(&ring_arc(*k, length));
-    let rings = (0..RINGS).filter(within);
-    match (rings.clone().next(), rings.last()) {
+    let mut rings = (0..RINGS).filter(within);
+    match (rings.clone().next(), rings.next_back()) {
         (Some(first), Some(last)) => first.saturating_sub(1) as u32..(last + 1).min(RINGS - 1) as u32,
         _ => 0..0,
     }
