@@ -26,6 +26,7 @@ struct Corner {
     @location(4) @interpolate(flat) finish: u32,
 }
 
+// The matrix of a solid; the w of its columns hold a colour (linear) in place of the mesh's own, or are negative.
 struct Instance {
     @location(3) column_x: vec4<f32>,
     @location(4) column_y: vec4<f32>,
@@ -38,7 +39,12 @@ fn linear_from_srgb(c: vec3<f32>) -> vec3<f32> {
 }
 
 fn place_of(instance: Instance) -> mat4x4<f32> {
-    return mat4x4<f32>(instance.column_x, instance.column_y, instance.column_z, instance.origin);
+    return mat4x4<f32>(
+        vec4<f32>(instance.column_x.xyz, 0.0),
+        vec4<f32>(instance.column_y.xyz, 0.0),
+        vec4<f32>(instance.column_z.xyz, 0.0),
+        instance.origin,
+    );
 }
 
 fn corner_of(position: vec3<f32>, normal: vec3<f32>, colour: vec4<f32>, instance: Instance) -> Corner {
@@ -47,7 +53,9 @@ fn corner_of(position: vec3<f32>, normal: vec3<f32>, colour: vec4<f32>, instance
     let turned = (place * vec4<f32>(normal, 0.0)).xyz;
     let finish = min(u32(colour.a * 255.0 + 0.5), 7u);
     let grains = position * finishes.all[finish].grain.xyz;
-    return Corner(frame.clip_from_world * world, world.xyz, turned, linear_from_srgb(colour.rgb), grains, finish);
+    let tint = vec3<f32>(instance.column_x.w, instance.column_y.w, instance.column_z.w);
+    let own = select(tint, linear_from_srgb(colour.rgb), tint.x < 0.0);
+    return Corner(frame.clip_from_world * world, world.xyz, turned, own, grains, finish);
 }
 
 @vertex
@@ -69,7 +77,7 @@ fn vertex_ghost(
     instance: Instance,
 ) -> Corner {
     var corner = corner_of(position, normal, colour, instance);
-    let ahead = corner.world + towards_eye(corner.world) * 0.0006;
+    let ahead = corner.world + towards_eye(corner.world) * 0.003;
     corner.clip = frame.clip_from_world * vec4<f32>(ahead, 1.0);
     return corner;
 }
@@ -145,5 +153,5 @@ fn fragment_ghost(corner: Corner, @builtin(front_facing) front: bool) -> @locati
         discard;
     }
     let edge = 1.0 - abs(dot(normalize(corner.normal), towards_eye(corner.world)));
-    return vec4<f32>(corner.colour, 0.22 + 0.70 * edge * edge);
+    return vec4<f32>(corner.colour, 0.15 + 0.72 * edge * edge);
 }

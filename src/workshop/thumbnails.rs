@@ -42,7 +42,7 @@ fn portrait(object: &ObjectModel) -> DrawList {
         shadow_bounds: (centre, 1.4 * radius),
         ground: Some(Ground { height: object.bounds.min.z as f32, colour: GROUND, grid: GROUND, radius: 6.0 * radius }),
         ghosts: Vec::new(),
-        solids: vec![Solid { mesh: Arc::clone(&object.surface), world_from_mesh: Mat4::from_translation(Vec3::ZERO) }],
+        solids: vec![Solid { mesh: Arc::clone(&object.surface), world_from_mesh: Mat4::IDENTITY, tint: None }],
         fingers: Vec::new(),
         arrows: Vec::new(),
         overlay: Overlay::default(),

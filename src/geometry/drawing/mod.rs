@@ -75,6 +75,8 @@ pub struct Solid {
     pub mesh: Arc<SurfaceMesh>,
     /// Its place.
     pub world_from_mesh: Mat4,
+    /// Colour in place of the mesh's own.
+    pub tint: Option<Rgb>,
 }
 
 /// A soft finger as a smooth skin over a chain of frames.

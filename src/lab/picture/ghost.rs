@@ -1,16 +1,18 @@
 //! Outline of a bent finger as one mesh, for the ghost of another run of the same scene.
 
-use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger};
+use glam::Mat4;
+use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, Solid};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::{Finish, SurfaceMesh, TriMesh};
+use std::sync::Arc;
 
 /// Points across the crown of the pad.
 const CROWN_POINTS: u32 = 7;
 /// Frames between two of the finger's own, so that its skin is as smooth as the one it is compared with.
 const BETWEEN: u32 = 3;
 
-/// The skin of a finger, swept along its axis and closed at both ends.
-pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> SurfaceMesh {
+/// The skin of a finger in one colour, swept along its axis and closed at both ends.
+pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> Solid {
     let outline = outline(&finger.section);
     let mut mesh = TriMesh::default();
     for frame in refined(&finger.frames) {
@@ -41,7 +43,7 @@ pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> SurfaceMesh {
     }
     let mut surface = SurfaceMesh::default();
     surface.add(&mesh, colour, Finish::Matt);
-    surface
+    Solid { mesh: Arc::new(surface), world_from_mesh: Mat4::IDENTITY, tint: Some(colour) }
 }
 
 /// Corners of the cross-section, once around: across the finger and inward (m).
@@ -97,7 +99,7 @@ mod tests {
             veil: Veil::default(),
             sensors: FingerSensors::default(),
         };
-        let surface = finger(&soft, Rgb(9, 9, 9));
+        let surface = finger(&soft, Rgb(9, 9, 9)).mesh;
         let corner = |i: u32| Vec3::from(surface.vertices[i as usize].position).as_dvec3();
         let six: f64 = surface.indices.chunks(3).map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum();
         // A box, less the segment that the crown leaves out: w^3 / 24 R of area, a little less for its chords.

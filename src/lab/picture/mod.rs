@@ -177,11 +177,9 @@ impl Stage {
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, 1.0);
         let colour = GhostKind::Engine.colour(theme);
-        let solid = |mesh, world_from_mesh| Solid { mesh, world_from_mesh };
-        let mut ghosts: Vec<Solid> =
-            fingers.iter().map(|finger| solid(Arc::new(ghost::finger(finger, colour)), Mat4::IDENTITY)).collect();
+        let mut ghosts: Vec<Solid> = fingers.iter().map(|finger| ghost::finger(finger, colour)).collect();
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
-            ghosts.push(solid(Arc::clone(mesh), matrix(pose)));
+            ghosts.push(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose), tint: Some(colour) });
         }
         ghosts
     }
@@ -194,15 +192,14 @@ impl Stage {
     /// Contact path on the object of a frame, for [`DrawList::solids`]; none for an empty hand.
     pub fn path(&self, mesh: &Arc<SurfaceMesh>, frame: &Frame) -> Option<Solid> {
         let pose = frame.world_from_object.as_ref()?;
-        Some(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose) })
+        Some(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose), tint: None })
     }
 
     /// Draws the fingers of a picture translucent, so that what they cover is seen.
     pub fn unveil(list: &mut DrawList, theme: Theme) {
         let colour = theme.colours().accent;
         let fingers = std::mem::take(&mut list.fingers);
-        let veils = fingers.iter().map(|finger| Arc::new(ghost::finger(finger, colour)));
-        list.ghosts.extend(veils.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY }));
+        list.ghosts.extend(fingers.iter().map(|finger| ghost::finger(finger, colour)));
     }
 
     /// The real fingers from the curvature of their flex strips (1/m), left and right, for
@@ -212,13 +209,15 @@ impl Stage {
         let colour = GhostKind::RealFingers.colour(theme);
         let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, &frame, 1.0);
         let read = fingers.iter().zip(curvature).filter(|(_, kappa)| kappa.is_some());
-        let mesh = read.map(|(finger, _)| Arc::new(ghost::finger(finger, colour)));
-        mesh.map(|mesh| Solid { mesh, world_from_mesh: Mat4::IDENTITY }).collect()
+        read.map(|(finger, _)| ghost::finger(finger, colour)).collect()
     }
 
     fn solids(&self, frame: &Frame) -> Vec<Solid> {
-        let solid =
-            |mesh: &Arc<SurfaceMesh>, pose: &Pose| Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose) };
+        let solid = |mesh: &Arc<SurfaceMesh>, pose: &Pose| Solid {
+            mesh: Arc::clone(mesh),
+            world_from_mesh: matrix(pose),
+            tint: None,
+        };
         let mut solids = vec![solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper))];
         solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY)));
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {

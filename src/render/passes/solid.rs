@@ -8,6 +8,7 @@ use super::build::{
 use super::{Pass, PassSetup, Prepare};
 use bytemuck::{Pod, Zeroable};
 use palpate_geometry::drawing::{DrawList, Solid};
+use palpate_geometry::palette::Rgb;
 use palpate_geometry::{Finish, SurfaceMesh, SurfaceVertex};
 use std::sync::Arc;
 use wgpu::{BindGroup, Buffer, BufferUsages, RenderPass, RenderPipeline, VertexBufferLayout, VertexStepMode};
@@ -52,7 +53,7 @@ const FINISHES: [Finish; Finish::COUNT] = [
     Finish::Wood,
 ];
 
-/// Mirrors `Instance` in shaders/solid.wgsl: the columns of the matrix.
+/// Mirrors `Instance` in shaders/solid.wgsl: the columns of the matrix, and the tint in the w of three of them.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Instance {
@@ -169,13 +170,19 @@ impl SolidPass {
     }
 }
 
+fn instance_of(solid: &Solid) -> Instance {
+    let mut columns = solid.world_from_mesh.to_cols_array_2d();
+    let tint = solid.tint.map_or([-1.0; 3], Rgb::to_linear);
+    columns.iter_mut().zip(tint).for_each(|(column, channel)| column[3] = channel);
+    Instance { columns }
+}
+
 impl Pass for SolidPass {
     fn prepare(&mut self, prepare: &Prepare<'_>) {
         let solids = (self.of)(prepare.list);
         self.meshes.retain(|m| solids.iter().any(|solid| Arc::ptr_eq(&m.mesh, &solid.mesh)));
         self.shown = solids.iter().map(|solid| self.index_of(prepare, solid)).collect();
-        let instances: Vec<Instance> =
-            solids.iter().map(|solid| Instance { columns: solid.world_from_mesh.to_cols_array_2d() }).collect();
+        let instances: Vec<Instance> = solids.iter().map(instance_of).collect();
         self.instances.write(prepare.device, prepare.queue, bytemuck::cast_slice(&instances));
     }
 

@@ -132,8 +132,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
             None => off_ui(ui, recognised.off),
         }
-        more_ui(ui, context, measures, actions);
-        next_ui(ui, context, measures, actions);
+        ui.horizontal(|ui| {
+            more_ui(ui, context, measures, actions);
+            next_ui(ui, context, measures, actions);
+        });
     });
 }
 
@@ -144,7 +146,9 @@ fn more_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions
     }
     let hint = "The threshold is above the probability reached: grasp the same object again (M)";
     let more = egui::Button::new("One more grasp").fill(accented(context.view.theme));
-    if ui.add_sized([ui.available_width(), measures.button], more).on_hover_text(hint).clicked() {
+    // Beside the button for another object.
+    let width = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
+    if ui.add_sized([width, measures.button], more).on_hover_text(hint).clicked() {
         actions.push(Command::GraspOnceMore);
     }
 }
