@@ -1,7 +1,7 @@
 //! Small pictures of the built-in objects for the window's list: `palpate-workshop thumbnails`.
 
 use super::Failure;
-use glam::{Mat4, Vec3};
+use glam::Mat4;
 use palpate_geometry::drawing::{Detail, DrawList, Ground, Overlay, Solid};
 use palpate_geometry::palette::Rgb;
 use palpate_lab::picture::{PORTRAIT_BACKDROP, portrait_camera};
