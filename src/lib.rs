@@ -81,6 +81,7 @@
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
+//! | a look of surfaces | `src/geometry/finish.rs`, and how it answers to light in `src/render/passes/solid.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!
 //! # What is deliberately absent

@@ -46,8 +46,17 @@ const FINISH_WORDS: [(&str, Finish); 18] = [
 ];
 
 impl Finish {
-    /// Number of finishes.
-    pub const COUNT: usize = 8;
+    /// All of them, in the order of their numbers; as many as `Finishes` in `shaders/solid.wgsl` holds.
+    pub const ALL: [Self; 8] = [
+        Self::Plastic,
+        Self::Matt,
+        Self::Rubber,
+        Self::Metal,
+        Self::Felt,
+        Self::Peel,
+        Self::Cardboard,
+        Self::Wood,
+    ];
 
     /// Finish of a material in a mesh file, by a word in its name; plastic where none is known.
     pub fn of_material(name: &str) -> Self {
@@ -71,6 +80,6 @@ mod tests {
         ] {
             assert_eq!(Finish::of_material(name), finish, "{name}");
         }
-        assert_eq!(Finish::Wood as usize + 1, Finish::COUNT);
+        assert!(Finish::ALL.iter().enumerate().all(|(k, finish)| *finish as usize == k));
     }
 }

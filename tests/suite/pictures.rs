@@ -53,7 +53,9 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let trial = grasp(&scene, object.as_ref(), 0);
     let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
     let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
+    let until = trial.frames().iter().take_while(|frame| frame.t <= shot.at);
     let view = PictureView {
+        full_scale: full_scale_of(&scene.gripper, until),
         camera: stage.camera(shot.view, frame, shot.size[0] as f32 / shot.size[1] as f32),
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
