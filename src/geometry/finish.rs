@@ -47,16 +47,8 @@ const FINISH_WORDS: [(&str, Finish); 18] = [
 
 impl Finish {
     /// All of them, in the order of their numbers; as many as `Finishes` in `shaders/solid.wgsl` holds.
-    pub const ALL: [Self; 8] = [
-        Self::Plastic,
-        Self::Matt,
-        Self::Rubber,
-        Self::Metal,
-        Self::Felt,
-        Self::Peel,
-        Self::Cardboard,
-        Self::Wood,
-    ];
+    pub const ALL: [Self; 8] =
+        [Self::Plastic, Self::Matt, Self::Rubber, Self::Metal, Self::Felt, Self::Peel, Self::Cardboard, Self::Wood];
 
     /// Finish of a material in a mesh file, by a word in its name; plastic where none is known.
     pub fn of_material(name: &str) -> Self {

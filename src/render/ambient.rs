@@ -2,6 +2,7 @@
 //! sees. A picture has four samples per pixel, whose depth cannot be read everywhere, so distances are drawn on their own.
 
 use super::frame::FrameBindings;
+use super::screen::screen_pipeline;
 use super::shaders;
 use super::targets::DEPTH;
 use wgpu::{
@@ -57,34 +58,9 @@ impl Ambient {
             bind_group_layouts: &[Some(&frame.unlit_layout), Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline = |label, entry| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(label),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &shader,
-                    entry_point: Some("vertex"),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &shader,
-                    entry_point: Some(entry),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    targets: &[Some(OPENNESS.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        Self {
-            rough: pipeline("ambient, rough", "fragment_rough"),
-            smooth: pipeline("ambient, smooth", "fragment_smooth"),
-            layout,
-        }
+        let [rough, smooth] = ["fragment_rough", "fragment_smooth"]
+            .map(|entry| screen_pipeline(device, &pipeline_layout, &shader, entry, OPENNESS));
+        Self { rough, smooth, layout }
     }
 
     /// Textures for pictures of this size (pixels).

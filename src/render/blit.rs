@@ -1,5 +1,6 @@
 //! Draws a finished picture into a render pass of the caller.
 
+use super::screen::screen_pipeline;
 use super::shaders;
 use wgpu::{BindGroup, BindGroupLayout, Device, RenderPass, RenderPipeline, Sampler, TextureFormat, TextureView};
 
@@ -46,27 +47,7 @@ impl Blit {
             immediate_size: 0,
         });
         let entry = if format.is_srgb() { "fragment_srgb" } else { "fragment" };
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("blit"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &shader,
-                entry_point: Some("vertex"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &shader,
-                entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let pipeline = screen_pipeline(device, &pipeline_layout, &shader, entry, format);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("blit"),
             mag_filter: wgpu::FilterMode::Linear,

@@ -10,7 +10,7 @@
 //! | layer | module | holds |
 //! |---|---|---|
 //! | 0 | `gpu` | graphics device without a window ([`Gpu`]) |
-//! | 0 | `shaders`, `targets`, `text` | WGSL sources, render targets, glyph atlas |
+//! | 0 | `shaders`, `targets`, `text`, `screen` | WGSL sources, render targets, glyph atlas, pipelines that cover a target |
 //! | 1 | `blit`, `shadow` | copy of a picture into another render pass ([`Blit`]), shadow map |
 //! | 2 | `frame` | uniforms shared by all passes |
 //! | 3 | `ambient` | distances of a picture, and how much of its surroundings each place sees |
@@ -45,6 +45,7 @@ mod movie;
 mod passes;
 mod picture;
 mod renderer;
+mod screen;
 mod shaders;
 mod shadow;
 mod targets;
