@@ -293,7 +293,7 @@ impl Drawn {
         Ok(())
     }
 
-    /// Steps the simulated grasp for some time (s), while it is not decided; returns what is left of it.
+    /// Steps the simulated grasp for some time (s), while it is not decided; returns the rest, shorter than a sample.
     fn step_for(&mut self, mut due_s: f64) -> Result<f64, OffscreenError> {
         let ctx = self.ctx.clone();
         self.until("the next object", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;

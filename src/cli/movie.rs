@@ -97,9 +97,9 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
 
 /// Films presenter mode, with a store of its own.
 fn film(arguments: &MovieArguments, target: &Target) -> Result<(), Failure> {
-    let MovieArguments { out, size, theme, speed, fps, demo, .. } = arguments;
-    let step_s = speed / fps;
-    let pictures = (demo.unwrap_or_default() / step_s + 1e-9).floor() as usize + 1;
+    let MovieArguments { out, size, theme, demo, .. } = arguments;
+    let step_s = step_s(arguments);
+    let pictures = count(demo.unwrap_or_default(), step_s)?;
     let folder = TemporaryFolder::new()?;
     let window = OffscreenWindow {
         scene: Scene::default(),
@@ -144,13 +144,23 @@ fn times(arguments: &MovieArguments, open: &OpenTrial) -> Result<Vec<f64>, Failu
         );
         return Err(text.into());
     }
-    let step = arguments.speed / arguments.fps;
-    let count = ((to - from) / step + 1e-9).floor() + 1.0;
+    let step_s = step_s(arguments);
+    Ok((0..count(to - from, step_s)?).map(|k| from + step_s * k as f64).collect())
+}
+
+/// Time from one picture to the next (s).
+fn step_s(arguments: &MovieArguments) -> f64 {
+    arguments.speed / arguments.fps
+}
+
+/// Number of pictures of a span of time (s).
+fn count(span_s: f64, step_s: f64) -> Result<usize, Failure> {
+    let count = (span_s / step_s + 1e-9).floor() + 1.0;
     if count > MOST_PICTURES {
         let text = format!("{count:.0} pictures are more than {MOST_PICTURES:.0}: raise --speed, or lower --fps");
         return Err(text.into());
     }
-    Ok((0..count as usize).map(|k| from + step * k as f64).collect())
+    Ok(count as usize)
 }
 
 /// Draws pictures of a trial.

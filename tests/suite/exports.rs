@@ -131,6 +131,21 @@ fn movies_hold_every_picture() {
 }
 
 #[test]
+fn presenter_mode_is_filmed_on_a_clock_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    done(at, &["movie", "--demo", "1.2", "--fps", "2.5", "--size", "320x200", "--out", "frames"]);
+    assert_eq!(std::fs::read_dir(at.join("frames")).unwrap().count(), 4);
+    let frames = ["frame_00001.png", "frame_00004.png"]
+        .map(|name| Picture::from_png(&std::fs::read(at.join("frames").join(name)).unwrap()).unwrap());
+    assert_ne!(frames[0], frames[1], "the fingers move");
+    // The filmed grasps stay in no store.
+    assert_eq!(files(at), ["frames"]);
+    let endless = ["movie", "--demo", "600", "--speed", "0.01", "--fps", "100", "--out", "a.gif"];
+    refused(at, &endless, &["6000001 pictures are more than 15000", "--fps"]);
+}
+
+#[test]
 fn pictures_are_compared_with_golden_ones() {
     let folder = folder();
     let at = folder.path();

@@ -1,5 +1,5 @@
-//! Presenter mode: the touch fills the window, beside it a column that tells what happens, what the program thinks after
-//! each grasp and why, and at last the true object. Nothing is smaller than a 36th of the window's height.
+//! Presenter mode: the touch fills the window, beside it a column says what happens, what the program thinks after
+//! each grasp and why, and shows the true object at last. Nothing is smaller than a 36th of the window's height.
 
 mod beliefs;
 mod verdict;

@@ -149,7 +149,7 @@ fn unlit_pipeline(
     })
 }
 
-/// A uniform that both stages read, with what is bound to it.
+/// Bind group of one uniform whose contents do not change.
 pub(super) fn fixed_uniform(
     setup: &PassSetup<'_>,
     label: &str,
