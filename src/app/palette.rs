@@ -13,7 +13,8 @@ use crate::app::panels;
 use crate::app::playback::SPEEDS;
 use crate::app::theme::colour;
 use crate::app::view_source::ViewSource;
-use egui::{Align2, FontId, Key, ScrollArea, Sense, TextEdit, Ui, vec2};
+use crate::app::widgets::text_field;
+use egui::{Align2, FontId, Key, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, GripperCommand};
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -66,8 +67,8 @@ pub(super) fn ui(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut 
     let drawn = area.show(ctx, |ui| {
         frame.show(ui, |ui| {
             ui.set_width(width - 16.0);
-            let field = TextEdit::singleline(&mut search.text).hint_text("find an action, object or panel ..");
-            let response = ui.add(field.desired_width(f32::INFINITY));
+            let field = text_field(&mut search.text, id.with("field")).hint_text("find an action, object or panel ..");
+            let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an action"));
             if response.changed() {
                 search.chosen = 0;

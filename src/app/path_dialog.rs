@@ -1,8 +1,8 @@
 //! File dialog inside the window, where the system has none: a path, and the files of its folder.
 
 use crate::app::files::{Answer, Question, Wording};
-use crate::app::widgets::wrapped;
-use egui::{Button, Key, Modal, RichText, ScrollArea, TextEdit, Ui};
+use crate::app::widgets::{text_field, wrapped};
+use egui::{Button, Id, Key, Modal, RichText, ScrollArea, Ui};
 use std::path::{Path, PathBuf};
 
 /// An open dialog.
@@ -52,7 +52,7 @@ impl PathDialog {
             ui.set_width((room.x - 60.0).min(560.0));
             ui.heading(wording.title);
             wrapped(ui, RichText::new("The system has no file dialog: write or paste a path.").small().weak());
-            let field = TextEdit::singleline(&mut self.path).desired_width(f32::INFINITY).hint_text("path of a file");
+            let field = text_field(&mut self.path, Id::unique("path of a file")).hint_text("path of a file");
             let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path"));
             if std::mem::take(&mut self.fresh) {

@@ -2,7 +2,10 @@
 
 use crate::app::actions::Actions;
 use crate::app::theme::colour;
-use egui::{Button, Color32, Label, Rect, RichText, Stroke, TextEdit, Ui, pos2};
+use egui::text_edit::TextEditState;
+use egui::{
+    AsIdSalt, Button, Color32, Id, Label, Rect, Response, RichText, Stroke, TextEdit, Ui, UiBuilder, Widget, pos2,
+};
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_lab::workers::GripperCommand;
 use palpate_store::labels::Sparkline;
@@ -11,6 +14,27 @@ use std::path::PathBuf;
 /// Text that wraps.
 pub(super) fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// Field for a line of text, as wide as there is room. Its id is fixed: it keeps the keyboard while widgets above it come
+/// and go.
+pub(super) fn text_field(text: &mut String, id: Id) -> TextEdit<'_> {
+    TextEdit::singleline(text).id(id).desired_width(f32::INFINITY)
+}
+
+/// Moves the keyboard to a text field, to the end of the text typed ahead; true once the field has it.
+pub(super) fn focus_field(ui: &Ui, id: Id) -> bool {
+    let focused = ui.memory(|memory| memory.has_focus(id));
+    let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+    state.cursor.set_char_range(None);
+    state.store(ui.ctx(), id);
+    ui.memory_mut(|memory| memory.request_focus(id));
+    focused
+}
+
+/// Adds a number that can be typed, under a fixed id for the same reason.
+pub(super) fn number_field(ui: &mut Ui, name: impl AsIdSalt, number: impl Widget) -> Response {
+    ui.scope_builder(UiBuilder::new().scope_id(ui.scope_id().with(name)), |ui| ui.add(number)).inner
 }
 
 /// Terminal command for `purpose`, with a button that copies it.
@@ -43,7 +67,7 @@ pub(super) fn port_field(ui: &mut Ui, id: egui::Id) -> Option<PathBuf> {
     let mut port = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     ui.horizontal(|ui| {
         let label = ui.label("Port");
-        ui.add(TextEdit::singleline(&mut port).hint_text(ANY_PORT)).labelled_by(label.id);
+        ui.add(text_field(&mut port, id.with("field")).hint_text(ANY_PORT)).labelled_by(label.id);
     });
     let named = Some(port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
     ui.data_mut(|data| data.insert_temp(id, port));

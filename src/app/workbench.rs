@@ -8,7 +8,7 @@ use crate::app::features::files::{FileAction, FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::{InspectAction, InspectFeature, Inspected};
 use crate::app::features::labelling::LabellingFeature;
-use crate::app::features::library::LibraryFeature;
+use crate::app::features::library::{LibraryAction, LibraryFeature};
 use crate::app::features::presenter::PresenterFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionAction, RecognitionFeature};
 use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
@@ -38,7 +38,7 @@ use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelCommand, LabelView, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
+    Inspector, LabelCommand, LabelView, LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
     Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
 use palpate_learn::{ModelError, Models, Shipped};
@@ -512,6 +512,11 @@ impl Workbench {
         if let Action::View(ViewAction::ShowPanel(name)) = action {
             self.show_panel(name);
             return ctx.request_repaint();
+        }
+        match &action {
+            Action::Library(LibraryAction::FocusSearch(_)) => self.show_panel("library"),
+            Action::Labelling(LabellingAction::FocusSearch(_)) => self.show_panel("label"),
+            _ => {}
         }
         if let Action::File(action) = &action
             && let Some(request) = self.export_request(ctx, action)

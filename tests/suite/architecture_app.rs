@@ -44,6 +44,16 @@ fn files_of_the_window_do_not_import_each_other() {
 }
 
 #[test]
+fn fields_that_are_typed_into_have_fixed_ids() {
+    for (file, text) in &app().files {
+        let made = ["TextEdit::singleline", "TextEdit::multiline", "text_edit_singleline"].iter().any(|call| text.contains(call));
+        assert!(!made || file == "widgets.rs", "src/app/{file} makes a text field without widgets::text_field");
+        let added = ["ui.add(drag)", "ui.add(DragValue", "ui.add(slider)"].iter().any(|call| text.contains(call));
+        assert!(!added, "src/app/{file} adds a number without widgets::number_field");
+    }
+}
+
+#[test]
 fn paths_are_read_as_the_compiler_reads_them() {
     let text =
         "use crate::app::theme::{self, colour};\nuse super::super::widgets::wrapped;\nuse super::{Part, words::title};";

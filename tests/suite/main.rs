@@ -28,6 +28,7 @@
 //! - `study_mode`: studies of the paper run, stopped, resumed and looked at in the window.
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `typing`: words typed into every text field.
 //! - `window`: command palette, undo, keys without effect, files without a system dialog, sizes.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
 //! - `signatures`: pads and heat maps over time in the window, clicked and switched.
@@ -78,5 +79,6 @@ mod studies;
 mod study_mode;
 mod training;
 mod trust;
+mod typing;
 mod why;
 mod window;

@@ -75,7 +75,7 @@ fn the_palette_lists_objects_panels_and_keys() {
 }
 
 /// A labelled trial of the real gripper.
-fn labelled(store: &mut Store) {
+pub(crate) fn labelled(store: &mut Store) {
     let header = TrialHeader::new("", Scene::default());
     let id = store.begin_board(&header, &BoardInfo::default()).unwrap();
     store.finish_board(id, &BoardInfo::default(), &[]).unwrap();

@@ -15,7 +15,7 @@ use crate::app::modes::mode::Mode;
 use crate::app::playback::{SPEEDS, Seek};
 use crate::app::theme::{accented, colour, veil};
 use crate::app::view_source::ViewSource;
-use crate::app::widgets::stop_button;
+use crate::app::widgets::{number_field, stop_button};
 use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
 use palpate_geometry::palette::{Rgb, Theme};
@@ -321,7 +321,7 @@ fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: 
     keep_ui(ui, context, actions);
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
-    if ui.add(drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
+    if number_field(ui, "grasps", drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
         actions.push(Command::SetGrasps(grasps));
     }
 }

@@ -25,9 +25,9 @@ pub enum Reach {
 pub enum LibraryAction {
     /// Show the trials that match.
     Find(TrialQuery),
-    /// Move the cursor into the search field.
-    FocusSearch,
-    /// The search field has the cursor.
+    /// Move the keyboard to the search field, and add text typed ahead.
+    FocusSearch(String),
+    /// The search field has the keyboard.
     SearchFocused,
     /// Select a trial.
     Select(TrialId, Reach),
@@ -174,7 +174,13 @@ impl LibraryFeature {
                 self.selection.query = query.clone();
                 self.librarian.ask(LibraryCommand::Find(query));
             }
-            LibraryAction::FocusSearch => self.selection.focus_search = true,
+            LibraryAction::FocusSearch(typed) => {
+                self.selection.focus_search = true;
+                if !typed.is_empty() {
+                    self.selection.query.search.push_str(&typed);
+                    self.librarian.ask(LibraryCommand::Find(self.selection.query.clone()));
+                }
+            }
             LibraryAction::SearchFocused => self.selection.focus_search = false,
             LibraryAction::Select(id, reach) => self.selection.select(&found, id, reach),
             LibraryAction::Step(by, range) => self.selection.step(&found, by, range),

@@ -1,4 +1,4 @@
-//! A key and its action.
+//! A key and its action, and text typed ahead of its field.
 
 use crate::app::actions::Action;
 use crate::app::context::PanelContext;
@@ -49,4 +49,30 @@ impl Binding {
             Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Minus | Key::Equals
         )
     }
+}
+
+/// Text typed after the key of a search field, in the same frame or before the field has the keyboard (`waits`). It is for
+/// the field and triggers no keys.
+pub(in crate::app) fn typed_ahead(ctx: &egui::Context, waits: bool) -> Option<String> {
+    ctx.input_mut(|input| {
+        let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });
+        let text = |event: &egui::Event| match event {
+            egui::Event::Text(text) if text != "/" => Some(text.clone()),
+            _ => None,
+        };
+        let pressed = input.events.iter().position(slash);
+        let from = pressed.or_else(|| waits.then_some(0))?;
+        let typed: String = input.events[from..].iter().filter_map(text).collect();
+        if pressed.is_none() && !input.events.iter().any(|event| matches!(event, egui::Event::Text(_))) {
+            return None;
+        }
+        let is_stop = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Escape, .. });
+        let is_typed = |event: &egui::Event| matches!(event, egui::Event::Key { .. } | egui::Event::Text(_));
+        let mut place = 0;
+        input.events.retain(|event| {
+            place += 1;
+            place <= from || !is_typed(event) || is_stop(event)
+        });
+        Some(typed)
+    })
 }

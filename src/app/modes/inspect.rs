@@ -6,7 +6,7 @@ use crate::app::features::files::FileAction;
 use crate::app::features::inspect::InspectAction;
 use crate::app::features::library::LibraryAction;
 use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key};
+use crate::app::keys::binding::{Binding, key, typed_ahead};
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
@@ -20,11 +20,13 @@ pub(super) const KIND: ModeKind = ModeKind {
     layout,
     open: key(Modifiers::COMMAND, Key::Num2, "Inspect mode", |_| Some(ViewAction::SetMode(Mode::Inspect).into())),
     keys: KEYS,
-    typed: |_, _| None,
+    typed: |ctx, context| {
+        typed_ahead(ctx, context.picked.focus_search).map(|typed| LibraryAction::FocusSearch(typed).into())
+    },
 };
 
 const KEYS: &[Binding] = &[
-    key(Modifiers::NONE, Key::Slash, "search the library", |_| Some(LibraryAction::FocusSearch.into())),
+    key(Modifiers::NONE, Key::Slash, "search the library", |_| Some(LibraryAction::FocusSearch(String::new()).into())),
     // Those with more modifiers come first, so that they win.
     key(Modifiers::SHIFT, Key::ArrowUp, "select the trial above too", |_| Some(LibraryAction::Step(-1, true).into())),
     key(Modifiers::SHIFT, Key::ArrowDown, "select the trial below too", |_| Some(LibraryAction::Step(1, true).into())),

@@ -3,11 +3,10 @@
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
 use crate::app::actions::Action;
-use crate::app::context::PanelContext;
 use crate::app::features::gripper::GripperAction;
 use crate::app::features::tools::ToolAction;
 use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key};
+use crate::app::keys::binding::{Binding, key, typed_ahead};
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 use palpate_lab::workers::LabellingAction;
@@ -19,7 +18,9 @@ pub(super) const KIND: ModeKind = ModeKind {
     layout,
     open: key(Modifiers::COMMAND, Key::Num3, "Label mode", |_| Some(ViewAction::SetMode(Mode::Label).into())),
     keys: KEYS,
-    typed: typed_for_search,
+    typed: |ctx, context| {
+        typed_ahead(ctx, context.draft.focus_search).map(|typed| LabellingAction::FocusSearch(typed).into())
+    },
 };
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -52,31 +53,6 @@ const KEYS: &[Binding] = &[
 
 fn choose(place: usize) -> Option<Action> {
     Some(LabellingAction::ChooseObject(place).into())
-}
-
-/// Text typed in this frame after the key of the search field, or before the field has focus: it goes into the field and
-/// triggers no keys.
-fn typed_for_search(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<Action> {
-    ctx.input_mut(|input| {
-        let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });
-        let text = |event: &egui::Event| match event {
-            egui::Event::Text(text) if text != "/" => Some(text.clone()),
-            _ => None,
-        };
-        let pressed = input.events.iter().position(slash);
-        let from = pressed.or_else(|| context.draft.focus_search.then_some(0))?;
-        let typed: String = input.events[from..].iter().filter_map(text).collect();
-        if pressed.is_none() && typed.is_empty() {
-            return None;
-        }
-        let is_stop = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Escape, .. });
-        let mut place = 0;
-        input.events.retain(|event| {
-            place += 1;
-            place <= from || is_stop(event)
-        });
-        Some(LabellingAction::FocusSearch(typed).into())
-    })
 }
 
 /// Plan and trials left, plots over the view in the middle, label and gripper right.

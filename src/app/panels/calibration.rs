@@ -4,8 +4,8 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::plots::static_plot;
 use crate::app::theme::colour;
-use crate::app::widgets::{ANY_PORT, wrapped};
-use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
+use crate::app::widgets::{ANY_PORT, text_field, wrapped};
+use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
@@ -72,7 +72,7 @@ fn begin_ui(
         ui.end_row();
         let label = ui.label("Part");
         let hint = "name or number, such as A7";
-        ui.add(TextEdit::singleline(&mut form.part).hint_text(hint).char_limit(80)).labelled_by(label.id);
+        ui.add(text_field(&mut form.part, id.with("part")).hint_text(hint).char_limit(80)).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Port");
         match context.gripper.and_then(|gripper| gripper.link.as_ref()) {
@@ -80,7 +80,7 @@ fn begin_ui(
                 ui.add(egui::Label::new(link.port.path.display().to_string()).truncate());
             }
             None => {
-                ui.add(TextEdit::singleline(&mut form.port).hint_text(ANY_PORT)).labelled_by(label.id);
+                ui.add(text_field(&mut form.port, id.with("port")).hint_text(ANY_PORT)).labelled_by(label.id);
             }
         }
         ui.end_row();

@@ -4,8 +4,8 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::gripper::{CONTROLS, GripperAction, control_title};
 use crate::app::theme::{accented, colour, veil};
-use crate::app::widgets::{command_ui, stop_button, wrapped};
-use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
+use crate::app::widgets::{command_ui, stop_button, text_field, wrapped};
+use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
@@ -57,8 +57,7 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut path = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     ui.horizontal(|ui| {
         let label = ui.label("Port or file");
-        let field =
-            TextEdit::singleline(&mut path).hint_text("/dev/ttyACM0 or captured bytes").desired_width(f32::INFINITY);
+        let field = text_field(&mut path, id.with("field")).hint_text("/dev/ttyACM0 or captured bytes");
         let response = ui.add(field).labelled_by(label.id);
         if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
             actions.push(GripperCommand::Connect(Some(PathBuf::from(path.trim()))));

@@ -4,9 +4,8 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::gripper::instruction;
 use crate::app::theme::{accented, colour, veil};
-use crate::app::widgets::wrapped;
-use egui::text_edit::TextEditState;
-use egui::{Align, Button, Key, Layout, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, vec2};
+use crate::app::widgets::{focus_field, text_field, wrapped};
+use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_lab::workers::{
     GripperView, LabelCommand, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
@@ -230,19 +229,12 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let draft = &context.draft;
     let mut search = draft.search.clone();
     let hint = "find or name an object ( / )";
-    if draft.focus_search {
-        // At the end of the text typed ahead, not where it was in the last answer.
-        let mut state = TextEditState::load(ui.ctx(), search_id()).unwrap_or_default();
-        state.cursor.set_char_range(None);
-        state.store(ui.ctx(), search_id());
-    }
-    let field = TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY).char_limit(80);
-    let response = ui.add(field.id(search_id()));
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
-    if draft.focus_search {
-        response.request_focus();
+    if draft.focus_search && focus_field(ui, search_id()) {
         actions.push(LabellingAction::SearchFocused);
     }
+    let field = text_field(&mut search, search_id()).hint_text(hint).char_limit(80);
+    let response = ui.add(field);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an object"));
     // Arrows choose among the matches while the cursor stays in the field.
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
     if response.has_focus() && step != 0 {
@@ -295,8 +287,7 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
     egui::Grid::new("remarks").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
         let mut note = own(&draft.note, trial.note.clone());
         let label = ui.label("Note");
-        let response =
-            ui.add(TextEdit::singleline(&mut note).desired_width(f32::INFINITY).char_limit(500)).labelled_by(label.id);
+        let response = ui.add(text_field(&mut note, Id::unique("note")).char_limit(500)).labelled_by(label.id);
         if response.changed() {
             actions.push(LabellingAction::WriteNote(trial.id, note.clone()));
         }
@@ -306,10 +297,7 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
         let label = ui.label("Tags");
-        let field = TextEdit::singleline(&mut tags)
-            .hint_text("separated by commas")
-            .desired_width(f32::INFINITY)
-            .char_limit(200);
+        let field = text_field(&mut tags, Id::unique("tags")).hint_text("separated by commas").char_limit(200);
         let response = ui.add(field).labelled_by(label.id);
         if response.changed() {
             actions.push(LabellingAction::WriteTags(trial.id, tags.clone()));

@@ -5,6 +5,7 @@ use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::colour;
+use crate::app::widgets::text_field;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_sim::objects::{EMPTY, catalogue};
 
@@ -44,9 +45,9 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
     if open.on_hover_text("Ctrl+O, or drop a file anywhere on the window").clicked() {
         actions.push(FileAction::Open);
     }
-    let id = ui.scope_id().with("path");
+    let id = egui::Id::unique("object path");
     let mut path = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
-    let field = egui::TextEdit::singleline(&mut path).hint_text(".. or paste a path").desired_width(f32::INFINITY);
+    let field = text_field(&mut path, id.with("field")).hint_text(".. or paste a path");
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
         actions.push(SimulationAction::OpenObject(path.trim().trim_matches(['"', '\'']).to_owned()));

@@ -3,7 +3,8 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
-use egui::{DragValue, Rect, RichText, ScrollArea, Sense, TextEdit, Ui, pos2, vec2};
+use crate::app::widgets::{number_field, text_field};
+use egui::{DragValue, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::LabelCommand;
 use palpate_sim::objects::{class_of, object_title};
@@ -38,9 +39,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     let id = egui::Id::unique("plan addition");
     let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
-    let field =
-        TextEdit::singleline(&mut name).hint_text("add an object ..").desired_width(f32::INFINITY).char_limit(80);
-    let response = ui.add(field);
+    let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object ..").char_limit(80));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
         actions.push(LabelCommand::Want(class_of(&name).to_owned(), WANTED));
@@ -85,7 +84,8 @@ fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, action
         painter.text(rect.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
         let mut new = *wanted;
         let drag = DragValue::new(&mut new).range(0..=MOST_WANTED).speed(0.2);
-        let response = ui.add_sized([40.0, 22.0], drag).on_hover_text("Trials wanted");
+        let sized = |ui: &mut Ui| ui.add_sized([40.0, 22.0], drag);
+        let response = number_field(ui, ("wanted", name), sized).on_hover_text("Trials wanted");
         // Dragging has not ended.
         if new != *wanted && new > 0 && !response.dragged() {
             actions.push(LabelCommand::Want(name.clone(), new));

@@ -4,9 +4,9 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::library::LibraryAction;
-use crate::app::widgets::wrapped;
+use crate::app::widgets::{text_field, wrapped};
 use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
-use egui::{Button, Key, PopupCloseBehavior, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Id, Key, PopupCloseBehavior, RichText, ScrollArea, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
 use palpate_store::labels::TrialEdit;
@@ -95,9 +95,9 @@ fn offers(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
 
 /// Field for a word; the word once it is entered.
 fn word_ui(ui: &mut Ui, name: &str, hint: &str, done: &str) -> Option<String> {
-    let id = ui.scope_id().with(name);
+    let id = Id::unique(("library word", name));
     let mut word = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
-    let field = ui.add(TextEdit::singleline(&mut word).hint_text(hint).desired_width(f32::INFINITY));
+    let field = ui.add(text_field(&mut word, id.with("field")).hint_text(hint));
     field.widget_info(|| {
         let mut info = egui::WidgetInfo::text_edit(true, &word, &word, hint);
         info.label = Some(name.to_owned());

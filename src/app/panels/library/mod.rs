@@ -9,7 +9,8 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::library::LibraryAction;
 use crate::app::theme::colour;
-use egui::{Frame, Margin, Panel, RichText, TextEdit, Ui};
+use crate::app::widgets::{focus_field, text_field};
+use egui::{Frame, Id, Margin, Panel, RichText, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_store::TrialQuery;
 
@@ -40,16 +41,16 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, action
     let picked = context.picked;
     let mut search = picked.query.search.clone();
     let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept));
-    let field = ui.add(TextEdit::singleline(&mut search).hint_text(hint).desired_width(f32::INFINITY));
+    let id = Id::unique("library search");
+    if picked.focus_search && focus_field(ui, id) {
+        actions.push(LibraryAction::SearchFocused);
+    }
+    let field = ui.add(text_field(&mut search, id).hint_text(hint));
     field.widget_info(|| {
         let mut info = egui::WidgetInfo::text_edit(true, &picked.query.search, &search, "");
         info.label = Some("Search trials".to_owned());
         info
     });
-    if picked.focus_search {
-        field.request_focus();
-        actions.push(LibraryAction::SearchFocused);
-    }
     if search != picked.query.search {
         actions.push(LibraryAction::Find(TrialQuery { search, ..picked.query.clone() }));
     }

@@ -17,6 +17,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::Recognised;
 use crate::app::theme::{accented, colour};
 use crate::app::view_source::ViewSource;
+use crate::app::widgets::number_field;
 use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::IdentificationView;
@@ -327,7 +328,7 @@ impl Part<'_, '_> {
                 .custom_formatter(plain)
                 .suffix(" %");
             let hint = "Probability from which a class counts as certain; drag the line or the number";
-            if ui.add(drag).labelled_by(label.id).on_hover_text(hint).changed() {
+            if number_field(ui, "threshold", drag).labelled_by(label.id).on_hover_text(hint).changed() {
                 self.actions.push(RecognitionAction::SetThreshold(classes::stepped(threshold / 100.0)));
             }
             if self.view.last.is_some() {

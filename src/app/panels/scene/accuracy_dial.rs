@@ -4,6 +4,7 @@ use super::choice;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::theme::colour;
+use crate::app::widgets::number_field;
 use egui::{RichText, Slider, Ui};
 use palpate_geometry::units::{three_digits, two_digits};
 use palpate_lab::workers::Command;
@@ -48,7 +49,7 @@ fn tolerance_row(ui: &mut Ui, scene: &mut Scene) {
         .custom_parser(|text| text.trim().parse().ok());
     // Fits a narrow panel together with its number.
     ui.spacing_mut().slider_width = 60.0;
-    if ui.add(slider).labelled_by(label.id).changed() {
+    if number_field(ui, "tolerance", slider).labelled_by(label.id).changed() {
         // A tolerance has one digit.
         let rounded = format!("{tolerance:.0e}").parse().unwrap_or(tolerance);
         scene.solver.accuracy = Accuracy::Tolerance(rounded);

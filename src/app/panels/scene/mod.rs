@@ -6,6 +6,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::files::FileAction;
 use crate::app::features::simulation::SimulationAction;
+use crate::app::widgets::number_field;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
 use palpate_sim::scene::{Auto, EngineKind, SCENES, Scene, SupportKind};
@@ -79,7 +80,7 @@ impl Number<'_> {
             .speed(self.speed)
             .max_decimals(3)
             .suffix(format!("\u{2009}{}", self.unit));
-        if ui.add(drag).labelled_by(label.id).changed() {
+        if number_field(ui, self.name, drag).labelled_by(label.id).changed() {
             *value = shown / self.factor;
         }
         ui.end_row();
@@ -102,7 +103,8 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
             .speed(number.speed)
             .max_decimals(3)
             .suffix(format!("\u{2009}{}", number.unit));
-        if ui.add_enabled(own, drag).labelled_by(label.id).changed() {
+        let enabled = |ui: &mut Ui| ui.add_enabled(own, drag);
+        if number_field(ui, number.name, enabled).labelled_by(label.id).changed() {
             *value = Auto::Value(shown / number.factor);
         }
     });
@@ -162,10 +164,9 @@ fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions
     choice(ui, "engine", &mut scene.solver.engine, &engines);
     accuracy_dial::rows(ui, scene, context, actions);
     let label = ui.label("sampling");
-    ui.add(
-        DragValue::new(&mut scene.timing.sample_hz).range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz"),
-    )
-    .labelled_by(label.id);
+    let rate = DragValue::new(&mut scene.timing.sample_hz);
+    let rate = rate.range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz");
+    number_field(ui, "sampling", rate).labelled_by(label.id);
     ui.end_row();
 }
 
@@ -174,7 +175,7 @@ fn finger_ui(ui: &mut Ui, scene: &mut Scene) {
     let finger = &mut scene.gripper.finger;
     let label = ui.label("joints");
     let range = Finger::FEWEST_JOINTS as usize..=Finger::MOST_JOINTS as usize;
-    ui.add(DragValue::new(&mut finger.joints).range(range).speed(0.1)).labelled_by(label.id);
+    number_field(ui, "joints", DragValue::new(&mut finger.joints).range(range).speed(0.1)).labelled_by(label.id);
     ui.end_row();
     Number { name: "length", unit: "mm", factor: 1e3, range: [20.0, 300.0], speed: 0.2 }.ui(ui, &mut finger.length);
     Number { name: "stiffness EI", unit: "N·cm²", factor: 1e4, range: [0.1, 10_000.0], speed: 0.2 }
