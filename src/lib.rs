@@ -70,7 +70,7 @@
 //! | a sensor model | a file in `src/tactile/model/` |
 //! | a recogniser | a file in `src/learn/` and a line in [`palpate_learn::METHODS`] |
 //! | a line format of boards | `src/device/protocol/fields.rs` |
-//! | a check of the doctor | a function in `src/device/doctor/checks.rs` |
+//! | a check of the doctor | a function, and a line in `src/device/doctor/checks.rs` |
 //! | a gripper | a file in `src/lab/gripper/` that implements [`palpate_lab::gripper::Gripper`] |
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
 //! | a filter or column of the trial library | `src/store/library/`, its option in `src/cli/trials/selection.rs` |

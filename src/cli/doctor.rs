@@ -7,7 +7,7 @@ use super::terminal::{note, say, say_json, table, typed_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::doctor::{
     Bleed, CheckFinding, CheckStatus, CrosstalkTest, Observations, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
-    is_sound, summary, write_sketch,
+    is_sound, not_checked, summary, write_sketch,
 };
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{Baud, LinkEvent, LinkOptions};
@@ -27,11 +27,12 @@ use std::time::{Duration, Instant};
   palpate doctor --wiring
   palpate doctor --sketch due_gripper
 
-Exit codes: 0 all good, 1 something is wrong, 2 wrong use")]
+Exit codes: 0 no fault in what was seen, 1 something is wrong, 2 wrong use")]
 pub(super) struct DoctorArguments {
     /// Port, or file of captured bytes (default: the only likely port).
     port: Option<PathBuf>,
-    /// How long to listen (s). Bend each finger and press each pad meanwhile to test the sensors.
+    /// How long to listen (s). Bend each finger and press each pad meanwhile: what does not move is not checked. A file is
+    /// read whole.
     #[arg(long, value_name = "S", default_value_t = USUAL_LISTEN_S, value_parser = within(1.0..=600.0))]
     seconds: f64,
     /// Baud rate (default: try the usual ones).
@@ -57,7 +58,10 @@ pub(super) struct DoctorArguments {
 struct Report<'a> {
     port: Option<&'a std::path::Path>,
     listened_s: f64,
+    /// No check failed.
     sound: bool,
+    /// Names of the checks that did not see what they need.
+    not_checked: Vec<&'static str>,
     findings: Vec<CheckFinding>,
 }
 
@@ -70,7 +74,10 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
         write_sketch(folder)?.iter().try_for_each(|path| say(path.display().to_string()))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let options = LinkOptions { path: arguments.port.clone(), baud: arguments.baud, ..LinkOptions::default() };
+    // Captured bytes need no real time.
+    let replay_speed = f64::INFINITY;
+    let path = arguments.port.clone();
+    let options = LinkOptions { path, baud: arguments.baud, replay_speed, ..LinkOptions::default() };
     let stop = super::interrupt::stop_flag()?;
     if arguments.crosstalk {
         return crosstalk(&options, &stop, arguments.json);
@@ -86,7 +93,13 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let sound = is_sound(&found);
     if arguments.json {
         let port = seen.link.as_ref().map(|link| link.port.path.as_path()).or(arguments.port.as_deref());
-        say_json(&Report { port, listened_s: seen.listened_s, sound, findings: found })?;
+        say_json(&Report {
+            port,
+            listened_s: seen.listened_s,
+            sound,
+            not_checked: not_checked(&found),
+            findings: found,
+        })?;
     } else {
         print(&seen, &found)?;
     }
@@ -106,10 +119,7 @@ const SILENCE: Duration = Duration::from_secs(10);
 
 /// Runs the crosstalk test: the user moves one sensor after the other.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
-    // Captured bytes need no real time.
-    let replay_speed = if options.path.as_ref().is_some_and(|path| path.is_file()) { f64::INFINITY } else { 1.0 };
-    let options = LinkOptions { replay_speed, ..options.clone() };
-    let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
+    let link = link::open(options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
     let (mut test, mut shown) = (None, String::new());
     let (mut readings, mut newest) = (0, Instant::now());
     let keys = typed_lines()?;
@@ -168,13 +178,15 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
 
 fn print(seen: &Observations, found: &[CheckFinding]) -> Result<(), Failure> {
     if let Some(link) = &seen.link {
-        say(format!("{} ({}), listened for {:.0} s\n", link.port.path.display(), link.port.title, seen.listened_s))?;
+        let (path, title) = (link.port.path.display(), &link.port.title);
+        let (samples, lasted) = (link.cadence.samples, seen.traces.seconds());
+        say(format!("{path} ({title}): {samples} readings over {lasted:.1} s\n"))?;
     }
     for finding in found {
-        say(format!("{:<9} {:<14} {}", finding.verdict.name(), finding.check, finding.seen))?;
+        say(format!("{:<11} {:<14} {}", finding.verdict.name(), finding.check, finding.seen))?;
         for (word, text) in [("why", &finding.cause), ("do", &finding.fix), ("copy", &finding.command)] {
             if let Some(text) = text {
-                say(format!("{:>24} {text}", format!("{word}:")))?;
+                say(format!("{:>26} {text}", format!("{word}:")))?;
             }
         }
     }

@@ -14,6 +14,10 @@ pub struct Cadence {
     pub bad_lines: u64,
     /// Gaps.
     pub gaps: u64,
+    /// Restarts of the board while it was connected, as its clock and its numbers show them.
+    pub restarts: u64,
+    /// Bytes so far.
+    pub bytes: u64,
     /// Readings per second, lately (1/s).
     pub rate_hz: f64,
     /// 95th percentile of how far the time between two readings is from the usual (ms); by the board's clock where it
@@ -29,4 +33,19 @@ pub struct Cadence {
     pub printable_share: f64,
     /// More than a fifth of the lines were unreadable for a whole second.
     pub troubled: bool,
+}
+
+impl Cadence {
+    /// The same, with its counters counted from `before` on.
+    pub fn since(&self, before: &Self) -> Self {
+        Self {
+            samples: self.samples.saturating_sub(before.samples),
+            lost: self.lost.saturating_sub(before.lost),
+            bad_lines: self.bad_lines.saturating_sub(before.bad_lines),
+            gaps: self.gaps.saturating_sub(before.gaps),
+            restarts: self.restarts.saturating_sub(before.restarts),
+            bytes: self.bytes.saturating_sub(before.bytes),
+            ..self.clone()
+        }
+    }
 }

@@ -47,7 +47,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 
 fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
     let port = port_field(ui, egui::Id::unique("doctor port"));
-    let hint = "Meanwhile, bend a finger and press each pad: more can be checked then.";
+    let hint = "Meanwhile, bend each finger and press each pad: what does not move is not checked.";
     ui.horizontal_wrapped(|ui| {
         if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
             let port = port.clone();
@@ -151,7 +151,7 @@ fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &
     let of = request.seconds;
     let share = (listened_s / of.max(1e-9)) as f32;
     ui.add(ProgressBar::new(share).text(format!("listening, {listened_s:.0} of {of:.0} s")));
-    wrapped(ui, RichText::new("Now bend a finger and press each pad.").strong());
+    wrapped(ui, RichText::new("Now bend each finger and press each pad.").strong());
     if ui.button("Stop").on_hover_text("End and report so far").clicked() {
         actions.push(ToolAction::StopExamining);
     }
@@ -173,8 +173,9 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {
     findings.sort_by_key(|finding| match finding.verdict {
         CheckStatus::Failed => 0,
         CheckStatus::Note => 1,
-        CheckStatus::Passed => 2,
-        CheckStatus::Skipped => 3,
+        CheckStatus::NotChecked => 2,
+        CheckStatus::Passed => 3,
+        CheckStatus::Skipped => 4,
     });
     for finding in findings {
         finding_ui(ui, theme, finding);
@@ -211,6 +212,7 @@ fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let (name, seen) = match finding.verdict {
         CheckStatus::Failed => (colours.error, colours.text),
         CheckStatus::Note => (colours.warning, colours.text),
+        CheckStatus::NotChecked => (colours.text, colours.text),
         CheckStatus::Passed => (colours.text, colours.quiet_text),
         CheckStatus::Skipped => (colours.quiet_text, colours.quiet_text),
     };
@@ -235,6 +237,7 @@ fn mark_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
         CheckStatus::Passed => icons::sign(ui, Icon::Check, rect, colour(colours.accent)),
         CheckStatus::Failed => icons::sign(ui, Icon::Cross, rect, colour(colours.error)),
         CheckStatus::Note => letter("!", colour(colours.warning)),
+        CheckStatus::NotChecked => letter("?", colour(colours.quiet_text)),
         CheckStatus::Skipped => letter("–", colour(colours.quiet_text)),
     }
     response.on_hover_text(label);

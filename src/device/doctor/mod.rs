@@ -1,11 +1,14 @@
 //! Diagnosis of the connection to the gripper's board: one look at the port, then a list of checks, each from observations
-//! to a finding with cause and fix. The terminal and the window show the same list.
+//! to a finding with its evidence, cause and fix. The terminal and the window show the same list.
 //!
-//! To add a check, write it in `checks` and add one line to [`CHECKS`].
+//! To add a check, write it in `connection` or `sensors` and add one line to [`CHECKS`]. A check that did not see what it
+//! needs has not passed: it was not checked.
 
 mod checks;
+mod connection;
 mod crosstalk;
 mod examine;
+mod sensors;
 #[cfg(test)]
 mod tests;
 mod traces;
@@ -13,10 +16,11 @@ mod wiring;
 
 pub use checks::{CHECKS, Check};
 pub use crosstalk::{Bleed, CrosstalkError, CrosstalkTest};
-pub use examine::examine;
+pub use examine::{examine, example_of, is_enough};
 pub use traces::{ChannelTrace, ChannelTraces};
 pub use wiring::{SKETCH, SketchError, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};
 
+use crate::protocol::ConsoleLine;
 use crate::serial::{LinkStatus, PortError, PortInfo};
 use serde::Serialize;
 
@@ -24,10 +28,12 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckStatus {
-    /// Not possible: an earlier check failed, or nothing moved.
+    /// It says nothing of this board or file.
     Skipped,
     /// Nothing is wrong.
     Passed,
+    /// What it needs was not seen: no readings, too few, or nothing moved.
+    NotChecked,
     /// Worth knowing.
     Note,
     /// Something is wrong.
@@ -40,6 +46,7 @@ impl CheckStatus {
         match self {
             Self::Skipped => "skipped",
             Self::Passed => "ok",
+            Self::NotChecked => "not checked",
             Self::Note => "note",
             Self::Failed => "FAILED",
         }
@@ -78,6 +85,8 @@ pub struct Observations {
     pub listened_s: f64,
     /// Readings, summed up per channel.
     pub traces: ChannelTraces,
+    /// A line that could not be read, or the newest one.
+    pub example: Option<ConsoleLine>,
 }
 
 /// Default duration (s): enough to bend a finger and press each pad.
@@ -88,10 +97,19 @@ pub fn is_sound(found: &[CheckFinding]) -> bool {
     found.iter().all(|finding| finding.verdict != CheckStatus::Failed)
 }
 
-/// Summary in a sentence.
+/// Names of the checks that did not see what they need.
+pub fn not_checked(found: &[CheckFinding]) -> Vec<&'static str> {
+    let unseen = found.iter().filter(|finding| finding.verdict == CheckStatus::NotChecked);
+    unseen.map(|finding| finding.check).collect()
+}
+
+/// Summary in a sentence. It says "no faults found" only where every check saw what it needs.
 pub fn summary(found: &[CheckFinding]) -> String {
     match found.iter().filter(|finding| finding.verdict == CheckStatus::Failed).count() {
-        0 => "no faults found".to_owned(),
+        0 => match not_checked(found).as_slice() {
+            [] => "no faults found".to_owned(),
+            unseen => format!("no fault in what was seen, but not checked: {}", unseen.join(", ")),
+        },
         1 => "1 fault found".to_owned(),
         more => format!("{more} faults found"),
     }

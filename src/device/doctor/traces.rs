@@ -1,4 +1,5 @@
-//! Range of each channel, and how much it follows the channel that is converted before it.
+//! Range of each channel, whether it stands still while others move, and how much it follows the channel that is converted
+//! before it.
 
 use palpate_tactile::board::Reading;
 
@@ -22,6 +23,13 @@ pub struct ChannelTrace {
     pub least: f64,
     /// Largest count.
     pub most: f64,
+    /// Some counts had decimals.
+    pub decimals: bool,
+    /// Newest count, and the time (s) since which it is exactly that.
+    still: Option<[f64; 2]>,
+    /// Count from which movement is measured, and when it last moved (s).
+    rested: Option<f64>,
+    moved_s: f64,
     /// Least count over the count of the channel before it at that time.
     least_share: f64,
     /// Time (s), count of the channel before, and own count, from which changes are counted.
@@ -32,8 +40,19 @@ pub struct ChannelTrace {
 
 impl Default for ChannelTrace {
     fn default() -> Self {
-        let (least, most) = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { numbers: 0, without: 0, least, most, least_share: 0.0, from: None, slopes: Vec::new() }
+        Self {
+            numbers: 0,
+            without: 0,
+            least: f64::INFINITY,
+            most: f64::NEG_INFINITY,
+            decimals: false,
+            still: None,
+            rested: None,
+            moved_s: f64::NEG_INFINITY,
+            least_share: 0.0,
+            from: None,
+            slopes: Vec::new(),
+        }
     }
 }
 
@@ -41,10 +60,17 @@ impl ChannelTrace {
     fn add(&mut self, t: f64, count: Option<f32>, before: Option<f32>) {
         let Some(y) = count.map(f64::from) else {
             self.without += 1;
-            self.from = None;
+            (self.from, self.still) = (None, None);
             return;
         };
         self.numbers += 1;
+        self.decimals |= y.fract() != 0.0;
+        if self.still.is_none_or(|[count, _]| count != y) {
+            self.still = Some([y, t]);
+        }
+        if (y - *self.rested.get_or_insert(y)).abs() > MOVES {
+            (self.rested, self.moved_s) = (Some(y), t);
+        }
         self.most = self.most.max(y);
         let is_least = y < self.least;
         self.least = self.least.min(y);
@@ -60,6 +86,16 @@ impl ChannelTrace {
         if moved || t - since >= WITHIN_S {
             self.from = Some([t, x, y]);
         }
+    }
+
+    /// Difference of its largest and least count.
+    pub fn range(&self) -> f64 {
+        (self.most - self.least).max(0.0)
+    }
+
+    /// True where it moved by more than noise.
+    pub fn moves(&self) -> bool {
+        self.range() > MOVES
     }
 
     /// Share of the channel before that it follows, if it does: at its least it reads that share, and at times, when the
@@ -82,17 +118,46 @@ const FEWEST: usize = 4;
 pub struct ChannelTraces {
     /// One for each.
     pub channels: Vec<ChannelTrace>,
+    /// Times of the first and the newest reading, and of their arrival (s).
+    span: Option<[[f64; 2]; 2]>,
 }
+
+/// A channel that has stayed at this count for so long (s) counts as stuck, where others moved meanwhile: noise moves every
+/// converter by a count.
+const STUCK_S: f64 = 1.0;
+/// It must be this share of the time, too: a strip at rest beside one that moves may be quiet.
+const STUCK_SHARE: f64 = 2.0 / 3.0;
 
 impl ChannelTraces {
     /// Takes in a reading.
     pub fn add(&mut self, reading: &Reading) {
+        let now = [reading.t_s, reading.arrived_s];
+        self.span.get_or_insert([now; 2])[1] = now;
         let width = reading.counts.len();
         self.channels.resize(self.channels.len().max(width), ChannelTrace::default());
         for (channel, trace) in self.channels.iter_mut().enumerate().take(width) {
             let before = channel.checked_sub(1).and_then(|before| reading.counts[before]);
             trace.add(reading.t_s, reading.counts[channel], before);
         }
+    }
+
+    /// The first reading's time to the newest's (s).
+    pub fn seconds(&self) -> f64 {
+        self.span.map_or(0.0, |[first, newest]| newest[0] - first[0])
+    }
+
+    /// The same by their arrival (s).
+    pub fn arrived_within_s(&self) -> f64 {
+        self.span.map_or(0.0, |[first, newest]| newest[1] - first[1])
+    }
+
+    /// Count at which a channel has stood still, and for how long (s), while others moved.
+    pub fn stuck(&self, channel: usize) -> Option<[f64; 2]> {
+        let [count, since] = self.channels.get(channel)?.still?;
+        let lasted = self.span?[1][0] - since;
+        let moved = |(other, trace): (usize, &ChannelTrace)| other != channel && trace.moved_s > since;
+        let long = lasted >= STUCK_S.max(STUCK_SHARE * self.seconds());
+        (long && self.channels.iter().enumerate().any(moved)).then_some([count, lasted])
     }
 }
 
@@ -102,8 +167,14 @@ mod tests {
 
     fn traces(rows: impl Iterator<Item = [Option<f32>; 3]>) -> ChannelTraces {
         let mut traces = ChannelTraces::default();
-        for counts in rows {
-            let reading = Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts: counts.to_vec(), line_bar: None };
+        for (k, counts) in (0u16..).zip(rows) {
+            let reading = Reading {
+                t_s: 0.02 * f64::from(k),
+                arrived_s: 0.0,
+                seq: None,
+                counts: counts.to_vec(),
+                line_bar: None,
+            };
             traces.add(&reading);
         }
         traces
@@ -128,6 +199,21 @@ mod tests {
         assert_eq!((found.channels[1].takes(), found.channels[2].takes()), (None, None));
         let closing = traces((0..100_u8).map(|k| [Some(bent(k)), Some(200.0 + 2.0 * bent(k)), None]));
         assert_eq!(closing.channels[1].takes(), Some(2.2), "what no multiplexer does is left to the check");
+    }
+
+    #[test]
+    fn a_channel_that_stands_still_while_another_moves_is_stuck() {
+        let still = |from: u8, step: f32| {
+            let own = |k: u8| if k < from { 1400.0 + f32::from(k % 2) } else { 1433.0 };
+            traces((0..200_u8).map(|k| [Some(1000.0 + step * f32::from(k)), Some(own(k)), None])).stuck(1)
+        };
+        let [count, seconds] = still(0, 5.0).expect("it is");
+        assert!(count == 1433.0 && (seconds - 3.98).abs() < 1e-9, "{seconds}");
+        assert!(still(50, 5.0).is_some_and(|[_, seconds]| (seconds - 2.98).abs() < 1e-9), "stuck from some moment on");
+        assert_eq!(still(150, 5.0), None, "it may rest");
+        assert_eq!(still(0, 0.1), None, "nothing moved");
+        let alive = traces((0..200_u8).map(|k| [Some(5.0 * f32::from(k)), Some(1433.0 + f32::from(k % 2)), None]));
+        assert_eq!((alive.stuck(1), alive.stuck(0), alive.stuck(2)), (None, None, None));
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub(super) struct Meter {
     lost: u64,
     bad_lines: u64,
     gaps: u64,
+    restarts: u64,
+    bytes: u64,
     steps: VecDeque<Step>,
     bins: VecDeque<Bin>,
     troubled: bool,
@@ -70,7 +72,7 @@ impl Meter {
     /// Forgets unreadable lines from before the first reading: they came at another baud rate.
     pub(super) fn forget_start(&mut self) {
         if self.samples == 0 {
-            *self = Self::default();
+            *self = Self { bytes: self.bytes, ..Self::default() };
         }
     }
 
@@ -79,8 +81,13 @@ impl Meter {
         self.lost = self.lost.saturating_add(lost.unwrap_or(0));
     }
 
+    pub(super) fn restart(&mut self) {
+        self.restarts += 1;
+    }
+
     pub(super) fn bytes(&mut self, bytes: &[u8], arrived_s: f64) {
         let printable = bytes.iter().filter(|b| b.is_ascii_graphic() || b" \t\r\n".contains(b)).count();
+        self.bytes += bytes.len() as u64;
         let bin = self.bin(arrived_s);
         bin.bytes += bytes.len() as u64;
         bin.printable += printable as u64;
@@ -129,6 +136,8 @@ impl Meter {
             lost: self.lost,
             bad_lines: self.bad_lines,
             gaps: self.gaps,
+            restarts: self.restarts,
+            bytes: self.bytes,
             rate_hz: self.rate(),
             jitter_p95_ms: self.jitter() * 1e3,
             delay_p95_ms: percentile_95(self.steps.iter().map(|step| step.delay_s).collect()) * 1e3,

@@ -333,6 +333,10 @@ impl Reader {
     fn report_gap(&mut self, stamp: &Stamp, events: &mut Vec<DecodedEvent>) {
         let unreadable = std::mem::take(&mut self.unreadable);
         let broken = self.broken.take();
+        // After an interruption it was given power anew.
+        if stamp.restarted && broken.is_none() {
+            self.meter.restart();
+        }
         let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
         let cause = match (broken, stamp.restarted, unreadable) {
             (Some(cause), true, _) => format!("{cause}; the board restarted"),

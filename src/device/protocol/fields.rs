@@ -175,6 +175,10 @@ pub(super) fn names_a_sensor(names: &[String]) -> bool {
 fn json(text: &str) -> Result<Fields, &'static str> {
     let members: serde_json::Map<String, serde_json::Value> =
         serde_json::from_str(text).map_err(|_not_json| "not a JSON object of numbers")?;
+    let nested = |value: &serde_json::Value| value.is_array() || value.is_object();
+    if members.values().any(nested) && !members.values().any(serde_json::Value::is_number) {
+        return Err("nested values: each number needs a name of its own");
+    }
     let mut fields = Fields::new();
     for (name, value) in &members {
         add(&mut fields, name, value.as_f64().filter(|value| value.is_finite()))?;
@@ -269,6 +273,7 @@ mod tests {
             ">flexL:512",
             "512,498 N",
             r#"{"flexL":512,"#,
+            r#"{"flex":[512,498]}"#,
             "[1,2]",
             "512,4 98",
             "512,5l2",

@@ -95,10 +95,13 @@ impl LinkStatus {
                     Some(format!("{name} is at full scale: the strip or one of its wires is disconnected"))
                 }
                 (Some(Saturation::Low), true) => Some(format!("{name} reads zero: the strip is shorted, or its divider has no supply")),
-                (Some(Saturation::High), false) => Some(format!(
-                    "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
-                     ground that is missing or too large"
-                )),
+                // Other channels, such as the limits of a plot, need not come from the converter.
+                (Some(Saturation::High), false) => sensor.map(|_| {
+                    format!(
+                        "{name} is saturated: more than it can measure, a divider on 5 V instead of 3.3 V, or a resistor to \
+                         ground that is missing or too large"
+                    )
+                }),
                 (Some(Saturation::NoNumber), _) => sensor.map(|_| {
                     format!("{name} has no numbers: an open circuit as the sketch sees it; look at its lines in the console")
                 }),
@@ -254,7 +257,7 @@ impl Drop for SerialLink {
 }
 
 /// True for a file of bytes; ports are devices.
-fn is_capture(path: &Path) -> bool {
+pub(crate) fn is_capture(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|metadata| metadata.is_file())
 }
 

@@ -13,6 +13,7 @@ mod scan;
 mod shared;
 
 pub use baud::{Baud, BaudError};
+pub(crate) use link::is_capture;
 pub use link::{LinkStatus, SendError, SerialLink};
 pub use port_error::{ACCESS_RULE, MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};

@@ -149,13 +149,8 @@ impl BoardWriter {
         self.about.course.reconnects = status.reconnects - reconnects;
         self.about.course.detected.clone_from(&status.detected);
         self.about.seconds = self.newest_s.map_or(0.0, |newest| (newest - self.about.course.began_s).max(0.0));
-        self.about.course.cadence = Cadence {
-            samples: self.samples,
-            lost: self.lost,
-            gaps: self.gaps,
-            bad_lines: status.cadence.bad_lines.saturating_sub(before.bad_lines),
-            ..status.cadence.clone()
-        };
+        self.about.course.cadence =
+            Cadence { samples: self.samples, lost: self.lost, gaps: self.gaps, ..status.cadence.since(before) };
         self.judge(store)?;
         let mut warnings = self.warnings(status);
         warnings.extend_from_slice(notes);
@@ -206,9 +201,16 @@ impl BoardWriter {
         if cadence.samples == 0 {
             warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
         }
-        let (lost, gaps) = (cadence.lost, cadence.gaps);
-        if gaps > 0 {
+        let Cadence { lost, gaps, restarts, .. } = *cadence;
+        if restarts > 0 {
+            warnings.push(format!(
+                "the board restarted {restarts} time(s), and what it took meanwhile is missing: check its supply and its cable"
+            ));
+        }
+        if lost > 0 {
             warnings.push(format!("{lost} reading(s) are missing for certain, in {gaps} gap(s)"));
+        } else if gaps > restarts {
+            warnings.push(format!("readings are missing in {} gap(s), how many is not known", gaps - restarts));
         }
         warnings.extend(status.wiring_remarks());
         let assumed = Sensor::ALL.iter().any(|sensor| self.about.course.board.channel_of(*sensor).is_none());

@@ -1,7 +1,8 @@
 //! Observation of the board for diagnostics, through the link that the gripper thread already holds: a port cannot be
 //! opened twice.
 
-use palpate_device::doctor::{ChannelTraces, Observations};
+use crate::gripper::BoardStream;
+use palpate_device::doctor::{ChannelTraces, Observations, example_of, is_enough};
 use palpate_device::serial::{LinkStatus, is_running, list_ports};
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
@@ -29,12 +30,14 @@ impl ObserveRequest {
 pub(super) struct Observing {
     request: ObserveRequest,
     began: Instant,
+    /// The link by then: what came before is not part of it.
+    before: LinkStatus,
     traces: ChannelTraces,
 }
 
 impl Observing {
-    pub(super) fn new(request: ObserveRequest) -> Self {
-        Self { request, began: Instant::now(), traces: ChannelTraces::default() }
+    pub(super) fn new(request: ObserveRequest, before: LinkStatus) -> Self {
+        Self { request, began: Instant::now(), before, traces: ChannelTraces::default() }
     }
 
     pub(super) fn add(&mut self, reading: &Reading) {
@@ -43,11 +46,15 @@ impl Observing {
 
     /// True when the time is over or the requester stopped it.
     pub(super) fn is_over(&self) -> bool {
-        self.request.stop.load(Ordering::Relaxed) || self.began.elapsed().as_secs_f64() >= self.request.seconds
+        let waited_s = self.began.elapsed().as_secs_f64();
+        self.request.stop.load(Ordering::Relaxed) || is_enough(&self.traces, waited_s, self.request.seconds)
     }
 
     /// Sends the result to the requester.
-    pub(super) fn finish(self, link: LinkStatus) {
+    pub(super) fn finish(self, stream: &dyn BoardStream) {
+        let mut link = stream.status();
+        link.cadence = link.cadence.since(&self.before.cadence);
+        link.reconnects = link.reconnects.saturating_sub(self.before.reconnects);
         let observations = Observations {
             ports: list_ports(),
             refused: None,
@@ -55,6 +62,7 @@ impl Observing {
             link: Some(link),
             listened_s: self.began.elapsed().as_secs_f64(),
             traces: self.traces,
+            example: example_of(&stream.console()),
         };
         // The requester may have ended.
         let _sent = self.request.observed.send(observations);

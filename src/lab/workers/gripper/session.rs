@@ -238,11 +238,11 @@ impl GripperSession {
             GripperCommand::Watch(request) => self.set_watching(request),
             GripperCommand::End => self.end(false, None),
             GripperCommand::Discard => self.end(true, None),
-            GripperCommand::Observe(request) if self.connection.is_some() => {
-                self.observing.push(Observing::new(request));
+            // Without a connection the requester notices that its channel closed and opens the port directly.
+            GripperCommand::Observe(request) => {
+                let status = self.connection.as_ref().map(|connection| connection.gripper.stream().status());
+                self.observing.extend(status.map(|status| Observing::new(request, status)));
             }
-            // The requester notices that its channel closed and opens the port directly.
-            GripperCommand::Observe(_) => {}
             GripperCommand::Calibrate(command) => self.calibrate(&command),
             GripperCommand::Crosstalk(command) => self.look_for_crosstalk(command),
             GripperCommand::Quit => {}
@@ -346,7 +346,7 @@ impl GripperSession {
     fn end_observations(&mut self) {
         let Some(connection) = &self.connection else { return };
         for observing in self.observing.extract_if(.., |observing| observing.is_over()) {
-            observing.finish(connection.gripper.stream().status());
+            observing.finish(connection.gripper.stream());
         }
     }
 
