@@ -8,9 +8,8 @@ use palpate_lab::workers::Wake;
 use palpate_render::{
     DriverChoice, FigureError, Gpu, GpuError, Picture, PictureError, Renderer, figure_picture, figure_svg,
 };
-use palpate_store::{NewFile, Store, StoreError};
+use palpate_store::{FileKind, Store, StoreError, write_whole};
 use palpate_tactile::trial::TrialId;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,13 +68,14 @@ pub enum FileExportError {
 impl ExportRequest {
     /// Writes it; the file appears whole or not at all. `stop` ends an export of trials.
     pub fn write(self, path: &Path, stop: &AtomicBool) -> Result<(), FileExportError> {
-        let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
+        let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
+        let is = |wanted: FileKind| kind == Some(wanted);
         let unknown = |known: &'static str| FileExportError::UnknownFormat { path: path.to_owned(), known };
         let bytes = match self {
-            Self::Figure(figure, theme, size) if is("svg") => figure_svg(&figure, theme, size)?.into_bytes(),
-            Self::Figure(figure, theme, size) if is("png") => figure_picture(&figure, theme, size)?.to_png()?,
+            Self::Figure(figure, theme, size) if is(FileKind::Svg) => figure_svg(&figure, theme, size)?.into_bytes(),
+            Self::Figure(figure, theme, size) if is(FileKind::Png) => figure_picture(&figure, theme, size)?.to_png()?,
             Self::Figure(..) => return Err(unknown("an .svg or a .png file")),
-            Self::View3d(list, size) if is("png") => {
+            Self::View3d(list, size) if is(FileKind::Png) => {
                 let gpu = Gpu::headless(DriverChoice::Any)?;
                 let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
                 Picture::draw(&gpu, &mut renderer, &list, size.map(|side| 2 * side), 2.0)?.to_png()?
@@ -87,12 +87,8 @@ impl ExportRequest {
                 return Ok(());
             }
         };
-        let write = || {
-            let mut file = NewFile::create(path)?;
-            file.write_all(&bytes)?;
-            file.finish()
-        };
-        write().map_err(|e: std::io::Error| FileExportError::Write { path: path.to_owned(), cause: e.to_string() })
+        write_whole(path, kind.unwrap_or(FileKind::Png), &bytes)
+            .map_err(|e| FileExportError::Write { path: path.to_owned(), cause: e.to_string() })
     }
 }
 

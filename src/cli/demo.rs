@@ -4,7 +4,7 @@
 mod real;
 
 use super::Failure;
-use super::output::make_folder;
+use super::output::{file_or_folder, make_folder, write_new};
 use super::recognise::{StageOne, load_model, named, warn_unless_learned};
 use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
@@ -21,7 +21,7 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
-use palpate_store::{Stored, file_name_of};
+use palpate_store::{FileKind, Stored, file_name_of};
 use palpate_tactile::Channel;
 use palpate_tactile::trial::{SimulatedTrial, TrialId};
 use rand::{RngExt, SeedableRng};
@@ -71,7 +71,7 @@ pub(super) struct DemoArguments {
     #[arg(long, conflicts_with = "as_released")]
     guided: bool,
     /// Folder for the pictures.
-    #[arg(long, value_name = "FOLDER", default_value = "palpate-demo")]
+    #[arg(long, value_name = "FOLDER", default_value = "palpate-demo", value_parser = file_or_folder(&[]))]
     out: PathBuf,
     /// Write no pictures.
     #[arg(long)]
@@ -422,7 +422,7 @@ impl Painter {
             ..PictureView::default()
         };
         let list = stage.draw(frame, &view);
-        Picture::draw(&self.gpu, &mut self.renderer, &list, SIZE, 1.0)?.save(path)?;
-        Ok(())
+        let picture = Picture::draw(&self.gpu, &mut self.renderer, &list, SIZE, 1.0)?;
+        write_new(path, FileKind::Png, &picture.to_png()?)
     }
 }

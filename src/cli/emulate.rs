@@ -1,6 +1,7 @@
 //! `palpate emulate`: emulates the gripper on a pseudo-terminal. Unix only.
 
 use super::Failure;
+use super::output::file_of;
 use super::setup::{SceneArguments, within};
 use super::terminal::{say, say_json};
 use palpate_device::emulator::{
@@ -9,6 +10,7 @@ use palpate_device::emulator::{
 #[cfg(unix)]
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
 use palpate_sim::objects::{anchored, catalogue};
+use palpate_store::FileKind;
 use std::path::PathBuf;
 
 /// Arguments of `palpate emulate`.
@@ -67,7 +69,7 @@ pub(super) struct EmulateArguments {
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = within(0.01..=100.0))]
     speed: f64,
     /// Write every line of the board to FILE, before any fault corrupts it.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.txt", value_parser = file_of(&[FileKind::BoardLines]))]
     sent: Option<PathBuf>,
     /// Print events as JSON, one object per line.
     #[arg(long)]
@@ -179,7 +181,11 @@ fn emulate(arguments: &EmulateArguments, mut gripper: EmulatedGripper) -> Result
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
     let stop = super::interrupt::stop_flag()?;
     let typed = (arguments.script.as_deref() == Some("-")).then(typed_steps);
-    let mut sent = arguments.sent.as_ref().map(std::fs::File::create).transpose()?;
+    let begun = |path: &std::path::PathBuf| {
+        let file = palpate_store::NewFile::create(path, FileKind::BoardLines).and_then(palpate_store::NewFile::appear);
+        file.map_err(|cause| super::output::cannot(path, &cause))
+    };
+    let mut sent = arguments.sent.as_ref().map(begun).transpose()?;
     let mut greeting = (!arguments.json).then(|| {
         let link = link.display();
         format!("emulated gripper at {link} until Ctrl+C; try: palpate doctor {link}")

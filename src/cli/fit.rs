@@ -1,11 +1,12 @@
 //! `palpate fit`: estimates stiffness, damping, torque curve and lag of a real finger from recorded grasps.
 
 use super::Failure;
+use super::output::{check_new, file_of, write_new};
 use super::setup::{SceneArguments, read_store};
 use super::terminal::{say, say_json, table, warn};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{FingerFit, Known, RecordedGrasps, fit_finger};
-use palpate_store::CalibrationId;
+use palpate_store::{CalibrationId, FileKind};
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ pub(super) struct FitArguments {
     #[arg(long, value_name = "PERCENT")]
     pad_gain: Option<f64>,
     /// Scene file to write, with the fitted gripper.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[FileKind::Scene]))]
     out: Option<PathBuf>,
     /// Print JSON instead of text.
     #[arg(long)]
@@ -47,6 +48,9 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), Failure> {
+    if let Some(path) = &arguments.out {
+        check_new(path, FileKind::Scene)?;
+    }
     let store = read_store(store)?;
     // Only the gripper of the scene is used.
     let scene = arguments.scene.any_given().then(|| arguments.scene.scene(None)).transpose()?;
@@ -69,7 +73,7 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
     if let Some(path) = &arguments.out {
         let mut scene = observations[0].scene.clone();
         scene.gripper = fit.gripper.clone();
-        std::fs::write(path, scene.to_toml()).map_err(|e| format!("cannot write \"{}\": {e}", path.display()))?;
+        write_new(path, FileKind::Scene, scene.to_toml().as_bytes())?;
     }
     if arguments.json {
         return say_json(&Report { fit, trials: arguments.trials.clone() });

@@ -1,6 +1,7 @@
 //! `palpate grasp`: simulates one grasp, prints a summary, stores the trial, writes it as CSV.
 
 use super::Failure;
+use super::output::{check_replaced, file_of};
 use super::setup::{RecomputeArguments, SceneArguments, SignalArguments, open_store};
 use super::terminal::{say, say_json, warn};
 use palpate_geometry::units::{mm, three_digits};
@@ -9,7 +10,7 @@ use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
-use palpate_store::{Stored, contacts_path, write_contacts_csv, write_trial_csv};
+use palpate_store::{FileKind, Stored, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Sensors, SignalDefinition};
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub(super) struct GraspArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     seed: Option<u64>,
     /// CSV file to write; the contacts go to a second file, .contacts.csv.
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", value_parser = file_of(&[FileKind::Csv]))]
     out: Option<PathBuf>,
     #[command(flatten)]
     signals: SignalArguments,
@@ -84,6 +85,10 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     }
     let layout = arguments.signals.view().shown()?;
     let sensors = Sensors::new(&layout, &nominal.gripper, arguments.signals.signals)?;
+    if let Some(path) = &arguments.out {
+        check_replaced(path, FileKind::Csv)?;
+        check_replaced(&contacts_path(path), FileKind::Contacts)?;
+    }
     let loading = cpu_time::ProcessTime::now();
     let object = nominal.load_object()?;
     let load_cpu_ms = loading.elapsed().as_secs_f64() * 1e3;

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::interrupt::stop_flag;
-use super::output::{TemporaryFolder, check_folder};
+use super::output::{TemporaryFolder, cannot, check_folder, check_replaced, file_or_folder};
 use super::setup::{read_store, within};
 use super::snapshot::{OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
 use super::terminal::{note, say};
@@ -14,7 +14,7 @@ use palpate_lab::inspection::OpenTrial;
 use palpate_lab::picture::PictureView;
 use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
 use palpate_sim::scene::Scene;
-use palpate_store::{NewFile, unfinished};
+use palpate_store::{FileKind, NewFile, NewFolder};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -65,7 +65,7 @@ pub(super) struct MovieArguments {
     #[arg(long)]
     bare: bool,
     /// File to write (.apng, .png or .gif), or a folder for one PNG file per picture.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", value_parser = file_or_folder(KINDS))]
     out: PathBuf,
 }
 
@@ -87,7 +87,6 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let mut writer = Writer::begin(&target, out, arguments, times.len())?;
     for (number, t_s) in times.iter().enumerate() {
         if stop.load(Ordering::Relaxed) {
-            writer.give_up();
             return Err("stopped; nothing was written".into());
         }
         writer.add(number, &shot.picture(*t_s)?)?;
@@ -112,16 +111,12 @@ fn film(arguments: &MovieArguments, target: &Target) -> Result<(), Failure> {
     };
     let stop = stop_flag()?;
     let mut writer = Writer::begin(target, out, arguments, pictures)?;
-    let filmed = film_presentation(&window, pictures, step_s, |number, picture| -> Result<(), Failure> {
+    film_presentation(&window, pictures, step_s, |number, picture| -> Result<(), Failure> {
         if stop.load(Ordering::Relaxed) {
             return Err("stopped; nothing was written".into());
         }
         writer.add(number, picture)
-    });
-    if let Err(cause) = filmed {
-        writer.give_up();
-        return Err(cause);
-    }
+    })?;
     end(writer, out, pictures)
 }
 
@@ -193,36 +188,31 @@ impl Shot<'_> {
     }
 }
 
+/// Kinds of movies in one file.
+const KINDS: &[FileKind] = &[FileKind::Apng, FileKind::Gif];
+
 /// Where pictures go.
 enum Target {
-    File(MovieFormat),
+    File(FileKind, MovieFormat),
     Folder,
 }
 
 impl Target {
     fn of(out: &Path) -> Result<Self, Failure> {
-        let extension = out.extension().map(|extension| extension.to_ascii_lowercase());
-        let target = match extension.as_ref().and_then(|extension| extension.to_str()) {
-            Some("apng" | "png") => Self::File(MovieFormat::Apng),
-            Some("gif") => Self::File(MovieFormat::Gif),
-            None => Self::Folder,
-            Some(other) => {
-                let text = format!("no movie format \".{other}\": choose .apng, .gif, or a folder for PNG files");
-                return Err(text.into());
-            }
-        };
         check_folder(out)?;
         if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(format!("\"{}\" is not empty; choose an empty or new folder", out.display()).into());
         }
-        Ok(target)
+        let Some(kind) = FileKind::of(out, KINDS).filter(|_| !out.is_dir()) else { return Ok(Self::Folder) };
+        check_replaced(out, kind)?;
+        Ok(Self::File(kind, if kind == FileKind::Gif { MovieFormat::Gif } else { MovieFormat::Apng }))
     }
 }
 
 /// Writes pictures; what is not finished leaves nothing.
 enum Writer {
     File { movie: MovieWriter<SharedFile>, file: SharedFile },
-    Folder(PathBuf),
+    Folder(NewFolder),
 }
 
 /// The file of a movie, which its encoder writes to and which gets its name at the end.
@@ -241,56 +231,35 @@ impl std::io::Write for SharedFile {
 
 impl Writer {
     fn begin(target: &Target, out: &Path, arguments: &MovieArguments, pictures: usize) -> Result<Self, Failure> {
-        let failed =
-            |cause: std::io::Error| -> Failure { format!("cannot write \"{}\": {cause}", out.display()).into() };
         match target {
-            Target::File(format) => {
-                let file = NewFile::create(out).map_err(failed)?;
+            Target::File(kind, format) => {
+                let file = NewFile::create(out, *kind).map_err(|cause| cannot(out, &cause))?;
                 let file = SharedFile(std::rc::Rc::new(std::cell::RefCell::new(file)));
                 let movie = MovieWriter::new(file.clone(), *format, arguments.size, pictures as u32, arguments.fps)?;
                 Ok(Self::File { movie, file })
             }
-            Target::Folder => {
-                let folder = unfinished(out);
-                std::fs::create_dir_all(&folder).map_err(failed)?;
-                Ok(Self::Folder(folder))
-            }
+            Target::Folder => Ok(Self::Folder(NewFolder::create(out).map_err(|cause| cannot(out, &cause))?)),
         }
     }
 
     fn add(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
-        let written = match self {
-            Self::File { movie, .. } => movie.add(picture).map_err(Failure::from),
+        match self {
+            Self::File { movie, .. } => Ok(movie.add(picture)?),
             Self::Folder(folder) => {
-                picture.save(&folder.join(format!("frame_{:05}.png", number + 1))).map_err(Failure::from)
+                let path = folder.unfinished().join(format!("frame_{:05}.png", number + 1));
+                std::fs::write(&path, picture.to_png()?).map_err(|cause| cannot(&path, &cause))
             }
-        };
-        written.inspect_err(|_cause| self.give_up())
-    }
-
-    /// Removes the pictures so far. A file removes itself.
-    fn give_up(&self) {
-        if let Self::Folder(folder) = self {
-            // Nothing more can be done about remains that cannot be removed.
-            let _gone = std::fs::remove_dir_all(folder);
         }
     }
 
     fn finish(self, out: &Path) -> Result<(), Failure> {
-        let failed =
-            |cause: std::io::Error| -> Failure { format!("cannot write \"{}\": {cause}", out.display()).into() };
-        match self {
+        let finished = match self {
             Self::File { movie, file } => {
                 movie.finish()?;
-                let file = std::rc::Rc::into_inner(file.0).ok_or("the movie is still being written")?;
-                file.into_inner().finish().map_err(failed)
+                std::rc::Rc::into_inner(file.0).ok_or("the movie is still being written")?.into_inner().finish()
             }
-            Self::Folder(folder) => {
-                if out.is_dir() {
-                    std::fs::remove_dir(out).map_err(failed)?;
-                }
-                std::fs::rename(&folder, out).map_err(failed)
-            }
-        }
+            Self::Folder(folder) => folder.finish(),
+        };
+        finished.map_err(|cause| cannot(out, &cause))
     }
 }

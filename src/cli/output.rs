@@ -1,19 +1,70 @@
 //! Files that commands write: whole or not at all, into folders that exist.
 
 use super::Failure;
-use palpate_store::NewFile;
-use std::io::Write as _;
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use palpate_lab::exchange::FORMATS;
+use palpate_store::{FileKind, check_target, write_whole};
 use std::path::{Path, PathBuf};
 
 /// Writes a file.
-pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let write = || {
-        let mut file = NewFile::create(path)?;
-        file.write_all(bytes)?;
-        file.finish()
-    };
+pub(super) fn write_new(path: &Path, kind: FileKind, bytes: &[u8]) -> Result<(), Failure> {
+    write_whole(path, kind, bytes).map_err(|cause| cannot(path, &cause))
+}
+
+/// Failure to write a file or folder.
+pub(super) fn cannot(path: &Path, cause: &std::io::Error) -> Failure {
+    format!("cannot write \"{}\": {cause}", path.display()).into()
+}
+
+/// Parser of the name of a file to write, whose ending stands for one of these kinds.
+pub(super) fn file_of(kinds: &'static [FileKind]) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| checked(path, kinds, false))
+}
+
+/// Parser of the name of a file of one of these kinds, or of a folder.
+pub(super) fn file_or_folder(kinds: &'static [FileKind]) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| checked(path, kinds, true))
+}
+
+/// Parser of the name of a file or folder for trials.
+pub(super) fn trials_target() -> impl TypedValueParser<Value = PathBuf> {
+    let kinds: Vec<FileKind> = std::iter::once(FileKind::Csv).chain(FORMATS.iter().map(|format| format.kind)).collect();
+    PathBufValueParser::new().try_map(move |path| {
+        let is_parquet = FileKind::of(&path, &[FileKind::Parquet]).is_some();
+        let checked = checked(path, &kinds, true);
+        let built = "this build writes no Parquet; build with --features parquet, or";
+        checked.map_err(|why| if is_parquet { format!("{built} {}", why.trim_start_matches(UNKNOWN)) } else { why })
+    })
+}
+
+const UNKNOWN: &str = "no format has this ending; ";
+
+/// Refuses a name with an ending that none of the kinds has. A folder's name has none, unless the folder exists.
+fn checked(path: PathBuf, kinds: &[FileKind], folder: bool) -> Result<PathBuf, String> {
+    if FileKind::of(&path, kinds).is_some() || (folder && names_folder(&path)) {
+        return Ok(path);
+    }
+    let mut choices: Vec<String> =
+        kinds.iter().flat_map(|kind| kind.endings()).map(|ending| format!(".{ending}")).collect();
+    choices.dedup();
+    choices.extend(folder.then(|| "a folder, whose name has no ending".to_owned()));
+    Err(format!("{UNKNOWN}choose {}", choices.join(", ")))
+}
+
+/// True for a name without ending, and for that of a folder.
+pub(super) fn names_folder(path: &Path) -> bool {
+    path.extension().is_none() || path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/")
+}
+
+/// Refuses, before any work is done for it, a path in a folder that does not exist, or in the place of something else.
+pub(super) fn check_new(path: &Path, kind: FileKind) -> Result<(), Failure> {
     check_folder(path)?;
-    write().map_err(|cause: std::io::Error| format!("cannot write \"{}\": {cause}", path.display()).into())
+    check_replaced(path, kind)
+}
+
+/// Refuses a path in the place of something else.
+pub(super) fn check_replaced(path: &Path, kind: FileKind) -> Result<(), Failure> {
+    check_target(path, kind).map_err(|cause| cannot(path, &cause))
 }
 
 /// Makes a folder that the user named for files, but not the folders above it.

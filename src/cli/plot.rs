@@ -1,13 +1,14 @@
 //! `palpate plot`: figures of stored trials, as SVG or PNG.
 
 use super::Failure;
-use super::output::check_folder;
+use super::output::{check_new, file_of};
 use super::setup::{SignalArguments, read_store};
 use super::snapshot::{parse_size, parse_theme};
 use super::terminal::say;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
+use palpate_store::FileKind;
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -50,9 +51,12 @@ pub(super) struct PlotArguments {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
     /// File to write: .svg or .png.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file_of(KINDS))]
     out: PathBuf,
 }
+
+/// Kinds of figures.
+const KINDS: &[FileKind] = &[FileKind::Svg, FileKind::Png];
 
 fn parse_align(text: &str) -> Result<Alignment, String> {
     let found = Alignment::ALL.into_iter().find(|align| align.name() == text);
@@ -69,10 +73,7 @@ fn parse_heat(text: &str) -> Result<HeatKind, String> {
 
 pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(), Failure> {
     let out = &arguments.out;
-    if !out.extension().is_some_and(|own| ["svg", "png"].iter().any(|known| own.eq_ignore_ascii_case(known))) {
-        return Err(format!("cannot write \"{}\": choose an .svg or a .png file", out.display()).into());
-    }
-    check_folder(out)?;
+    check_new(out, FileKind::of(out, KINDS).unwrap_or(FileKind::Svg))?;
     let sensors = arguments.signals.view();
     sensors.learnt()?;
     let store = read_store(store)?;

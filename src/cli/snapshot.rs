@@ -1,7 +1,7 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
 use super::Failure;
-use super::output::{TemporaryFolder, check_folder, write_new};
+use super::output::{TemporaryFolder, check_new, file_of, write_new};
 use super::setup::{SceneArguments, read_store, store_path};
 use super::terminal::{note, say};
 use crate::app::{Mode, OffscreenWindow, window_picture};
@@ -13,7 +13,7 @@ use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
-use palpate_store::Store;
+use palpate_store::{FileKind, Store};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,7 +63,7 @@ pub(super) struct SnapshotArguments {
     #[arg(long)]
     bare: bool,
     /// PNG file to write.
-    #[arg(long, value_name = "FILE.png", required_unless_present = "compare")]
+    #[arg(long, value_name = "FILE.png", required_unless_present = "compare", value_parser = file_of(&[FileKind::Png]))]
     out: Option<PathBuf>,
     /// Compare with this PNG file; exit code 1 where they differ. With --out, a picture of the differences is beside it.
     #[arg(long, value_name = "GOLDEN.png")]
@@ -113,13 +113,13 @@ pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
 
 pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
     if let Some(out) = &arguments.out {
-        check_folder(out)?;
+        check_new(out, FileKind::Png)?;
     }
     // Read first: a missing file is known before anything is drawn.
     let golden = arguments.compare.as_ref().map(|path| golden(path)).transpose()?;
     let picture = if arguments.panels { window(arguments, store)? } else { scene_picture(arguments, store)? };
     if let Some(out) = &arguments.out {
-        write_new(out, &picture.to_png()?)?;
+        write_new(out, FileKind::Png, &picture.to_png()?)?;
     }
     if let Some(golden) = golden {
         compare(arguments, &picture, &golden)?;
@@ -147,7 +147,7 @@ fn compare(arguments: &SnapshotArguments, picture: &Picture, golden: &Picture) -
     let beside = match &arguments.out {
         Some(out) => {
             let path = out.with_extension("diff.png");
-            write_new(&path, &difference.picture.to_png()?)?;
+            write_new(&path, FileKind::Png, &difference.picture.to_png()?)?;
             format!(". See \"{}\"", path.display())
         }
         None => ". --out FILE.png writes the picture, and one of the differences beside it".to_owned(),

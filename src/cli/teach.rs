@@ -3,15 +3,16 @@
 use super::Failure;
 use super::interrupt::stop_flag;
 use super::learning::progress_bar;
-use super::output::check_folder;
+use super::output::{check_folder, file_of};
 use super::recognise::load_model;
 use super::setup::read_store;
 use super::terminal::{say, say_json};
-use palpate_lab::datasets::{make_models_folder, models_folder};
+use palpate_lab::datasets::{check_model_path, make_models_folder, models_folder, save_model};
 use palpate_lab::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 use palpate_learn::{LearnError, Shipped};
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::ObjectSetup;
+use palpate_store::FileKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -53,7 +54,7 @@ pub(super) struct TeachArguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Model file to write (.safetensors), with its card beside it (default: taught.safetensors in the models folder).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file_of(&[FileKind::Model]))]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text.
     #[arg(long)]
@@ -84,6 +85,7 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
     let out = match &arguments.out {
         Some(out) => {
             check_folder(out)?;
+            check_model_path(out)?;
             out.clone()
         }
         None => {
@@ -121,7 +123,7 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         Err(LessonError::Learn(LearnError::Stopped)) => return Err("stopped; no model was saved".into()),
         taught => taught?,
     };
-    taught.save(&out)?;
+    save_model(&taught, &out)?;
     let classes: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
     let report = Report {
         model: &out,

@@ -2,13 +2,14 @@
 
 use super::Failure;
 use super::learning::{DataArguments, known_method, progress_bar};
-use super::output::check_folder;
+use super::output::{check_folder, file_of};
 use super::setup::read_store;
 use super::terminal::{say, say_json, table};
-use palpate_lab::datasets::{make_models_folder, models_folder};
+use palpate_lab::datasets::{check_model_path, make_models_folder, models_folder, save_model};
 use palpate_lab::study::{SearchRow, search};
 use palpate_learn::evaluation::Evaluation;
 use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan};
+use palpate_store::FileKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -48,7 +49,7 @@ pub(super) struct TrainArguments {
     #[arg(long)]
     search: bool,
     /// Model file to write (.safetensors), with its card beside it (default: in the models folder).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = file_of(&[FileKind::Model]))]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text.
     #[arg(long)]
@@ -84,6 +85,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     }
     if let Some(out) = &arguments.out {
         check_folder(out)?;
+        check_model_path(out)?;
     }
     let store = read_store(store)?;
     let data = arguments.data.read(&store, false, arguments.trials)?;
@@ -105,7 +107,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     if let Some((test, evaluation)) = &judged {
         model.card.metrics = evaluation.metrics(test);
     }
-    model.save(&out)?;
+    save_model(&model, &out)?;
     let report = Report {
         model: &out,
         method: method.key,

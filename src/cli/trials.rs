@@ -6,12 +6,15 @@ mod selection;
 mod show;
 
 use super::Failure;
+use super::output::trials_target;
 use super::setup::{SignalArguments, existing_store, open_store, read_store};
 use super::terminal::{note, say, say_json, table, warn};
 use labels::LabelCommand;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
-use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial};
+use palpate_store::{
+    FileKind, Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial,
+};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{SensorLayout, SignalDefinition};
 use selection::{Filters, Numbers, chosen};
@@ -87,7 +90,7 @@ enum TrialsCommand {
         #[arg(long, conflicts_with_all = ["ids", "layout", "signals", "unsound"])]
         labelled: bool,
         /// Folder, CSV file for a single trial, or a file of another format for any number.
-        #[arg(long, value_name = "PATH")]
+        #[arg(long, value_name = "PATH", value_parser = trials_target())]
         out: PathBuf,
         #[command(flatten)]
         signals: SignalArguments,
@@ -307,7 +310,7 @@ fn export(
     out: &Path,
     channels: (&SensorLayout, SignalDefinition),
 ) -> Result<(), Failure> {
-    let as_file = out.extension().is_some_and(|e| e == "csv");
+    let as_file = FileKind::of(out, &[FileKind::Csv]).is_some();
     if as_file && ids.len() > 1 {
         return Err("several trials need a folder: --out FOLDER".into());
     }

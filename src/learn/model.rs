@@ -201,7 +201,7 @@ pub enum ModelError {
         cause: String,
     },
     /// The file cannot be written.
-    #[error("cannot write the model \"{path}\": {cause}; its folder must exist and be writable", path = path.display())]
+    #[error("cannot write \"{path}\": {cause}", path = path.display())]
     Unwritable {
         /// Path of the file.
         path: PathBuf,

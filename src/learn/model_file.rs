@@ -98,13 +98,12 @@ impl Model {
         tensor_file::encode(card, &arrays).map_err(|cause| malformed(&self.card.method, cause))
     }
 
-    /// Writes the model and its card into a folder that exists. Interrupted writes leave the old file intact.
-    pub fn save(&self, path: &Path) -> Result<(), ModelError> {
+    /// Card for people, as JSON; it stands beside the model.
+    pub fn card_text(&self) -> Result<String, ModelError> {
         // The file itself lists the grasps that were learned; nobody reads their hashes.
         let card = ModelCard { learned: LearnedGrasps::default(), ..self.card.clone() };
-        let card = serde_json::to_string_pretty(&card).map_err(|e| malformed(&path.display().to_string(), e))?;
-        replace_file(path, &self.to_bytes()?)?;
-        replace_file(&card_path(path), (card + "\n").as_bytes())
+        let text = serde_json::to_string_pretty(&card).map_err(|e| malformed(&self.card.method, e))?;
+        Ok(text + "\n")
     }
 
     /// Reads a model from a file.
@@ -162,9 +161,14 @@ impl Labels {
 }
 
 impl ModelCard {
+    /// Path of a model's card: `live.json` for `live.safetensors`.
+    pub fn path_beside(model: &Path) -> PathBuf {
+        model.with_extension("json")
+    }
+
     /// Reads the card beside a model file.
     pub fn beside(model: &Path) -> Result<Self, ModelError> {
-        let path = card_path(model);
+        let path = Self::path_beside(model);
         let text = std::fs::read_to_string(&path)
             .map_err(|error| ModelError::Unreadable { path: path.clone(), cause: error.to_string() })?;
         Self::parse(&text).map_err(|error| malformed(&path.display().to_string(), error))
@@ -183,22 +187,4 @@ impl ModelCard {
         parts.extend(self.only_simulated().then(|| "contact pressure: simulation only".to_owned()));
         parts.join(", ")
     }
-}
-
-/// Path of a model's card: `live.json` for `live.safetensors`.
-fn card_path(path: &Path) -> PathBuf {
-    path.with_extension("json")
-}
-
-fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ModelError> {
-    let unfinished = path.with_extension("unfinished");
-    let written = (|| {
-        std::fs::write(&unfinished, bytes)?;
-        std::fs::rename(&unfinished, path)
-    })();
-    written.map_err(|cause| {
-        // A leftover file does no harm, and failing to remove it adds nothing to the message.
-        let _removed = std::fs::remove_file(&unfinished);
-        ModelError::Unwritable { path: path.to_owned(), cause: cause.to_string() }
-    })
 }

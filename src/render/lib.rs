@@ -30,7 +30,7 @@
 //! fn save(list: &DrawList, choice: DriverChoice) -> Result<(), Box<dyn std::error::Error>> {
 //!     let gpu = Gpu::headless(choice)?;
 //!     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-//!     Picture::draw(&gpu, &mut renderer, list, [640, 480], 1.0)?.save("picture.png".as_ref())?;
+//!     std::fs::write("picture.png", Picture::draw(&gpu, &mut renderer, list, [640, 480], 1.0)?.to_png()?)?;
 //!     Ok(())
 //! }
 //! ```

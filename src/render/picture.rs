@@ -2,7 +2,6 @@
 
 use super::{Gpu, Renderer};
 use palpate_geometry::drawing::DrawList;
-use std::path::{Path, PathBuf};
 
 /// Pixels, sRGB with opacity, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,14 +33,6 @@ pub enum PictureError {
     #[error("these bytes are not a PNG picture: {cause}")]
     Decode {
         /// Cause.
-        cause: String,
-    },
-    /// The file could not be written.
-    #[error("cannot write the picture \"{path}\": {cause}; its folder must exist and be writable", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Message of the operating system.
         cause: String,
     },
 }
@@ -126,15 +117,5 @@ impl Picture {
         image::write_buffer_with_format(&mut bytes, &self.rgba, self.width, self.height, colours, format)
             .map_err(|cause| PictureError::Encode { cause: cause.to_string() })?;
         Ok(bytes.into_inner())
-    }
-
-    /// Writes a PNG file into a folder that exists.
-    pub fn save(&self, path: &Path) -> Result<(), PictureError> {
-        let written = (|| -> Result<(), Box<dyn std::error::Error>> {
-            let format = image::ImageFormat::Png;
-            image::save_buffer_with_format(path, &self.rgba, self.width, self.height, image::ColorType::Rgba8, format)?;
-            Ok(())
-        })();
-        written.map_err(|cause| PictureError::Write { path: path.to_owned(), cause: cause.to_string() })
     }
 }

@@ -6,6 +6,7 @@
 //! row, `?` where unknown.
 
 use super::csv_export::{CsvError, number, write_file};
+use super::file_kind::FileKind;
 use palpate_tactile::board::Reading;
 use palpate_tactile::trial::{BoardLog, PhaseMark};
 use std::path::Path;
@@ -13,7 +14,7 @@ use std::path::Path;
 /// Writes one row per reading.
 pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), CsvError> {
     let channels = &trial.course.board.channels;
-    write_file(path, |out| {
+    write_file(path, FileKind::Csv, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();
         let after = ["line_pressure [bar]", "phase"].map(str::to_owned);
         out.write_record(before.chain(channels.iter().map(|name| format!("{name} [counts]"))).chain(after))?;

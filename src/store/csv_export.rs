@@ -5,6 +5,7 @@
 //! world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave their planes the
 //! sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
 
+use super::file_kind::FileKind;
 use super::new_file::NewFile;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, Sway};
@@ -33,7 +34,7 @@ pub fn contacts_path(path: &Path) -> PathBuf {
 
 /// Writes one row per sample.
 pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
-    write_file(path, |out| {
+    write_file(path, FileKind::Csv, |out| {
         let sway = trial.frames().iter().any(|frame| frame.sways != [Sway::NONE; 2]);
         out.write_record(header(scene, sensors, trial, sway))?;
         for frame in trial.frames() {
@@ -45,7 +46,7 @@ pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, senso
 
 /// Writes an imported trial: time, then its channels unchanged.
 pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError> {
-    write_file(path, |out| {
+    write_file(path, FileKind::Csv, |out| {
         out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
         for (sample, t) in signals.t_s.iter().enumerate() {
             let values = signals.row(sample).iter().map(ToString::to_string);
@@ -72,7 +73,7 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
         "shear_across [N]",
     ];
     let grid = scene.gripper.taxels();
-    write_file(path, |out| {
+    write_file(path, FileKind::Contacts, |out| {
         out.write_record(header)?;
         for frame in trial.frames() {
             for side in Side::BOTH {
@@ -96,13 +97,14 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
 /// Writes a file that appears whole or not at all, and its folder where there is none.
 pub(super) fn write_file(
     path: &Path,
+    kind: FileKind,
     fill: impl FnOnce(&mut csv::Writer<NewFile>) -> csv::Result<()>,
 ) -> Result<(), CsvError> {
     let write = || -> std::io::Result<()> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)?;
         }
-        let mut out = csv::Writer::from_writer(NewFile::create(path)?);
+        let mut out = csv::Writer::from_writer(NewFile::create(path, kind)?);
         fill(&mut out)?;
         out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.finish()
     };

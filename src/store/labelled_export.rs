@@ -13,7 +13,8 @@
 
 use super::board_export::write_board_csv;
 use super::csv_export::{CsvError, number};
-use super::new_file::unfinished;
+use super::file_kind::FileKind;
+use super::new_file::{NewFolder, write_whole};
 use super::store::Store;
 use super::store_error::StoreError;
 use crate::labels::LabelledTrial;
@@ -73,7 +74,8 @@ pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<boo
     let Some(trial) = store.board_log(id)? else { return Ok(false) };
     write_board_csv(path, &trial)?;
     let bytes = path.with_extension("bytes");
-    std::fs::write(&bytes, store.board_bytes(id)?.unwrap_or_default()).map_err(|e| cannot(&bytes, &e))?;
+    let received = store.board_bytes(id)?.unwrap_or_default();
+    write_whole(&bytes, FileKind::Capture, &received).map_err(|e| cannot(&bytes, &e))?;
     Ok(true)
 }
 
@@ -86,19 +88,9 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
     if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         return Err(ExportError::NotEmpty { folder: folder.to_owned() });
     }
-    let unfinished = unfinished(folder);
-    let written = write_all(store, &rows, &unfinished).and_then(|left_out| {
-        // Replaces an empty folder, but nothing else that has appeared meanwhile.
-        if folder.is_dir() {
-            std::fs::remove_dir(folder).map_err(|e| cannot(folder, &e))?;
-        }
-        std::fs::rename(&unfinished, folder).map_err(|e| cannot(folder, &e))?;
-        Ok(left_out)
-    });
-    let left_out = written.inspect_err(|_error| {
-        // Nothing to add to the message where the remains cannot be removed either.
-        let _gone = std::fs::remove_dir_all(&unfinished);
-    })?;
+    let new = NewFolder::create(folder).map_err(|e| cannot(folder, &e))?;
+    let left_out = write_all(store, &rows, new.unfinished())?;
+    new.finish().map_err(|e| cannot(folder, &e))?;
     Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived: rows.len() - left_out.len(), left_out })
 }
 

@@ -14,8 +14,9 @@
 //! |---|---|---|
 //! | 0 | `checksum`, `frame_blob`, `reading_blob` | checksums; frames and readings as bytes |
 //! | 0 | [`labels`] | class names, flags, plan, labelled trials, sparklines: plain values |
-//! | 0 | `new_file` | files that appear whole or not at all |
-//! | 1 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
+//! | 0 | `file_kind` | kinds of files, and what each may replace |
+//! | 1 | `new_file` | the one way to write a file or folder that a person names |
+//! | 2 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
 //! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
@@ -54,6 +55,7 @@ mod damage_tests;
 mod demo_log;
 #[cfg(test)]
 mod demo_log_tests;
+mod file_kind;
 mod frame_blob;
 mod free_space;
 mod identity;
@@ -92,6 +94,7 @@ pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCali
 pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
 pub use demo_log::{DEMO_LOG_TRIALS, TrialPlace};
+pub use file_kind::{FileKind, check_target};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use identity::Stored;
@@ -102,7 +105,7 @@ pub use library::{
     Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
 };
 pub use merge::Merged;
-pub use new_file::{NewFile, unfinished};
+pub use new_file::{NewFile, NewFolder, write_whole};
 pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
 pub use store_error::StoreError;

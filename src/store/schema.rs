@@ -19,6 +19,7 @@
 //! Blobs carry a CRC-32 in a column beside them; rows from before version 10 have none.
 
 use super::identity::identify_old;
+use super::new_file::unfinished;
 use super::store_error::StoreError;
 use rusqlite::{Connection, OpenFlags, Transaction};
 use std::path::{Path, PathBuf};
@@ -209,8 +210,7 @@ fn free_name(store: &Path) -> PathBuf {
 
 /// Copies the committed content of a store through a connection of its own; the copy appears whole or not at all.
 fn copy_file(store: &Path, copy: &Path) -> Result<(), String> {
-    let unfinished = copy.with_extension("unfinished");
-    let _no_remains = std::fs::remove_file(&unfinished);
+    let unfinished = unfinished(copy);
     let copied = Connection::open_with_flags(store, OpenFlags::SQLITE_OPEN_READ_ONLY)
         .and_then(|reader| reader.execute("VACUUM INTO ?1", [unfinished.to_string_lossy()]))
         .map_err(|e| super::store_error::plain(&e))
@@ -287,9 +287,9 @@ mod tests {
     fn without_a_copy_nothing_is_updated() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
         let path = old_store(folder.path(), 9)?;
-        // A folder in the place of the unfinished copy cannot be replaced.
-        let copy = folder.path().join(format!("trials.before-v{SCHEMA_VERSION}.sqlite"));
-        std::fs::create_dir_all(copy.with_extension("unfinished").join("full"))?;
+        // A store that is damaged behind its tables cannot be copied.
+        let bytes = std::fs::read(&path)?;
+        std::fs::write(&path, &bytes[..bytes.len() - 4096])?;
         let refused = Store::open(&path).expect_err("no copy");
         assert!(matches!(refused, StoreError::NotCopied { .. }), "{refused}");
         assert_eq!(version_of(&path)?, 9);

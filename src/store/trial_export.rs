@@ -1,6 +1,7 @@
 //! Export of one trial of any source, for the window and the command line.
 
 use super::csv_export::{contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
+use super::file_kind::FileKind;
 use super::labelled_export::{ExportError, export_board_trial, file_name_of};
 use super::store::Store;
 use crate::labels::shown_name;
@@ -18,7 +19,7 @@ pub fn export_trial(
 ) -> Result<PathBuf, ExportError> {
     let trial = store.load(id)?;
     let name = format!("trial_{id}_{}.csv", file_name_of(shown_name(&trial.header.object)));
-    let is_file = out.extension().is_some_and(|extension| extension == "csv");
+    let is_file = FileKind::of(out, &[FileKind::Csv]).is_some();
     let path = if is_file { out.to_owned() } else { out.join(name) };
     write_csv(store, id, trial, &path, (layout, signals))?;
     Ok(path)

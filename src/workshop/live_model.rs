@@ -112,7 +112,7 @@ pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failur
     model.check_channels(&grasps.channels)?;
     let signatures = grasps.relabelled(&model.card.labels).as_ref().and_then(Signatures::of);
     let model = model.with_signatures(Some(signatures.ok_or("the model lacks a class of the training grasps")?));
-    model.save(&path)?;
+    palpate_lab::datasets::save_model(&model, &path)?;
     if Model::load(&path)?.recogniser.arrays() != before {
         return Err("the weights of the saved model differ".into());
     }
@@ -183,7 +183,7 @@ pub(crate) fn make(which: Shipped, out: &Path, store: &mut Store) -> Result<(), 
     // How long it took depends on the machine, and the file should not.
     model.card.train_cpu_s = 0.0;
     let path = out.join(recipe.which.model_file());
-    model.save(&path)?;
+    palpate_lab::datasets::save_model(&model, &path)?;
     let e = &row.evaluation;
     report(format_args!(
         "F1 {:.3}, after three grasps {:.3}",

@@ -26,7 +26,8 @@ pub(crate) fn draw_all(folder: &Path) -> Result<usize, Failure> {
         if let Some(object) = scene.load_object()? {
             let list = portrait(&object);
             let path = folder.join(&built_in.name).join("thumbnail.png");
-            Picture::draw(&gpu, &mut renderer, &list, [SIDE, SIDE], 1.0)?.save(&path)?;
+            let picture = Picture::draw(&gpu, &mut renderer, &list, [SIDE, SIDE], 1.0)?;
+            std::fs::write(&path, picture.to_png()?)?;
         }
     }
     Ok(catalogue().len())

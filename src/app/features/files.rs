@@ -7,6 +7,7 @@ use crate::app::notices::Notices;
 use palpate_lab::inspection::FigureOptions;
 use palpate_lab::workers::Wake;
 use palpate_sim::scene::Scene;
+use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -137,7 +138,7 @@ impl FileFeature {
 }
 
 fn save_scene(path: &Path, scene: &Scene, notices: &mut Notices) {
-    match std::fs::write(path, scene.to_toml()) {
+    match write_whole(path, FileKind::Scene, scene.to_toml().as_bytes()) {
         Ok(()) => notices.info(format!("Scene saved as {}.", path.display())),
         Err(error) => notices.error(format!("Cannot write {}: {error}", path.display())),
     }

@@ -1,9 +1,10 @@
 //! Manages calibrations: list, show, export, import, mount, withdraw.
 
 use super::super::Failure;
+use super::super::output::{file_of, write_new};
 use super::super::terminal::{say, say_json, table, warn};
 use super::{parse_sensor, print, zero};
-use palpate_store::{CalibrationId, Store, StoredCalibration};
+use palpate_store::{CalibrationId, FileKind, Store, StoredCalibration};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::Calibration;
 use serde::Serialize;
@@ -33,7 +34,7 @@ pub(super) enum CalibrateCommand {
         /// Calibration numbers (default: all).
         ids: Vec<CalibrationId>,
         /// File to write.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, value_name = "FILE.json", value_parser = file_of(&[FileKind::Json]))]
         out: PathBuf,
     },
     /// Import calibrations from JSON files, without duplicates.
@@ -204,7 +205,7 @@ fn export(store: &Store, ids: &[CalibrationId], out: &Path) -> Result<(), Failur
         ids => ids.iter().map(|id| store.calibrations().get(*id)).collect::<Result<_, _>>()?,
     };
     let text = serde_json::to_string_pretty(&chosen)?;
-    std::fs::write(out, text + "\n").map_err(|e| format!("cannot write \"{}\": {e}", out.display()))?;
+    write_new(out, FileKind::Json, (text + "\n").as_bytes())?;
     say(format!("{}: {} calibration(s)", out.display(), chosen.len()))
 }
 

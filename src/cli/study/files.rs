@@ -2,12 +2,14 @@
 
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
+use super::super::output::{file_or_folder, write_new};
 use super::super::terminal::note;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_geometry::drawing::Figure;
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::{Measuring, StoredStudy};
 use palpate_render::{figure_picture, figure_svg};
+use palpate_store::FileKind;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
@@ -17,7 +19,7 @@ use std::path::PathBuf;
 pub(super) struct StudyOutput {
     /// Folder for the results, which the same command continues, and for the pictures (default: palpate-NAME, with
     /// --quick palpate-NAME-quick).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = file_or_folder(&[]))]
     out: Option<PathBuf>,
     /// Number of threads (default: one per core).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -68,8 +70,8 @@ impl StudyFolder {
     ) -> Result<String, Failure> {
         let path = |extension: &str| self.0.join(format!("{study}.{extension}"));
         stored.write(&path("json"))?;
-        std::fs::write(path("svg"), figure_svg(figure, Theme::Light, SIZE)?)?;
-        figure_picture(figure, Theme::Light, SIZE)?.save(&path("png"))?;
+        write_new(&path("svg"), FileKind::Svg, figure_svg(figure, Theme::Light, SIZE)?.as_bytes())?;
+        write_new(&path("png"), FileKind::Png, &figure_picture(figure, Theme::Light, SIZE)?.to_png()?)?;
         let files = ["json", "svg", "png"].map(|extension| path(extension).display().to_string());
         Ok(format!("Written: {}", files.join(", ")))
     }

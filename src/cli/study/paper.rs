@@ -3,6 +3,7 @@
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
 use super::super::learning::{QueryArguments, parse_sensors};
+use super::super::output::file_or_folder;
 use super::super::setup::open_store;
 use super::super::terminal::{note, say, say_json, table};
 use super::files::note_stopped;
@@ -36,7 +37,7 @@ pub(super) struct PaperArguments {
     seed: u64,
     /// Folder for results, which the same command continues, tables (CSV) and figures (SVG) (default: palpate-studies,
     /// with --quick palpate-studies-quick).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = file_or_folder(&[]))]
     out: Option<PathBuf>,
     /// Number of threads (default: one per core). The results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]

@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::interrupt::stop_flag;
-use super::super::output::check_folder;
+use super::super::output::check_new;
 use super::super::terminal::say;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::{ExchangeFormat, read_mcap};
@@ -21,7 +21,7 @@ pub(super) fn export(
     (out, model): (&Path, Option<&Path>),
     sensors: SensorView,
 ) -> Result<(), Failure> {
-    check_folder(out)?;
+    check_new(out, format.kind)?;
     let models = match model {
         Some(path) => Models::all(&Arc::new(Model::load(path)?)),
         None => Models::shipped()?,

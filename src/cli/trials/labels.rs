@@ -1,6 +1,7 @@
 //! `palpate trials label`, `note`, `tag`, `undo`, `redo`, `journal` and `export --labelled`.
 
 use super::super::Failure;
+use super::super::output::names_folder;
 use super::super::terminal::{say, say_json, table, warn};
 use super::selection::{Filters, Numbers, chosen};
 use palpate_sim::objects::{EMPTY, class_of, titled};
@@ -168,6 +169,11 @@ fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {
 
 /// Exports all labelled trials.
 pub(super) fn export(store: &Store, out: &Path) -> Result<(), Failure> {
+    if !names_folder(out) {
+        return Err(
+            format!("all labelled trials need a folder, whose name has no ending, not \"{}\"", out.display()).into()
+        );
+    }
     let exported = export_labelled(store, out)?;
     // Hundreds of trials may lack the same calibration: one warning.
     let mut reasons: BTreeMap<&str, Vec<String>> = BTreeMap::new();

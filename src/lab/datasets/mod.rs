@@ -13,4 +13,6 @@ pub use query::{
     sequence_of, trial_signals,
 };
 pub use sampling::{Cut, NoCut};
-pub use saved_models::{SavedModel, make_models_folder, models_folder, new_model_path, saved_models};
+pub use saved_models::{
+    SavedModel, check_model_path, make_models_folder, models_folder, new_model_path, save_model, saved_models,
+};

@@ -1,7 +1,8 @@
 //! Folder of trained models.
 
-use palpate_learn::{ModelCard, ModelError};
-use palpate_store::Store;
+use palpate_learn::{Model, ModelCard, ModelError};
+use palpate_store::{FileKind, NewFile, Store, check_target};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Folder of trained models, beside the default store.
@@ -12,8 +13,44 @@ pub fn models_folder() -> PathBuf {
 
 /// Makes the folder of trained models, which is the program's own, where there is none yet.
 pub fn make_models_folder(folder: &Path) -> Result<(), ModelError> {
-    std::fs::create_dir_all(folder)
-        .map_err(|cause| ModelError::Unwritable { path: folder.to_owned(), cause: cause.to_string() })
+    std::fs::create_dir_all(folder).map_err(|cause| unwritable(folder, &cause))
+}
+
+/// Refuses a path whose model, or the card beside it, would replace something else.
+pub fn check_model_path(path: &Path) -> Result<(), ModelError> {
+    let card = ModelCard::path_beside(path);
+    check_target(path, FileKind::Model).map_err(|cause| unwritable(path, &cause))?;
+    check_target(&card, FileKind::Json).map_err(|cause| unwritable(&card, &cause))?;
+    if card == path {
+        return Err(unwritable(path, &"its card would have the same name; choose one that ends in .safetensors"));
+    }
+    if card.exists() && ModelCard::beside(path).is_err() {
+        let cause = "there is a file of this name which is no card of a model; choose another name for the model";
+        return Err(unwritable(&card, &cause));
+    }
+    Ok(())
+}
+
+/// Writes a model, and its card for people beside it, into a folder that exists.
+pub fn save_model(model: &Model, path: &Path) -> Result<(), ModelError> {
+    check_model_path(path)?;
+    let card = ModelCard::path_beside(path);
+    let written = |path: &Path, kind, bytes: &[u8]| {
+        let write = || {
+            let mut file = NewFile::create(path, kind)?;
+            file.write_all(bytes)?;
+            Ok(file)
+        };
+        write().map_err(|cause: io::Error| unwritable(path, &cause))
+    };
+    let new_model = written(path, FileKind::Model, &model.to_bytes()?)?;
+    let new_card = written(&card, FileKind::Json, model.card_text()?.as_bytes())?;
+    new_model.finish().map_err(|cause| unwritable(path, &cause))?;
+    new_card.finish().map_err(|cause| unwritable(&card, &cause))
+}
+
+fn unwritable(path: &Path, cause: &dyn std::fmt::Display) -> ModelError {
+    ModelError::Unwritable { path: path.to_owned(), cause: cause.to_string() }
 }
 
 /// Model file with its description.

@@ -13,7 +13,7 @@ mod urdf;
 pub use mcap::{McapImportError, read_mcap};
 
 use crate::inspection::{OpenOptions, OpenTrialError};
-use palpate_store::{Store, StoreError};
+use palpate_store::{FileKind, Store, StoreError};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 
@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 pub struct ExchangeFormat {
     /// Name.
     pub name: &'static str,
-    /// Extension of its files, by which it is chosen.
-    pub extension: &'static str,
+    /// Kind of its files, by whose ending it is chosen.
+    pub kind: FileKind,
     /// What it is for, in a few words.
     pub about: &'static str,
     write: fn(&Request<'_>, &Path, Allow<'_>) -> Result<(), ExchangeError>,
@@ -33,15 +33,15 @@ pub struct ExchangeFormat {
 pub const FORMATS: &[ExchangeFormat] = &[
     ExchangeFormat {
         name: "MCAP",
-        extension: "mcap",
+        kind: FileKind::Mcap,
         about: "ROS 2 messages over time: Foxglove, PlotJuggler, Rerun, ros2 bag",
         write: mcap::write,
     },
-    ExchangeFormat { name: "NPZ", extension: "npz", about: "arrays of all trials: numpy.load", write: npz::write },
+    ExchangeFormat { name: "NPZ", kind: FileKind::Npz, about: "arrays of all trials: numpy.load", write: npz::write },
     #[cfg(feature = "parquet")]
     ExchangeFormat {
         name: "Parquet",
-        extension: "parquet",
+        kind: FileKind::Parquet,
         about: "a row per sample: pandas, polars, DuckDB",
         write: parquet::write,
     },
@@ -117,8 +117,7 @@ fn step(allow: &mut dyn FnMut(usize, usize) -> bool, done: usize, all: usize) ->
 impl ExchangeFormat {
     /// The format of a file, by its extension.
     pub fn of(path: &Path) -> Option<&'static Self> {
-        let extension = path.extension()?;
-        FORMATS.iter().find(|format| extension.eq_ignore_ascii_case(format.extension))
+        FORMATS.iter().find(|format| FileKind::of(path, &[format.kind]).is_some())
     }
 
     /// Writes trials into one file, which appears whole or not at all. Simulated trials are read through the sensors of the
@@ -144,7 +143,7 @@ pub fn write_trials(
     allow: Allow<'_>,
 ) -> Result<(), ExchangeError> {
     let format = ExchangeFormat::of(path).ok_or_else(|| {
-        let known: Vec<&str> = FORMATS.iter().map(|format| format.extension).collect();
+        let known: Vec<&str> = FORMATS.iter().flat_map(|format| format.kind.endings()).copied().collect();
         ExchangeError::UnknownFormat { path: path.to_owned(), known: known.join(", ") }
     })?;
     format.write(store, ids, options, path, allow)
@@ -236,7 +235,7 @@ mod tests {
     fn an_export_that_ends_early_leaves_no_file() {
         let (folder, store) = store_of(&["ball", "ball"]);
         for format in FORMATS {
-            let path = folder.path().join(format!("out.{}", format.extension));
+            let path = folder.path().join(format!("out.{}", format.kind.endings()[0]));
             let mut allowed = 0;
             let outcome = write_trials(&store, &[1, 2], &OpenOptions::default(), &path, &mut |done, _| {
                 allowed += 1;
@@ -248,7 +247,7 @@ mod tests {
                 write_trials(&store, &[1, 99], &OpenOptions::default(), &path, &mut |_, _| true),
                 Err(ExchangeError::Open(_) | ExchangeError::Store(_))
             ));
-            let nowhere = folder.path().join(format!("no/such/out.{}", format.extension));
+            let nowhere = folder.path().join(format!("no/such/out.{}", format.kind.endings()[0]));
             let outcome = write_trials(&store, &[1], &OpenOptions::default(), &nowhere, &mut |_, _| true);
             assert!(matches!(outcome, Err(ExchangeError::Write { .. })), "{}", format.name);
         }

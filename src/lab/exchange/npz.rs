@@ -8,7 +8,7 @@ use crate::inspection::{TouchPhase, scene_hash};
 use palpate_geometry::Pose;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_store::NewFile;
+use palpate_store::{FileKind, NewFile};
 use std::io::{self, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
@@ -21,7 +21,7 @@ const POSE: usize = 7;
 /// Writes all trials as arrays of one archive.
 pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
     let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path).map_err(|e| ExchangeError::write(path, &e))?;
+    let file = NewFile::create(path, FileKind::Npz).map_err(|e| ExchangeError::write(path, &e))?;
     let mut trials = Vec::new();
     let mut bytes = 0;
     for (done, id) in request.ids.iter().enumerate() {

@@ -12,7 +12,7 @@ use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::schema::types::Type;
-use palpate_store::NewFile;
+use palpate_store::{FileKind, NewFile};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ const FIXED: [(&str, Physical); 8] = [
 pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
     let failed = |error: &dyn std::fmt::Display| ExchangeError::write(path, error);
     let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path).map_err(|e| failed(&e))?;
+    let file = NewFile::create(path, FileKind::Parquet).map_err(|e| failed(&e))?;
     // Every trial has to be seen before the columns are known.
     let mut trials = Vec::new();
     for (done, id) in request.ids.iter().enumerate() {

@@ -2,6 +2,7 @@
 //! numbers.
 
 use super::result_file::{ResultFileError, program};
+use palpate_store::{FileKind, write_whole};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -36,7 +37,7 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
     pub fn write(&self, path: &Path) -> Result<(), ResultFileError> {
         let text = serde_json::to_string(self).map(|text| text.replace("},{", "},\n{"));
         let text = text.map_err(|cause| ResultFileError::Unwritable { cause })?;
-        std::fs::write(path, text + "\n").map_err(|cause| ResultFileError::File {
+        write_whole(path, FileKind::Json, (text + "\n").as_bytes()).map_err(|cause| ResultFileError::File {
             attempt: "write",
             path: path.to_owned(),
             cause,

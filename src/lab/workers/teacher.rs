@@ -4,7 +4,7 @@
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
 use super::trainer::TrainedModel;
-use crate::datasets::{make_models_folder, new_model_path};
+use crate::datasets::{make_models_folder, new_model_path, save_model};
 use crate::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 use palpate_learn::{Model, ModelError};
 use palpate_sim::scene::ObjectSetup;
@@ -117,7 +117,7 @@ fn taught(
     let model = lessons.teach(&request.model, Some(&store))?;
     let path = new_model_path(models, "taught", &store.now()?);
     make_models_folder(models)?;
-    model.save(&path)?;
+    save_model(&model, &path)?;
     let about = model.card.described();
     Ok(TrainedModel { model: Arc::new(model), path, about })
 }

@@ -3,7 +3,7 @@
 
 use super::background_job::{BackgroundJob, Outlet};
 use super::messages::Wake;
-use crate::datasets::{SavedModel, make_models_folder, new_model_path, saved_models};
+use crate::datasets::{SavedModel, make_models_folder, new_model_path, save_model, saved_models};
 use crate::study::{
     JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage, labelled_classes,
 };
@@ -132,7 +132,7 @@ impl TrainingService {
         let now = store.now()?;
         let path = new_model_path(&self.models, method.key, &now);
         make_models_folder(&self.models)?;
-        judged.model.save(&path)?;
+        save_model(&judged.model, &path)?;
         let (model, about) = (Arc::new(judged.model.clone()), judged.model.card.described());
         Ok(FinishedTraining { trained: TrainedModel { model, path, about }, judged })
     }

@@ -10,7 +10,7 @@ use crate::inspection::scene_hash;
 use palpate_geometry::Pose;
 use palpate_learn::Pmf;
 use palpate_sim::gripper::Side;
-use palpate_store::NewFile;
+use palpate_store::{FileKind, NewFile};
 use palpate_tactile::Quantity;
 use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ const BETWEEN: u64 = 1_000_000_000;
 pub(crate) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
     let failed = |error: io::Error| ExchangeError::write(path, &error);
     let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path).map_err(failed)?;
+    let file = NewFile::create(path, FileKind::Mcap).map_err(failed)?;
     let library = format!("palpate {}", env!("CARGO_PKG_VERSION"));
     let mut out = Bag {
         writer: McapWriter::new(file, &library).map_err(failed)?,

@@ -4,6 +4,7 @@ use super::report::{LinkedFigure, StudyReport};
 use super::{PaperStudy, StudySize};
 use crate::study::result_file::ResultFileError;
 use crate::study::stored_study::StoredStudy;
+use palpate_store::{FileKind, write_whole};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -79,18 +80,18 @@ impl StudyFolder {
         let key = study.card().key;
         let mut names = vec![format!("{key}.json")];
         stored.write(&self.result(key))?;
-        let mut put = |name: String, text: io::Result<String>| {
+        let mut put = |name: String, kind: FileKind, text: io::Result<String>| {
             let path = self.0.join(&name);
-            let written = text.and_then(|text| std::fs::write(&path, text));
+            let written = text.and_then(|text| write_whole(&path, kind, text.as_bytes()));
             names.push(name);
             written.map_err(|cause| ResultFileError::File { attempt: "write", path, cause })
         };
         for table in &stored.result.tables {
-            put(format!("{}.csv", table.name), Ok(table.csv()))?;
+            put(format!("{}.csv", table.name), FileKind::Csv, Ok(table.csv()))?;
         }
         for linked in study.figures(&stored.result) {
             let linked = linked.with_note(&stored.plain_origin());
-            put(format!("{}.svg", linked.name), draw(&linked))?;
+            put(format!("{}.svg", linked.name), FileKind::Svg, draw(&linked))?;
         }
         Ok(names)
     }
