@@ -2,10 +2,10 @@
 
 use super::Failure;
 use super::interrupt::stop_flag;
-use super::setup::{RecomputeArguments, SceneArguments, open_store};
+use super::setup::{RecomputeArguments, SceneArguments, classes_of, open_store};
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects, collect};
+use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects};
 use palpate_sim::objects::titled;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -27,6 +27,9 @@ pub(super) struct CollectArguments {
     /// Built-in names or files, separated by commas (default: the sixteen and the empty hand).
     #[arg(long, value_name = "A,B,..", value_delimiter = ',')]
     objects: Vec<String>,
+    /// Classes of the objects, separated by commas (default: the names in their files, or of the files or their folders).
+    #[arg(long = "class", value_name = "A,B,..", value_delimiter = ',', requires = "objects")]
+    classes: Vec<String>,
     #[command(flatten)]
     scene: SceneArguments,
     /// Random seed of the poses.
@@ -67,6 +70,7 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
     let objects = if arguments.objects.is_empty() { all_objects() } else { arguments.objects.clone() };
     let plan = CollectionPlan {
         scene: arguments.scene.scene(None)?,
+        classes: classes_of(&arguments.classes, objects.len())?,
         objects,
         trials: arguments.trials,
         seed: arguments.seed,
@@ -77,12 +81,14 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         Some(threads) => usize::from(threads),
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
+    // Before the store, which is made where there is none.
+    let ready = plan.ready()?;
     let mut store = open_store(store)?;
     let stop = stop_flag()?;
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
     let start = cpu_time::ProcessTime::now();
     let mut of = 0;
-    let outcome = collect(&plan, &mut store, threads, &mut |progress| {
+    let outcome = ready.collect(&mut store, threads, &mut |progress| {
         bar.set_length(u64::from(progress.of));
         bar.set_message(titled(&progress.object));
         bar.set_position(u64::from(progress.done));

@@ -10,6 +10,7 @@ use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
+use palpate_store::labels::class_name;
 use palpate_store::{FileKind, Stored, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Sensors, SignalDefinition};
@@ -30,6 +31,9 @@ See also: palpate help scenes, palpate help sensors")]
 pub(super) struct GraspArguments {
     /// Built-in name (lemon, ball, cube ..), a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
+    /// Class of the object (default: the name in its file, or that of the file or its folder).
+    #[arg(long, value_name = "NAME")]
+    class: Option<String>,
     #[command(flatten)]
     scene: SceneArguments,
     /// Random seed of the pose, which varies as `pose` of the scene or --preset says (default: no variation).
@@ -90,7 +94,10 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         check_replaced(&contacts_path(path), FileKind::Contacts)?;
     }
     let loading = cpu_time::ProcessTime::now();
-    let object = nominal.load_object()?;
+    let mut object = nominal.load_object()?;
+    if let (Some(object), Some(class)) = (&mut object, &arguments.class) {
+        object.name = class_name(class)?;
+    }
     let load_cpu_ms = loading.elapsed().as_secs_f64() * 1e3;
     let scene = match arguments.seed {
         Some(seed) => jittered(&nominal, object.as_ref(), seed).0,

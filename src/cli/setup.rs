@@ -6,6 +6,7 @@ use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
+use palpate_store::labels::class_name;
 use palpate_tactile::SignalDefinition;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -126,6 +127,14 @@ impl SceneArguments {
         }
         Ok(scene.with_settings(&self.settings)?)
     }
+}
+
+/// Classes of as many objects, checked; none where none are named.
+pub(super) fn classes_of(named: &[String], objects: usize) -> Result<Vec<String>, Failure> {
+    if !named.is_empty() && named.len() != objects {
+        return Err(format!("--class names {} classes for {objects} objects; name one for each", named.len()).into());
+    }
+    Ok(named.iter().map(|name| class_name(name)).collect::<Result<_, _>>()?)
 }
 
 /// Path of the named store, or of the default one. Folders are not created for a named one.

@@ -5,7 +5,7 @@ use super::interrupt::stop_flag;
 use super::learning::progress_bar;
 use super::output::{check_folder, file_of};
 use super::recognise::load_model;
-use super::setup::read_store;
+use super::setup::{classes_of, read_store};
 use super::terminal::{say, say_json};
 use palpate_lab::datasets::{check_model_path, make_models_folder, models_folder, save_model};
 use palpate_lab::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
@@ -47,6 +47,9 @@ pub(super) struct TeachArguments {
     /// Model to teach, of the method geometry-network (default: the shipped one).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Classes of the objects, separated by commas (default: the names in their files, or of the files or their folders).
+    #[arg(long = "class", value_name = "A,B,..", value_delimiter = ',')]
+    classes: Vec<String>,
     /// Simulated grasps of each object.
     #[arg(long, value_name = "N", default_value_t = LESSON_GRASPS, value_parser = within_grasps)]
     grasps: usize,
@@ -106,10 +109,12 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         }
     };
     let stop = stop_flag()?;
+    let classes = classes_of(&arguments.classes, arguments.files.len())?;
     let setup = |file: &String| ObjectSetup { source: anchored(file), ..ObjectSetup::default() };
     let objects: Vec<ObjectSetup> = arguments.files.iter().map(setup).collect();
     let lessons = Lessons {
         objects: &objects,
+        classes: &classes,
         recorded: &arguments.recorded,
         grasps: arguments.grasps,
         seed: arguments.seed,

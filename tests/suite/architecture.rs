@@ -27,6 +27,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("egui_wgpu", &["src/app"]),
     ("epaint_default_fonts", &["src/render/text.rs", "src/render/figure"]),
     ("fs4", &["src/store"]),
+    ("unicode_normalization", &["src/store/labels"]),
     ("gif", &["src/render/movie.rs"]),
     ("glam", &["src"]),
     ("image", &["src/render/picture.rs"]),

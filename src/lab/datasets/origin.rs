@@ -13,6 +13,8 @@ pub(super) struct TrialOrigin {
     pub(super) calibrations: Vec<CalibrationId>,
     /// The build of the gripper was drawn.
     pub(super) built: bool,
+    /// Hash of the object's files, and their path; none for other trials, and those of early versions.
+    pub(super) object: Option<(u64, String)>,
     /// Group of similar poses.
     pub(super) pose: u32,
     /// Identity of the grasp before, if the object has stayed as that one released it.
@@ -35,6 +37,7 @@ impl TrialOrigin {
         Self {
             simulated: Some((preset, scene.holds_object())),
             built: scene.pose.build > 0.0,
+            object: header.origin.as_ref().map(|origin| (origin.object, scene.object.source.clone())),
             pose: pose_group(scene),
             after: header.origin.as_ref().and_then(|origin| origin.after.clone()),
             stayed,

@@ -5,6 +5,7 @@ use super::sampling::{Cut, resampled};
 use palpate_learn::{Class, Labels, ModelCard, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_store::labels::{ClassClash, compared};
 use palpate_store::{CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
@@ -197,6 +198,9 @@ pub enum DatasetError {
         /// Missing parts of the first trial.
         why: String,
     },
+    /// Trials of different objects under one class.
+    #[error(transparent)]
+    OneClass(#[from] ClassClash),
     /// An object of the query without trials.
     #[error("the store has no trial of \"{object}\"; `palpate trials list` lists the trials")]
     NoSuchObject {
@@ -269,8 +273,13 @@ impl DatasetQuery {
             && (self.collection.is_none() || self.collection_of(row).is_some())
             && self.physics.is_none_or(of_physics)
             && (self.calibrations.is_empty() || row.source == TrialSource::Recorded)
-            && (self.objects.is_empty() || self.objects.contains(&row.object))
+            && (self.objects.is_empty() || self.names(&row.object))
             && !(self.without_empty && row.object == EMPTY)
+    }
+
+    /// True for a name of one of its objects, however it is written.
+    fn names(&self, object: &str) -> bool {
+        self.objects.iter().any(|own| own == object) || self.objects.iter().any(|own| compared(own) == compared(object))
     }
 
     /// The query in words, for tables and cards: `collection 52c1, preset B, since 2026-11-21`. Days are dates.

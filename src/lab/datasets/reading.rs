@@ -5,7 +5,7 @@ use super::origin::TrialOrigin;
 use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
 use palpate_learn::{Dataset, Example, OTHER, Sequence};
 use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
-use palpate_store::labels::Flag;
+use palpate_store::labels::{Classes, Flag, compared};
 use palpate_store::{Library, Store, TrialPlace, TrialRow};
 use palpate_tactile::trial::TrialId;
 use std::collections::btree_map::Entry;
@@ -35,16 +35,16 @@ impl DatasetQuery {
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
         let matching = rows.len();
         // An object whose trials are all left out is counted among those.
-        let has_trials = |object: &&String| rows.iter().any(|row| row.object == **object);
+        let has_trials = |object: &&String| rows.iter().any(|row| compared(&row.object) == compared(object));
         if matching > 0
             && let Some(object) = self.objects.iter().find(|object| !has_trials(object))
         {
             return Err(DatasetError::NoSuchObject { object: object.clone() });
         }
         let mut left_out = LeftOut::new();
-        let (mut kept, mut held) = (BTreeMap::<&str, usize>::new(), BTreeSet::new());
+        let (mut kept, mut held) = (BTreeMap::<String, usize>::new(), BTreeSet::new());
         rows.retain(|row| {
-            let count = kept.entry(row.object.as_str()).or_default();
+            let count = kept.entry(compared(&row.object)).or_default();
             if self.most_of_each.is_some_and(|most| *count >= most) {
                 return false;
             }
@@ -114,7 +114,7 @@ impl DatasetQuery {
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
         let mut channels: Option<(TrialId, Vec<String>)> = None;
-        let mut named = BTreeMap::new();
+        let (mut named, mut classes) = (BTreeMap::new(), Classes::default());
         let (mut read, mut origins) = (Vec::new(), Vec::new());
         let mut seen: BTreeMap<(u64, u64), TrialId> = BTreeMap::new();
         let (mut uncalibrated, mut missing) = (0, String::new());
@@ -152,7 +152,12 @@ impl DatasetQuery {
                 Entry::Occupied(_) => *left_out.entry(COPIES.to_owned()).or_default() += 1,
                 Entry::Vacant(free) => {
                     free.insert(row.id);
-                    named.entry(class_of(row).to_owned()).or_insert_with(|| known_properties(row));
+                    let class = classes.named(class_of(row)).to_owned();
+                    if let Some((content, source)) = origin.object.as_ref().filter(|_| class != OTHER && class != EMPTY)
+                    {
+                        classes.take(&class, *content, source, SEPARATE)?;
+                    }
+                    named.entry(class.clone()).or_insert_with(|| known_properties(row, &class));
                     let further: Vec<_> = further.iter().map(|signals| Arc::new(sequence_of(signals))).collect();
                     read.push((*row, (grasp, further), before.of_trial(row, &origin)));
                     origins.push(origin);
@@ -170,14 +175,17 @@ impl DatasetQuery {
         }
         let labels = labels(&named);
         let used: Vec<&TrialRow> = read.iter().map(|(row, ..)| *row).collect();
-        let about = card(self, &self.described(store), &used, &origins, view, left_out);
+        let mut about = card(self, &self.described(store), &used, &origins, view, left_out);
+        about
+            .mixed
+            .extend(classes.several().iter().map(|all| format!("spellings of one class ({all}); it is one here")));
         let poses: Vec<u32> = origins.iter().map(|origin| origin.pose).collect();
         type Read<'r> = (&'r TrialRow, (Sequence, Vec<Arc<Sequence>>), Option<TrialId>);
-        let example = |((row, (grasp, further), after), pose): (Read<'_>, u32)| {
+        let mut example = |((row, (grasp, further), after), pose): (Read<'_>, u32)| {
             let content = content_of(row, &grasp);
             Some(Example {
                 id: row.id,
-                class: labels.class(class_of(row))?,
+                class: labels.class(classes.named(class_of(row)))?,
                 grasp: Arc::new(grasp),
                 content,
                 after,
@@ -185,12 +193,14 @@ impl DatasetQuery {
                 further,
             })
         };
-        let examples = read.into_iter().zip(poses).filter_map(example).collect();
+        let examples = read.into_iter().zip(poses).filter_map(&mut example).collect();
         let channels = channels.map(|(_, channels)| channels).unwrap_or_default();
         Ok(Dataset { channels, labels, examples, about })
     }
 }
 
+/// What to do with two objects in one class.
+const SEPARATE: &str = "choose one of them with --collection, or collect one of them anew under another --class";
 /// Reason: diverged, did not converge, or did not come to rest.
 const NOT_SOUND: &str = "not sound";
 /// Reason: another trial holds the same grasp.
@@ -240,9 +250,9 @@ fn class_of(row: &TrialRow) -> &str {
     if RandomShape::seed_of(&row.object).is_some() { OTHER } else { &row.object }
 }
 
-fn known_properties(row: &TrialRow) -> Option<(String, String)> {
+fn known_properties(row: &TrialRow, class: &str) -> Option<(String, String)> {
     let of_catalogue = || {
-        let class = catalogue().iter().find(|b| b.name == row.object)?.class();
+        let class = catalogue().iter().find(|b| b.name == class)?.class();
         Some((class.size.name().to_owned(), class.shape.name().to_owned()))
     };
     row.properties.clone().or_else(of_catalogue)

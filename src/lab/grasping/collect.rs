@@ -5,9 +5,10 @@
 //! are stored in the order of the plan.
 
 use super::agreement::{Recompute, grasp_soundly};
-use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
+use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, RandomShape, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
+use palpate_store::labels::{ClassClash, Classes};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::SimulatedTrial;
 use serde::Serialize;
@@ -25,6 +26,8 @@ pub struct CollectionPlan {
     pub scene: Scene,
     /// Names of built-in objects, or paths of object files.
     pub objects: Vec<String>,
+    /// Their classes, in the same order; empty where they have their own names.
+    pub classes: Vec<String>,
     /// Trials of each object.
     pub trials: u32,
     /// Seed of the poses.
@@ -89,6 +92,9 @@ pub enum CollectionError {
     /// An object failed to load.
     #[error(transparent)]
     Object(#[from] Arc<ObjectError>),
+    /// Two objects would be one class.
+    #[error(transparent)]
+    OneClass(#[from] ClassClash),
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -122,7 +128,20 @@ impl CollectionPlan {
     /// Trials of the sixteen and the empty hand.
     pub fn of_all_objects(scene: Scene, trials: u32, seed: u64) -> Self {
         let (objects, recompute) = (all_objects(), Recompute::default());
-        Self { scene, objects, trials, seed, shard: Shard::WHOLE, recompute }
+        Self { scene, objects, classes: Vec::new(), trials, seed, shard: Shard::WHOLE, recompute }
+    }
+
+    /// Loads the files of the plan, and refuses two objects in one class, before anything is stored.
+    pub fn ready(&self) -> Result<ReadyCollection<'_>, CollectionError> {
+        let mut bench = Bench::new(self);
+        let mut classes = Classes::default();
+        for object in 0..self.objects.len() {
+            let source = &self.objects[object];
+            let content = bench.prepare(object)?;
+            let class = bench.names[object].clone();
+            classes.take(&class, content, source, "name a class of each with --class")?;
+        }
+        Ok(ReadyCollection { bench })
     }
 
     /// Name of the collection: plans that differ in scene or seed have different names, parts of one plan the same.
@@ -167,40 +186,60 @@ fn mixed(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `progress` receives
-/// the progress, and ends the collection by [`ControlFlow::Break`].
+/// A plan whose objects are at hand, each in a class of its own.
+pub struct ReadyCollection<'a> {
+    bench: Bench<'a>,
+}
+
+/// Collects a plan; see [`ReadyCollection::collect`].
 pub fn collect(
     plan: &CollectionPlan,
     store: &mut Store,
     threads: usize,
     progress: &mut dyn FnMut(CollectionProgress) -> ControlFlow<()>,
 ) -> Result<CollectionReport, CollectionError> {
-    let collection = plan.name();
-    let known = store.collected(&collection)?;
-    let all = plan.tasks();
-    let bench = Bench::new(plan, &collection);
-    let is_new = |task: &Task| !known.contains(&(bench.stored_name(task.object), task.seed));
-    let tasks: Vec<Task> = all.iter().copied().filter(is_new).collect();
-    let mut report = CollectionReport { collection: collection.clone(), ..CollectionReport::default() };
-    report.known = (all.len() - tasks.len()) as u32;
-    let line =
-        Line { tasks: &tasks, taken: AtomicUsize::new(0), stored: AtomicUsize::new(0), stop: AtomicBool::new(false) };
-    std::thread::scope(|scope| {
-        let (sender, made) = sync_channel(2 * threads.max(1));
-        for _ in 0..threads.max(1) {
-            let (line, bench, sender) = (&line, &bench, sender.clone());
-            scope.spawn(move || line.work(bench, &sender));
-        }
-        drop(sender);
-        let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
-            progress(CollectionProgress { done, of: all.len() as u32, object })
-        });
-        // Threads that wait for room in the channel find it closed.
-        line.stop.store(true, Ordering::Relaxed);
-        drop(made);
-        outcome
-    })?;
-    Ok(report)
+    plan.ready()?.collect(store, threads, progress)
+}
+
+impl ReadyCollection<'_> {
+    /// Simulates and stores the trials of the plan that the store lacks, on `threads` threads. `progress` receives
+    /// the progress, and ends the collection by [`ControlFlow::Break`].
+    pub fn collect(
+        &self,
+        store: &mut Store,
+        threads: usize,
+        progress: &mut dyn FnMut(CollectionProgress) -> ControlFlow<()>,
+    ) -> Result<CollectionReport, CollectionError> {
+        let bench = &self.bench;
+        let known = store.collected(&bench.collection)?;
+        let all = bench.plan.tasks();
+        let is_new = |task: &Task| !known.contains(&(bench.names[task.object].clone(), task.seed));
+        let tasks: Vec<Task> = all.iter().copied().filter(is_new).collect();
+        let mut report = CollectionReport { collection: bench.collection.clone(), ..CollectionReport::default() };
+        report.known = (all.len() - tasks.len()) as u32;
+        let line = Line {
+            tasks: &tasks,
+            taken: AtomicUsize::new(0),
+            stored: AtomicUsize::new(0),
+            stop: AtomicBool::new(false),
+        };
+        std::thread::scope(|scope| {
+            let (sender, made) = sync_channel(2 * threads.max(1));
+            for _ in 0..threads.max(1) {
+                let (line, sender) = (&line, sender.clone());
+                scope.spawn(move || line.work(bench, &sender));
+            }
+            drop(sender);
+            let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
+                progress(CollectionProgress { done, of: all.len() as u32, object })
+            });
+            // Threads that wait for room in the channel find it closed.
+            line.stop.store(true, Ordering::Relaxed);
+            drop(made);
+            outcome
+        })?;
+        Ok(report)
+    }
 }
 
 /// A finished trial and how often its pose was redrawn, or the reason for a failure.
@@ -288,7 +327,7 @@ fn store_in_order(
     Ok(())
 }
 
-/// Loaded object with its pose sampler; loaded for its first trial.
+/// Loaded object with its pose sampler; a built-in one is loaded for its first trial.
 struct OnBench {
     model: Option<ObjectModel>,
     sampler: PoseSampler,
@@ -296,25 +335,39 @@ struct OnBench {
 
 struct Bench<'a> {
     plan: &'a CollectionPlan,
-    collection: &'a str,
+    collection: String,
+    /// Names of the objects in the store.
+    names: Vec<String>,
     objects: Vec<OnceLock<Result<OnBench, Arc<ObjectError>>>>,
 }
 
 impl<'a> Bench<'a> {
-    fn new(plan: &'a CollectionPlan, collection: &'a str) -> Self {
-        Self { plan, collection, objects: plan.objects.iter().map(|_| OnceLock::new()).collect() }
+    fn new(plan: &'a CollectionPlan) -> Self {
+        let objects = plan.objects.iter().map(|_| OnceLock::new()).collect();
+        Self { plan, collection: plan.name(), names: plan.objects.clone(), objects }
     }
 
-    /// Name of an object in the store: for a file, its name without folder and extension.
-    fn stored_name(&self, object: usize) -> String {
-        let source = std::path::Path::new(&self.plan.objects[object]);
-        source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+    /// Loads the object of a file; returns the hash of its content. Those without a file cannot fail.
+    fn prepare(&mut self, object: usize) -> Result<u64, CollectionError> {
+        let source = &self.plan.objects[object];
+        let is_named = source == EMPTY || RandomShape::seed_of(source).is_some();
+        let (mut name, mut content) = (source.clone(), 0);
+        if !is_named && !catalogue().iter().any(|built_in| built_in.name == *source) {
+            let loaded = self.load(object).map_err(Arc::new)?;
+            (name, content) = loaded.model.as_ref().map_or((name, 0), |model| (model.name.clone(), model.content));
+            self.objects[object] = OnceLock::from(Ok(loaded));
+        }
+        self.names[object] = self.plan.classes.get(object).filter(|_| source != EMPTY).cloned().unwrap_or(name);
+        Ok(content)
     }
 
     fn load(&self, object: usize) -> Result<OnBench, ObjectError> {
         let mut scene = self.plan.scene.clone();
         scene.object.source = palpate_sim::objects::anchored(&self.plan.objects[object]);
-        let model = scene.load_object()?;
+        let mut model = scene.load_object()?;
+        if let (Some(model), Some(class)) = (&mut model, self.plan.classes.get(object)) {
+            model.name.clone_from(class);
+        }
         let sampler = PoseSampler::new(&scene, model.as_ref());
         Ok(OnBench { model, sampler })
     }
@@ -340,7 +393,7 @@ impl<'a> Bench<'a> {
         let released = before.as_ref().and_then(|trial| trial.frames().last());
         let (scene, redrawn) = on_bench.sampler.draw_after(model, task.seed, released);
         let mut trial = grasp_soundly(&scene, model, task.seed, self.plan.recompute);
-        trial.header.collection = Some(self.collection.to_owned());
+        trial.header.collection = Some(self.collection.clone());
         if let Some(origin) = trial.header.origin.as_mut().filter(|_| on_bench.sampler.is_left(&scene)) {
             origin.after = before.and_then(|trial| trial.header.identity());
         }
@@ -357,7 +410,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.timing.duration_s = 0.4;
         let objects = ["ball", "smallcube", EMPTY].map(str::to_owned).to_vec();
-        CollectionPlan { scene, objects, trials: 5, seed: 1, shard: Shard::WHOLE, recompute: Recompute::default() }
+        CollectionPlan { objects, ..CollectionPlan::of_all_objects(scene, 5, 1) }
     }
 
     fn store(folder: &tempfile::TempDir, name: &str) -> Store {
@@ -479,15 +532,35 @@ mod tests {
     }
 
     #[test]
-    fn an_object_that_cannot_be_loaded_stops_the_work_and_keeps_what_is_done() {
+    fn objects_are_at_hand_and_told_apart_before_anything_is_stored() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut store = store(&folder, "store");
         let objects = ["ball", "/nowhere/at/all.urdf"].map(str::to_owned).to_vec();
-        let outcome = collect(&CollectionPlan { objects, ..plan() }, &mut store, 2, &mut |_| ControlFlow::Continue(()));
+        let outcome = CollectionPlan { objects, ..plan() }.ready().map(drop);
         assert!(
             matches!(&outcome, Err(CollectionError::Object(cause)) if cause.to_string().contains("/nowhere/at/all.urdf")),
             "{outcome:?}"
         );
-        assert_eq!(store.list(false).expect("lists").len(), 5);
+        let made = |name: &str, side: f64| {
+            let path = folder.path().join(name).join("urdf/model.urdf");
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            let shape = format!("<collision><geometry><box size='0.03 0.03 {side}'/></geometry></collision>");
+            std::fs::write(&path, format!("<robot name='model'><link name='a'>{shape}</link></robot>"))
+                .expect("written");
+            path.to_str().expect("a name").to_owned()
+        };
+        let objects = vec![made("can", 0.03), made("brick", 0.04)];
+        let clash = CollectionPlan { objects: objects.clone(), ..plan() }.ready().map(drop).expect_err("one class");
+        let text = clash.to_string();
+        assert!(objects.iter().all(|path| text.contains(path.as_str())) && text.contains("--class"), "{text}");
+        let same = vec![objects[0].clone(), made("again", 0.03)];
+        assert!(CollectionPlan { objects: same, ..plan() }.ready().is_ok(), "one content is one class");
+        let classes = ["can", "brick"].map(str::to_owned).to_vec();
+        let told = CollectionPlan { objects, classes, trials: 1, ..plan() };
+        let mut store = store(&folder, "store");
+        let collected =
+            |store: &mut Store| collect(&told, store, 2, &mut |_| ControlFlow::Continue(())).expect("collects");
+        assert_eq!((collected(&mut store).stored, collected(&mut store).known), (2, 2));
+        let rows = store.list(false).expect("lists");
+        assert_eq!(rows.iter().map(|row| row.object.as_str()).collect::<Vec<_>>(), ["can", "brick"]);
     }
 }

@@ -11,6 +11,7 @@ use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{ObjectSetup, PosePreset, Scene};
 use palpate_store::Store;
+use palpate_store::labels::{ClassClash, Classes, compared};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialSource;
 use palpate_tactile::{Channel, LayoutError};
@@ -40,6 +41,8 @@ pub enum LessonStage {
 pub struct Lessons<'a> {
     /// Objects whose grasps are simulated.
     pub objects: &'a [ObjectSetup],
+    /// Their classes, in the same order; empty where they have their own names.
+    pub classes: &'a [String],
     /// Labels of recorded grasps, in the store.
     pub recorded: &'a [String],
     /// Simulated grasps of each object.
@@ -65,11 +68,16 @@ pub enum LessonError {
         source_name: String,
     },
     /// The model already has such a class.
-    #[error("the model already knows \"{name}\"; rename the file to teach another object")]
+    #[error(
+        "the model already knows \"{name}\"; to teach another object, name its class with --class, or rename the file"
+    )]
     Known {
         /// Name of the object.
         name: String,
     },
+    /// Two objects would be one class.
+    #[error(transparent)]
+    OneClass(#[from] ClassClash),
     /// None of the simulated grasps is sound.
     #[error("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")]
     Unsound {
@@ -120,16 +128,22 @@ impl Lessons<'_> {
             Ok(())
         };
         let scene = scene_of(&model.card);
-        let known = |name: &String| !model.card.taught.contains(name) && model.card.labels.class(name).is_some();
+        let has = |name: &str| model.card.labels.classes.iter().any(|class| compared(&class.name) == compared(name));
+        let known = |name: &String| !model.card.taught.contains(name) && has(name);
+        let mut classes = Classes::default();
         for (number, setup) in self.objects.iter().enumerate() {
             let mut scene = scene.clone();
             let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
             scene.object = ObjectSetup { fixed, shift, ..setup.clone() };
             let object = scene.load_object()?;
-            let object = object.ok_or_else(|| LessonError::NoObject { source_name: setup.source.clone() })?;
+            let mut object = object.ok_or_else(|| LessonError::NoObject { source_name: setup.source.clone() })?;
+            if let Some(class) = self.classes.get(number) {
+                object.name.clone_from(class);
+            }
             if known(&object.name) || object.name == OTHER {
                 return Err(LessonError::Known { name: object.name });
             }
+            classes.take(&object.name, object.content, &setup.source, "name a class of each with --class")?;
             add(self.simulated(number, &scene, &object, &view)?)?;
         }
         for name in self.recorded {

@@ -23,7 +23,9 @@ pub use agreement::{
     Agreed, EndState, Recompute, ends_alike, grasp_soundly, grasp_until_agreement, has_lost_object, until_agreement,
 };
 pub(crate) use collect::SUCCESSION;
-pub use collect::{CollectionError, CollectionPlan, CollectionProgress, CollectionReport, Shard, all_objects, collect};
+pub use collect::{
+    CollectionError, CollectionPlan, CollectionProgress, CollectionReport, ReadyCollection, Shard, all_objects, collect,
+};
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance, TouchLibrary, TouchesError};

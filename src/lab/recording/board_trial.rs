@@ -125,6 +125,11 @@ impl BoardTrialRecording {
         }
     }
 
+    /// True where readings came until the end of the programme or the length.
+    pub fn is_complete(&self) -> bool {
+        self.over
+    }
+
     /// True at the end of the programme or the length, and after an abort.
     pub fn is_over(&self, gripper: &SerialGripper) -> bool {
         // Captured bytes keep their own time.

@@ -76,7 +76,7 @@ pub struct Recording {
     pub trial: RecordedTrial,
     /// The link at its end.
     pub status: LinkStatus,
-    /// Why a driven grasp was aborted.
+    /// Why it ended early: a driven grasp was aborted, or readings came no longer.
     pub aborted: Option<String>,
 }
 
@@ -119,7 +119,9 @@ pub fn record(
             progress(RecordProgress { id, samples: recording.samples(), status: &gripper.stream().status() });
         }
     }
-    let aborted = recording.controller().abort_cause().map(str::to_owned);
+    let missing = live && !recording.is_complete() && !stop.load(Ordering::Relaxed);
+    let lost = missing.then(|| format!("readings came no longer. {}", gripper.stream().status().state.sentence()));
+    let aborted = recording.controller().abort_cause().map(str::to_owned).or(lost);
     recording.finish(&recorder, gripper, false, None);
     let status = gripper.stream().status();
     drop(recorder);

@@ -5,6 +5,7 @@ use super::comparison::{Comparison, ComparisonError};
 use crate::datasets::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::evaluation::Evaluation;
 use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, ModelError, SplitError, SplitPlan, StopRule};
+use palpate_store::labels::Classes;
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialSource;
 use std::collections::BTreeMap;
@@ -35,7 +36,7 @@ impl LabelledClass {
 
 /// Numbers of labelled trials of the real gripper, by object name.
 pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError> {
-    let mut counts = BTreeMap::<String, usize>::new();
+    let (mut counts, mut classes) = (BTreeMap::<String, usize>::new(), Classes::default());
     let labelled = |row: &palpate_store::TrialRow| {
         row.source == TrialSource::Recorded
             && row.state == "complete"
@@ -43,7 +44,7 @@ pub fn labelled_classes(store: &Store) -> Result<Vec<LabelledClass>, StoreError>
             && DatasetQuery::default().refused(row).is_none()
     };
     for row in store.list(false)?.into_iter().filter(labelled) {
-        *counts.entry(row.object).or_default() += 1;
+        *counts.entry(classes.named(&row.object).to_owned()).or_default() += 1;
     }
     Ok(counts.into_iter().map(|(name, trials)| LabelledClass { name, trials }).collect())
 }

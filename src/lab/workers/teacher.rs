@@ -108,6 +108,7 @@ fn taught(
     let recorded: Vec<String> = request.recorded.then(|| request.name.clone()).into_iter().collect();
     let lessons = Lessons {
         objects: &objects,
+        classes: &[],
         recorded: &recorded,
         grasps: LESSON_GRASPS,
         seed: SEED,

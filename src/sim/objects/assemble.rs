@@ -27,6 +27,8 @@ pub(super) struct Inertial {
 /// Everything gathered from a file, in its own units and in the frame of its root.
 pub(super) struct Blueprint {
     pub(super) name: String,
+    /// Name of the robot in a URDF.
+    pub(super) robot: Option<String>,
     pub(super) visual: Vec<ColouredPart>,
     pub(super) visual_solids: Vec<SolidPart>,
     pub(super) collision: Vec<SolidPart>,
@@ -57,6 +59,7 @@ impl Blueprint {
     pub(super) fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
+            robot: None,
             visual: Vec::new(),
             visual_solids: Vec::new(),
             collision: Vec::new(),

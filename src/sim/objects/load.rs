@@ -115,6 +115,41 @@ fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
     }
 }
 
+/// Names that say nothing of what is in a file.
+const GENERIC: [&str; 16] = [
+    "model",
+    "object",
+    "robot",
+    "untitled",
+    "unnamed",
+    "default",
+    "part",
+    "body",
+    "mesh",
+    "meshes",
+    "urdf",
+    "file",
+    "files",
+    "textured",
+    "nontextured",
+    "export",
+];
+
+/// True for a name that tells an object from others: `mug`, not `Model_2`.
+fn is_telling(name: &str) -> bool {
+    let word = name.trim_end_matches(|c: char| !c.is_alphabetic()).to_lowercase();
+    !name.is_empty() && !GENERIC.contains(&word.as_str()) && name.len() <= 80 && !name.contains(char::is_control)
+}
+
+/// Class of the object in a file: the name that it has in the file, else the file's name, else that of its folder; the first
+/// of them that is not generic.
+fn class_in(path: &Path, robot: Option<&str>) -> String {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let folder = whole.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+    let mut names = robot.map(|name| name.trim().to_owned()).into_iter().chain([stem(path)]).chain(folder);
+    names.find(|name| is_telling(name)).unwrap_or_else(|| stem(path))
+}
+
 fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
 }
@@ -151,13 +186,15 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
             }),
         }
     };
-    urdf::parse(&stem(path), &bytes, &mesh)
+    let mut blueprint = urdf::parse(&stem(path), &bytes, &mesh)?;
+    blueprint.name = class_in(path, blueprint.robot.as_deref());
+    Ok(blueprint)
 }
 
 fn read_mesh_file(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
     let read = |path: &str| content.of(read_referenced(Path::new(path)));
     let parts = read_mesh(&path.to_string_lossy(), &read).map_err(|cause| ObjectError::Mesh { cause })?;
-    let mut blueprint = Blueprint::new(&stem(path));
+    let mut blueprint = Blueprint::new(&class_in(path, None));
     blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);
     Ok(blueprint)
 }
@@ -169,6 +206,18 @@ fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_class_has_the_first_name_that_tells_it_from_others() {
+        let class = |path: &str, robot: Option<&str>| class_in(Path::new(path), robot);
+        assert_eq!(class("/set/can/model.urdf", Some("tin")), "tin");
+        assert_eq!(class("/set/can/Model_2.urdf", Some(" Robot ")), "can");
+        assert_eq!(class("/downloads/mug.urdf", Some("object")), "mug");
+        assert_eq!(class("/set/can/mesh.stl", None), "can");
+        assert_eq!(class("/set/meshes/part1.stl", None), "part1", "nothing says more");
+        assert_eq!(class("/set/can/mug.obj", Some("a\tb")), "mug");
+        assert_eq!(class("/set/002.urdf", Some("")), "002");
+    }
 
     #[test]
     fn objects_have_one_title() {

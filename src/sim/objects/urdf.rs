@@ -35,6 +35,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
     let malformed = |cause: String| ObjectError::Malformed { name: name.to_owned(), cause };
     let robot = robot_of(bytes).map_err(malformed)?;
     let mut blueprint = Blueprint::new(name);
+    blueprint.robot = robot.attribute("name").map(str::to_owned);
     let links = named(&robot, "link");
     let joints = joints_of(&robot, &mut blueprint.warnings).map_err(malformed)?;
     let poses = link_poses(&links, &joints, &mut blueprint.warnings).map_err(malformed)?;

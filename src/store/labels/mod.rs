@@ -8,7 +8,9 @@ mod plan;
 mod sparkline;
 mod unknown_word;
 
-pub use class_name::{ClassNameError, LONGEST_NAME, class_name, shown_name, shown_title};
+pub use class_name::{
+    ClassClash, ClassNameError, Classes, LONGEST_NAME, class_name, compared, shown_name, shown_title,
+};
 pub use edit::{Edited, TrialEdit};
 pub use flag::{Flag, FlagRemark, cadence_line, flaws};
 pub use labelled_trial::{Guess, GuessTop, LabelledTrial};
