@@ -11,6 +11,7 @@ use crate::model::{LoadError, Model, ModelCard};
 use crate::network::{self, Recipe};
 use crate::recogniser::{Pupil, Recogniser};
 use crate::signatures::Signatures;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Group of a method in tables.
@@ -138,6 +139,7 @@ impl Method {
             metrics: serde_json::Value::Null,
             signature_grasps: None,
             taught: Vec::new(),
+            taught_from: BTreeMap::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };

@@ -10,6 +10,7 @@ use crate::recogniser::Recogniser;
 use crate::signatures::Signatures;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,6 +34,9 @@ pub struct ModelCard {
     /// Classes that it learned after the others, by [`Model::taught`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub taught: Vec<String>,
+    /// Hash of the files of each of these that was simulated, and where they lay.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub taught_from: BTreeMap<String, (u64, String)>,
     /// Settings chosen or found while fitting.
     pub settings: serde_json::Value,
     /// Fingerprint of the method that made it, [`crate::Method::fingerprint`]; absent in files of older versions.

@@ -403,7 +403,7 @@ pub(crate) fn model_of_contact(at: &Path) -> String {
     for channel in &mut model.card.channels {
         *channel = channel.replace("pressure_", "contact_pressure_");
     }
-    model.save(&at.join("contact.safetensors")).unwrap();
+    palpate_lab::datasets::save_model(&model, &at.join("contact.safetensors")).unwrap();
     "contact.safetensors".to_owned()
 }
 
@@ -412,7 +412,7 @@ pub(crate) fn model_of_pads(at: &Path) -> String {
     let mut model = crate::scripted::made_up();
     let data = &mut model.card.data;
     (data.signals, data.sensors, data.layout) = (None, None, None);
-    model.save(&at.join("pads.safetensors")).unwrap();
+    palpate_lab::datasets::save_model(&model, &at.join("pads.safetensors")).unwrap();
     "pads.safetensors".to_owned()
 }
 

@@ -12,7 +12,7 @@
 //! arrays = numpy.load("all.npz"); print({name: (a.dtype, a.shape) for name, a in arrays.items()})
 //! ```
 
-use crate::program::{json, refused, run};
+use crate::program::{json, misused, refused, run};
 use palpate_render::Picture;
 use std::path::Path;
 
@@ -102,7 +102,7 @@ fn figures_of_trials_are_drawn_and_named() {
     }
     refused(at, &["plot", "1", "--channels", "warmth", "--out", "a.svg"], &["no channel \"warmth\"", "pressure_left"]);
     refused(at, &["plot", "1", "--raw", "--out", "a.svg"], &["only trials of the real gripper have raw counts"]);
-    refused(at, &["plot", "1", "--out", "a.pdf"], &["an .svg or a .png file"]);
+    misused(at, &["plot", "1", "--out", "a.pdf"], &["no format has this ending; choose .svg, .png"]);
     refused(at, &["plot", "7", "--out", "a.svg"], &["no trial 7"]);
     let nobody = tempfile::tempdir().unwrap();
     refused(nobody.path(), &["plot", "1", "--out", "a.svg"], &["no trials yet", "there is no store"]);
@@ -124,7 +124,7 @@ fn movies_hold_every_picture() {
     let apng = std::fs::read(at.join("grasp.apng")).unwrap();
     assert_eq!(apng.windows(4).filter(|window| window == b"fcTL").count(), 5);
     assert!(std::fs::read(at.join("grasp.gif")).unwrap().starts_with(b"GIF89a"));
-    refused(at, &["movie", "1", "--out", "a.mp4"], &["no movie format \".mp4\""]);
+    misused(at, &["movie", "1", "--out", "a.mp4"], &["choose .apng, .png, .gif, a folder"]);
     refused(at, &["movie", "1", "--to", "9", "--out", "a.gif"], &["runs from", "--to within it"]);
     refused(at, &["movie", "1", "--out", "frames"], &["is not empty"]);
     assert_eq!(files(at), ["frames", "grasp.apng", "grasp.gif"]);

@@ -13,6 +13,7 @@
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
+//! - `outputs`: what is written replaces nothing else, and is what its name says.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `library`: all trials found and changed, in the window and on the command line.
 //! - `datasets`: each grasp once, nothing mixed in silence, few and foreign trials judged.
@@ -63,6 +64,7 @@ mod learning;
 mod library;
 mod one_path;
 mod one_signal;
+mod outputs;
 mod panels;
 mod peers;
 mod physics;

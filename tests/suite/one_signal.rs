@@ -152,7 +152,7 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     // As versions wrote it that knew no definition: contact pressure was called pressure.
     model.card.data.signals = None;
     model.card.data.sensors = Some("virtual".to_owned());
-    model.save(&path).unwrap();
+    palpate_lab::datasets::save_model(&model, &path).unwrap();
     let old = Model::load(&path).unwrap();
     assert!(old.card.only_simulated() && old.card.described().contains("simulation only"), "{}", old.card.described());
     assert_eq!(old.card.data.signals.as_deref(), Some("contact"));
@@ -165,6 +165,6 @@ fn a_model_of_an_earlier_version_never_runs_on_what_pads_measure() {
     // One that was trained on a board's readings stays as it was.
     let mut recorded = crate::scripted::made_up();
     (recorded.card.data.signals, recorded.card.data.sensors) = (None, None);
-    recorded.save(&path).unwrap();
+    palpate_lab::datasets::save_model(&recorded, &path).unwrap();
     assert_eq!(Model::load(&path).unwrap().card.channels, recorded.card.channels);
 }

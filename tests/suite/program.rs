@@ -43,6 +43,15 @@ pub(crate) fn json(folder: &Path, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_str(&ran.out).unwrap()
 }
 
+/// Runs something that is wrong use: exit code 2 and a message that holds `wanted`.
+pub(crate) fn misused(folder: &Path, arguments: &[&str], wanted: &[&str]) {
+    let ran = run(folder, arguments);
+    assert!(ran.code == Some(2) && ran.out.is_empty(), "{arguments:?}: {ran:?}");
+    for part in wanted {
+        assert!(ran.err.contains(part), "{arguments:?} does not say \"{part}\": {ran:?}");
+    }
+}
+
 /// Runs something that must fail with exit code 1, one `error:` line that holds `wanted`, and no panic.
 pub(crate) fn refused(folder: &Path, arguments: &[&str], wanted: &[&str]) {
     let ran = run(folder, arguments);

@@ -6,6 +6,7 @@ use palpate_learn::{
     Arrays, DataCard, Dataset, Example, Fitting, Labels, LiveRecogniser, Model, ModelCard, Models, Pmf, Properties,
     Recogniser, Sequence, Shipped, Signatures, StopRule, Verdict, method,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -31,6 +32,7 @@ pub(crate) fn model() -> Arc<Model> {
         metrics: serde_json::Value::Null,
         signature_grasps: None,
         taught: Vec::new(),
+        taught_from: BTreeMap::new(),
         version: String::new(),
     };
     Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })

@@ -177,12 +177,30 @@ fn a_board_that_does_not_come_back_leaves_a_gap_to_the_end() {
     let child = start(record(folder.path(), &port, &["--seconds", "2.5"]));
     wait_for_samples(&store, 0, 50);
     board.unplug();
-    let result = result(child);
+    let ended = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.code() == Some(1) && said.contains("ended early, and is stored"), "{said}");
+    let result: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
     let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
     let [gap] = &trial.gaps[..] else { panic!("{:?}", trial.gaps) };
     assert!(gap.cause.contains("unplugged") && gap.lost.is_none() && gap.to_s - trial.course.began_s >= 2.5, "{gap:?}");
     assert_eq!(gap.from_s, trial.readings.last().unwrap().t_s);
     assert!(result["warnings"].to_string().contains("interrupted"), "{result}");
+}
+
+#[test]
+fn a_recording_that_ends_with_its_port_is_a_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    let (port, store) = (folder.path().join("due"), folder.path().join("trials.sqlite"));
+    let board = Board::plug_in(&port, 0);
+    let child = start(record(folder.path(), &port, &["--seconds", "60", "--no-reconnect"]));
+    wait_for_samples(&store, 0, 50);
+    board.unplug();
+    let ended = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.code() == Some(1) && said.contains("ended early, and is stored"), "{said}");
+    let trial = Store::open(&store).unwrap().board_log(1).unwrap().unwrap();
+    assert!((50..5000).contains(&trial.readings.len()), "{}", trial.readings.len());
 }
 
 #[test]

@@ -160,7 +160,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     let odd = folder.path().join("odd.safetensors");
     let mut foreign = Model::clone(&loaded.model);
     foreign.card.channels[0] = "grip".to_owned();
-    foreign.save(&odd).unwrap();
+    palpate_lab::datasets::save_model(&foreign, &odd).unwrap();
     for (file, result) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
         let before = trainer.view().unwrap().loaded.0;
         trainer.ask(TrainCommand::Load(folder.path().join(file)));

@@ -55,7 +55,8 @@ fn the_command_says_why_and_names_the_nearest_trials() {
     assert!(!alone.contains("Nearest") && alone.contains("How measured"), "{alone}");
     assert_eq!(run(at, &["recognise", "1", "--nearest", "2"]).code, Some(2), "--nearest needs --why");
     // An older model is recognised.
-    Shipped::PerfectSensors.model().unwrap().with_signatures(None).save(&at.join("old.safetensors")).unwrap();
+    let bare = Shipped::PerfectSensors.model().unwrap().with_signatures(None);
+    palpate_lab::datasets::save_model(&bare, &at.join("old.safetensors")).unwrap();
     assert_eq!(run(at, &["recognise", "1", "--model", "old.safetensors"]).code, Some(0));
     refused(at, &["recognise", "1", "--why", "--model", "old.safetensors"], &["no class signatures", "palpate train"]);
 }

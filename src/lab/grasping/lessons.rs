@@ -25,6 +25,8 @@ pub const LESSON_GRASPS: usize = 80;
 const LEAST_RECORDED: usize = 5;
 /// Grippers with drawn sensors that read each simulated grasp.
 const DRAWS: u32 = 6;
+/// What to do with two objects in one class.
+const SEPARATE: &str = "name another class with --class, or rename one of them";
 /// Pose preset where the model's own is unknown.
 const PRESET: &str = "B";
 
@@ -130,7 +132,10 @@ impl Lessons<'_> {
         let scene = scene_of(&model.card);
         let has = |name: &str| model.card.labels.classes.iter().any(|class| compared(&class.name) == compared(name));
         let known = |name: &String| !model.card.taught.contains(name) && has(name);
-        let mut classes = Classes::default();
+        let (mut classes, mut taught_from) = (Classes::default(), model.card.taught_from.clone());
+        for (class, (content, source)) in &taught_from {
+            classes.take(class, *content, source, SEPARATE)?;
+        }
         for (number, setup) in self.objects.iter().enumerate() {
             let mut scene = scene.clone();
             let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
@@ -143,7 +148,8 @@ impl Lessons<'_> {
             if known(&object.name) || object.name == OTHER {
                 return Err(LessonError::Known { name: object.name });
             }
-            classes.take(&object.name, object.content, &setup.source, "name a class of each with --class")?;
+            classes.take(&object.name, object.content, &setup.source, SEPARATE)?;
+            taught_from.insert(object.name.clone(), (object.content, setup.source.clone()));
             add(self.simulated(number, &scene, &object, &view)?)?;
         }
         for name in self.recorded {
@@ -160,7 +166,9 @@ impl Lessons<'_> {
         let fitting =
             Fitting { seed: self.seed, quick: false, settings, second: None, progress: &progress, stop: self.stop };
         fitting.check()?;
-        Ok(model.taught(&lessons, &fitting)?)
+        let mut taught = model.taught(&lessons, &fitting)?;
+        taught.card.taught_from = taught_from;
+        Ok(taught)
     }
 
     /// Simulated grasps of one object.

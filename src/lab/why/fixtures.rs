@@ -4,6 +4,7 @@ use palpate_learn::{
     Arrays, Class, DataCard, Dataset, Example, Labels, Model, ModelCard, Pmf, Recogniser, Sequence, Signatures,
     StopRule, Verdict,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -78,6 +79,7 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         metrics: serde_json::Value::Null,
         signature_grasps: None,
         taught: Vec::new(),
+        taught_from: BTreeMap::new(),
         version: String::new(),
     };
     let calls = Arc::new(AtomicUsize::new(0));

@@ -9,6 +9,7 @@ use palpate_learn::{
 };
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::Store;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -62,6 +63,7 @@ impl Parrot {
             metrics: serde_json::Value::Null,
             signature_grasps: None,
             taught: Vec::new(),
+            taught_from: BTreeMap::new(),
             version: String::new(),
         };
         (Model { card, recogniser: Arc::new(parrot), signatures: None }, rows)
