@@ -4,10 +4,11 @@ use super::Failure;
 use super::link;
 use super::setup::within;
 use super::terminal::{note, say, say_json, table, typed_lines};
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::doctor::{
-    Bleed, CheckFinding, CheckStatus, CrosstalkTest, Observations, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
-    is_sound, not_checked, summary, write_sketch,
+    Bleed, CheckFinding, CheckStatus, CrosstalkTest, Observations, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine,
+    findings, is_sound, not_checked, summary, write_sketch,
 };
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{Baud, LinkEvent, LinkOptions};
@@ -46,11 +47,19 @@ pub(super) struct DoctorArguments {
     #[arg(long, conflicts_with_all = ["crosstalk", "json"])]
     wiring: bool,
     /// Write the Arduino sketch to a folder, which must be named due_gripper, then exit.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"], value_parser = sketch_folder())]
     sketch: Option<PathBuf>,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
+}
+
+/// Parser of the name of a folder that is named like the sketch, as Arduino wants it.
+fn sketch_folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        let is_named = std::path::absolute(&path).is_ok_and(|whole| whole.ends_with(SKETCH));
+        if is_named { Ok(path) } else { Err(format!("Arduino wants the sketch in a folder named {SKETCH}")) }
+    })
 }
 
 /// Output of `--json`.

@@ -116,10 +116,15 @@ impl FileKind {
                 Self::Model => head.get(8..).is_some_and(|rest| rest.starts_with(br#"{"__metadata__":{"palpate""#)),
                 Self::Npz => head.starts_with(b"PK"),
                 Self::Parquet => head.starts_with(b"PAR1"),
-                Self::Scene => is_text && line().lines().any(|line| line.starts_with('[') || line.contains(" = ")),
+                Self::Scene => is_text && line().lines().any(is_toml),
                 Self::Svg => is_text && line().starts_with('<') && line().contains("<svg"),
             }
     }
+}
+
+/// True for a table or a value of TOML.
+fn is_toml(line: &str) -> bool {
+    line.strip_prefix('[').is_some_and(|rest| rest.starts_with(char::is_alphabetic)) || line.contains(" = ")
 }
 
 /// Refuses a name to which a file of this kind may not be written: that of a store or of a part of one, of a file of another

@@ -270,6 +270,7 @@ fn wiring_and_sketch_come_with_the_program() {
         assert!(result.code == Some(0) && result.out.contains("gripper_logic.h"), "{result:?}");
     }
     std::fs::write(at.join("due_gripper/due_gripper.ino"), "mine").unwrap();
+    crate::program::misused(at, &["doctor", "--sketch", "foo"], &["a folder named due_gripper"]);
     refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "nothing was written", "another folder"]);
     let [dark, light] = Theme::ALL.map(|theme| {
         let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };

@@ -201,7 +201,10 @@ impl RecognitionFeature {
         let Some(model) = model.filter(|model| model.learns_new_objects()) else { return };
         let Some(card) = &snapshot.object else { return };
         let source = &snapshot.scene.object.source;
-        if model.card.labels.class(&card.name).is_some() || self.taught.as_ref() == Some(source) {
+        // A lesson with another object of a class that was taught says why it cannot be.
+        let is_other = model.card.taught_from.get(&card.name).is_some_and(|(content, _)| *content != card.content);
+        let is_known = model.card.labels.class(&card.name).is_some() && !is_other;
+        if is_known || self.taught.as_ref() == Some(source) {
             return;
         }
         self.taught = Some(source.clone());

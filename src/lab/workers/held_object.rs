@@ -24,6 +24,7 @@ pub(super) fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
 /// Description of an object in a scene.
 pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
     ObjectCard {
+        content: model.content,
         name: model.name.clone(),
         title: object_title(&model.name),
         class: model.class,

@@ -155,6 +155,8 @@ pub struct MeasuredAccuracy {
 pub struct ObjectCard {
     /// Short name.
     pub name: String,
+    /// Hash of its files.
+    pub content: u64,
     /// Name for display.
     pub title: String,
     /// Size and shape class, where known.
