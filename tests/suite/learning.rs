@@ -94,7 +94,7 @@ fn from_nothing_to_a_table_and_a_model() {
     // A models folder that cannot be made ends it before the training.
     std::fs::remove_dir_all(at.join("data")).unwrap();
     std::fs::write(at.join("data"), "").unwrap();
-    refused(at, &["train", "ds-lstm", "--set", "unitz=3"], &["cannot write the model"]);
+    refused(at, &["train", "ds-lstm", "--set", "unitz=3"], &["cannot write"]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::super::output::names_folder;
 use super::super::terminal::{say, say_json, table, warn};
 use super::selection::{Filters, Numbers, chosen};
 use palpate_sim::objects::{EMPTY, class_of, titled};
-use palpate_store::labels::{TrialEdit, class_name};
+use palpate_store::labels::{TrialEdit, class_name, compared};
 use palpate_store::{JournalEntry, Shown, Store, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
@@ -133,8 +133,9 @@ fn edit(store: &Store, ids: &[TrialId], change: &TrialEdit, done: &str) -> Resul
 fn label(store: &Store, ids: &[TrialId], name: &str, unsure: bool) -> Result<(), Failure> {
     let name = class_name(class_of(name))?;
     let recorded = store.labels().trials()?;
-    let planned = store.labels().plan()?.objects.iter().any(|object| object.name == name);
-    let known = planned || recorded.iter().any(|row| row.object.as_deref() == Some(&name));
+    let is_same = |other: &str| compared(other) == compared(&name);
+    let planned = store.labels().plan()?.objects.iter().any(|object| is_same(&object.name));
+    let known = planned || recorded.iter().any(|row| row.object.as_deref().is_some_and(is_same));
     edit(
         store,
         ids,

@@ -4,7 +4,7 @@
 //! The order matters: sensors warm up and creep, and with objects in blocks a recogniser learns the time instead of the
 //! object. So the object with the smallest share done comes next, and none comes twice in a row while another is left.
 
-use super::class_name::{ClassNameError, class_name};
+use super::class_name::{ClassNameError, Classes, class_name, compared};
 use super::labelled_trial::LabelledTrial;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::PoseSpread;
@@ -80,7 +80,7 @@ impl LabelPlan {
         let mut sound = Self { objects: Vec::new() };
         for PlannedObject { name, wanted } in &self.objects {
             let name = class_name(name)?;
-            if sound.objects.iter().any(|object| object.name == name) {
+            if sound.objects.iter().any(|object| compared(&object.name) == compared(&name)) {
                 return Err(PlanError::Twice { name });
             }
             sound.set(&name, *wanted)?;
@@ -94,7 +94,7 @@ impl LabelPlan {
         if !(1..=MOST_WANTED).contains(&wanted) {
             return Err(PlanError::Count { name, wanted });
         }
-        match self.objects.iter_mut().find(|object| object.name == name) {
+        match self.objects.iter_mut().find(|object| compared(&object.name) == compared(&name)) {
             Some(object) => object.wanted = wanted,
             None => self.objects.push(PlannedObject { name, wanted }),
         }
@@ -103,29 +103,28 @@ impl LabelPlan {
 
     /// Removes an object from the plan; its trials stay.
     pub fn remove(&mut self, name: &str) -> Result<(), PlanError> {
-        let at = self.objects.iter().position(|object| object.name == name.trim());
+        let at = self.objects.iter().position(|object| compared(&object.name) == compared(name));
         self.objects.remove(at.ok_or_else(|| PlanError::NotPlanned { name: name.trim().to_owned() })?);
         Ok(())
     }
 
     /// Progress of the plan. Recorded objects that are not planned follow by name, with no trials wanted.
     pub fn progress(&self, rows: &[LabelledTrial]) -> Progress {
-        let mut met: BTreeMap<&str, (u32, u32)> = BTreeMap::new();
+        let (mut met, mut classes) = (BTreeMap::<String, (u32, u32)>::new(), Classes::default());
         for row in rows.iter().filter(|row| row.counts()) {
-            let (done, flagged) = met.entry(row.object.as_deref().unwrap_or_default()).or_default();
+            let class = classes.named(row.object.as_deref().unwrap_or_default());
+            let (done, flagged) = met.entry(class.to_owned()).or_default();
             *done += 1;
             *flagged += u32::from(!row.flags.is_empty());
         }
         let mut row = |name: &str, wanted: u32| {
-            let (done, flagged) = met.remove(name).unwrap_or_default();
+            let (done, flagged) = met.remove(classes.named(name)).unwrap_or_default();
             ObjectProgress { name: name.to_owned(), wanted, done, flagged }
         };
         let mut objects: Vec<ObjectProgress> =
             self.objects.iter().map(|object| row(&object.name, object.wanted)).collect();
-        let unplanned = |(name, (done, flagged)): (&str, (u32, u32))| {
-            let name = name.to_owned();
-            ObjectProgress { name, wanted: 0, done, flagged }
-        };
+        let unplanned =
+            |(name, (done, flagged)): (String, (u32, u32))| ObjectProgress { name, wanted: 0, done, flagged };
         objects.extend(met.into_iter().map(unplanned));
         Progress { objects }
     }
