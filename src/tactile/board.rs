@@ -133,6 +133,16 @@ pub struct Gap {
     pub cause: String,
 }
 
+impl Gap {
+    /// Reason of a gap after which the board's counters began anew.
+    pub const RESTARTED: &str = "the board restarted";
+
+    /// True where the board restarted.
+    pub fn is_restart(&self) -> bool {
+        self.cause.ends_with(Self::RESTARTED)
+    }
+}
+
 /// Line format of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]

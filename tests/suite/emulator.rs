@@ -258,6 +258,23 @@ fn a_host_drives_the_fingers_through_a_programme() {
     assert!(!events.iter().any(|event| event["event"] == "watchdog"), "the host kept itself known: {events:?}");
 }
 
+#[test]
+fn a_command_that_drives_a_silent_board_vents_it_and_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--faults", "silent@3/60"]);
+    let mut command = palpate(&folder.path().join("trials.sqlite"));
+    command.args(["record", "--drive", "--port"]).arg(emulated.port()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let ran = ran(&start(command).wait_with_output().unwrap());
+    assert!(ran.code == Some(1) && ran.err.contains("no readable line came from the board for 0."), "{ran:?}");
+    assert!(ran.err.contains("palpate doctor") && ran.out.contains("flagged"), "{ran:?}");
+    let bars = std::fs::read_to_string(folder.path().join("sent.txt")).unwrap();
+    let bars: Vec<f32> =
+        bars.lines().filter_map(|line| line.split_once(",p_bar:")?.1.split(',').next()?.parse().ok()).collect();
+    let most = bars.iter().copied().fold(0.0, f32::max);
+    assert!(most > 0.0 && most < 1.0, "not to the end of the programme: {most}");
+    assert!(!emulated.end().iter().any(|event| event["event"] == "watchdog"), "it was told to vent");
+}
+
 /// What the doctor says of a fault: which checks are not content.
 fn diagnosed(arguments: &[&str], seconds: &str) -> (i32, Vec<(String, String)>, Value) {
     let folder = tempfile::tempdir().unwrap();

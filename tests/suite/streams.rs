@@ -1,7 +1,7 @@
 //! Boards without a port, for what listens to one: readings that a test makes up, and the emulated gripper on a clock
 //! that runs as fast as it is asked.
 
-use palpate_device::emulator::{EmulatedGripper, EmulatorSetup};
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, parse_faults};
 use palpate_device::protocol::AdcRange;
 use palpate_device::protocol::{ConsoleLine, DecodedEvent, Decoder};
 use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
@@ -119,6 +119,13 @@ impl Emulated {
     pub(crate) fn new(setup: EmulatorSetup, look: Duration) -> Self {
         let gripper = EmulatedGripper::new(setup).unwrap();
         Self { gripper, decoder: Decoder::default(), t_s: 0.0, look }
+    }
+
+    /// Lets a fault begin now: `NAME[=VALUE]`, and how long it lasts (s).
+    pub(crate) fn strike(&mut self, fault: &str, seconds: f64) {
+        for fault in parse_faults(&format!("{fault}@{}/{seconds}", self.t_s)).unwrap() {
+            self.gripper.add_fault(fault);
+        }
     }
 }
 

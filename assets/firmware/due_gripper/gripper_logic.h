@@ -304,7 +304,8 @@ static void gripper_sample(const GripperState *state, const GripperSetup *setup,
 /* Vents when the host has gone silent. It is short and prints nothing, so that a timer's interrupt may call it: printing can
  * wait for a host that hangs, and the hand must open nevertheless. */
 static void gripper_watch(GripperState *state, const GripperPins *pins, uint32_t now_us) {
-  if (state->steps && now_us - state->heard_us > GRIPPER_WATCHDOG_US) {
+  /* Signed, because the interrupt's clock may be a little behind the one that a line was heard by. */
+  if (state->steps && (int32_t)(now_us - state->heard_us) > (int32_t)GRIPPER_WATCHDOG_US) {
     gripper_set_pressure(state, pins, 0);
     state->vented = 1;
   }

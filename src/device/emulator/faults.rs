@@ -38,6 +38,14 @@ pub enum FaultKind {
     Silent,
     /// The port disappears and comes back.
     Vanish,
+    /// The board hears nothing.
+    Deaf,
+    /// Commands are not answered.
+    NoAnswer,
+    /// Commands are answered with another pressure.
+    WrongAnswer,
+    /// Another pressure is reported.
+    WrongPressure,
 }
 
 /// Name, default value, default duration (s) and description of a kind.
@@ -55,7 +63,7 @@ const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, w
     Row { kind, name, value, duration_s, words }
 }
 
-const TABLE: [Row; 16] = [
+const TABLE: [Row; 20] = [
     row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE is stuck at its reading"),
     row(FaultKind::Saturated, "saturation", 0.0, FOR_EVER, "channel VALUE is saturated at full scale"),
     row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE is disconnected"),
@@ -72,6 +80,10 @@ const TABLE: [Row; 16] = [
     row(FaultKind::Burst, "burst", 0.25, 2.0, "lines arrive in bunches, every VALUE s"),
     row(FaultKind::Silent, "silent", 0.0, 2.0, "nothing is sent"),
     row(FaultKind::Vanish, "vanish", 0.0, 1.0, "the port disappears and comes back"),
+    row(FaultKind::Deaf, "deaf", 0.0, FOR_EVER, "the board hears no command"),
+    row(FaultKind::NoAnswer, "noanswer", 0.0, FOR_EVER, "the board answers no command"),
+    row(FaultKind::WrongAnswer, "wronganswer", 1.5, FOR_EVER, "the board acknowledges VALUE bar, whatever was asked"),
+    row(FaultKind::WrongPressure, "wrongpressure", 0.0, FOR_EVER, "the board reports VALUE bar as its pressure"),
 ];
 
 impl FaultKind {
@@ -113,7 +125,7 @@ pub fn fault_help() -> String {
     let line = |row: &Row| {
         let lasts =
             if row.duration_s.is_finite() { format!("{} s", row.duration_s) } else { "until the end".to_owned() };
-        format!("  {:<10} {} (VALUE {}, duration {lasts})", row.name, row.words, row.value)
+        format!("  {:<13} {} (VALUE {}, duration {lasts})", row.name, row.words, row.value)
     };
     TABLE.iter().map(line).collect::<Vec<_>>().join("\n")
 }

@@ -201,6 +201,12 @@ fn silence_of_the_host_vents_within_a_second_but_a_sign_of_life_does_not() {
     // Rubbish is no sign of life: a host whose line is broken must not hold the pressure.
     assert!(vents(&[after(0), on(), after(900_000), hear("%&/"), after(1_100_000)]));
     assert!(!vents(&[after(0), on(), hear("V"), after(5_000_000)]), "nothing to vent");
+    // The interrupt's clock may be a millisecond behind, also where it wraps in between.
+    for heard_us in [500_000, 700_200] {
+        let behind = Input::Watch(start.wrapping_add(heard_us - 1000));
+        assert!(!vents(&[after(heard_us), on(), behind.clone(), after(heard_us + 900_000)]));
+        assert!(vents(&[after(heard_us), on(), behind, after(heard_us + 1_000_001)]));
+    }
 }
 
 #[test]
@@ -225,4 +231,59 @@ fn pressure_set_by_hand_is_printed_and_the_watchdog_leaves_it() {
     assert!("P 0.50\n".bytes().any(|byte| board.hear(byte, 4_000_000, &mut printed)));
     board.poll(5_000_001, &mut |_| 1, &mut printed);
     assert!(printed.contains("# vent reason=watchdog\n") && board.line_bar() == 0.0);
+}
+
+/// What the sketch does to a board of which only this is known: one letter for each thing.
+#[cfg(unix)]
+const SKETCH_BOARD: &str = r#"
+#include <stdint.h>
+#include <stdio.h>
+enum { A0, A1, A2, A3, DAC0 };
+static uint32_t clock_us;
+static uint32_t micros(void) { return clock_us; }
+static int analogRead(uint8_t pin) { return pin; }
+static void analogWrite(int pin, uint32_t value) { printf("%s%u ", pin == DAC0 ? "dac" : "pin", (unsigned)value); }
+static void analogReadResolution(int bits) { (void)bits; }
+static void analogWriteResolution(int bits) { (void)bits; }
+static void watchdogEnable(uint32_t ms) { printf("watchdog%u ", (unsigned)ms); }
+static void watchdogReset(void) { printf("fed "); }
+static const char *host = "P 0.50\n";
+static int available(void) { return *host != 0; }
+static int read_byte(void) { return *host++; }
+static void begin(long baud) { (void)baud; printf("begun "); }
+static size_t write_bytes(const uint8_t *text, size_t length) { (void)text; return length; }
+static struct {
+  void (*begin)(long); int (*available)(void); int (*read)(void); size_t (*write)(const uint8_t *, size_t);
+} SerialUSB = {begin, available, read_byte, write_bytes};
+#include SKETCH
+int main(void) {
+  watchdogSetup(); initVariant(); setup(); sysTickHook(); loop(); sysTickHook(); clock_us = 1000001; sysTickHook();
+  return 0;
+}
+"#;
+
+/// Compiles the sketch for that board.
+#[cfg(unix)]
+fn sketch(folder: &std::path::Path, most_steps: u32) -> std::process::Output {
+    let (code, sketch) =
+        (folder.join("board.c"), concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/firmware/due_gripper"));
+    std::fs::write(&code, SKETCH_BOARD).expect("writes");
+    let mut compiler = std::process::Command::new("cc");
+    compiler.arg(format!("-DMOST_STEPS={most_steps}")).arg(format!("-DSKETCH=\"{sketch}/due_gripper.ino\""));
+    compiler.args(["-DARDUINO_ARCH_SAM", "-I", sketch, "-o"]).arg(folder.join("board")).arg(code);
+    compiler.output().expect("the compiler that built the firmware")
+}
+
+#[cfg(unix)]
+#[test]
+fn the_sketch_puts_out_no_pressure_first_and_starts_the_chips_watchdog() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let built = sketch(folder.path(), 30);
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let ran = std::process::Command::new(folder.path().join("board")).output().expect("just built");
+    let did = String::from_utf8_lossy(&ran.stdout);
+    // Under pressure only the loop feeds the watchdog, and after a second without the host there is none.
+    assert_eq!(did.trim(), "watchdog2000 dac0 dac0 begun dac0 fed fed dac1365 dac0 fed");
+    let beyond = sketch(folder.path(), 31);
+    assert!(!beyond.status.success() && String::from_utf8_lossy(&beyond.stderr).contains("MOST_STEPS is above 30"));
 }

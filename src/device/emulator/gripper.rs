@@ -117,6 +117,8 @@ pub struct EmulatedGripper {
     struck: Vec<bool>,
     converter: Conversions,
     now_s: f64,
+    /// Time to which it was advanced (s); earlier than `now_s` while the board starts again.
+    reached_s: f64,
     /// A moment on both clocks: our time (s) and the board's, unwrapped (µs).
     anchor: (f64, u64),
     line_chance: Stream,
@@ -158,6 +160,7 @@ impl EmulatedGripper {
             struck: vec![false; setup.faults.len()],
             faults: setup.faults,
             now_s: 0.0,
+            reached_s: 0.0,
             anchor: (0.0, u64::from(setup.clock_start_us)),
             line_chance: Stream::new(setup.seed, "line", "chance"),
             garbage: Stream::new(setup.seed, "line", "garbage"),
@@ -177,6 +180,12 @@ impl EmulatedGripper {
     /// Adds a step to its script.
     pub fn add_step(&mut self, step: Step) -> Result<(), ObjectError> {
         self.hand.add(step)
+    }
+
+    /// Adds a fault.
+    pub fn add_fault(&mut self, fault: EmulatedFault) {
+        self.faults.push(fault);
+        self.struck.push(false);
     }
 
     /// Takes the bytes since the last call.
@@ -215,11 +224,15 @@ impl EmulatedGripper {
             self.sample();
         }
         self.now_s = t.max(self.now_s);
+        self.reached_s = t;
         self.release();
     }
 
-    /// Takes bytes from the host, now.
+    /// Takes bytes from the host, now. A board that starts again does not get them.
     pub fn hear(&mut self, bytes: &[u8]) {
+        if self.fault(FaultKind::Deaf).is_some() || self.reached_s + SAME_TIME_S < self.anchor.0 {
+            return;
+        }
         let mut said = String::new();
         let clock_us = self.clock_us(self.now_s) as u32;
         for &byte in bytes {
@@ -331,15 +344,16 @@ impl EmulatedGripper {
 
     /// Applies the faults to a line.
     fn on_the_line(&mut self, line: &str) -> Vec<u8> {
+        let line = self.misstated(line);
         let chance = self.line_chance.within(0.0, 1.0);
         let where_cut = self.line_chance.within(0.0, line.len() as f64) as usize;
-        if self.fault(FaultKind::Silent).is_some() || self.fault(FaultKind::Loss).is_some_and(|f| chance < f.value) {
+        if line.is_empty()
+            || self.fault(FaultKind::Silent).is_some()
+            || self.fault(FaultKind::Loss).is_some_and(|f| chance < f.value)
+        {
             return Vec::new();
         }
         let mut sent = line.as_bytes().to_vec();
-        if let Some(fault) = self.fault(FaultKind::Nan) {
-            sent = self.without_number(line, fault.value as usize).into_bytes();
-        }
         if self.fault(FaultKind::Partial).is_some_and(|fault| chance < fault.value) {
             sent.truncate(where_cut);
         }
@@ -355,18 +369,25 @@ impl EmulatedGripper {
         }
     }
 
-    /// A line with `nan` for a channel, with its checksum.
-    fn without_number(&self, line: &str, channel: usize) -> String {
-        let name = self.board_setup.channels.get(channel);
-        let Some((name, body)) = name.zip(line.rsplit_once(",ck:").map(|(body, _)| body)) else {
-            return line.to_owned();
-        };
-        let field = |field: &str| match field.split_once(':') {
-            Some((key, _)) if key == name => format!("{key}:nan"),
-            _ => field.to_owned(),
-        };
-        let body = body.split(',').map(field).collect::<Vec<_>>().join(",");
-        format!("{body},ck:{}\n", checksum(body.as_bytes()))
+    /// A line as the board says it, where it is wrong itself.
+    fn misstated(&self, line: &str) -> String {
+        let bar = |kind| self.fault(kind).map(|fault| format!("{:.2}", fault.value));
+        let answers = line.starts_with("# ok") || line.starts_with("# refused");
+        if answers && self.fault(FaultKind::NoAnswer).is_some() {
+            return String::new();
+        }
+        if let Some(bar) = bar(FaultKind::WrongAnswer).filter(|_| answers) {
+            return format!("# ok p={bar}\n");
+        }
+        let mut line = line.to_owned();
+        if let Some(bar) = bar(FaultKind::WrongPressure) {
+            line = with_field(&line, "p_bar", &bar);
+        }
+        let silenced = self.fault(FaultKind::Nan).and_then(|fault| self.board_setup.channels.get(fault.value as usize));
+        match silenced {
+            Some(name) => with_field(&line, name, "nan"),
+            None => line,
+        }
     }
 
     /// Releases what a burst holds back, at its time.
@@ -379,6 +400,17 @@ impl EmulatedGripper {
         }
         self.bytes.append(&mut self.held_back);
     }
+}
+
+/// A line with another text in a field, and its checksum.
+fn with_field(line: &str, name: &str, text: &str) -> String {
+    let Some((body, _)) = line.rsplit_once(",ck:") else { return line.to_owned() };
+    let field = |field: &str| match field.split_once(':') {
+        Some((key, _)) if key == name => format!("{key}:{text}"),
+        _ => field.to_owned(),
+    };
+    let body = body.split(',').map(field).collect::<Vec<_>>().join(",");
+    format!("{body},ck:{}\n", checksum(body.as_bytes()))
 }
 
 /// The board's converter, with its faults.

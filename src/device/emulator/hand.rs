@@ -5,7 +5,7 @@ use super::parts::Stimulus;
 use super::script::Step;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Phase, Programme};
-use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel};
+use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::Scene;
@@ -41,7 +41,8 @@ struct Graspable {
 pub struct HandPlan {
     /// The gripper, its programme, and how objects lie.
     pub scene: Scene,
-    /// Objects, grasped in turn.
+    /// What is in the hand, grasp by grasp and then again; `empty` in front of others stands for the first grasp of a host
+    /// only. None: the built-in objects by itself, and nothing once a host drives, because nobody puts anything there.
     pub objects: Vec<String>,
     /// Random seed of the poses.
     pub seed: u64,
@@ -81,6 +82,8 @@ pub(super) struct Hand {
     scripted: bool,
     doing: Doing,
     grasps: u32,
+    /// Grasps since the hand was last emptied.
+    turn: usize,
     next_s: f64,
     /// A host drives.
     driven: bool,
@@ -96,7 +99,10 @@ impl Hand {
             Step::Grasp { object, .. } => Some(object.clone()),
             Step::Hold { .. } => None,
         });
-        let mut wanted: Vec<String> = plan.objects.iter().cloned().chain(in_script).collect();
+        let nobody = plan.objects.is_empty().then_some(EMPTY.to_owned());
+        let own = plan.grasp_every_s.filter(|_| plan.objects.is_empty()).map(|_| built_in());
+        let named = plan.objects.iter().cloned().chain(in_script);
+        let mut wanted: Vec<String> = named.chain(nobody).chain(own.into_iter().flatten()).collect();
         wanted.sort();
         wanted.dedup();
         let mut hand = Self {
@@ -106,6 +112,7 @@ impl Hand {
             things: Vec::new(),
             doing: Doing::Rest,
             grasps: 0,
+            turn: 0,
             next_s: 0.0,
             driven: false,
             vented_since_s: None,
@@ -160,7 +167,7 @@ impl Hand {
             // Until now the old pressure was on.
             self.at(t, was_bar);
         } else {
-            (self.driven, self.doing) = (true, Doing::Rest);
+            (self.driven, self.doing, self.turn) = (true, Doing::Rest, 0);
             self.script.clear();
         }
     }
@@ -239,11 +246,22 @@ impl Hand {
     }
 
     fn grasp_next(&mut self, t: f64, programme: Option<Programme>) {
-        let turn = self.grasps as usize % self.plan.objects.len().max(1);
-        let name = self.plan.objects.get(turn).map_or(EMPTY, String::as_str);
+        let name = self.next_object();
         if let Some(thing) = self.things.iter().position(|thing| thing.name == name) {
             self.grasp(thing, t, programme);
         }
+    }
+
+    /// What is in the hand at the next grasp.
+    fn next_object(&mut self) -> String {
+        let turn = self.turn;
+        self.turn += 1;
+        let objects = match self.plan.objects.as_slice() {
+            [] if !self.driven => built_in(),
+            [empty, others @ ..] if self.driven && turn > 0 && empty == EMPTY && !others.is_empty() => others.to_vec(),
+            objects => objects.to_vec(),
+        };
+        objects.get(turn % objects.len().max(1)).map_or(EMPTY, String::as_str).to_owned()
     }
 
     fn grasp(&mut self, thing: usize, t: f64, programme: Option<Programme>) {
@@ -253,6 +271,11 @@ impl Hand {
         self.began.push(Began::Grasp { number: self.grasps, object: name.clone() });
         self.doing = Doing::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
     }
+}
+
+/// Names of the built-in objects.
+fn built_in() -> Vec<String> {
+    catalogue().iter().map(|object| object.name.clone()).collect()
 }
 
 /// Simulated grasp, driven while it runs.

@@ -153,6 +153,30 @@ fn every_fault_does_what_it_says() {
 }
 
 #[test]
+fn each_fault_of_the_pressure_does_what_it_says() {
+    let drive = |faults: &str| {
+        let mut gripper = EmulatedGripper::new(setup("", faults)).expect("nothing to load");
+        sent(&mut gripper, 0.0, 1.0);
+        gripper.hear(b"P 0.50\n");
+        (String::from_utf8_lossy(&sent(&mut gripper, 1.0, 1.5)).into_owned(), gripper.take_printed())
+    };
+    let line = |text: &str, words: &str| text.lines().any(|line| line.contains(words));
+    let (sound, _) = drive("");
+    assert!(line(&sound, "# ok p=0.50") && line(&sound, ",p_bar:0.50,") && !line(&sound, ",p_bar:1.20,"));
+    let (mute, printed) = drive("noanswer@1");
+    assert!(!line(&mute, "# ok") && line(&mute, ",p_bar:0.50,") && line(&printed, "# ok p=0.50"));
+    let (deaf, printed) = drive("deaf@1");
+    assert!(!line(&deaf, "# ok") && !line(&printed, "# ok") && !line(&deaf, ",p_bar:0.50,"));
+    let (wrong, _) = drive("wronganswer=1.2@1");
+    assert!(line(&wrong, "# ok p=1.20") && !line(&wrong, "# ok p=0.50") && line(&wrong, ",p_bar:0.50,"));
+    let (off, _) = drive("wrongpressure=1.2@1");
+    assert!(line(&off, "# ok p=0.50") && line(&off, ",p_bar:1.20,") && !line(&off, ",p_bar:0.50,"));
+    let (restarted, _) = drive("reset@0.9/0.3");
+    assert!(line(&restarted, "# tactile-gripper") && line(&restarted, ",p_bar:0.00,"));
+    assert!(!line(&restarted, "# ok") && !line(&restarted, ",p_bar:0.50,"), "what is sent meanwhile is lost");
+}
+
+#[test]
 fn a_stuck_channel_keeps_its_reading_while_the_others_go_on() {
     let found = text(setup("rest=1;angle=90 hold=2", "stuck=0@0.5"), 2.5);
     let lines = samples(&found);

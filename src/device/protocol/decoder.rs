@@ -339,9 +339,9 @@ impl Reader {
         }
         let Some(from_s) = self.last_s.filter(|_| stamp.missing != Some(0)) else { return };
         let cause = match (broken, stamp.restarted, unreadable) {
-            (Some(cause), true, _) => format!("{cause}; the board restarted"),
+            (Some(cause), true, _) => format!("{cause}; {}", Gap::RESTARTED),
             (Some(cause), false, _) => cause,
-            (None, true, _) => "the board restarted".to_owned(),
+            (None, true, _) => Gap::RESTARTED.to_owned(),
             (None, false, 0) if stamp.missing.is_none() => "no data".to_owned(),
             (None, false, 0) => "lost in transit".to_owned(),
             (None, false, 1) => "1 unreadable line".to_owned(),

@@ -11,7 +11,7 @@ use super::checksum;
 use palpate_tactile::board::Board;
 
 /// First word of the handshake.
-const GREETING: &str = "tactile-gripper";
+pub(super) const GREETING: &str = "tactile-gripper";
 
 /// First version of the firmware whose lines end in a checksum.
 const CHECKED_FROM: u32 = 2;

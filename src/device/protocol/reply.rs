@@ -6,6 +6,7 @@
 //! # vent reason=watchdog                       the board vented on its own
 //! ```
 
+use super::handshake::GREETING;
 use std::fmt;
 
 /// Reply or remark of the board, without its `#`.
@@ -31,6 +32,11 @@ pub enum BoardReply {
 }
 
 impl BoardReply {
+    /// True for the handshake, which a board sends when it starts, and when it is asked.
+    pub fn is_handshake(&self) -> bool {
+        matches!(self, Self::Other(text) if text.split_whitespace().next() == Some(GREETING))
+    }
+
     /// Parses a remark.
     pub(super) fn parse(remark: &str) -> Self {
         let text = remark.strip_prefix('#').unwrap_or(remark).trim();
@@ -75,6 +81,7 @@ mod tests {
             let reply = BoardReply::parse(&line);
             assert_eq!(format!("# {reply}"), line);
             let handshake = line.starts_with("# tactile-gripper");
+            assert_eq!(reply.is_handshake(), handshake, "{line}");
             assert_eq!(matches!(reply, BoardReply::Other(_)), handshake, "{line}");
         }
     }

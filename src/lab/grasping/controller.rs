@@ -9,6 +9,7 @@
 //! ([`Control::Free`]) has no programme; its phases, where known, are those that [`GraspController::observe_phase`]
 //! hands in.
 
+use super::pressure_watch::PressureWatch;
 use crate::gripper::GripperEvent;
 use palpate_device::protocol::{BoardReply, DecodedEvent};
 use palpate_device::serial::LinkEvent;
@@ -109,6 +110,8 @@ pub struct GraspController {
     phase: Option<Phase>,
     closing_s: Option<f64>,
     abort: Option<String>,
+    /// Over a board that drives real fingers.
+    watch: Option<PressureWatch>,
 }
 
 impl GraspController {
@@ -116,7 +119,17 @@ impl GraspController {
     pub fn new(plan: GraspPlan, now_s: f64) -> Self {
         let programme_s = now_s + plan.lead_s;
         let closing_s = (plan.control != Control::Free).then_some(programme_s);
-        Self { plan, began_s: now_s, programme_s, tick: None, command: None, phase: None, closing_s, abort: None }
+        Self {
+            plan,
+            began_s: now_s,
+            programme_s,
+            tick: None,
+            command: None,
+            phase: None,
+            closing_s,
+            abort: None,
+            watch: None,
+        }
     }
 
     /// The plan.
@@ -148,7 +161,22 @@ impl GraspController {
         if self.command.replace((bar, phase)) == Some((bar, phase)) {
             return None;
         }
+        if let Some(watch) = &mut self.watch {
+            watch.command(bar, now_s);
+        }
         Some(PressureCommand { bar, phase, at_s: now_s })
+    }
+
+    /// From now on the board that drives the fingers is watched; it was told to vent at `now_s`.
+    pub fn watch_board(&mut self, now_s: f64) {
+        self.watch = Some(PressureWatch::new(now_s));
+    }
+
+    /// Aborts where something of a watched board is overdue at `now_s`, up to which all its events were observed.
+    pub fn check_board(&mut self, now_s: f64) {
+        if let Some(Err(fault)) = self.watch.as_ref().map(|watch| watch.check(now_s)) {
+            self.abort(fault.to_string());
+        }
     }
 
     /// The mark that a command leaves in the trial. By hand only the phase is known, not the pressure.
@@ -170,8 +198,9 @@ impl GraspController {
         new.then_some(phase)
     }
 
-    /// Handles an event of the gripper: a board that refuses, vents on its own or disconnects aborts a driven grasp, which
-    /// must not continue later with a leap of pressure. The cause, where the event interrupts the grasp.
+    /// Handles an event of the gripper: a board that refuses, vents on its own, disconnects or fails its watch aborts a
+    /// driven grasp, which must not continue later with a leap of pressure. The cause, where the event interrupts a grasp
+    /// that goes on.
     pub fn observe(&mut self, event: &GripperEvent) -> Option<String> {
         let cause = match event {
             GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Refused { reason }))) => {
@@ -182,16 +211,18 @@ impl GraspController {
                 format!("the board vented on its own ({cause})")
             }
             GripperEvent::Board(LinkEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
-            GripperEvent::Board(_)
-            | GripperEvent::Sampled(_)
-            | GripperEvent::Signals { .. }
-            | GripperEvent::Tick
-            | GripperEvent::Finished => {
+            GripperEvent::Board(event) => {
+                if let Some(Err(fault)) = self.watch.as_mut().map(|watch| watch.observe(event)) {
+                    self.abort(fault.to_string());
+                }
+                return None;
+            }
+            GripperEvent::Sampled(_) | GripperEvent::Signals { .. } | GripperEvent::Tick | GripperEvent::Finished => {
                 return None;
             }
         };
         self.abort(cause.clone());
-        Some(cause)
+        Some(cause).filter(|_| self.abort.is_none())
     }
 
     /// Aborts a driven grasp; others continue, because this program does not move their fingers. The first cause is kept.
@@ -302,8 +333,9 @@ mod tests {
         let vented = GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(vented)));
         for (control, aborts) in [(Control::Driven, true), (Control::ByHand, false), (Control::Free, false)] {
             let mut controller = GraspController::new(plan(control), 0.0);
-            assert_eq!(controller.observe(&vented), Some("the board vented on its own (watchdog)".to_owned()));
-            assert_eq!(controller.abort_cause().is_some(), aborts, "{control:?}");
+            let cause = "the board vented on its own (watchdog)";
+            assert_eq!(controller.observe(&vented), (!aborts).then(|| cause.to_owned()));
+            assert_eq!(controller.abort_cause(), aborts.then_some(cause), "{control:?}");
             assert_eq!(controller.is_over(0.0), aborts);
             assert_eq!(controller.command(9.0).is_none(), control != Control::ByHand, "{control:?}");
         }

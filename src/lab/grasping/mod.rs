@@ -13,6 +13,7 @@ mod identify;
 mod known_geometry;
 mod lessons;
 mod presentation;
+mod pressure_watch;
 mod row;
 mod run;
 mod shuffled_objects;

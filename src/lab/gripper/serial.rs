@@ -18,12 +18,18 @@ pub struct SerialGripper {
     tick_due: bool,
     bar: f64,
     sent_s: f64,
+    looked_s: f64,
 }
 
 impl SerialGripper {
     /// Wraps an open stream.
     pub fn new(stream: Box<dyn BoardStream>) -> Self {
-        Self { stream, waiting: VecDeque::new(), tick_due: false, bar: 0.0, sent_s: 0.0 }
+        Self { stream, waiting: VecDeque::new(), tick_due: false, bar: 0.0, sent_s: 0.0, looked_s: 0.0 }
+    }
+
+    /// When the stream was looked at last (s): what had arrived by then was delivered before the next tick.
+    pub fn looked_s(&self) -> f64 {
+        self.looked_s
     }
 
     /// The stream: status, console.
@@ -59,6 +65,7 @@ impl Gripper for SerialGripper {
         if self.waiting.is_empty() {
             self.keep_alive()?;
             self.waiting = self.stream.take(patience).into();
+            self.looked_s = self.stream.now_s();
         }
         let event = self.waiting.pop_front();
         self.tick_due = event.is_some() && self.waiting.is_empty();

@@ -48,7 +48,7 @@ impl BoardTrialRecording {
     /// moments do.
     pub fn begin(
         recorder: &Recorder,
-        gripper: &SerialGripper,
+        gripper: &mut SerialGripper,
         recent: &RecentEvents,
         scene: &Scene,
         request: TrialRequest,
@@ -77,7 +77,19 @@ impl BoardTrialRecording {
             over: false,
         };
         before.into_iter().for_each(|event| recording.take(recorder, event));
+        if recording.is_driven() {
+            recording.vent_first(gripper);
+        }
         recording
+    }
+
+    /// Vents fingers that will be driven: they rest before they close, and a board that does not answer is found out before
+    /// there is pressure.
+    fn vent_first(&mut self, gripper: &mut SerialGripper) {
+        match gripper.vent() {
+            Ok(()) => self.controller.watch_board(gripper.now_s()),
+            Err(error) => self.controller.abort(error.to_string()),
+        }
     }
 
     /// Records an event of the board, and lets it abort a driven grasp. Readings after the end are left out.
@@ -100,8 +112,10 @@ impl BoardTrialRecording {
         recorder.board(event);
     }
 
-    /// Sets the line pressure that is due; the phase that begins, if any. A line that cannot be sent aborts the grasp.
+    /// Sets the line pressure that is due, after all events up to the last look at the board; the phase that begins, if any.
+    /// A line that cannot be sent, or an answer that is overdue, aborts the grasp.
     pub fn drive(&mut self, recorder: &Recorder, gripper: &mut SerialGripper) -> Option<Phase> {
+        self.controller.check_board(gripper.looked_s());
         let command = self.controller.command(gripper.now_s())?;
         if self.is_driven()
             && let Err(error) = gripper.set_pressure(command.bar, command.phase)
@@ -149,7 +163,8 @@ impl BoardTrialRecording {
         if self.is_driven() && gripper.vent().is_err() {
             self.note("the last vent could not be sent; the board vents within a second".to_owned());
         }
-        if let Some(cause) = self.controller.abort_cause() {
+        if let Some(cause) = self.controller.abort_cause().map(str::to_owned) {
+            recorder.interrupted(&cause);
             self.note(format!("ended early and vented: {cause}"));
         }
         recorder.finish_board(BoardTrialEnd { status: gripper.stream().status(), notes: self.notes, guess, discarded });

@@ -121,7 +121,9 @@ impl BoardWriter {
 
     /// Notes an interruption of the grasp, though the board kept sending.
     pub(super) fn interrupt(&mut self, cause: String) {
-        self.interruptions.push(cause);
+        if !self.interruptions.contains(&cause) {
+            self.interruptions.push(cause);
+        }
     }
 
     /// Notes a change of the control box.

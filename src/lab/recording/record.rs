@@ -103,10 +103,11 @@ pub fn record(
         match gripper.next_event(PATIENCE) {
             Ok(GripperEvent::Board(event)) => recording.take(&recorder, event),
             Ok(GripperEvent::Finished) => break,
-            Ok(GripperEvent::Tick | GripperEvent::Sampled(_) | GripperEvent::Signals { .. }) => {}
+            Ok(GripperEvent::Tick | GripperEvent::Sampled(_) | GripperEvent::Signals { .. }) => {
+                recording.drive(&recorder, gripper);
+            }
             Err(error) => recording.controller_mut().abort(error.to_string()),
         }
-        recording.drive(&recorder, gripper);
         for notice in notices.try_iter() {
             match notice {
                 RecorderNotice::Begun(begun) => id = Some(begun),
