@@ -9,7 +9,7 @@ use palpate_device::emulator::{
 };
 #[cfg(unix)]
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
-use palpate_sim::objects::{anchored, catalogue};
+use palpate_sim::objects::anchored;
 use palpate_store::FileKind;
 use std::path::PathBuf;
 
@@ -20,7 +20,8 @@ pub(super) struct EmulateArguments {
     /// Symbolic link to create: the port that a host opens.
     #[arg(long, value_name = "FILE", required_unless_present = "print_secrets")]
     link: Option<PathBuf>,
-    /// Objects to grasp in turn: names or files, separated by commas (default: the sixteen).
+    /// What is in the hand, grasp by grasp: names or files, separated by commas; `empty` in front of others for the first
+    /// close by a host only, to adapt to (default: the sixteen by itself, nothing while a host drives).
     #[arg(long = "object", value_name = "A,B,..", value_delimiter = ',')]
     objects: Vec<String>,
     #[command(flatten)]
@@ -107,13 +108,9 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         return say_json(&parts);
     }
     let script = script(arguments)?;
-    let objects = match arguments.objects.as_slice() {
-        [] => catalogue().iter().map(|object| object.name.clone()).collect(),
-        named => named.iter().map(|name| anchored(name)).collect(),
-    };
     let hand = HandPlan {
         scene: arguments.scene.scene(None)?,
-        objects,
+        objects: arguments.objects.iter().map(|name| anchored(name)).collect(),
         seed: arguments.seed,
         grasp_every_s: Some(arguments.grasp_every).filter(|every| *every > 0.0),
         script,

@@ -19,11 +19,11 @@ struct Emulator {
 }
 
 impl Emulator {
-    /// Starts it with these objects in turn, which only a host grasps.
-    fn start(folder: &Path, objects: &str) -> Self {
+    /// Starts it.
+    fn start(folder: &Path, arguments: &[&str]) -> Self {
         let port = folder.join("port");
         let mut command = palpate(&folder.join("unused.sqlite"));
-        command.args(["emulate", "--grasp-every", "0", "--seed", "77", "--object", objects, "--link"]).arg(&port);
+        command.arg("emulate").args(arguments).arg("--link").arg(&port);
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         let child = start(command);
         let began = Instant::now();
@@ -54,7 +54,7 @@ fn json_at_port(folder: &Path, arguments: &[&str], port: &Path) -> Value {
 #[test]
 fn a_gripper_recognises_after_one_close_of_its_empty_hand() {
     let folder = tempfile::tempdir().unwrap();
-    let emulator = Emulator::start(folder.path(), "empty,lemon");
+    let emulator = Emulator::start(folder.path(), &["--grasp-every", "0", "--seed", "77", "--object", "empty,lemon"]);
     let port = emulator.port.to_str().unwrap();
     refused(folder.path(), &["demo", "--port", port], &["not calibrated", "palpate adapt --port"]);
 
@@ -107,4 +107,24 @@ fn what_adapt_cannot_use_is_refused_with_a_remedy() {
     let nothing = folder.path().join("nothing.bytes");
     std::fs::write(&nothing, "noise\n").unwrap();
     refused(folder.path(), &["adapt", "--port", nothing.to_str().unwrap()], &["no reading"]);
+}
+
+#[test]
+fn adapt_works_as_the_readme_prints_it_and_refuses_a_ball() {
+    let folder = tempfile::tempdir().unwrap();
+    // It grasps the built-in objects by itself until a host drives it.
+    let emulator = Emulator::start(folder.path(), &[]);
+    for _ in 0..2 {
+        let adapted = json_at_port(folder.path(), &["adapt", "--replace"], &emulator.port);
+        let outcomes: Vec<&str> =
+            adapted["sensors"].as_array().unwrap().iter().filter_map(|sensor| sensor["outcome"].as_str()).collect();
+        assert_eq!(outcomes, ["adapted"; 4], "{adapted}");
+    }
+    drop(emulator);
+    let kept = |store: &Store| store.calibrations().serving(None, &[]).unwrap().calibrations.len();
+    let second = tempfile::tempdir().unwrap();
+    let holding = Emulator::start(second.path(), &["--object", "ball"]);
+    let port = holding.port.to_str().unwrap();
+    refused(second.path(), &["adapt", "--port", port], &["something is in the hand", "Take it out and close again"]);
+    assert_eq!(kept(&Store::open(&second.path().join("trials.sqlite")).unwrap()), 0, "nothing is calibrated by a ball");
 }

@@ -4,23 +4,29 @@
 use crate::bench::{Bench, BenchSetup};
 use crate::calibration::{calibrated, parts};
 use crate::cpu_renderer::CpuRenderer;
-use crate::gripper::board;
+use crate::gripper::{TRUE_TO_TIME, board, emulated};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, ViewAction, ViewSource};
+use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{GripperCommand, LabellingAction};
+use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::Store;
 use palpate_tactile::trial::Control;
 
 fn desk() -> Bench {
+    desk_at(board(&parts(1, false)))
+}
+
+fn desk_at(listen: Listen) -> Bench {
     let fill = |store: &mut Store| {
         for (sensor, calibration) in calibrated(&parts(1, false), 1).1 {
             store.calibrations().add(&calibration.record).unwrap();
             store.calibrations().mount(sensor, &calibration.record.part).unwrap();
         }
     };
-    let setup = BenchSetup { fill, listen: board(&parts(1, false)), size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let setup = BenchSetup { fill, listen, size: [1400.0, 1000.0], ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
     bench.tell(ViewAction::SetMode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
@@ -268,4 +274,32 @@ fn blind_hides_the_models_guess_until_the_label_is_given() {
     desk.until_shown(true, "is hidden until you label the trial");
     desk.press(Key::N);
     desk.until_shown(false, "is hidden until you label the trial");
+}
+
+#[test]
+fn adapting_shows_the_empty_hand_and_asks_for_one() {
+    let mut desk = desk_at(emulated(&parts(1, false), None, TRUE_TO_TIME, 30));
+    desk.press_with(Modifiers::COMMAND, Key::G);
+    desk.until_shown(true, "Stop and vent");
+    let object = |desk: &Bench| desk.workbench().snapshot().map(|snapshot| snapshot.scene.object.source.clone());
+    assert_ne!(object(&desk).as_deref(), Some(EMPTY));
+    let next = desk.next_object();
+    desk.tell(GripperCommand::Adapt(Control::Driven));
+    desk.until_shown(true, "Adapting: take everything out of the hand");
+    assert!(desk.harness.query_all_by_label(object_title(&next).as_ref()).next().is_none(), "nothing is to be held");
+    for _ in 0..MOST_LOOKS {
+        if object(&desk).as_deref() == Some(EMPTY) {
+            break;
+        }
+        desk.wait();
+    }
+    assert_eq!(object(&desk).as_deref(), Some(EMPTY));
+    desk.until_shown(false, "Adapting: take everything out of the hand");
+    for _ in 0..MOST_LOOKS {
+        if object(&desk).as_deref() != Some(EMPTY) {
+            return;
+        }
+        desk.wait();
+    }
+    panic!("the scene from before does not come back: {:?}", object(&desk));
 }

@@ -40,7 +40,7 @@ const MOST_VIEWS: u32 = 3000;
 /// A look at the emulated gripper takes this long in truth.
 pub(crate) const FAST: Duration = Duration::from_micros(100);
 /// A look when its time is the time of the clock.
-const TRUE_TO_TIME: Duration = Duration::from_millis(10);
+pub(crate) const TRUE_TO_TIME: Duration = Duration::from_millis(10);
 
 pub(crate) fn scene() -> Scene {
     let mut scene = Scene::default();
@@ -58,7 +58,7 @@ fn moving(parts: &HiddenParts) -> Listen {
     emulated(parts, Some(7.0), FAST, 30)
 }
 
-fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
+pub(crate) fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
     let parts = parts.clone();
     Arc::new(move |port| {
         if let Some(port) = port {
@@ -420,7 +420,7 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     let mut desk = Desk::on(emulated(&parts(1, false), None, FAST, 10));
     desk.connect();
     let id = desk.trial(Control::Driven, false);
-    desk.until_said("trial ended and fingers vented: the board refused a command (above-maximum");
+    desk.until_said("trial ended and fingers told to vent: the board refused a command (above-maximum");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let trial = desk.store().board_log(id).unwrap().unwrap();
     // The refused step is the last that it was told.

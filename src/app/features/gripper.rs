@@ -9,6 +9,7 @@ use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{Command, GripperCommand, GripperWorker, Notice, TrialView};
 use palpate_sim::gripper::Phase;
+use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
 use palpate_tactile::trial::Control;
@@ -39,13 +40,15 @@ pub(in crate::app) struct GripperFeature {
     before_following: Option<(Option<TrialPlace>, u32)>,
     /// Scene that the gripper's thread has.
     scene: Scene,
+    /// Scene from before the empty hand is shown to adapt to.
+    before_adapting: Option<Scene>,
 }
 
 impl GripperFeature {
     /// `scene` is the one that the worker was started with.
     pub(in crate::app) fn new(worker: GripperWorker, scene: Scene) -> Self {
         let traces = TraceHistory::default();
-        Self { worker, traces, connected: false, part: None, before_following: None, scene }
+        Self { worker, traces, connected: false, part: None, before_following: None, scene, before_adapting: None }
     }
 
     pub(in crate::app) fn worker(&self) -> &GripperWorker {
@@ -86,6 +89,7 @@ impl GripperFeature {
             view.source = if self.connected { ViewSource::Gripper } else { ViewSource::Simulation };
             self.hand_over(simulation, notices);
         }
+        self.show_empty(gripper.trial.as_ref().is_some_and(|trial| trial.adapting), simulation);
         let part = gripper.trial.as_ref().map(|trial| trial.stage);
         if self.part != part {
             self.part = part;
@@ -125,6 +129,19 @@ impl GripperFeature {
                 let state = if watching { "press R to record" } else { "detected automatically" };
                 notices.info(format!("Trials: {state}."));
             }
+        }
+    }
+
+    /// Shows the empty hand while a close to adapt to is recorded, and then the scene from before.
+    fn show_empty(&mut self, adapting: bool, simulation: &mut SimulationFeature) {
+        match (adapting, self.before_adapting.take()) {
+            (true, None) => {
+                self.before_adapting = Some(simulation.scene().clone());
+                simulation.use_scene(simulation.scene_with(EMPTY));
+            }
+            (true, before) => self.before_adapting = before,
+            (false, Some(before)) => simulation.use_scene(before),
+            (false, None) => {}
         }
     }
 

@@ -213,7 +213,7 @@ impl SimulationFeature {
     }
 
     /// The scene with another object: a built-in name or a file.
-    fn scene_with(&self, source: &str) -> Scene {
+    pub(in crate::app) fn scene_with(&self, source: &str) -> Scene {
         let mut scene = self.scene.clone();
         scene.object.source = anchored(source);
         // Mass and size belong to the object before.
@@ -249,7 +249,8 @@ impl SimulationFeature {
         self.use_scene(scene);
     }
 
-    fn use_scene(&mut self, scene: Scene) {
+    /// Takes a scene without noting the change.
+    pub(in crate::app) fn use_scene(&mut self, scene: Scene) {
         self.scene = scene;
         self.effects.give_up();
         self.send_scene();

@@ -30,6 +30,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 wrapped(ui, RichText::new(text).small().color(colour(context.view.theme.colours().accent)));
                 open.into_iter().for_each(|asked| question_ui(ui, context, view, asked, actions));
             }
+            (Some(trial), _) if trial.adapting => adapting_ui(ui, context, trial),
             (Some(trial), _) => {
                 running_ui(ui, context, view, trial);
                 answer_ahead_ui(ui, context, actions);
@@ -114,17 +115,27 @@ fn cue(next: &NextTrial) -> String {
     format!("trial {}: {turn}{shifts}", next.number)
 }
 
-/// Instruction, large enough to be read at the control box.
 fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: &TrialView) {
+    stage_ui(ui, context, trial);
+    if let Some(next) = &view.next {
+        object_ui(ui, context, &next.object, &cue(next));
+    }
+}
+
+/// A close to adapt to holds no object.
+fn adapting_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &TrialView) {
+    ui.strong("Adapting: take everything out of the hand");
+    stage_ui(ui, context, trial);
+}
+
+/// Instruction, large enough to be read at the control box.
+fn stage_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &TrialView) {
     let accent = colour(context.view.theme.colours().accent);
     ui.label(RichText::new(instruction(trial)).size(26.0).strong().color(accent));
     if let Some(left_s) = trial.left_s {
         ui.label(RichText::new(format!("{left_s:.1} s")).size(30.0).monospace());
     }
     ui.weak(format!("{}: {} readings", trial.title(), trial.samples));
-    if let Some(next) = &view.next {
-        object_ui(ui, context, &next.object, &cue(next));
-    }
 }
 
 /// Last label, with the model's prediction.

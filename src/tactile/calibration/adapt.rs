@@ -68,6 +68,31 @@ impl EmptyHand<'_> {
         self.fit(sensor, part, vec![point(0.0, rest), point(angle, bent_counts)], None)
     }
 
+    /// Course of a strip's bend: time since the closing began (s), and bend as a share of the largest. Resistance is linear
+    /// in the bend, so that no calibration is needed. Empty where the strip does not move, or nobody knows when it began.
+    pub fn course(&self, side: Side) -> Vec<(f64, f64)> {
+        let sensor = SensorKind::Flex.on(side);
+        let (Some(closing_s), Ok(rest), Some(column)) =
+            (self.closing_s, self.rest(sensor), self.board.channel_of(sensor))
+        else {
+            return Vec::new();
+        };
+        let input = Input::on(self.board, sensor);
+        let bend = |reading: &Reading| {
+            let counts = reading.counts.get(column).copied().flatten().filter(|counts| counts.is_finite())?;
+            Some((reading.t_s - closing_s, input.ohm(f64::from(counts)) - input.ohm(rest)))
+        };
+        let bends: Vec<(f64, f64)> = self.readings.iter().filter_map(bend).filter(|(t_s, _)| *t_s >= 0.0).collect();
+        let mut sizes: Vec<f64> = bends.iter().map(|(_, bend)| *bend).collect();
+        sizes.sort_by(f64::total_cmp);
+        // One reading in fifty may be a fault of the line.
+        let most = sizes.get(sizes.len() * 49 / 50).copied().unwrap_or_default();
+        if most < LEAST_CHANGE * input.ohm(rest) {
+            return Vec::new();
+        }
+        bends.into_iter().map(|(t_s, bend)| (t_s, bend / most)).collect()
+    }
+
     /// Calibration of a pad: a nominal part, or the one that reads so under a known weight. `strip` is the calibration of
     /// the strip on its finger, which tells the bending.
     pub fn pad(

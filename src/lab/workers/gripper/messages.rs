@@ -106,6 +106,8 @@ pub struct TrialView {
     pub samples: u64,
     /// Detected from the movement of the fingers.
     pub automatic: bool,
+    /// A close of the empty hand, to adapt to.
+    pub adapting: bool,
 }
 
 impl TrialView {

@@ -33,6 +33,7 @@ fn running(id: TrialId) -> GripperView {
         length_s: None,
         samples: 0,
         automatic: false,
+        adapting: false,
     };
     GripperView { trial: Some(trial), ..GripperView::default() }
 }

@@ -85,7 +85,7 @@ impl GripperSession {
     pub(super) fn end_aborted(&mut self) {
         let cause = self.recording.as_ref().and_then(|recording| recording.controller().abort_cause());
         let Some(cause) = cause else { return };
-        self.outlets.notify(Notice::Warning(format!("trial ended and fingers vented: {cause}")));
+        self.outlets.notify(Notice::Warning(format!("trial ended and fingers told to vent: {cause}")));
         self.end(false, None);
     }
 
@@ -119,7 +119,7 @@ impl GripperSession {
         if let Some(occupied) = self.occupied() {
             return self.outlets.notify(Notice::Warning(format!("trial not started: {occupied}")));
         }
-        let Some(connection) = &self.connection else {
+        let Some(connection) = &mut self.connection else {
             let text = "no board is connected: connect the gripper first";
             return self.outlets.notify(Notice::Warning(text.to_owned()));
         };
@@ -131,8 +131,14 @@ impl GripperSession {
             return self.outlets.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
-        let recording =
-            BoardTrialRecording::begin(recorder, &connection.gripper, &connection.recent, &self.scene, request, from_s);
+        let recording = BoardTrialRecording::begin(
+            recorder,
+            &mut connection.gripper,
+            &connection.recent,
+            &self.scene,
+            request,
+            from_s,
+        );
         self.begin_stretch(recording.controller().closing_s().unwrap_or(recording.began_s()));
         self.recording = Some(recording);
         self.recording_id = None;
@@ -224,6 +230,7 @@ impl GripperSession {
             length_s: controller.end_s().map(|end_s| end_s - closing_s),
             samples: recording.samples(),
             automatic: recording.is_automatic(),
+            adapting: self.adapting,
         }
     }
 }
