@@ -3,10 +3,10 @@
 use super::Failure;
 use super::origin::OriginFilters;
 use super::setup::{SignalArguments, within};
-use super::terminal::warn;
+use super::terminal::{note, warn};
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
-use palpate_lab::study::{Compared, Comparison, compare};
+use palpate_lab::study::{Compared, Comparison, MethodResult, compare};
 use palpate_learn::{Dataset, METHODS, Method, Split, StopRule, counted, method};
 use palpate_store::{CalibrationId, Store};
 use palpate_tactile::model::SensorModel;
@@ -121,7 +121,8 @@ impl DataArguments {
         Ok(data)
     }
 
-    /// Fits and tests methods on all splits, on this many threads, or one per core.
+    /// Fits and tests methods on all splits, on this many threads, or one per core. Of several methods, each has a line on
+    /// standard error as it ends.
     pub(super) fn compare(
         &self,
         data: &Dataset,
@@ -136,7 +137,14 @@ impl DataArguments {
         let bar = progress_bar("training and testing")?;
         bar.set_length((methods.len() * splits.len()) as u64);
         bar.tick();
-        let compared = compare(&comparisons, methods, threads.map_or_else(cores, usize::from), &|_, _| bar.inc(1));
+        let progress = |ended: Option<MethodResult>| {
+            bar.inc(1);
+            if let Some(MethodResult { method, f1_macro, train_cpu_s }) = ended.filter(|_| methods.len() > 1) {
+                let line = format!("{method}: F1 {:.1}, training {train_cpu_s:.1} CPU s", 100.0 * f1_macro);
+                bar.suspend(|| note(&line));
+            }
+        };
+        let compared = compare(&comparisons, methods, threads.map_or_else(cores, usize::from), &progress);
         bar.finish_and_clear();
         Ok(compared?)
     }

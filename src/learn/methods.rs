@@ -213,7 +213,7 @@ fn on_one_thread<T: Send>(fit: impl FnOnce() -> Result<T, LearnError> + Send) ->
         let start = cpu_time::ThreadTime::now();
         fit().map(|made| (made, start.elapsed().as_secs_f64()))
     };
-    // candle and smartcore would spread over all cores, which is slower for models this small. A caller with a thread of
+    // candle would spread over all cores, which is slower for models this small. A caller with a thread of
     // its own counts the CPU time of the fit there.
     let has_own_thread = rayon::current_thread_index().is_some() && rayon::current_num_threads() == 1;
     if has_own_thread {

@@ -63,7 +63,6 @@ const HOMES: &[(&str, &[&str])] = &[
     ("serde", &["src"]),
     ("serde_json", &["src"]),
     ("serialport", &["src/device/serial", "src/device/emulator/port.rs"]),
-    ("smartcore", &["src/learn/baselines"]),
     ("statrs", &["src/learn/metrics", "src/tactile/calibration/straight_line.rs"]),
     ("stl_io", &["src/geometry/mesh_files.rs"]),
     ("strsim", &["src/sim/objects", "src/sim/scene"]),

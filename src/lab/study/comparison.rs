@@ -116,6 +116,28 @@ pub struct Compared {
     pub left_out: Vec<(&'static str, LearnError)>,
 }
 
+/// Result of a method in short, as soon as its last fit has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MethodResult {
+    /// Key of the method.
+    pub method: &'static str,
+    /// Macro F1 over the tests of all splits.
+    pub f1_macro: f64,
+    /// CPU time of a fit (s).
+    pub train_cpu_s: f64,
+}
+
+impl MethodResult {
+    /// The result where all splits have ended and none has failed.
+    fn of(method: &'static str, splits: &[Option<Result<Tested, ComparisonError>>]) -> Option<Self> {
+        let tested: Vec<&Tested> = splits.iter().map(|split| split.as_ref()?.as_ref().ok()).collect::<Option<_>>()?;
+        let pairs = tested.iter().flat_map(|own| own.answers.truth.iter().copied().zip(decisions(&own.answers)));
+        let confusion = Confusion::from_pairs(tested.first()?.data.labels.classes.len(), pairs)?;
+        let train_cpu_s = tested.iter().map(|own| own.train_cpu_s).sum::<f64>() / tested.len() as f64;
+        Some(Self { method, f1_macro: confusion.macro_f1()?, train_cpu_s })
+    }
+}
+
 /// Error of a comparison.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ComparisonError {
@@ -136,31 +158,33 @@ pub enum ComparisonError {
 }
 
 /// Fits and evaluates methods on several splits in parallel, each fit on one thread; rows are in the order of the methods.
-/// A row holds the tests of all splits. `progress` receives the number of finished fits and of all. Methods that cannot
-/// learn from these data are left out, unless there is no other.
+/// A row holds the tests of all splits. `progress` is called after each fit, with the method's result after its last one.
+/// Methods that cannot learn from these data are left out, unless there is no other.
 pub fn compare(
     splits: &[Comparison<'_>],
     methods: &[&'static Method],
     threads: usize,
-    progress: &(dyn Fn(usize, usize) + Sync),
+    progress: &(dyn Fn(Option<MethodResult>) + Sync),
 ) -> Result<Compared, ComparisonError> {
     let Some(first) = splits.first() else { return Err(ComparisonError::NoTest) };
     for split in splits {
         split.check()?;
     }
     let fits = methods.len() * splits.len();
-    let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let next = AtomicUsize::new(0);
     let done: Mutex<Vec<Option<Result<Tested, ComparisonError>>>> = Mutex::new((0..fits).map(|_| None).collect());
     std::thread::scope(|scope| {
         for _ in 0..threads.clamp(1, fits.max(1)) {
             scope.spawn(|| {
                 while let Some(n) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|n| *n < fits) {
-                    let tested = splits[n % splits.len()].of_method(methods[n / splits.len()]);
-                    progress(finished.fetch_add(1, Ordering::Relaxed) + 1, fits);
+                    let method = methods[n / splits.len()];
+                    let tested = splits[n % splits.len()].of_method(method);
                     // The lock is poisoned only when another thread has panicked, and then the scope panics too.
-                    if let Ok(mut done) = done.lock() {
+                    let result = done.lock().ok().and_then(|mut done| {
                         done[n] = Some(tested);
-                    }
+                        MethodResult::of(method.key, &done[n - n % splits.len()..][..splits.len()])
+                    });
+                    progress(result);
                 }
             });
         }

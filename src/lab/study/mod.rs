@@ -21,7 +21,7 @@ mod timed_grasp;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use comparison::{
-    Compared, Comparison, ComparisonError, ComparisonRow, Controls, Difference, compare, in_table_order,
+    Compared, Comparison, ComparisonError, ComparisonRow, Controls, Difference, MethodResult, compare, in_table_order,
 };
 pub use effect_audit::{
     AuditError, AuditPlan, AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectSize, SEEN, audit_effects,

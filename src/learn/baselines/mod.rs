@@ -15,6 +15,7 @@ mod measures;
 mod neighbours;
 mod other;
 mod row_model;
+mod smo;
 mod svm;
 mod tabular;
 mod warping;

@@ -1,14 +1,11 @@
-//! Support vector machines with a Gaussian kernel, one for each pair of classes. smartcore fits them; the support
-//! vectors are kept in arrays, because smartcore's machines borrow their training rows.
+//! Support vector machines with a Gaussian kernel, one for each pair of classes.
 
 use super::row_model::{RowModel, Rows};
+use super::smo;
 use crate::arrays::{ArrayError, Arrays};
 use crate::fitting::{Fitting, LearnError};
 use crate::model::LoadError;
-use smartcore::linalg::basic::matrix::DenseMatrix;
-use smartcore::svm::Kernels;
-use smartcore::svm::svc::{SVC, SVCParameters};
-use std::collections::HashMap;
+use crate::network::{Matrix, multiply};
 
 /// Penalty C of margin violations.
 const COST: f64 = 100.0;
@@ -47,12 +44,12 @@ impl Svm {
         present.dedup();
         let mut svm =
             Self { columns: rows.columns, classes: rows.classes, gamma, vectors: Vec::new(), machines: Vec::new() };
-        let mut known = HashMap::new();
+        let mut known = vec![None; rows.labels.len()];
         let pairs = present.len() * present.len().saturating_sub(1) / 2;
         for (n, &negative) in present.iter().enumerate() {
             for &positive in &present[n + 1..] {
                 fitting.check()?;
-                let machine = svm.fit_pair(rows, [negative, positive], &mut known)?;
+                let machine = svm.fit_pair(rows, [negative, positive], &mut known, fitting)?;
                 svm.machines.push(machine);
                 (fitting.progress)(0.1 + 0.9 * svm.machines.len() as f64 / pairs as f64);
             }
@@ -60,46 +57,29 @@ impl Svm {
         Ok(svm)
     }
 
+    /// Trains the machine of a pair; `known` holds the index of each row among the support vectors.
     fn fit_pair(
         &mut self,
         rows: &Rows,
         pair: [usize; 2],
-        known: &mut HashMap<Vec<u32>, usize>,
+        known: &mut [Option<usize>],
+        fitting: &Fitting<'_>,
     ) -> Result<Machine, LearnError> {
-        let mut own: Vec<usize> = (0..rows.labels.len()).filter(|k| pair.contains(&rows.labels[*k])).collect();
-        // smartcore 0.7 truncates each row to as many columns as there are rows. Repeating all rows, each at its share of
-        // the cost, has the same solution.
-        let copies = rows.columns.div_ceil(own.len().max(1)).max(1);
-        own = own.repeat(copies);
+        let own: Vec<usize> = (0..rows.labels.len()).filter(|k| pair.contains(&rows.labels[*k])).collect();
         let row = |k: usize| &rows.values[k * rows.columns..(k + 1) * rows.columns];
-        let table: Vec<Vec<f64>> = own.iter().map(|k| row(*k).iter().map(|x| f64::from(*x)).collect()).collect();
-        let x = DenseMatrix::from_2d_vec(&table).map_err(LearnError::failed)?;
-        let y: Vec<i32> = own.iter().map(|k| if rows.labels[*k] == pair[1] { 1 } else { -1 }).collect();
-        let settings = SVCParameters::default()
-            .with_c(COST / copies as f64)
-            .with_kernel(Kernels::rbf().with_gamma(self.gamma))
-            .with_seed(Some(1));
-        let fitted = SVC::fit(&x, &y, &settings).map_err(LearnError::failed)?;
-        // smartcore's fields are private, but it serialises them.
-        let written = serde_json::to_value(&fitted).map_err(LearnError::failed)?;
-        let read = || -> Option<(f64, Vec<f64>, Vec<Vec<f64>>)> {
-            let numbers = |v: &serde_json::Value| v.as_array()?.iter().map(serde_json::Value::as_f64).collect();
-            let instances = written["instances"].as_array()?.iter().map(numbers).collect::<Option<_>>()?;
-            Some((written["b"].as_f64()?, numbers(&written["w"])?, instances))
-        };
-        let (bias, weights, instances) =
-            read().ok_or_else(|| LearnError::failed("cannot read the support vectors of smartcore"))?;
+        let values: Vec<f32> = own.iter().flat_map(|k| row(*k)).copied().collect();
+        let signs: Vec<f64> = own.iter().map(|k| if rows.labels[*k] == pair[1] { 1.0 } else { -1.0 }).collect();
+        let solution = smo::solve(&kernel(&values, own.len(), self.gamma), &signs, COST, fitting)?;
         let mut terms = Vec::new();
-        for (instance, weight) in instances.iter().zip(weights) {
-            let row: Vec<f32> = instance.iter().map(|x| *x as f32).collect();
-            let next = known.len();
-            let index = *known.entry(row.iter().map(|x| x.to_bits()).collect()).or_insert(next);
+        for (k, weight) in own.into_iter().zip(solution.weights).filter(|(_, weight)| *weight != 0.0) {
+            let next = self.vectors.len() / rows.columns.max(1);
+            let index = *known[k].get_or_insert(next);
             if index == next {
-                self.vectors.extend(row);
+                self.vectors.extend(row(k));
             }
             terms.push((index, weight));
         }
-        Ok(Machine { pair, bias, terms })
+        Ok(Machine { pair, bias: solution.bias, terms })
     }
 
     /// Settings of every fit.
@@ -156,6 +136,21 @@ impl Svm {
     }
 }
 
+/// Gaussian kernel of all pairs of rows, `[rows][rows]`.
+fn kernel(values: &[f32], rows: usize, gamma: f64) -> Vec<f32> {
+    let table = Matrix::new(values, rows, values.len() / rows.max(1));
+    let mut kernel = vec![0.0; rows * rows];
+    multiply(table, table.t(), 0.0, &mut kernel);
+    let squares: Vec<f64> = kernel.iter().step_by(rows + 1).map(|x| f64::from(*x)).collect();
+    for (row, own) in kernel.chunks_exact_mut(rows.max(1)).zip(&squares) {
+        for (x, other) in row.iter_mut().zip(&squares) {
+            let distance = (own + other - 2.0 * f64::from(*x)).max(0.0);
+            *x = (-gamma * distance).exp() as f32;
+        }
+    }
+    kernel
+}
+
 impl RowModel for Svm {
     /// Exponential of each class's votes over all pairs; margins break ties.
     fn predict(&self, row: &[f32]) -> Vec<f64> {
@@ -198,5 +193,86 @@ impl RowModel for Svm {
         let terms = || self.machines.iter().flat_map(|m| &m.terms);
         arrays.put_integers("svm.term_vectors", terms().map(|(v, _)| *v));
         arrays.put_f64("svm.term_weights", terms().map(|(_, w)| *w).collect());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conformance_tests::quick;
+
+    /// Three classes that overlap, in small numbers.
+    fn rows(first: usize, end: usize) -> Rows {
+        let value = |r: usize, c: usize| {
+            (((r * r * (7 + 4 * c) + 13 * r) % 61) as f64 / 8.0 + if r % 3 == c { 3.0 } else { 0.0 }) as f32
+        };
+        let values = (first..end).flat_map(|r| (0..3).map(move |c| value(r, c))).collect();
+        Rows { values, columns: 3, labels: (first..end).map(|r| r % 3).collect(), weights: None, classes: 3 }
+    }
+
+    /// Agreement with scikit-learn 1.9.1, which printed the numbers by
+    ///
+    /// ```python
+    /// import numpy as np
+    /// from sklearn.svm import SVC
+    /// def rows(first, end):
+    ///     x = [[(r*r*(7+4*c) + 13*r) % 61 / 8 + 3*(r % 3 == c) for c in range(3)] for r in range(first, end)]
+    ///     return np.array(x), np.arange(first, end) % 3
+    /// (x, y), (t, _) = rows(0, 90), rows(90, 390)
+    /// m = SVC(C=100, gamma=1/3, decision_function_shape="ovo").fit(x, y)
+    /// print(m.n_support_, -m.intercept_, -m.decision_function(t[:4]), np.bincount(m.predict(t)))
+    /// ends = np.r_[0, np.cumsum(m.n_support_)]
+    /// for i, j in (0, 1), (0, 2), (1, 2):
+    ///     i_rows, j_rows = slice(*ends[i:i+2]), slice(*ends[j:j+2])
+    ///     w = np.r_[m.dual_coef_[j-1, i_rows], m.dual_coef_[i, j_rows]]
+    ///     v = np.r_[m.support_vectors_[i_rows], m.support_vectors_[j_rows]]
+    ///     k = np.exp(-((v[:, None] - v)**2).sum(2) / 3)
+    ///     print(abs(w).sum() - w @ k @ w / 2)
+    /// ```
+    #[test]
+    fn support_vectors_objectives_and_answers_are_those_of_scikit_learn() {
+        let (train, test) = (rows(0, 90), rows(90, 390));
+        let svm = Svm::fit(&train, &quick(1)).expect("fits");
+        let mut support = [0; 3];
+        for v in svm.vectors.chunks(3) {
+            let of = train.values.chunks(3).position(|row| row == v).expect("a training row");
+            support[train.labels[of]] += 1;
+        }
+        assert_eq!(support, [28, 26, 30]);
+        let kernel = |a: &[f32], b: &[f32]| -> f64 {
+            let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
+            (-svm.gamma * squares.sum::<f64>()).exp()
+        };
+        let vector = |k: usize| &svm.vectors[3 * k..3 * k + 3];
+        let answer = |machine: &Machine, row: &[f32]| {
+            machine.bias + machine.terms.iter().map(|(v, w)| w * kernel(vector(*v), row)).sum::<f64>()
+        };
+        let biases = [-0.0464, -0.3814, -0.0902];
+        let objectives = [45.1421, 434.4077, 47.1054];
+        for (n, machine) in svm.machines.iter().enumerate() {
+            let objective = |(v, w): &(usize, f64)| w.abs() - w * (answer(machine, vector(*v)) - machine.bias) / 2.0;
+            let objective: f64 = machine.terms.iter().map(objective).sum();
+            assert!((objective - objectives[n]).abs() < 1e-3, "machine {n}: {objective}");
+            assert!((machine.bias - biases[n]).abs() < 2e-3, "machine {n}: {}", machine.bias);
+        }
+        // scikit-learn's sign is positive for the first class of a pair, and so the script turns it.
+        let expected = [
+            [0.0448, -0.8173, -0.3643],
+            [-0.0046, -0.9480, -0.7303],
+            [-0.0177, 0.5658, 0.5062],
+            [0.1837, -0.5926, 1.0194],
+        ];
+        for (row, expected) in test.values.chunks(3).zip(expected) {
+            for (machine, expected) in svm.machines.iter().zip(expected) {
+                assert!((answer(machine, row) - expected).abs() < 2e-3, "{} for {expected}", answer(machine, row));
+            }
+        }
+        let mut predicted = [0; 3];
+        for row in test.values.chunks(3) {
+            let weights = svm.predict(row);
+            let top = (0..3).max_by(|a, b| weights[*a].total_cmp(&weights[*b])).expect("three classes");
+            predicted[top] += 1;
+        }
+        assert_eq!(predicted, [124, 100, 76]);
     }
 }

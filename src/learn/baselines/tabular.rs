@@ -218,6 +218,7 @@ impl Classifier {
     /// Fits to rows; returns also a description of the settings.
     fn fit(&self, rows: &Rows, fitting: &Fitting<'_>) -> Result<(Box<dyn RowModel>, String), LearnError> {
         let table = Table { values: &rows.values, columns: rows.columns };
+        table.check_finite()?;
         let weights = rows.weights.as_deref();
         let examples = Examples { table, labels: &rows.labels, classes: rows.classes, weights };
         Ok(match self {
@@ -226,7 +227,7 @@ impl Classifier {
                 (Box::new(GradientBoosting::fit(&examples, settings)?), format!("{settings:?}"))
             }
             Self::RusBoost(settings) => (Box::new(RusBoost::fit(&examples, settings)?), format!("{settings:?}")),
-            Self::Neighbours => (Box::new(Neighbours::fit(rows)?), Neighbours::DESCRIPTION.to_owned()),
+            Self::Neighbours => (Box::new(Neighbours::fit(rows)), Neighbours::DESCRIPTION.to_owned()),
             Self::Svm => {
                 let model = Svm::fit(rows, fitting)?;
                 let description = model.described();

@@ -45,6 +45,14 @@ impl<'a> Table<'a> {
     fn row(&self, row: usize) -> &'a [f32] {
         &self.values[row * self.columns..(row + 1) * self.columns]
     }
+
+    /// Refuses features that are not finite.
+    pub(crate) fn check_finite(&self) -> Result<(), LearnError> {
+        match self.values.iter().position(|value| !value.is_finite()) {
+            Some(at) => Err(LearnError::NotFinite { row: at / self.columns, feature: at % self.columns }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Training examples.
@@ -76,10 +84,7 @@ impl Examples<'_> {
         let mut weights = self.weights.unwrap_or_default().iter();
         assert!(weights.all(|weight| (0.0..=MOST_WEIGHT).contains(weight)), "weights from 0 to {MOST_WEIGHT:e}");
         assert!(!self.rows().is_empty(), "a row with weight");
-        match self.table.values.iter().position(|value| !value.is_finite()) {
-            Some(at) => Err(LearnError::NotFinite { row: at / columns, feature: at % columns }),
-            None => Ok(()),
-        }
+        self.table.check_finite()
     }
 
     fn weight(&self, row: usize) -> f64 {

@@ -2,7 +2,7 @@
 
 /// Row-major matrix, or its transpose.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Matrix<'a> {
+pub(crate) struct Matrix<'a> {
     values: &'a [f32],
     rows: usize,
     columns: usize,
@@ -11,13 +11,13 @@ pub(super) struct Matrix<'a> {
 
 impl<'a> Matrix<'a> {
     /// Creates a matrix from its rows.
-    pub(super) fn new(values: &'a [f32], rows: usize, columns: usize) -> Self {
+    pub(crate) fn new(values: &'a [f32], rows: usize, columns: usize) -> Self {
         assert_eq!(values.len(), rows * columns, "a matrix of {rows} by {columns}");
         Self { values, rows, columns, transposed: false }
     }
 
     /// Transposes, without copying.
-    pub(super) fn t(self) -> Self {
+    pub(crate) fn t(self) -> Self {
         Self { transposed: !self.transposed, ..self }
     }
 
@@ -32,7 +32,7 @@ impl<'a> Matrix<'a> {
 }
 
 /// Computes out = keep * out + a b, with `out` row-major.
-pub(super) fn multiply(a: Matrix<'_>, b: Matrix<'_>, keep: f32, out: &mut [f32]) {
+pub(crate) fn multiply(a: Matrix<'_>, b: Matrix<'_>, keep: f32, out: &mut [f32]) {
     let ((m, k), (inner, n)) = (a.shape(), b.shape());
     assert_eq!(k, inner, "inner sizes agree");
     assert_eq!(out.len(), m * n, "the product is {m} by {n}");

@@ -34,6 +34,7 @@ use crate::recogniser::Recogniser;
 use paper_network::PaperNetwork;
 use tactile_network::TactileNetwork;
 
+pub(crate) use gemm::{Matrix, multiply};
 pub use macro_layer::{Batch, Block, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
 pub(crate) use preparation::Preparation;
 pub use recipe::Recipe;
