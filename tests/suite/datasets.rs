@@ -227,6 +227,14 @@ fn foreign_grasps_without_sizes_get_a_table_without_a_flag() {
     assert!(table.err.contains("ds-lstm is left out") && table.err.contains("size"), "{table:?}");
     let rows = json(at, &["evaluate", "--models", "knn,svm", "--split", "40/40/20", "--repeats", "3", "--json"]);
     assert!(rows.as_array().unwrap().iter().all(|row| row["macro_accuracy"].as_f64().unwrap() > 0.8), "{rows}");
+    // Of several methods, each has a line with its F1 as it ends, and standard output stays one document.
+    let said = run(at, &["evaluate", "--models", "knn,svm", "--split", "40/40/20", "--repeats", "3", "--json"]);
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&said.out).unwrap().as_array().unwrap().len(), 2);
+    for row in rows.as_array().unwrap() {
+        let line = format!("{}: F1 {:.1},", row["model"].as_str().unwrap(), 100.0 * row["f1_macro"].as_f64().unwrap());
+        assert_eq!(said.err.lines().filter(|own| own.starts_with(&line)).count(), 1, "{line} in {}", said.err);
+    }
+    assert!(!run(at, &["evaluate", "--models", "knn"]).err.contains("knn: F1"), "one method has its table alone");
     // Only a method that these data cannot train: an error, not an empty table.
     refused(at, &["evaluate", "--models", "ds-lstm", "--quick"], &["ds-lstm", "size"]);
 }

