@@ -54,6 +54,11 @@ const LINE: f32 = 18.0;
 /// Time that a message with a button stays.
 const WITH_BUTTON: Duration = Duration::from_secs(30);
 
+/// In messages of a store that is lost, which stay until they are dismissed: whatever is recorded goes nowhere.
+const STORE_LOST: &str = "while it was open";
+/// Time that they stay: a day's work.
+const LASTING: Duration = Duration::from_secs(86_400);
+
 /// Level of a message, least urgent first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Level {
@@ -91,6 +96,7 @@ impl Notices {
         };
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
+        let time = if text.contains(STORE_LOST) { LASTING } else { time };
         let time = if remedies(&text).next().is_some() { time.max(WITH_BUTTON) } else { time };
         self.shown.retain(|shown| shown.text != text);
         self.shown.push(Shown { level, text: text.clone(), until: Instant::now() + time });
@@ -192,6 +198,19 @@ mod tests {
     use super::*;
     use palpate_geometry::MeshError;
     use palpate_sim::scene::Scene;
+
+    #[test]
+    fn the_loss_of_the_store_is_shown_until_it_is_dismissed() {
+        let mut notices = Notices::default();
+        let path = std::path::PathBuf::from("trials.sqlite");
+        let lost = palpate_store::StoreError::FileLost { path, event: "cut short" }.to_string();
+        notices.error(lost.clone());
+        notices.error("Another failure");
+        let ctx = egui::Context::default();
+        let hour = Instant::now() + Duration::from_secs(3600);
+        notices.shown.retain(|shown| shown.until > hour);
+        assert_eq!(notices.current(&ctx), Some(lost.as_str()));
+    }
 
     #[test]
     fn warnings_carry_the_buttons_that_help() {

@@ -38,8 +38,8 @@ use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
     Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelCommand, LabelView, LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup,
-    Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
+    Inspector, LabelCommand, LabelView, LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker,
+    SimWorkerSetup, Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};

@@ -5,8 +5,9 @@ use super::interrupt::stop_flag;
 use super::setup::{RecomputeArguments, SceneArguments, classes_of, open_store};
 use super::terminal::{say, say_json};
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::grasping::{CollectionPlan, CollectionReport, Shard, all_objects};
+use palpate_lab::grasping::{CollectionError, CollectionPlan, CollectionReport, Shard, all_objects};
 use palpate_sim::objects::titled;
+use palpate_store::StoreError;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -87,16 +88,22 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
     let stop = stop_flag()?;
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
     let start = cpu_time::ProcessTime::now();
-    let mut of = 0;
+    let (mut kept, mut of) = (0, 0);
     let outcome = ready.collect(&mut store, threads, &mut |progress| {
         bar.set_length(u64::from(progress.of));
         bar.set_message(titled(&progress.object));
         bar.set_position(u64::from(progress.done));
-        of = progress.of;
+        (kept, of) = (progress.done, progress.of);
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     bar.finish_and_clear();
-    let report = Report { collection: outcome?, cpu_s: start.elapsed().as_secs_f64(), threads };
+    let collection = outcome.map_err(|error| match error {
+        // Of a store that is gone nothing is kept.
+        CollectionError::Store(StoreError::FileLost { .. }) => error.to_string(),
+        _ if kept == 0 => error.to_string(),
+        error => format!("{error}. {kept} of {of} trials are kept; the same command resumes with the rest"),
+    })?;
+    let report = Report { collection, cpu_s: start.elapsed().as_secs_f64(), threads };
     if arguments.json {
         say_json(&report)?;
     } else {

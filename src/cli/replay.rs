@@ -9,6 +9,7 @@ use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::Replay;
 use palpate_learn::Shipped;
+use palpate_tactile::trial::TrialId;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -63,7 +64,8 @@ struct Report {
 
 pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(), Failure> {
     let model = |shipped| Ok::<_, Failure>(Some(Arc::new(load_model(arguments.model.as_deref(), shipped)?)));
-    let mut replay = match arguments.source.to_str().and_then(|text| text.parse().ok()) {
+    let trial: Option<TrialId> = arguments.source.to_str().and_then(|text| text.parse().ok());
+    let mut replay = match trial {
         Some(id) => {
             let store = read_store(store)?;
             Replay::of_trial(&store, id, model(shipped_for(&store, &[id])?)?)?
@@ -79,8 +81,9 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
             Replay::of_capture(gripper, existing_store(store)?.as_ref(), model(Shipped::AnyGripper)?)?
         }
     };
-    let (mut rows, mut header, mut pace) = (Vec::new(), Vec::new(), None);
+    let (mut rows, mut header, mut pace, mut count) = (Vec::new(), Vec::new(), None, 0);
     while let Some(row) = replay.next_row()? {
+        count += 1;
         let answer = answer(&replay);
         if arguments.json {
             rows.push(report(&replay, &row, answer));
@@ -106,21 +109,28 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
     if let Some(own) = identification.filter(|_| decided.is_some() && replay.is_of_board()) {
         warn_of_perfect_sensors(own.model());
     }
+    let cut_short = replay.cut_short().map(|cause| format!("the replay ended early, after {count} readings: {cause}"));
+    if count == 0 && trial.is_none() {
+        let no_board =
+            || format!("\"{}\" has no reading: it should hold bytes as a board sent them", arguments.source.display());
+        return Err(cut_short.unwrap_or_else(no_board).into());
+    }
     if arguments.json {
         let model = identification.map(Identification::model);
-        return say_json(&Report {
+        say_json(&Report {
             rows,
             decided: decided.map(|(class, _)| class),
             stage_one: verdict.zip(model).and_then(|(verdict, model)| StageOne::of(verdict, &model.card.labels)),
             pmf: verdict.zip(model).map(|(verdict, model)| named(model, &verdict.pmf)).unwrap_or_default(),
             not_recognised,
-        });
+        })?;
+    } else {
+        match (decided, not_recognised) {
+            (Some((class, p)), None) => note(&format!("recognised as {class} ({:.0} %)", 100.0 * p)),
+            (_, cause) => note(&format!("no recognition: {}", cause.unwrap_or_default())),
+        }
     }
-    match (decided, not_recognised) {
-        (Some((class, probability)), None) => note(&format!("recognised as {class} ({:.0} %)", 100.0 * probability)),
-        (_, cause) => note(&format!("no recognition: {}", cause.unwrap_or_default())),
-    }
-    Ok(())
+    cut_short.map_or(Ok(()), |cause| Err(cause.into()))
 }
 
 /// The most likely class of the running or last grasp.

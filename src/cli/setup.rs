@@ -8,6 +8,7 @@ use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
 use palpate_store::Store;
 use palpate_store::labels::class_name;
 use palpate_tactile::SignalDefinition;
+use std::io::ErrorKind;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -156,10 +157,16 @@ pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
     opened(&store_path(path)?)
 }
 
-/// Opens the named store, or the default one, for a command that reads; `None` where there is none, which is not created.
+/// Opens the named store, or the default one, for a command that reads; `None` where there is none, or an empty file: neither
+/// is made a store.
 pub(super) fn existing_store(path: Option<&Path>) -> Result<Option<Store>, Failure> {
     let path = store_path(path)?;
-    if path.exists() { opened(&path).map(Some) } else { Ok(None) }
+    match std::fs::metadata(&path) {
+        Ok(file) if file.is_file() && file.len() == 0 => Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(format!("cannot open the store \"{}\": {error}", path.display()).into()),
+        Ok(_) => opened(&path).map(Some),
+    }
 }
 
 /// The same for a command that cannot do without.

@@ -80,34 +80,67 @@ pub(super) fn is_closed_pipe(failure: &(dyn Error + 'static)) -> bool {
 
 /// Prints rows in columns: text left-aligned, numbers right-aligned.
 pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure> {
-    let width = |column: usize| {
-        let cells = rows.iter().map(|row| row[column].chars().count());
-        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    for line in aligned(header, rows) {
+        writeln!(out, "{line}")?;
+    }
+    Ok(out.flush()?)
+}
+
+/// Lines of a table. Each column is looked at once, so that the time grows with the number of cells.
+fn aligned<'a, C: AsRef<str>>(header: &'a [&str], rows: &'a [Vec<C>]) -> impl Iterator<Item = String> + 'a {
+    let column = |column: usize| {
+        let mut width = header[column].chars().count();
+        let mut numeric = !rows.is_empty();
+        for cell in rows.iter().map(|row| row[column].as_ref()) {
+            width = width.max(cell.chars().count());
+            numeric = numeric && cell.parse::<f64>().is_ok();
+        }
+        (width, numeric)
     };
-    let widths: Vec<usize> = (0..header.len()).map(width).collect();
-    let numeric = |column: usize| !rows.is_empty() && rows.iter().all(|row| row[column].parse::<f64>().is_ok());
-    let line = |cells: &[&str]| {
+    let columns: Vec<(usize, bool)> = (0..header.len()).map(column).collect();
+    let line = move |cells: &mut dyn Iterator<Item = &str>| {
         let padded: Vec<String> = cells
-            .iter()
-            .enumerate()
-            .map(|(i, cell)| {
-                let width = widths[i];
-                if numeric(i) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
-            })
+            .zip(&columns)
+            .map(
+                |(cell, (width, numeric))| if *numeric { format!("{cell:>width$}") } else { format!("{cell:<width$}") },
+            )
             .collect();
         padded.join("  ").trim_end().to_owned()
     };
-    say(line(header))?;
-    for row in rows {
-        say(line(&row.iter().map(String::as_str).collect::<Vec<_>>()))?;
-    }
-    Ok(())
+    std::iter::once(line(&mut header.iter().copied()))
+        .chain(rows.iter().map(move |row| line(&mut row.iter().map(C::as_ref))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::Cell;
     use std::process::Command;
+
+    /// A cell that counts how often it is looked at.
+    struct Counted<'a>(&'a str, &'a Cell<usize>);
+
+    impl AsRef<str> for Counted<'_> {
+        fn as_ref(&self) -> &str {
+            self.1.set(self.1.get() + 1);
+            self.0
+        }
+    }
+
+    #[test]
+    fn a_table_is_aligned_with_two_looks_at_each_cell() {
+        let looks = Cell::new(0);
+        let rows: Vec<Vec<Counted<'_>>> = [["7", "Lemon"], ["1234", "Tomato"], ["9", "-"]]
+            .iter()
+            .cycle()
+            .take(3000)
+            .map(|row| row.iter().map(|text| Counted(text, &looks)).collect())
+            .collect();
+        let lines: Vec<String> = aligned(&["id", "object"], &rows).collect();
+        assert_eq!(lines[..4], ["  id  object", "   7  Lemon", "1234  Tomato", "   9  -"]);
+        assert_eq!((lines.len(), looks.get()), (3001, 2 * 2 * 3000));
+    }
 
     /// Set where this test runs itself to panic.
     const PANICS: &str = "PALPATE_TEST_PANICS";

@@ -13,12 +13,14 @@ use labels::LabelCommand;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
 use palpate_store::{
-    FileKind, Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial,
+    ExportError, FileKind, Library, Shown, Store, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery,
+    TrialRow, export_trial,
 };
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{SensorLayout, SignalDefinition};
 use selection::{Filters, Numbers, chosen};
 use std::collections::BTreeSet;
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trials`.
@@ -60,7 +62,7 @@ enum TrialsCommand {
         /// Last first.
         #[arg(long)]
         reverse: bool,
-        /// Print this many at most.
+        /// Print this many at most (default: all; on a terminal the newest 1000).
         #[arg(long, value_name = "N")]
         limit: Option<usize>,
         /// Print JSON instead of a table.
@@ -159,7 +161,7 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
                 _ => Shown::Kept,
             };
             let order = TrialOrder { column: *sort, descending: *reverse };
-            list(&store, &TrialQuery { order, ..filters.query(shown) }, limit.unwrap_or(usize::MAX), *json)
+            list(&store, &TrialQuery { order, ..filters.query(shown) }, *limit, *json)
         }
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
@@ -180,8 +182,14 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         }
         TrialsCommand::Merge { stores } => {
             for other in stores {
-                let merged = store.merge_from(other)?;
+                let merged = store.merge_from(other).map_err(|error| nothing_added(other, &error))?;
                 let (added, known) = (merged.added, merged.known);
+                if !merged.damaged.is_empty() {
+                    let (other, damaged) = (other.display(), numbers(&merged.damaged));
+                    warn(&format!(
+                        "{other}: trial {damaged} damaged, and left out; `palpate trials list --store {other}` shows them"
+                    ));
+                }
                 say(format!("{}: {added} trial(s) added, {known} already there", other.display()))?;
                 if merged.annotated > 0 {
                     warn(&format!(
@@ -209,6 +217,15 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
     }
 }
 
+/// A file of which nothing came into the store.
+fn nothing_added(file: &Path, error: &StoreError) -> String {
+    format!("nothing was added from \"{}\": {error}", file.display())
+}
+
+fn numbers(ids: &[TrialId]) -> String {
+    ids.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
 const NONE_YET: &str = "no trials yet: `palpate grasp lemon` records one";
 
 fn import(store: &mut Store, file: &Path, label: Option<&str>) -> Result<(), Failure> {
@@ -217,15 +234,27 @@ fn import(store: &mut Store, file: &Path, label: Option<&str>) -> Result<(), Fai
         warn(warning);
     }
     let collection = file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let added = store.insert_imported(&collection, &import.trials)?;
+    let added = store.insert_imported(&collection, &import.trials).map_err(|error| nothing_added(file, &error))?;
     let known = import.trials.len() - added as usize;
     say(format!("{}: {added} trial(s) added as collection {collection}, {known} already there", file.display()))
 }
 
-fn list(store: &Store, query: &TrialQuery, limit: usize, json: bool) -> Result<(), Failure> {
+/// Most trials that a terminal shows without `--limit`.
+const ON_TERMINAL: usize = 1000;
+
+/// The rows to print: the first of a limit; without one all, but on a terminal only as many as can be looked through, from
+/// the end with the newest.
+fn shown_rows<T>(found: &[T], limit: Option<usize>, newest_first: bool, on_terminal: bool) -> &[T] {
+    let most = limit.unwrap_or(if on_terminal { ON_TERMINAL } else { usize::MAX }).min(found.len());
+    if limit.is_some() || newest_first { &found[..most] } else { &found[found.len() - most..] }
+}
+
+fn list(store: &Store, query: &TrialQuery, limit: Option<usize>, json: bool) -> Result<(), Failure> {
     let library = Library::read(store)?;
     let found = library.find(store, query)?;
-    let rows: Vec<&TrialRow> = found.iter().take(limit).map(|trial| &trial.row).collect();
+    let on_terminal = std::io::stdout().is_terminal() && !json;
+    let rows = shown_rows(&found, limit, query.order.descending, on_terminal);
+    let rows: Vec<&TrialRow> = rows.iter().map(|trial| &trial.row).collect();
     if json {
         return say_json(&rows);
     }
@@ -236,7 +265,8 @@ fn list(store: &Store, query: &TrialQuery, limit: usize, json: bool) -> Result<(
         return say(NONE_YET);
     }
     if rows.len() < found.len() {
-        note(&format!("{} of {} trials", rows.len(), found.len()));
+        let all = if limit.is_none() { "; `palpate trials list | less` shows all" } else { "" };
+        note(&format!("{} of {} trials{all}", rows.len(), found.len()));
     }
     let cells: Vec<Vec<String>> = rows
         .iter()
@@ -257,6 +287,9 @@ fn list(store: &Store, query: &TrialQuery, limit: usize, json: bool) -> Result<(
 
 fn remark(row: &TrialRow) -> String {
     let mut remarks = Vec::new();
+    if row.damaged {
+        remarks.push(format!("damaged: take the store from a backup, or `palpate trials delete {}`", row.id));
+    }
     if row.deleted.is_some() {
         remarks.push("deleted".to_owned());
     }
@@ -266,7 +299,7 @@ fn remark(row: &TrialRow) -> String {
     if row.state != "complete" {
         remarks.push("interrupted or still recording".to_owned());
     }
-    if !row.sound {
+    if !row.sound && !row.damaged {
         remarks.push("unsound: data sets exclude it".to_owned());
     }
     if row.warnings > 0 {
@@ -287,15 +320,16 @@ fn remark(row: &TrialRow) -> String {
 
 /// Excludes unsound trials, whose flaws a CSV file would not show.
 fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
-    let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(|row| !row.sound).map(|row| row.id).collect();
+    // A damaged trial gives its own reason where it is read.
+    let is_unsound = |row: &&TrialRow| !row.sound && !row.damaged;
+    let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(is_unsound).map(|row| row.id).collect();
     let (left_out, kept): (Vec<TrialId>, Vec<TrialId>) = ids.iter().partition(|id| unsound.contains(id));
     if left_out.is_empty() {
         return Ok(kept);
     }
-    let list: Vec<String> = left_out.iter().map(ToString::to_string).collect();
     let text = format!(
         "trial {} excluded: diverged, did not converge or did not come to rest (--unsound includes it)",
-        list.join(", ")
+        numbers(&left_out)
     );
     if kept.is_empty() {
         return Err(text.into());
@@ -315,7 +349,26 @@ fn export(
         return Err("several trials need a folder: --out FOLDER".into());
     }
     for id in ids {
-        say(export_trial(store, *id, out, channels)?.display())?;
+        match export_trial(store, *id, out, channels) {
+            Err(ExportError::Store(error)) if error.is_damage() && ids.len() > 1 => warn(&error.to_string()),
+            written => say(written?.display())?,
+        }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_shows_the_newest_thousand_and_a_pipe_everything() {
+        let found: Vec<u32> = (1..=2500).collect();
+        let reversed: Vec<u32> = found.iter().rev().copied().collect();
+        assert_eq!(shown_rows(&found, None, false, true), &found[1500..]);
+        assert_eq!(shown_rows(&reversed, None, true, true), &reversed[..1000]);
+        assert_eq!(shown_rows(&found, None, false, false), &found);
+        assert_eq!(shown_rows(&found, Some(2000), false, true), &found[..2000]);
+        assert_eq!(shown_rows(&found[..3], None, false, true), &found[..3]);
+    }
 }

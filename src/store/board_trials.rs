@@ -1,15 +1,16 @@
 //! Trials of a real gripper in the store: the bytes that its board sent, and the readings parsed from them.
 
-use super::checksum::{checksum, is_intact};
+use super::checksum::{BYTES, READINGS};
+use super::chunks::all_there;
 use super::reading_blob::{decode_readings, encode_readings};
-use super::store::{Store, insert_recorded, json, set_complete};
-use super::store_error::{StoreError, fault};
+use super::store::{Store, count_chunk, insert_recorded, json, set_complete};
+use super::store_error::{StoreError, fault, row_fault};
 use crate::labels::{FlagRemark, Sparkline};
 use palpate_sim::frame::Quality;
 use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, read_record};
 use palpate_tactile::trial::{BoardCourse, BoardLog, TrialHeader, TrialId};
-use rusqlite::{OptionalExtension, Row, params};
+use rusqlite::{OptionalExtension, Row, Transaction, params};
 use serde::{Deserialize, Serialize};
 
 /// Description of a trial of a real gripper, besides its readings.
@@ -54,9 +55,8 @@ impl Store {
         let fault = |e: rusqlite::Error| fault(&path, &e);
         let transaction = self.write()?;
         let id = insert_recorded(&transaction, header).map_err(fault)?;
-        let sql = "INSERT INTO board_trials (trial, about) VALUES (?1, ?2)";
-        transaction.execute(sql, params![id, json(about)]).map_err(fault)?;
-        transaction.commit().map_err(fault)?;
+        set_about(&transaction, id, about).map_err(fault)?;
+        self.commit(transaction)?;
         self.calibrations().note_parts(id)?;
         Ok(id)
     }
@@ -72,22 +72,17 @@ impl Store {
             let _infallible = piece.write(&mut bytes);
         }
         let (readings, gaps) = (encode_readings(&chunk.readings), json(&chunk.gaps));
-        let (readings_sum, bytes_sum) = (checksum(&[&readings, gaps.as_bytes()]), checksum(&[&bytes]));
         let path = self.path().to_owned();
         let fault = |e: rusqlite::Error| fault(&path, &e);
         let transaction = self.write()?;
-        transaction
-            .execute(
-                "INSERT INTO board_chunks (trial, number, readings, gaps, bytes, checksum, bytes_checksum) VALUES (?1,
-                     (SELECT coalesce(max(number), -1) + 1 FROM board_chunks WHERE trial = ?1), ?2, ?3, ?4, ?5, ?6)",
-                params![id, readings, gaps, bytes, readings_sum, bytes_sum],
-            )
-            .map_err(fault)?;
-        let sql = "UPDATE trials SET samples = samples + ?2 WHERE id = ?1";
-        transaction.execute(sql, params![id, chunk.readings.len() as i64]).map_err(fault)?;
-        let sql = "UPDATE board_trials SET about = ?2 WHERE trial = ?1 AND about <> ?2";
-        transaction.execute(sql, params![id, json(about)]).map_err(fault)?;
-        transaction.commit().map_err(fault)
+        let sql = "WITH new (uid, number) AS (SELECT uid, chunks FROM trials WHERE id = ?1)
+            INSERT INTO board_chunks (trial, number, readings, gaps, bytes, checksum, bytes_checksum)
+            VALUES (?1, (SELECT number FROM new), ?2, ?3, ?4, (SELECT checksum(uid, number, ?2, ?3) FROM new),
+                (SELECT checksum(uid, number, ?4) FROM new))";
+        transaction.execute(sql, params![id, readings, gaps, bytes]).map_err(fault)?;
+        count_chunk(&transaction, id, chunk.readings.len()).map_err(fault)?;
+        set_about(&transaction, id, about).map_err(fault)?;
+        self.commit(transaction)
     }
 
     /// Ends a trial of a real gripper.
@@ -95,33 +90,23 @@ impl Store {
         let path = self.path().to_owned();
         let fault = |e: rusqlite::Error| fault(&path, &e);
         let transaction = self.write()?;
-        let sql = "UPDATE board_trials SET about = ?2 WHERE trial = ?1";
-        transaction.execute(sql, params![id, json(about)]).map_err(fault)?;
+        set_about(&transaction, id, about).map_err(fault)?;
         set_complete(&transaction, id, &Quality::default(), warnings).map_err(fault)?;
-        transaction.commit().map_err(fault)
+        self.commit(transaction)
     }
 
     /// Data of a trial of a real gripper, without its header; none for a trial of another kind.
     pub fn board_log(&self, id: TrialId) -> Result<Option<BoardLog>, StoreError> {
         let Some(about) = self.board_info(id)? else { return Ok(None) };
-        let sql =
-            "SELECT number, readings, CAST(gaps AS BLOB), checksum FROM board_chunks WHERE trial = ?1 ORDER BY number";
-        let columns = |row: &Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
-        type Columns = (i64, Vec<u8>, Vec<u8>, Option<u32>);
-        let chunks: Vec<Columns> = self
-            .connection
-            .prepare(sql)
-            .and_then(|mut statement| statement.query_map([id], columns)?.collect())
-            .map_err(|e| fault(self.path(), &e))?;
+        let (chunks, samples) = self
+            .read_chunks(id, &READINGS, |row| Ok((row.get::<_, Vec<u8>>(0)?, row.get_ref(1)?.as_bytes()?.to_vec())))?;
         let mut log = BoardLog { course: about.course, ..BoardLog::default() };
-        for (chunk, readings, gaps, stored) in chunks {
-            if !is_intact(stored, &[&readings, &gaps]) {
-                return Err(StoreError::Checksum { id, what: "readings", chunk });
-            }
+        for (chunk, (readings, gaps)) in chunks {
             let damaged = |what: &str| StoreError::BadInfo { id, cause: format!("{what} of its part {chunk}") };
             log.readings.extend(decode_readings(&readings).ok_or_else(|| damaged("the readings"))?);
             log.gaps.extend(serde_json::from_slice::<Vec<Gap>>(&gaps).map_err(|_json| damaged("the gaps"))?);
         }
+        all_there(id, READINGS.what, log.readings.len(), samples)?;
         // Earlier readings have no count for channels that appeared later.
         for reading in &mut log.readings {
             reading.counts.resize(log.course.board.channels.len(), None);
@@ -131,12 +116,13 @@ impl Store {
 
     /// Description of a trial of a real gripper; none for a trial of another kind.
     pub fn board_info(&self, id: TrialId) -> Result<Option<BoardInfo>, StoreError> {
-        let sql = "SELECT about FROM board_trials JOIN trials ON trials.id = trial
-                   WHERE trial = ?1 AND deleted IS NULL";
-        let about: Option<String> =
-            self.connection.query_row(sql, [id], |row| row.get(0)).optional().map_err(|e| fault(self.path(), &e))?;
-        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
-        about.map(|about| serde_json::from_str(&about).map_err(bad)).transpose()
+        let sql = "SELECT about, checksum(uid, about) IS board_trials.checksum FROM board_trials
+                   JOIN trials ON trials.id = trial WHERE trial = ?1 AND deleted IS NULL";
+        let columns = |row: &Row<'_>| Ok((row.get::<_, String>(0)?, row.get::<_, bool>(1)?));
+        let found = self.connection.query_row(sql, [id], columns).optional();
+        let Some((about, intact)) = found.map_err(|e| row_fault(self.path(), id, &e))? else { return Ok(None) };
+        let about = serde_json::from_str(&about).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?;
+        if intact { Ok(Some(about)) } else { Err(StoreError::altered(id)) }
     }
 
     /// Bytes of a trial as received, as a capture file; none for a trial of another kind.
@@ -144,19 +130,9 @@ impl Store {
         if self.board_info(id)?.is_none() {
             return Ok(None);
         }
-        let sql = "SELECT number, bytes, bytes_checksum FROM board_chunks WHERE trial = ?1 ORDER BY number";
-        let chunks: Vec<(i64, Vec<u8>, Option<u32>)> = self
-            .connection
-            .prepare(sql)
-            .and_then(|mut s| s.query_map([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?.collect())
-            .map_err(|e| fault(self.path(), &e))?;
+        let (chunks, _) = self.read_chunks(id, &BYTES, |row| row.get::<_, Vec<u8>>(0))?;
         let mut file = CAPTURE_MAGIC.to_vec();
-        for (chunk, bytes, stored) in chunks {
-            if !is_intact(stored, &[&bytes]) {
-                return Err(StoreError::Checksum { id, what: "bytes", chunk });
-            }
-            file.extend(bytes);
-        }
+        file.extend(chunks.into_iter().flat_map(|(_, bytes)| bytes));
         // A kill leaves no part of a record: records must be whole.
         let mut records = &file[CAPTURE_MAGIC.len()..];
         let whole =
@@ -166,4 +142,12 @@ impl Store {
             Err(error) => Err(StoreError::BadInfo { id, cause: error.to_string() }),
         }
     }
+}
+
+/// Stores the description of a trial of a real gripper.
+fn set_about(transaction: &Transaction<'_>, id: TrialId, about: &BoardInfo) -> rusqlite::Result<()> {
+    let sql =
+        "INSERT INTO board_trials (trial, about, checksum) SELECT id, ?2, checksum(uid, ?2) FROM trials WHERE id = ?1
+               ON CONFLICT (trial) DO UPDATE SET about = excluded.about, checksum = excluded.checksum";
+    transaction.prepare_cached(sql)?.execute(params![id, json(about)]).map(drop)
 }

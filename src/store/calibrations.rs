@@ -78,7 +78,7 @@ impl CalibrationRepository<'_> {
     pub fn add(&self, record: &Record) -> Result<StoredCalibration, StoreError> {
         let transaction = self.store.write()?;
         let id = insert(&transaction, record, None).map_err(|e| self.store.fault(&e))?;
-        transaction.commit().map_err(|e| self.store.fault(&e))?;
+        self.store.commit(transaction)?;
         self.get(id)
     }
 
@@ -94,7 +94,7 @@ impl CalibrationRepository<'_> {
                 added += 1;
             }
         }
-        transaction.commit().map_err(fault)?;
+        self.store.commit(transaction)?;
         Ok(added)
     }
 
@@ -122,7 +122,7 @@ impl CalibrationRepository<'_> {
                    CASE WHEN ?2 THEN strftime('%Y-%m-%dT%H:%M:%fZ', 'now') ELSE NULL END WHERE id = ?1";
         let transaction = self.store.write()?;
         let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| self.store.fault(&e))?;
-        transaction.commit().map_err(|e| self.store.fault(&e))?;
+        self.store.commit(transaction)?;
         if changed == 0 { Err(StoreError::NoCalibration { id }) } else { Ok(()) }
     }
 
@@ -131,7 +131,7 @@ impl CalibrationRepository<'_> {
         let transaction = self.store.write()?;
         let sql = "INSERT INTO mountings (sensor, part) VALUES (?1, ?2)";
         transaction.execute(sql, params![sensor.channel(), part.trim()]).map_err(|e| self.store.fault(&e))?;
-        transaction.commit().map_err(|e| self.store.fault(&e))
+        self.store.commit(transaction)
     }
 
     /// The part mounted in each place, in the order of [`Sensor::ALL`].
@@ -162,7 +162,7 @@ impl CalibrationRepository<'_> {
             let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
             transaction.execute(sql, params![trial, sensor.channel(), part]).map_err(fault)?;
         }
-        transaction.commit().map_err(fault)
+        self.store.commit(transaction)
     }
 
     /// The parts a trial was recorded with; where none are stored, those mounted at its time.

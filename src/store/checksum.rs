@@ -1,13 +1,120 @@
-//! CRC-32 of blobs: finds every flipped bit of a stored trial, and every other change to 31 neighbouring bits.
+//! CRC-32 of rows: finds every flipped bit of a stored trial, chunks that were exchanged, and rows that another program changed.
+//!
+//! A checksum covers the identity of the trial, the number of a chunk, and each value with its type and length. SQL computes
+//! it by the function `checksum`. Triggers of each connection keep the checksum of a row of `trials`: a change carries a
+//! mismatch on, so that an edit does not hide damage.
 
-/// CRC-32 over some byte strings one after the other.
-pub(super) fn checksum(parts: &[&[u8]]) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    parts.iter().for_each(|part| hasher.update(part));
-    hasher.finalize()
+use rusqlite::Connection;
+use rusqlite::functions::{Context, FunctionFlags};
+use rusqlite::types::ValueRef;
+
+/// Columns of `trials` whose change would falsify a trial. The number differs between stores, and `deleted`, `demo` and
+/// `reviewed` say nothing of the grasp.
+const COLUMNS: &str = "uid created state rig object seed scene world_from_gripper quality warnings version samples chunks \
+    collection size shape plan note tags unsure earlier phases origin identity";
+
+/// Frames of `chunks`.
+pub(super) const FRAMES: Chunks =
+    Chunks { table: "chunks", columns: &["frames"], checksum: "checksum", what: "frames" };
+/// Readings and gaps of `board_chunks`.
+pub(super) const READINGS: Chunks =
+    Chunks { table: "board_chunks", columns: &["readings", "gaps"], checksum: "checksum", what: "readings" };
+/// Bytes of `board_chunks`.
+pub(super) const BYTES: Chunks =
+    Chunks { table: "board_chunks", columns: &["bytes"], checksum: "bytes_checksum", what: "bytes" };
+
+/// Columns of a table of chunks that one checksum covers.
+pub(super) struct Chunks {
+    pub(super) table: &'static str,
+    pub(super) columns: &'static [&'static str],
+    pub(super) checksum: &'static str,
+    /// What they hold, for messages.
+    pub(super) what: &'static str,
 }
 
-/// True where bytes match their stored checksum; rows from before there were checksums have none and pass.
-pub(super) fn is_intact(stored: Option<u32>, parts: &[&[u8]]) -> bool {
-    stored.is_none_or(|stored| stored == checksum(parts))
+impl Chunks {
+    /// SQL that is true for an intact chunk, where the table `trials` has the trial's identity.
+    pub(super) fn intact(&self, trials: &str) -> String {
+        let Self { table, columns, checksum, .. } = self;
+        format!("checksum({trials}.uid, number, {}) IS {table}.{checksum}", columns.join(", "))
+    }
+}
+
+/// SQL of the checksum of a row of `trials`, under the name that the row has in the statement.
+pub(super) fn of_trial(row: &str) -> String {
+    let columns: Vec<String> = COLUMNS.split_whitespace().map(|column| format!("{row}.{column}")).collect();
+    format!("checksum({})", columns.join(", "))
+}
+
+/// SQL that is true for an intact row of `trials`.
+pub(super) fn is_intact() -> String {
+    format!("{} IS trials.checksum", of_trial("trials"))
+}
+
+/// Adds the functions to a connection: `checksum` of values, and `carried` to a changed row, by the old checksum and those of
+/// the row before and after.
+pub(super) fn add_functions(connection: &Connection) -> rusqlite::Result<()> {
+    let flags = FunctionFlags::SQLITE_UTF8 | FunctionFlags::SQLITE_DETERMINISTIC;
+    connection.create_scalar_function("checksum", -1, flags, |context| {
+        let mut hasher = crc32fast::Hasher::new();
+        values(context).for_each(|value| add(&mut hasher, value));
+        Ok(hasher.finalize())
+    })?;
+    connection.create_scalar_function("carried", 3, flags, |context| {
+        let [old, before, after] = [context.get::<Option<i64>>(0)?, context.get(1)?, context.get(2)?];
+        Ok(old.zip(before).zip(after).map(|((old, before), after)| old ^ before ^ after))
+    })
+}
+
+fn values<'a>(context: &'a Context<'_>) -> impl Iterator<Item = ValueRef<'a>> {
+    (0..context.len()).map(|index| context.get_raw(index))
+}
+
+fn add(hasher: &mut crc32fast::Hasher, value: ValueRef<'_>) {
+    let (kind, bytes): (u8, &[u8]) = match value {
+        ValueRef::Null => (0, &[]),
+        ValueRef::Integer(number) => (1, &number.to_le_bytes()),
+        ValueRef::Real(number) => (2, &number.to_le_bytes()),
+        ValueRef::Text(bytes) | ValueRef::Blob(bytes) => (3, bytes),
+    };
+    hasher.update(&[kind]);
+    hasher.update(&(bytes.len() as u64).to_le_bytes());
+    hasher.update(bytes);
+}
+
+/// Makes the triggers that keep the checksums of `trials`. Merged rows bring their own.
+pub(super) fn add_triggers(connection: &Connection) -> rusqlite::Result<()> {
+    let (columns, old, new) = (COLUMNS.replace(' ', ", "), of_trial("OLD"), of_trial("NEW"));
+    connection.execute_batch(&format!(
+        "CREATE TEMP TRIGGER trial_added AFTER INSERT ON main.trials WHEN NEW.checksum IS NULL
+         BEGIN UPDATE trials SET checksum = {new} WHERE id = NEW.id; END;
+         CREATE TEMP TRIGGER trial_changed AFTER UPDATE OF {columns} ON main.trials
+         BEGIN UPDATE trials SET checksum = carried(checksum, {old}, {new}) WHERE id = NEW.id; END;"
+    ))
+}
+
+/// Gives the rows of older versions checksums. Their blobs had a CRC-32 of their bytes alone, or none; a mismatch stays one.
+pub(super) fn add_to_old(connection: &Connection) -> rusqlite::Result<()> {
+    let flags = FunctionFlags::SQLITE_UTF8 | FunctionFlags::SQLITE_DETERMINISTIC;
+    connection.create_scalar_function("of_bytes", -1, flags, |context| {
+        let mut hasher = crc32fast::Hasher::new();
+        values(context).filter_map(|value| value.as_bytes().ok()).for_each(|bytes| hasher.update(bytes));
+        Ok(hasher.finalize())
+    })?;
+    let set = |table: &str, checksum: &str, key: &str, columns: &str| {
+        format!(
+            "UPDATE {table} SET {checksum} = carried(coalesce({checksum}, of_bytes({columns})), of_bytes({columns}),
+                 checksum((SELECT uid FROM trials WHERE id = trial), {key}{columns}));"
+        )
+    };
+    let of_chunks = |chunks: Chunks| set(chunks.table, chunks.checksum, "number, ", &chunks.columns.join(", "));
+    connection.execute_batch(&[FRAMES, READINGS, BYTES].map(of_chunks).concat())?;
+    connection.execute_batch(&set("readings", "checksum", "", "channels, samples"))?;
+    connection.execute_batch(&format!(
+        "UPDATE board_trials SET checksum = checksum((SELECT uid FROM trials WHERE id = trial), about);
+         UPDATE trials SET chunks = coalesce((SELECT max(number) + 1 FROM chunks WHERE trial = id),
+             (SELECT max(number) + 1 FROM board_chunks WHERE trial = id), 0);
+         UPDATE trials SET checksum = {};",
+        of_trial("trials")
+    ))
 }

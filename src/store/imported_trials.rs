@@ -7,10 +7,10 @@
 //! per sample:        f64 time (s), then f32 per channel, little-endian
 //! ```
 
-use super::checksum::{checksum, is_intact};
+use super::chunks::all_there;
 use super::csv_import::ImportedTrial;
 use super::store::Store;
-use super::store_error::{StoreError, fault};
+use super::store_error::{StoreError, fault, row_fault};
 use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{OptionalExtension, params};
@@ -81,31 +81,35 @@ impl Store {
                 let id = transaction.last_insert_rowid();
                 let channels = serde_json::to_string(&trial.signals.channels).unwrap_or_default();
                 let samples = encode(&trial.signals);
-                let sum = checksum(&[channels.as_bytes(), &samples]);
-                let sql = "INSERT INTO readings (trial, channels, samples, checksum) VALUES (?1, ?2, ?3, ?4)";
-                transaction.execute(sql, params![id, channels, samples, sum]).map_err(fault)?;
+                let sql = "INSERT INTO readings (trial, channels, samples, checksum)
+                    SELECT id, ?2, ?3, checksum(uid, ?2, ?3) FROM trials WHERE id = ?1";
+                transaction.execute(sql, params![id, channels, samples]).map_err(fault)?;
                 added += 1;
             }
         }
-        transaction.commit().map_err(fault)?;
+        self.commit(transaction)?;
         Ok(added)
     }
 
     /// Channels of an imported trial; none for a trial of another kind.
     pub fn readings(&self, id: TrialId) -> Result<Option<Signals>, StoreError> {
-        let sql = "SELECT CAST(channels AS BLOB), samples, checksum FROM readings WHERE trial = ?1";
-        let found: Option<(Vec<u8>, Vec<u8>, Option<u32>)> = self
+        let sql = "SELECT channels, readings.samples, checksum(uid, channels, readings.samples) IS readings.checksum,
+                   trials.samples FROM readings JOIN trials ON trials.id = trial WHERE trial = ?1";
+        let found: Option<(Vec<u8>, Vec<u8>, bool, i64)> = self
             .connection
-            .query_row(sql, [id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+            .query_row(sql, [id], |row| {
+                Ok((row.get_ref(0)?.as_bytes()?.to_vec(), row.get(1)?, row.get(2)?, row.get(3)?))
+            })
             .optional()
-            .map_err(|e| fault(self.path(), &e))?;
-        let Some((channels, samples, stored)) = found else { return Ok(None) };
-        if !is_intact(stored, &[&channels, &samples]) {
+            .map_err(|e| row_fault(self.path(), id, &e))?;
+        let Some((channels, samples, intact, count)) = found else { return Ok(None) };
+        if !intact {
             return Err(StoreError::Checksum { id, what: "channels", chunk: 0 });
         }
         let bad = |cause: String| StoreError::BadInfo { id, cause };
         let channels = serde_json::from_slice(&channels).map_err(|e| bad(e.to_string()))?;
         let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
+        all_there(id, "samples", signals.len(), count)?;
         Ok(Some(signals))
     }
 }

@@ -240,7 +240,7 @@ impl Store {
                 return Err(self.no_trial(*id));
             }
         }
-        transaction.commit().map_err(fault)
+        self.commit(transaction)
     }
 }
 
@@ -341,7 +341,7 @@ impl JournalRepository<'_> {
                 return Err(StoreError::ChangedMeanwhile { id, change: entry.change.sentence() });
             }
         }
-        transaction.commit().map_err(fault)?;
+        self.store.commit(transaction)?;
         Ok(joined(step))
     }
 }

@@ -274,9 +274,11 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
     let path = folder.path().join("old.sqlite");
     let store = store_with(&path, &["lemon"])?;
     // What version 6 did not have is taken away again.
-    store.connection.execute_batch(
+    drop(store);
+    rusqlite::Connection::open(&path)?.execute_batch(
         "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
-         ALTER TABLE chunks DROP COLUMN checksum; ALTER TABLE readings DROP COLUMN checksum;
+         ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
+         ALTER TABLE board_trials DROP COLUMN checksum; ALTER TABLE chunks DROP COLUMN checksum; ALTER TABLE readings DROP COLUMN checksum;
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
          ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
@@ -286,7 +288,6 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
          UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
          PRAGMA user_version = 6;",
     )?;
-    drop(store);
     let store = Store::open(&path)?;
     let row = &store.labels().trials()?[0];
     assert_eq!((row.object.as_deref(), row.cadence.as_str()), (Some("lemon"), "50.00 Hz, jitter 0.0 ms, 2 lost"));

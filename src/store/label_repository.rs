@@ -1,10 +1,11 @@
 //! Labels of trials in the store, and what belongs to them: notes, tags, predictions and the plan. Every change adds an
 //! entry to the journal in the same transaction.
 
+use super::checksum::is_intact;
 use super::demo_log::TrialPlace;
 use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
-use super::store_error::StoreError;
+use super::store_error::{StoreError, row_fault};
 use crate::labels::{ClassNameError, Edited, Guess, LabelPlan, TrialEdit, class_name};
 use palpate_tactile::trial::{CorrectedPhases, TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
@@ -49,14 +50,16 @@ struct LabelState {
     reviewed: bool,
     phases: Option<CorrectedPhases>,
     place: TrialPlace,
+    intact: bool,
 }
 
 fn state_of(row: &Row<'_>) -> rusqlite::Result<LabelState> {
     let tags = serde_json::from_str(&row.get::<_, String>(3)?).unwrap_or_default();
     let (unsure, reviewed) = (row.get(4)?, row.get(5)?);
     let phases = serde_json::from_str(&row.get::<_, String>(6)?).unwrap_or_default();
-    let place = TrialPlace::of_column(row.get(7)?);
-    Ok(LabelState { rig: row.get(0)?, object: row.get(1)?, note: row.get(2)?, tags, unsure, reviewed, phases, place })
+    let (place, intact) = (TrialPlace::of_column(row.get(7)?), row.get(8)?);
+    let (rig, object, note) = (row.get(0)?, row.get(1)?, row.get(2)?);
+    Ok(LabelState { rig, object, note, tags, unsure, reviewed, phases, place, intact })
 }
 
 impl LabelRepository<'_> {
@@ -177,7 +180,7 @@ impl LabelRepository<'_> {
         let sql = "INSERT INTO label_plan (only, plan) VALUES (1, ?1) ON CONFLICT (only) DO UPDATE SET plan = ?1";
         transaction.execute(sql, params![json(&to)]).map_err(fault)?;
         append(&transaction, None, &Change::Plan { from, to }, Links::default()).map_err(fault)?;
-        transaction.commit().map_err(fault)
+        self.store.commit(transaction)
     }
 
     /// Makes the changes that follow from the present states of trials, all or none. A known object is an error only where
@@ -192,11 +195,19 @@ impl LabelRepository<'_> {
         let batch = new_batch(&transaction, ids.len()).map_err(fault)?;
         let links = Links { undoes: None, batch: batch.as_deref() };
         let mut edited = Edited::default();
-        let sql = "SELECT rig, object, note, tags, unsure, reviewed, phases, demo FROM trials WHERE id = ?1 AND deleted IS NULL";
+        let sql = format!(
+            "SELECT rig, object, note, tags, unsure, reviewed, phases, demo, {} FROM trials WHERE id = ?1 AND deleted IS NULL",
+            is_intact()
+        );
         for id in ids {
             let state =
-                transaction.prepare_cached(sql).and_then(|mut found| found.query_row([id], state_of).optional());
-            let wanted = match follows(*id, state.map_err(fault)?.ok_or_else(|| self.store.no_trial(*id))?) {
+                transaction.prepare_cached(&sql).and_then(|mut found| found.query_row([id], state_of).optional());
+            let state = state.map_err(|e| row_fault(self.store.path(), *id, &e))?;
+            let state = state.ok_or_else(|| self.store.no_trial(*id))?;
+            if !state.intact {
+                return Err(StoreError::altered(*id));
+            }
+            let wanted = match follows(*id, state) {
                 Err(StoreError::NotOfBoard { .. }) if edited.known + 1 < ids.len() => {
                     edited.known += 1;
                     continue;
@@ -206,7 +217,7 @@ impl LabelRepository<'_> {
             let Some(wanted) = wanted.filter(|change| !change.is_idle()) else { continue };
             edited.changed += usize::from(change(&transaction, *id, &wanted, links).map_err(fault)?);
         }
-        transaction.commit().map_err(fault)?;
+        self.store.commit(transaction)?;
         Ok(edited)
     }
 

@@ -35,7 +35,7 @@ pub struct Exported {
     pub trials: usize,
     /// Trials whose channels are in `signals.csv`.
     pub derived: usize,
-    /// Trials left out of `signals.csv`, with the reason.
+    /// Trials left out of `signals.csv`, and damaged ones, with the reason.
     pub left_out: Vec<(TrialId, String)>,
 }
 
@@ -81,7 +81,8 @@ pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<boo
 
 /// Writes all labelled trials into a folder that is empty or does not exist.
 pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportError> {
-    let rows: Vec<LabelledTrial> = store.labels().trials()?.into_iter().filter(LabelledTrial::counts).collect();
+    let trials = store.labels().trials()?;
+    let rows: Vec<&LabelledTrial> = trials.iter().filter(|trial| trial.counts()).collect();
     if rows.is_empty() {
         return Err(ExportError::Nothing);
     }
@@ -89,12 +90,15 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
         return Err(ExportError::NotEmpty { folder: folder.to_owned() });
     }
     let new = NewFolder::create(folder).map_err(|e| cannot(folder, &e))?;
-    let left_out = write_all(store, &rows, new.unfinished())?;
+    let mut left_out = write_all(store, &rows, new.unfinished())?;
     new.finish().map_err(|e| cannot(folder, &e))?;
-    Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived: rows.len() - left_out.len(), left_out })
+    let derived = rows.len() - left_out.len();
+    let damaged = trials.iter().filter(|trial| trial.damaged && !trial.discarded);
+    left_out.extend(damaged.map(|trial| (trial.id, StoreError::altered(trial.id).to_string())));
+    Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived, left_out })
 }
 
-fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
+fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
     let raw = folder.join("raw");
     std::fs::create_dir_all(&raw).map_err(|e| cannot(&raw, &e))?;
     let channels = whole_fingers(SignalDefinition::Parts);
@@ -109,7 +113,13 @@ fn write_all(store: &Store, rows: &[LabelledTrial], folder: &Path) -> Result<Vec
     for row in rows {
         let label = row.object.as_deref().unwrap_or_default();
         let name = format!("trial_{}_{}.csv", row.id, file_name_of(label));
-        export_board_trial(store, row.id, &raw.join(&name))?;
+        match export_board_trial(store, row.id, &raw.join(&name)) {
+            Err(ExportError::Store(error)) if error.is_damage() => {
+                left_out.push((row.id, error.to_string()));
+                continue;
+            }
+            written => written?,
+        };
         let read = store.board_signals(row.id, &[])?.unwrap_or_default();
         list_out.write_record(list_row(row, &read.serving.ids, &name)).map_err(|e| cannot(&list, &e))?;
         let wanted: Vec<String> = channels.iter().map(Channel::name).collect();

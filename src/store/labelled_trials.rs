@@ -1,6 +1,7 @@
 //! Lists of the real gripper's trials with their labels. Everything that a list shows is stored with the trial, so that
 //! hundreds of them are read without decoding one.
 
+use super::checksum::is_intact;
 use super::label_repository::LabelRepository;
 use super::store_error::StoreError;
 use crate::labels::{FlagRemark, Guess, GuessTop, LabelledTrial, Sparkline, cadence_line, flaws};
@@ -19,7 +20,14 @@ struct ListedInfo {
     seconds: f64,
 }
 
+/// A row; of a damaged one what can be read.
 fn of_row(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
+    let unreadable =
+        || Ok(LabelledTrial { id: row.get(0)?, discarded: row.get(9)?, damaged: true, ..Default::default() });
+    read_intact(row).or_else(|_damage: rusqlite::Error| unreadable())
+}
+
+fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
     let text = |column: usize| row.get::<_, String>(column);
     let shown: ListedInfo = serde_json::from_str(&text(11)?).unwrap_or_default();
     let object = Some(text(4)?).filter(|object| !object.is_empty());
@@ -45,6 +53,7 @@ fn of_row(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         samples,
         seconds: if shown.seconds > 0.0 { shown.seconds } else { by_rate },
         discarded: row.get(9)?,
+        damaged: !row.get::<_, bool>(14)?,
         sparkline: shown.sparkline,
         object,
     })
@@ -53,14 +62,17 @@ fn of_row(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
 impl LabelRepository<'_> {
     /// All trials of the real gripper, oldest first; deleted ones too.
     pub fn trials(&self) -> Result<Vec<LabelledTrial>, StoreError> {
-        let sql = "SELECT trials.id, uid, created, state, object, note, tags, unsure, reviewed, deleted IS NOT NULL,
-                   samples, about, guesses.model, guesses.pmf
-                   FROM trials JOIN board_trials ON board_trials.trial = trials.id
-                   LEFT JOIN guesses ON guesses.trial = trials.id WHERE rig = ?1 ORDER BY trials.id";
+        let sql = format!(
+            "SELECT trials.id, uid, created, state, object, note, tags, unsure, reviewed, deleted IS NOT NULL,
+             samples, about, guesses.model, guesses.pmf, checksum(uid, about) IS board_trials.checksum AND {}
+             FROM trials JOIN board_trials ON board_trials.trial = trials.id
+             LEFT JOIN guesses ON guesses.trial = trials.id WHERE rig = ?1 ORDER BY trials.id",
+            is_intact()
+        );
         let rows = self
             .store
             .connection
-            .prepare(sql)
+            .prepare(&sql)
             .and_then(|mut s| s.query_map([TrialSource::Recorded.name()], of_row)?.collect());
         rows.map_err(|e| self.store.fault(&e))
     }

@@ -12,18 +12,19 @@
 //!
 //! | layer | module | holds |
 //! |---|---|---|
-//! | 0 | `checksum`, `frame_blob`, `reading_blob` | checksums; frames and readings as bytes |
+//! | 0 | `checksum`, `frame_blob`, `reading_blob` | checksums of rows; frames and readings as bytes |
 //! | 0 | [`labels`] | class names, flags, plan, labelled trials, sparklines: plain values |
 //! | 0 | `file_kind` | kinds of files, and what each may replace |
 //! | 1 | `new_file` | the one way to write a file or folder that a person names |
 //! | 2 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
-//! | 2 | `schema`, `free_space` | tables and their migration; free space on the disk |
+//! | 2 | `schema`, `free_space`, `open_file` | tables and their migration; free space on the disk; whether the open file is still there |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
-//! | 4 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
+//! | 4 | `chunks` | chunks of a trial, checked |
 //! | 4 | `trial_rows` | the list of trials |
 //! | 4 | `calibrations`, `journal`, `merge` | calibrations, undoable changes, merging of stores |
+//! | 5 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
 //! | 5 | `library` | search, filters and order of all trials ([`Library`]) |
 //! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
 //! | 5 | `board_export`, `board_signals` | counts of a board trial as CSV; its signals by the calibrations |
@@ -48,6 +49,7 @@ mod board_signals;
 mod board_trials;
 mod calibrations;
 mod checksum;
+mod chunks;
 mod csv_export;
 mod csv_import;
 #[cfg(test)]
@@ -56,6 +58,8 @@ mod demo_log;
 #[cfg(test)]
 mod demo_log_tests;
 mod file_kind;
+#[cfg(test)]
+mod file_tests;
 mod frame_blob;
 mod free_space;
 mod identity;
@@ -74,6 +78,7 @@ mod merge;
 mod new_file;
 #[cfg(test)]
 mod old_store_tests;
+mod open_file;
 mod points_csv;
 mod reading_blob;
 mod schema;

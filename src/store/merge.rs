@@ -1,15 +1,18 @@
 //! Merging: copies the trials of another store into this one, such as the parts of a data set that several machines
 //! collected.
 
+use super::checksum::{BYTES, FRAMES, READINGS};
 use super::schema::TABLES_OF_A_TRIAL;
-use super::store::Store;
+use super::store::{Store, json};
 use super::store_error::StoreError;
+use palpate_tactile::trial::TrialId;
 use rusqlite::Transaction;
+use rusqlite::types::{ToSqlOutput, ValueRef};
 use serde::Serialize;
 use std::path::Path;
 
 /// Result of a merge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Merged {
     /// Trials copied.
     pub added: u64,
@@ -17,6 +20,8 @@ pub struct Merged {
     pub known: u64,
     /// Those of them that have a label, note, tag or corrected phase in the other store alone, which stays there.
     pub annotated: u64,
+    /// Trials of the other store that are damaged, which were left out.
+    pub damaged: Vec<TrialId>,
 }
 
 const CHOOSE_INCOMING: &str = "
@@ -66,9 +71,31 @@ const COPY_JOURNAL: &str = "
     WHERE theirs.uid NOT IN (SELECT uid FROM main.journal) ORDER BY theirs.number;
 ";
 
+/// Takes damaged trials out of those that are copied: those with these numbers, and those whose chunks are damaged or missing.
+fn leave_out_damaged(transaction: &Transaction<'_>, rows: &[TrialId]) -> rusqlite::Result<Vec<TrialId>> {
+    let of_chunks = [FRAMES, READINGS, BYTES].map(|kind| {
+        let (table, intact) = (kind.table, kind.intact("theirs"));
+        format!("EXISTS (SELECT 1 FROM other.{table} WHERE trial = theirs.id AND NOT ({intact}))")
+    });
+    let sql = format!(
+        "CREATE TEMP TABLE damaged AS SELECT theirs.id FROM temp.incoming JOIN other.trials AS theirs ON theirs.id = incoming.id
+         WHERE theirs.id IN (SELECT value FROM json_each('{}')) OR {}
+         OR EXISTS (SELECT 1 FROM other.readings WHERE trial = theirs.id
+             AND checksum(theirs.uid, channels, readings.samples) IS NOT readings.checksum)
+         OR theirs.chunks <> (SELECT count(*) FROM other.chunks WHERE trial = theirs.id)
+             + (SELECT count(*) FROM other.board_chunks WHERE trial = theirs.id);
+         DELETE FROM temp.incoming WHERE id IN (SELECT id FROM temp.damaged);",
+        json(rows),
+        of_chunks.join(" OR ")
+    );
+    transaction.execute_batch(&sql)?;
+    transaction.prepare("SELECT id FROM temp.damaged ORDER BY id")?.query_map([], |row| row.get(0))?.collect()
+}
+
 /// Copies the chosen trials with everything that belongs to them; returns how many, and how many others are annotated.
-fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<(u64, i64)> {
+fn copy(transaction: &Transaction<'_>, damaged: &[TrialId]) -> rusqlite::Result<Merged> {
     transaction.execute_batch(CHOOSE_INCOMING)?;
+    let damaged = leave_out_damaged(transaction, damaged)?;
     let columns = columns_of(transaction, "trials", "id")?;
     let sql = format!(
         "INSERT INTO main.trials ({columns}) SELECT {columns} FROM other.trials
@@ -88,16 +115,20 @@ fn copy(transaction: &Transaction<'_>) -> rusqlite::Result<(u64, i64)> {
     transaction.execute_batch(KEEP_KNOWN)?;
     transaction.execute_batch(COPY_CALIBRATIONS)?;
     transaction.execute_batch(COPY_JOURNAL)?;
-    let annotated = transaction.query_row(COUNT_ANNOTATED, [], |row| row.get(0))?;
-    transaction.execute_batch("DROP TABLE temp.incoming")?;
-    Ok((added, annotated))
+    let annotated = transaction.query_row(COUNT_ANNOTATED, [], |row| row.get::<_, i64>(0))?.cast_unsigned();
+    let count = "SELECT count(*) FROM other.trials WHERE demo = 0";
+    let total = transaction.query_row(count, [], |row| row.get::<_, i64>(0))?.cast_unsigned();
+    let known = total.saturating_sub(added + damaged.len() as u64);
+    transaction.execute_batch("DROP TABLE temp.incoming; DROP TABLE temp.damaged")?;
+    Ok(Merged { added, known, annotated, damaged })
 }
 
 /// Trials known here, about which the other store's journal says more, or that have a note or tag there and another
 /// uid here.
 const COUNT_ANNOTATED: &str = "
     SELECT count(*) FROM other.trials AS theirs
-    WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming) AND (
+    WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)
+    AND theirs.id NOT IN (SELECT id FROM temp.damaged) AND (
         EXISTS (SELECT 1 FROM other.journal AS told
             WHERE told.trial = theirs.uid AND told.uid NOT IN (SELECT uid FROM main.journal))
         OR (theirs.note <> '' OR theirs.tags <> '[]') AND theirs.uid NOT IN (SELECT uid FROM main.trials));
@@ -118,16 +149,16 @@ impl Store {
             return Err(StoreError::Open { path: other.to_owned(), cause });
         }
         // Opening it updates its tables, or says why it cannot be read.
-        drop(Self::open(other)?);
+        let theirs = Self::open(other)?;
+        let damaged: Vec<TrialId> = theirs.list(true)?.iter().filter(|row| row.damaged).map(|row| row.id).collect();
         let fault = |e: rusqlite::Error| self.fault(&e);
-        self.connection.execute("ATTACH DATABASE ?1 AS other", [other.to_string_lossy()]).map_err(fault)?;
+        // As it is spelt, even where that is no UTF-8.
+        let name = ToSqlOutput::Borrowed(ValueRef::Text(theirs.file().as_os_str().as_encoded_bytes()));
+        self.connection.execute("ATTACH DATABASE ?1 AS other", [name]).map_err(fault)?;
         let merged = self.write().and_then(|transaction| {
-            let count = "SELECT count(*) FROM other.trials WHERE demo = 0";
-            let total: i64 = transaction.query_row(count, [], |row| row.get(0)).map_err(fault)?;
-            let (added, annotated) = copy(&transaction).map_err(fault)?;
-            transaction.commit().map_err(fault)?;
-            let known = total.cast_unsigned().saturating_sub(added);
-            Ok(Merged { added, known, annotated: annotated.cast_unsigned() })
+            let merged = copy(&transaction, &damaged).map_err(fault)?;
+            self.commit(transaction)?;
+            Ok(merged)
         });
         self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;
         merged
@@ -140,6 +171,10 @@ mod tests {
     use crate::test_trials::grasp;
     use palpate_sim::scene::Scene;
     use palpate_tactile::trial::{GraspOrigin, SimulatedTrial};
+
+    fn merged(added: u64, known: u64, annotated: u64) -> Merged {
+        Merged { added, known, annotated, damaged: Vec::new() }
+    }
 
     #[test]
     fn merging_adds_what_is_new_and_only_once() -> Result<(), StoreError> {
@@ -155,8 +190,8 @@ mod tests {
         }
         // The same trial of the same collection, made elsewhere.
         all.insert_collected([&trial].into_iter())?;
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 2, known: 1, annotated: 0 });
-        assert_eq!(all.merge_from(&path("shard.sqlite"))?, Merged { added: 0, known: 3, annotated: 0 });
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, merged(2, 1, 0));
+        assert_eq!(all.merge_from(&path("shard.sqlite"))?, merged(0, 3, 0));
         assert_eq!(all.collected("set")?.len(), 3);
         for id in 1..=3 {
             assert!(all.load(id)?.frames() == trial.frames());
@@ -216,18 +251,18 @@ mod tests {
         let (mut all, mut shard) = (open(&folder, "all.sqlite")?, open(&folder, "shard.sqlite")?);
         all.insert(&collected("own"))?;
         let id = shard.insert(&collected("first"))?.id();
-        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 1, annotated: 0 });
+        assert_eq!(all.merge_from(shard.path())?, merged(0, 1, 0));
         shard.labels().set_note(id, "slipped")?;
-        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 1, annotated: 1 });
+        assert_eq!(all.merge_from(shard.path())?, merged(0, 1, 1));
 
         // A trial merged earlier, annotated since; what has come along already does not count.
         let mut other = collected("own");
         other.header.seed = 1;
         let id = shard.insert(&other)?.id();
         shard.labels().set_tags(id, &["wet".to_owned()])?;
-        assert_eq!(all.merge_from(shard.path())?, Merged { added: 1, known: 1, annotated: 1 });
+        assert_eq!(all.merge_from(shard.path())?, merged(1, 1, 1));
         shard.labels().set_note(id, "late")?;
-        assert_eq!(all.merge_from(shard.path())?, Merged { added: 0, known: 2, annotated: 2 });
+        assert_eq!(all.merge_from(shard.path())?, merged(0, 2, 2));
         Ok(())
     }
 

@@ -24,8 +24,8 @@ fn it_is_updated_listed_and_loaded() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = copied(folder.path())?;
     let store = Store::open(&path)?;
-    assert!(store.warnings()[0].contains("before-v14.sqlite"), "{:?}", store.warnings());
-    let copy = std::fs::read(folder.path().join("trials.before-v14.sqlite"))?;
+    assert!(store.warnings()[0].contains("before-v15.sqlite"), "{:?}", store.warnings());
+    let copy = std::fs::read(folder.path().join("trials.before-v15.sqlite"))?;
     assert!(copy.len() > 100_000 && Store::open(&path)?.warnings().is_empty());
 
     let rows = store.list(true)?;

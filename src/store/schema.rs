@@ -16,8 +16,9 @@
 //! journal      every change of a label, note, tag, deletion, place or plan; only ever added to
 //! ```
 //!
-//! Blobs carry a CRC-32 in a column beside them; rows from before version 10 have none.
+//! Rows of trials and chunks carry a CRC-32 in a column beside them; see `checksum`.
 
+use super::checksum::add_to_old;
 use super::identity::identify_old;
 use super::new_file::unfinished;
 use super::store_error::StoreError;
@@ -31,7 +32,7 @@ pub(super) const APPLICATION_ID: i32 = 0x5061_6c70;
 pub(super) const SCHEMA_VERSION: i32 = MIGRATIONS.len() as i32;
 
 /// Each makes the next version out of the one before; the first makes the tables.
-pub(super) const MIGRATIONS: [&str; 14] = [
+pub(super) const MIGRATIONS: [&str; 15] = [
     "CREATE TABLE trials (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         uid TEXT NOT NULL UNIQUE DEFAULT (lower(hex(randomblob(16)))),
@@ -167,10 +168,16 @@ pub(super) const MIGRATIONS: [&str; 14] = [
     // 1 for a trial of the demo log; see the module `demo_log`.
     "ALTER TABLE trials ADD COLUMN demo INTEGER NOT NULL DEFAULT 0;
      CREATE INDEX trials_of_demo_log ON trials (demo) WHERE demo = 1;",
+    // The module `checksum` fills them in for older trials.
+    "ALTER TABLE trials ADD COLUMN chunks INTEGER NOT NULL DEFAULT 0;
+     ALTER TABLE trials ADD COLUMN checksum INTEGER;
+     ALTER TABLE board_trials ADD COLUMN checksum INTEGER;",
 ];
 
 /// The first version with identities of grasps.
 const IDENTITIES: i32 = 13;
+/// The first version whose checksums cover rows.
+const CHECKSUMS: i32 = 15;
 
 /// Tables whose rows belong to a trial by their column `trial`; merging copies them with it.
 pub(super) const TABLES_OF_A_TRIAL: [&str; 7] =
@@ -195,13 +202,16 @@ pub(super) fn migrate(transaction: &Transaction<'_>, store: &Path) -> Result<Opt
     if (1..IDENTITIES).contains(&version) {
         identify_old(transaction).map_err(fault)?;
     }
+    if (1..CHECKSUMS).contains(&version) {
+        add_to_old(transaction).map_err(fault)?;
+    }
     if version < SCHEMA_VERSION {
         transaction.pragma_update(None, "user_version", SCHEMA_VERSION).map_err(fault)?;
     }
     Ok(copy)
 }
 
-/// `trials.before-v14.sqlite` beside the store, or with a number where such a file exists.
+/// `trials.before-v15.sqlite` beside the store, or with a number where such a file exists.
 fn free_name(store: &Path) -> PathBuf {
     let name = |suffix: String| store.with_extension(format!("before-v{SCHEMA_VERSION}{suffix}.sqlite"));
     let numbered = (2..).map(|number| name(format!("-{number}")));

@@ -6,19 +6,20 @@
 //!
 //! Deleting marks a trial; purging removes it. Chunks are only ever added.
 
-use super::checksum::{checksum, is_intact};
+use super::checksum::{add_functions, add_triggers, is_intact};
 use super::demo_log::{TrialPlace, keep, log, place_of};
-use super::frame_blob::{decode_frames, encode_frames};
+use super::frame_blob::encode_frames;
 use super::identity::{Stored, add_to, known};
+use super::open_file::OpenFile;
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
-use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain};
+use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain, row_fault};
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{
     SimulatedData, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource, UnknownSource,
 };
-use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,7 @@ const FRAMES_PER_CHUNK: usize = 75;
 pub struct Store {
     pub(super) connection: Connection,
     path: PathBuf,
+    file: OpenFile,
     warnings: Vec<String>,
 }
 
@@ -50,9 +52,12 @@ impl Store {
             std::fs::create_dir_all(folder)
                 .map_err(|e| StoreError::Folder { path: folder.to_owned(), cause: e.to_string() })?;
         }
-        let connection =
-            Connection::open(path).map_err(|e| StoreError::Open { path: path.to_owned(), cause: plain(&e) })?;
-        let mut store = Self { connection, path: path.to_owned(), warnings: Vec::new() };
+        let refused = |cause| StoreError::Open { path: path.to_owned(), cause };
+        // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
+        let file = std::path::absolute(path).map_err(|e| refused(e.to_string()))?;
+        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection = Connection::open_with_flags(&file, flags).map_err(|e| refused(plain(&e)))?;
+        let mut store = Self { connection, path: path.to_owned(), file: OpenFile::at(file)?, warnings: Vec::new() };
         store.prepare()?;
         Ok(store)
     }
@@ -60,6 +65,11 @@ impl Store {
     /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Absolute path of the file.
+    pub(super) fn file(&self) -> &Path {
+        self.file.path()
     }
 
     /// Warnings from opening the store, one sentence each.
@@ -85,9 +95,11 @@ impl Store {
         self.set_journal(mode)?;
         self.connection.pragma_update(None, "synchronous", "NORMAL").map_err(fault)?;
         self.connection.pragma_update(None, "foreign_keys", true).map_err(fault)?;
+        add_functions(&self.connection).map_err(fault)?;
         let transaction = self.write()?;
-        let copy = migrate(&transaction, &self.path)?;
-        transaction.commit().map_err(fault)?;
+        let copy = migrate(&transaction, self.file())?;
+        self.commit(transaction)?;
+        add_triggers(&self.connection).map_err(fault)?;
         self.warnings.extend(copy.map(|copy| {
             format!(
                 "the store was updated to version {SCHEMA_VERSION}; a copy of the file before the update is \"{}\". Delete it \
@@ -150,7 +162,16 @@ impl Store {
 
     /// Begins a transaction that takes the write lock at once, so that it cannot fail half-way without it.
     pub(super) fn write(&self) -> Result<Transaction<'_>, StoreError> {
-        Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate).map_err(|e| self.fault(&e))
+        let begun = Transaction::new_unchecked(&self.connection, TransactionBehavior::Immediate);
+        let transaction = begun.map_err(|e| self.fault(&e))?;
+        self.file.check()?;
+        Ok(transaction)
+    }
+
+    /// Commits a transaction. An error where the file is no longer the one that was opened: what was written is lost then.
+    pub(super) fn commit(&self, transaction: Transaction<'_>) -> Result<(), StoreError> {
+        transaction.commit().map_err(|e| self.fault(&e))?;
+        self.file.check()
     }
 
     /// Current time, UTC, in the format of [`TrialRow::created`](crate::TrialRow::created): `2026-11-21T15:36:00.123Z`.
@@ -182,7 +203,7 @@ impl Store {
         let path = self.path.clone();
         let transaction = self.write()?;
         let id = insert_simulated(&transaction, trial, place).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.commit(transaction)?;
         Ok(id)
     }
 
@@ -209,7 +230,7 @@ impl Store {
         let path = self.path.clone();
         let transaction = self.write()?;
         insert_chunk(&transaction, id, frames).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))
+        self.commit(transaction)
     }
 
     /// Ends a trial, whose quality, warnings and pulls are now known. It is removed where another trial holds the same
@@ -219,7 +240,7 @@ impl Store {
         let path = self.path.clone();
         let transaction = self.write()?;
         let stored = end(&transaction, id, quality, header).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.commit(transaction)?;
         Ok(stored)
     }
 
@@ -237,7 +258,7 @@ impl Store {
             None => insert_whole(&transaction, trial, place).map(Stored::New),
         };
         let stored = insert().map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.commit(transaction)?;
         Ok(stored)
     }
 
@@ -267,7 +288,7 @@ impl Store {
                 }
             }
         }
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.commit(transaction)?;
         Ok(stored)
     }
 
@@ -275,9 +296,10 @@ impl Store {
     pub fn collected(&self, collection: &str) -> Result<BTreeSet<(String, u64)>, StoreError> {
         let sql = "SELECT object, seed FROM trials WHERE collection = ?1 UNION SELECT object, seed FROM trials
             JOIN memberships ON memberships.trial = trials.id WHERE memberships.collection = ?1";
-        let rows = self.connection.prepare(sql).and_then(|mut statement| {
-            statement.query_map([collection], |row| Ok((row.get(0)?, row.get::<_, i64>(1)?.cast_unsigned())))?.collect()
-        });
+        let rows = self
+            .connection
+            .prepare(sql)
+            .and_then(|mut statement| statement.query_map([collection], object_and_seed)?.collect());
         rows.map_err(|e| self.fault(&e))
     }
 
@@ -311,54 +333,20 @@ impl Store {
 
     /// Header of a trial, with its source and the columns that only simulated trials use.
     fn load_header(&self, id: TrialId) -> Result<StoredHeader, StoreError> {
-        let sql = "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, \
-                   collection, plan, earlier, phases, origin FROM trials WHERE id = ?1 AND deleted IS NULL";
-        type Columns = (String, String, i64, String, [String; 3], String, String, [Option<String>; 4]);
-        let found: Option<Columns> = self
-            .connection
-            .query_row(sql, [id], |row| {
-                let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
-                let scene = row.get(3)?;
-                let optional = [row.get(8)?, row.get(10)?, row.get(11)?, row.get(12)?];
-                Ok((row.get(0)?, row.get(1)?, row.get(2)?, scene, simulation, row.get(6)?, row.get(7)?, optional))
-            })
-            .optional()
-            .map_err(|e| self.fault(&e))?;
-        let Some((rig, object, seed, scene, simulation, warnings, version, [collection, earlier, phases, origin])) =
-            found
-        else {
-            return Err(self.no_trial(id));
-        };
-        let header = TrialHeader {
-            object,
-            seed: seed.cast_unsigned(),
-            collection,
-            // An empty text, as imported trials have, is the default scene.
-            scene: Scene::from_toml(&scene).map_err(|cause| StoreError::Scene { id, cause })?,
-            warnings: serde_json::from_str(&warnings).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?,
-            version,
-            earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
-            phases: phases.as_deref().and_then(|phases| serde_json::from_str(phases).ok()).flatten(),
-            origin: origin.as_deref().and_then(|origin| serde_json::from_str(origin).ok()),
-        };
-        Ok(StoredHeader { source: source_named(id, &rig)?, header, simulation })
-    }
-
-    fn load_frames(&self, id: TrialId) -> Result<Vec<Frame>, StoreError> {
-        let sql = "SELECT number, frames, checksum FROM chunks WHERE trial = ?1 ORDER BY number";
-        let chunks: Vec<(i64, Vec<u8>, Option<u32>)> = self
-            .connection
-            .prepare(sql)
-            .and_then(|mut s| s.query_map([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?.collect())
-            .map_err(|e| self.fault(&e))?;
-        let mut frames = Vec::new();
-        for (chunk, bytes, stored) in chunks {
-            if !is_intact(stored, &[&bytes]) {
-                return Err(StoreError::Checksum { id, what: "frames", chunk });
-            }
-            frames.extend(decode_frames(&bytes).map_err(|cause| StoreError::Damaged { id, chunk, cause })?);
+        let sql = format!(
+            "SELECT rig, object, seed, scene, world_from_gripper, quality, warnings, version, collection, plan, earlier, phases,
+             origin, {} FROM trials WHERE id = ?1 AND deleted IS NULL",
+            is_intact()
+        );
+        let read = |row: &Row<'_>| Ok((row.get(13)?, HeaderColumns::of(row)?));
+        let found =
+            self.connection.query_row(&sql, [id], read).optional().map_err(|e| row_fault(&self.path, id, &e))?;
+        let (intact, columns) = found.ok_or_else(|| self.no_trial(id))?;
+        match columns.header(id) {
+            header if intact => header,
+            Ok(_) => Err(StoreError::altered(id)),
+            Err(error) => Err(StoreError::BadInfo { id, cause: error.to_string() }),
         }
-        Ok(frames)
     }
 
     pub(super) fn no_trial(&self, id: TrialId) -> StoreError {
@@ -376,7 +364,7 @@ impl Store {
         let transaction = self.write()?;
         let removed =
             transaction.execute("DELETE FROM trials WHERE deleted IS NOT NULL", []).map_err(|e| fault(&path, &e))?;
-        transaction.commit().map_err(|e| fault(&path, &e))?;
+        self.commit(transaction)?;
         Ok(removed)
     }
 }
@@ -413,6 +401,45 @@ struct StoredHeader {
     header: TrialHeader,
     /// JSON of pose, quality and plan.
     simulation: [String; 3],
+}
+
+/// Columns of a header as they are stored.
+struct HeaderColumns {
+    rig: String,
+    object: String,
+    seed: i64,
+    scene: String,
+    simulation: [String; 3],
+    warnings: String,
+    version: String,
+    optional: [Option<String>; 4],
+}
+
+impl HeaderColumns {
+    fn of(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let (rig, object, seed, scene) = (row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?);
+        let simulation = [row.get(4)?, row.get(5)?, row.get(9)?];
+        let optional = [row.get(8)?, row.get(10)?, row.get(11)?, row.get(12)?];
+        Ok(Self { rig, object, seed, scene, simulation, warnings: row.get(6)?, version: row.get(7)?, optional })
+    }
+
+    fn header(self, id: TrialId) -> Result<StoredHeader, StoreError> {
+        let [collection, earlier, phases, origin] = self.optional;
+        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
+        let header = TrialHeader {
+            object: self.object,
+            seed: self.seed.cast_unsigned(),
+            collection,
+            // An empty text, as imported trials have, is the default scene.
+            scene: Scene::from_toml(&self.scene).map_err(|cause| StoreError::Scene { id, cause })?,
+            warnings: serde_json::from_str(&self.warnings).map_err(bad)?,
+            version: self.version,
+            earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
+            phases: phases.as_deref().and_then(|phases| serde_json::from_str(phases).ok()).flatten(),
+            origin: origin.as_deref().and_then(|origin| serde_json::from_str(origin).ok()),
+        };
+        Ok(StoredHeader { source: source_named(id, &self.rig)?, header, simulation: self.simulation })
+    }
 }
 
 /// Source of a trial by its stored name.
@@ -473,14 +500,23 @@ pub(super) fn json<T: Serialize + ?Sized>(value: &T) -> String {
 }
 
 fn insert_chunk(transaction: &Transaction<'_>, id: TrialId, frames: &[Frame]) -> rusqlite::Result<()> {
-    let bytes = encode_frames(frames);
-    transaction.execute(
-        "INSERT INTO chunks (trial, number, frames, checksum) \
-         VALUES (?1, (SELECT coalesce(max(number), -1) + 1 FROM chunks WHERE trial = ?1), ?2, ?3)",
-        params![id, bytes, checksum(&[&bytes])],
-    )?;
-    transaction.execute("UPDATE trials SET samples = samples + ?2 WHERE id = ?1", params![id, frames.len() as i64])?;
-    Ok(())
+    let sql = "WITH new (uid, number) AS (SELECT uid, chunks FROM trials WHERE id = ?1)
+        INSERT INTO chunks (trial, number, frames, checksum)
+        VALUES (?1, (SELECT number FROM new), ?2, (SELECT checksum(uid, number, ?2) FROM new))";
+    transaction.execute(sql, params![id, encode_frames(frames)])?;
+    count_chunk(transaction, id, frames.len())
+}
+
+/// Counts a chunk that was added, and its samples.
+pub(super) fn count_chunk(transaction: &Transaction<'_>, id: TrialId, samples: usize) -> rusqlite::Result<()> {
+    let sql = "UPDATE trials SET samples = samples + ?2, chunks = chunks + 1 WHERE id = ?1";
+    transaction.execute(sql, params![id, samples as i64]).map(drop)
+}
+
+/// Object and seed of a trial; a damaged name is that of no object.
+fn object_and_seed(row: &Row<'_>) -> rusqlite::Result<(String, u64)> {
+    let object = row.get_ref(0)?.as_bytes().map_or_else(|_| String::new(), |name| String::from_utf8_lossy(name).into());
+    Ok((object, row.get::<_, i64>(1)?.cast_unsigned()))
 }
 
 /// Completes a simulated trial, or removes it where another trial holds the same grasp and nobody has annotated this one.

@@ -69,8 +69,20 @@ pub enum StoreError {
     #[error("the store is busy: another program has been writing to it for {} s; try again", BUSY_TIMEOUT.as_secs())]
     Busy,
     /// The disk is full.
-    #[error("the disk is full: the trial was not stored. Free some space and record again; earlier trials are safe")]
+    #[error("the disk with the store is full. Free some space and try again; trials stored earlier are safe")]
     DiskFull,
+    /// The file was deleted, replaced or cut short while it was open.
+    #[error(
+        "the store \"{path}\" was {event} while it was open: new trials are not in it. Put it back or choose another with \
+         --store, then start Palpate again",
+        path = path.display()
+    )]
+    FileLost {
+        /// Path of the store.
+        path: PathBuf,
+        /// Its fate.
+        event: &'static str,
+    },
     /// Too little space to begin a trial.
     #[error(
         "the disk with the store \"{path}\" has {free_mb} MB free; the trial may need {needed_mb} MB and was not begun. Free \
@@ -106,7 +118,7 @@ pub enum StoreError {
         id: TrialId,
     },
     /// A trial whose frames cannot be decoded.
-    #[error("trial {id} is damaged in its part {chunk}: {cause}. {REMEDY}")]
+    #[error("trial {id} is damaged in its part {chunk}: {cause}. {}", remedy(*id))]
     Damaged {
         /// Number of the trial.
         id: TrialId,
@@ -116,7 +128,7 @@ pub enum StoreError {
         cause: BlobError,
     },
     /// A trial whose data differ from their checksum.
-    #[error("trial {id} is damaged: its {what}, part {chunk}, do not match their checksum. {REMEDY}")]
+    #[error("trial {id} is damaged: its {what}, part {chunk}, do not match their checksum. {}", remedy(*id))]
     Checksum {
         /// Number of the trial.
         id: TrialId,
@@ -125,8 +137,20 @@ pub enum StoreError {
         /// Number of the chunk.
         chunk: i64,
     },
+    /// A trial that has lost some of its data.
+    #[error("trial {id} is damaged: {found} of its {wanted} {what} are left. {}", remedy(*id))]
+    Incomplete {
+        /// Number of the trial.
+        id: TrialId,
+        /// Which of its data.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        wanted: i64,
+    },
     /// A trial whose description cannot be read.
-    #[error("the description of trial {id} is damaged: {cause}. {REMEDY}")]
+    #[error("the description of trial {id} is damaged: {cause}. {}", remedy(*id))]
     BadInfo {
         /// Number of the trial.
         id: TrialId,
@@ -217,9 +241,32 @@ pub enum StoreError {
     },
 }
 
+impl StoreError {
+    /// A trial whose row does not match its checksum.
+    pub(super) fn altered(id: TrialId) -> Self {
+        Self::BadInfo { id, cause: "it does not match its checksum".to_owned() }
+    }
+
+    /// True where one trial is damaged and others are not affected.
+    pub fn is_damage(&self) -> bool {
+        matches!(self, Self::Damaged { .. } | Self::Checksum { .. } | Self::Incomplete { .. } | Self::BadInfo { .. })
+    }
+}
+
 /// Advice for every kind of damage.
-const REMEDY: &str =
-    "Take the store from a backup, or delete this trial (`palpate trials delete`): other trials are not affected";
+fn remedy(id: TrialId) -> String {
+    format!(
+        "Take the store from a backup, or delete this trial: palpate trials delete {id}. Other trials are not affected"
+    )
+}
+
+/// Translates an error of reading the row of one trial.
+pub(super) fn row_fault(path: &Path, id: TrialId, error: &rusqlite::Error) -> StoreError {
+    match error.sqlite_error_code() {
+        Some(_) => fault(path, error),
+        None => StoreError::BadInfo { id, cause: error.to_string() },
+    }
+}
 
 /// Translates an error of SQLite.
 pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {

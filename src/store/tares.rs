@@ -46,7 +46,7 @@ impl CalibrationRepository<'_> {
                        FROM calibrations WHERE id = ?2";
             transaction.execute(sql, params![calibration.record.part, id, offset]).map_err(fault)?;
         }
-        transaction.commit().map_err(fault)?;
+        self.store.commit(transaction)?;
         Ok(self.tare()?.unwrap_or_default())
     }
 

@@ -1,18 +1,20 @@
-//! The list of trials: what is known of each without its data.
+//! The list of trials: what is known of each without its data. A damaged row is listed as such, with what can be read of it.
 
+use super::checksum::is_intact;
 use super::demo_log::TrialPlace;
-use super::store::{Store, source_named};
+use super::store::Store;
 use super::store_error::StoreError;
 use crate::labels::{Flag, FlagRemark, flaws};
 use palpate_sim::frame::Quality;
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
-use palpate_tactile::trial::{GraspOrigin, TrialId, TrialSource};
+use palpate_tactile::trial::{GraspOrigin, TrialId, TrialSource, UnknownSource};
+use rusqlite::types::Type;
 use rusqlite::{Params, Row};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// One row of the list of trials.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TrialRow {
     /// Number in this store.
     pub id: TrialId,
@@ -56,7 +58,10 @@ pub struct TrialRow {
     pub properties: Option<(String, String)>,
     /// Samples stored.
     pub samples: i64,
-    /// Whether it stayed finite and converged.
+    /// Its row cannot be read or does not match its checksum.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub damaged: bool,
+    /// Whether it stayed finite and converged, and is not damaged.
     pub sound: bool,
     /// Number of warnings.
     pub warnings: usize,
@@ -80,9 +85,15 @@ impl TrialRow {
     pub fn collections(&self) -> impl Iterator<Item = &String> {
         self.collection.iter().chain(&self.also_in)
     }
+
+    /// A trial of which nothing else can be read.
+    fn unreadable(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let state = "complete".to_owned();
+        Ok(Self { id: row.get(0)?, state, damaged: true, deleted: row.get(9).unwrap_or_default(), ..Self::default() })
+    }
 }
 
-/// Columns that [`RowReader`] reads. Sensors: the parts of a board, else its channels; or the imported channels.
+/// Columns that [`RowReader`] reads, followed by whether the row is intact. Sensors: the parts of a board, else its channels; or the imported channels.
 const ROWS: &str =
     "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, collection, size,
     shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END,
@@ -98,8 +109,8 @@ const ROWS: &str =
     CASE WHEN identity IS NOT NULL AND state = 'complete' THEN (SELECT min(first.id) FROM trials AS first
         WHERE first.identity = trials.identity AND first.state = 'complete' AND first.deleted IS NULL
         AND first.id < trials.id) END,
-    rig = 'serial' AND earlier IS NOT NULL, demo
-    FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id";
+    rig = 'serial' AND earlier IS NOT NULL, demo,
+    (rig <> 'serial' OR about IS NOT NULL AND checksum(uid, about) IS board_trials.checksum)";
 
 /// Reads rows; presets are looked up once per text.
 #[derive(Default)]
@@ -109,11 +120,15 @@ struct RowReader {
 
 impl RowReader {
     /// A row of [`ROWS`].
-    fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<Result<TrialRow, StoreError>> {
-        let source = match source_named(row.get(0)?, &row.get::<_, String>(3)?) {
-            Ok(source) => source,
-            Err(error) => return Ok(Err(error)),
-        };
+    fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<TrialRow> {
+        let read = self.read_intact(row).or_else(|_damage| TrialRow::unreadable(row))?;
+        let damaged = read.damaged || !row.get::<_, bool>(26)?;
+        Ok(TrialRow { damaged, sound: read.sound && !damaged, ..read })
+    }
+
+    fn read_intact(&mut self, row: &Row<'_>) -> rusqlite::Result<TrialRow> {
+        let unknown = |error: UnknownSource| rusqlite::Error::FromSqlConversionFailure(3, Type::Text, Box::new(error));
+        let source: TrialSource = row.get::<_, String>(3)?.parse().map_err(unknown)?;
         let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
         let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
         let object: String = row.get(4)?;
@@ -127,7 +142,7 @@ impl RowReader {
             row.get::<_, Option<String>>(21)?.and_then(|origin| serde_json::from_str(&origin).ok());
         let pulled = origin.as_ref().is_some_and(|origin| origin.pulls != 0)
             || source == TrialSource::Simulated && warnings.iter().any(|warning| warning.contains(PULLED));
-        Ok(Ok(TrialRow {
+        Ok(TrialRow {
             id: row.get(0)?,
             created: row.get(1)?,
             local: row.get(17)?,
@@ -153,8 +168,9 @@ impl RowReader {
             place: TrialPlace::of_column(row.get(25)?),
             pulled,
             deleted: row.get(9)?,
+            damaged: false,
             object,
-        }))
+        })
     }
 
     /// Preset of a scene, from the text of its table of poses.
@@ -191,10 +207,14 @@ impl Store {
     /// Rows that a condition in SQL chooses.
     pub(super) fn rows(&self, condition: &str, values: impl Params) -> Result<Vec<TrialRow>, StoreError> {
         let mut reader = RowReader::default();
-        let rows: rusqlite::Result<Vec<Result<TrialRow, StoreError>>> = self
+        let intact = is_intact();
+        let sql = format!(
+            "{ROWS} AND {intact} FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id {condition}"
+        );
+        let rows = self
             .connection
-            .prepare_cached(&format!("{ROWS} {condition}"))
+            .prepare_cached(&sql)
             .and_then(|mut statement| statement.query_map(values, |row| reader.read(row))?.collect());
-        rows.map_err(|e| self.fault(&e))?.into_iter().collect()
+        rows.map_err(|e| self.fault(&e))
     }
 }

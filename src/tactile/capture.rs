@@ -9,7 +9,7 @@
 //!   bytes           u8 x length
 //! ```
 //!
-//! Records are only ever appended; a file cut within one, as after a kill, keeps the others.
+//! Records are only ever appended; a file cut within one, as after a kill, keeps the others, and the cut is an error.
 
 use std::io::{self, Read, Write};
 
@@ -65,21 +65,29 @@ impl Captured {
     }
 }
 
-/// Reads the next record; `None` at the end, also where it cuts a record.
+/// Reads the next record; `None` at the end. An error where a record is cut or damaged.
 pub fn read_record(source: &mut impl Read) -> io::Result<Option<Captured>> {
+    let damaged =
+        |what: &str| Err(io::Error::new(io::ErrorKind::InvalidData, format!("{what}; what follows is missing")));
+    const CUT: &str = "the captured bytes end within a record, as a file that was cut does";
     let mut head = [0; 13];
-    if !fill(source, &mut head)? {
-        return Ok(None);
+    match fill(source, &mut head)? {
+        0 => return Ok(None),
+        found if head[..found].starts_with(CAPTURE_MAGIC) => {
+            return damaged("a second file of captured bytes begins here: take joined files apart");
+        }
+        found if found < head.len() => return damaged(CUT),
+        _ => {}
     }
     let [kind, a, b, c, d, e, f, g, h, i, j, k, l] = head;
     let at_s = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
     let length = u32::from_le_bytes([i, j, k, l]) as usize;
     if kind > 1 || !at_s.is_finite() || length > LONGEST_RECORD {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "a record of captured bytes is damaged"));
+        return damaged("a record of captured bytes is damaged");
     }
     let mut bytes = vec![0; length];
-    if !fill(source, &mut bytes)? {
-        return Ok(None);
+    if fill(source, &mut bytes)? < length {
+        return damaged(CUT);
     }
     Ok(Some(if kind == 0 {
         Captured::Bytes { arrived_s: at_s, bytes }
@@ -88,13 +96,9 @@ pub fn read_record(source: &mut impl Read) -> io::Result<Option<Captured>> {
     }))
 }
 
-/// Fills the buffer; false where the source ends before.
-fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
-    match source.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(error) => Err(error),
-    }
+/// Fills the buffer as far as the source goes; returns how far.
+fn fill(source: &mut impl Read, mut buffer: &mut [u8]) -> io::Result<usize> {
+    Ok(io::copy(&mut source.take(buffer.len() as u64), &mut buffer)? as usize)
 }
 
 #[cfg(test)]
@@ -128,11 +132,23 @@ mod tests {
         assert_eq!(back[..2], records()[..2]);
         let length = |piece: &Captured| if let Captured::Bytes { bytes, .. } = piece { bytes.len() } else { 0 };
         assert_eq!(back[2..].iter().map(length).collect::<Vec<_>>(), [LONGEST_RECORD, 100_000 - LONGEST_RECORD]);
-        // Every cut leaves the records before it.
+        // Every cut leaves the records before it, and is an error.
         for end in [5, 30, 60, bytes.len() - 1] {
-            let cut: Vec<Captured> = read_all(&bytes[..end])?;
-            assert!(cut.iter().zip(&back).all(|(a, b)| a == b) && cut.len() < back.len(), "{end}");
+            let mut rest = &bytes[CAPTURE_MAGIC.len()..end];
+            let mut cut = Vec::new();
+            let error = loop {
+                match read_record(&mut rest) {
+                    Ok(record) => cut.push(record.ok_or_else(|| io::Error::other("the cut is hidden"))?),
+                    Err(error) => break error.to_string(),
+                }
+            };
+            assert!(
+                cut == back[..cut.len()] && cut.len() < back.len() && error.contains("end within"),
+                "{end}: {error}"
+            );
         }
+        let joined = read_all(&[&*bytes, &*bytes].concat()).expect_err("two files").to_string();
+        assert!(joined.contains("joined"), "{joined}");
         let mut damaged = bytes;
         damaged[4] = 9;
         assert!(read_all(&damaged).is_err());

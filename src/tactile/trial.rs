@@ -25,9 +25,10 @@ pub struct PhaseMark {
 }
 
 /// Origin of a trial.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TrialSource {
     /// A simulated gripper.
+    #[default]
     Simulated,
     /// A real gripper.
     Recorded,

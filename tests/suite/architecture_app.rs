@@ -46,7 +46,9 @@ fn files_of_the_window_do_not_import_each_other() {
 #[test]
 fn fields_that_are_typed_into_have_fixed_ids() {
     for (file, text) in &app().files {
-        let made = ["TextEdit::singleline", "TextEdit::multiline", "text_edit_singleline"].iter().any(|call| text.contains(call));
+        let made = ["TextEdit::singleline", "TextEdit::multiline", "text_edit_singleline"]
+            .iter()
+            .any(|call| text.contains(call));
         assert!(!made || file == "widgets.rs", "src/app/{file} makes a text field without widgets::text_field");
         let added = ["ui.add(drag)", "ui.add(DragValue", "ui.add(slider)"].iter().any(|call| text.contains(call));
         assert!(!added, "src/app/{file} adds a number without widgets::number_field");

@@ -67,7 +67,15 @@ fn sound() -> Observations {
         let counts = [1400.0 + bend, 1500.0, 3.0 * bend, bend].map(Some).to_vec();
         traces.add(&Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts, line_bar: None });
     }
-    Observations { ports: vec![port], refused: None, modem_manager: false, link: Some(link), listened_s: 8.0, example: None, traces }
+    Observations {
+        ports: vec![port],
+        refused: None,
+        modem_manager: false,
+        link: Some(link),
+        listened_s: 8.0,
+        example: None,
+        traces,
+    }
 }
 
 /// The same with a strip unplugged, ModemManager about and lines damaged.

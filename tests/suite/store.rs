@@ -1,6 +1,6 @@
 //! The store when things go wrong around it: killed programs, two programs at once, files that are no stores.
 
-use crate::program::{palpate, run};
+use crate::program::{json, palpate, refused, run};
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
@@ -149,7 +149,7 @@ fn a_store_of_version_0_1_0_is_copied_updated_listed_and_exported() {
     let list = run(folder.path(), &["trials", "list"]);
     assert_eq!(list.code, Some(0), "{list:?}");
     assert!(
-        list.err.contains("trials.before-v") && folder.path().join("trials.before-v14.sqlite").is_file(),
+        list.err.contains("trials.before-v") && folder.path().join("trials.before-v15.sqlite").is_file(),
         "{list:?}"
     );
     for row in ["Lemon", "mug", "Rubber ball (ball)", "slipped a little", "[wet, late]", "unsure"] {
@@ -169,4 +169,103 @@ fn a_store_of_version_0_1_0_is_copied_updated_listed_and_exported() {
     let row = "1.1599999999999997,1.1610256049999998,84,,1687.8,1618.1,842.3,946.1,0.6,close";
     assert_eq!(read("trial_4_lemon.csv").lines().nth(59), Some(row));
     assert_eq!(std::fs::metadata(folder.path().join("out/trial_4_lemon.bytes")).unwrap().len(), 17_083);
+}
+
+/// Changes a text in a file to another of the same length, wherever it stands.
+fn overwrite(path: &Path, from: &str, to: &str) {
+    assert_eq!(from.len(), to.len());
+    let mut bytes = std::fs::read(path).unwrap();
+    let found: Vec<usize> =
+        (0..bytes.len() - from.len()).filter(|at| bytes[*at..].starts_with(from.as_bytes())).collect();
+    assert!(!found.is_empty());
+    found.iter().for_each(|at| bytes[*at..*at + to.len()].copy_from_slice(to.as_bytes()));
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_damaged_trial_is_listed_as_such_and_holds_up_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for object in ["lemon", "ball"] {
+        assert_eq!(run(at, &["grasp", object]).code, Some(0));
+    }
+    let created = json(at, &["trials", "list", "--json"])[0]["created"].as_str().unwrap().to_owned();
+    overwrite(&at.join("trials.sqlite"), &created, &created.replace('T', "#"));
+    let list = run(at, &["trials", "list"]);
+    assert_eq!((list.code, list.out.lines().count()), (Some(0), 3), "{list:?}");
+    let damaged = list.out.lines().nth(1).unwrap();
+    assert!(damaged.contains("damaged") && damaged.contains("palpate trials delete 1"), "{list:?}");
+    assert_eq!(json(at, &["trials", "list", "--json", "--quality", "damaged"])[0]["id"], 1);
+    refused(at, &["trials", "show", "1"], &["trial 1", "palpate trials delete 1"]);
+    let export = run(at, &["trials", "export", "1", "2", "--out", "csv"]);
+    assert_eq!((export.code, at.join("csv/trial_2_ball.csv").is_file()), (Some(0), true), "{export:?}");
+    assert!(export.err.contains("trial 1 is damaged") && !at.join("csv/trial_1_lemon.csv").exists(), "{export:?}");
+    assert_eq!(run(at, &["recognise", "2"]).code, Some(0));
+    let merged = run(at, &["trials", "merge", "trials.sqlite", "--store", "all.sqlite"]);
+    assert!(merged.out.contains("1 trial(s) added, 0 already there"), "{merged:?}");
+    assert!(merged.err.contains("trial 1 damaged, and left out"), "{merged:?}");
+    assert_eq!(run(at, &["trials", "delete", "1"]).code, Some(0));
+    assert_eq!(run(at, &["trials", "list"]).out.lines().count(), 2);
+}
+
+#[test]
+fn every_store_name_is_the_name_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in [":memory:", "file:real.sqlite", "file:x?mode=memory"] {
+        let ran = run(at, &["grasp", "ball", "--store", name]);
+        assert!(ran.code == Some(0) && ran.out.contains("trial 1"), "{name}: {ran:?}");
+        assert!(at.join(name).is_file(), "{name}");
+        assert_eq!(json(at, &["trials", "list", "--json", "--store", name]).as_array().unwrap().len(), 1);
+    }
+    refused(at, &["grasp", "ball", "--store", ""], &["cannot open the store"]);
+    std::fs::write(at.join("empty.sqlite"), "").unwrap();
+    assert!(run(at, &["trials", "list", "--store", "empty.sqlite"]).out.contains("no trials yet"));
+    assert_eq!(std::fs::metadata(at.join("empty.sqlite")).unwrap().len(), 0, "not made a store by a look");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("loop.sqlite", at.join("loop.sqlite")).unwrap();
+        refused(at, &["trials", "list", "--store", "loop.sqlite"], &["cannot open the store", "loop.sqlite"]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_collection_whose_store_is_deleted_does_not_say_that_it_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.sqlite");
+    let mut command = palpate(&path);
+    command.args(["collect", "--objects", "ball", "--trials", "100000", "--threads", "1"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let begun = || path.is_file() && Store::open(&path).is_ok_and(|store| !store.list(true).unwrap().is_empty());
+    while !begun() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::fs::remove_file(&path).unwrap();
+    let ran = crate::program::ran(&child.wait_with_output().unwrap());
+    assert!(ran.code == Some(1) && ran.err.contains("was deleted or moved while it was open"), "{ran:?}");
+    assert!(!ran.err.contains("are kept") && !path.exists(), "{ran:?}");
+}
+
+#[test]
+fn a_replay_of_damaged_bytes_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("passwd.txt"), "root:x:0:0:root:/root:/bin/bash\n").unwrap();
+    refused(at, &["replay", "passwd.txt"], &["has no reading"]);
+    let mut bytes = b"PPB1".to_vec();
+    for k in 0..80u32 {
+        let line = format!("t_us:{},seq:{k},flexL:2000,flexR:2100,fsrL:10,fsrR:0\n", 20_000 * k);
+        let arrived_s = 0.02 * f64::from(k);
+        palpate_tactile::capture::Captured::Bytes { arrived_s, bytes: line.into_bytes() }.write(&mut bytes).unwrap();
+    }
+    std::fs::write(at.join("cut.bytes"), &bytes[..bytes.len() - 9]).unwrap();
+    let ran = run(at, &["replay", "cut.bytes", "--speed", "0"]);
+    assert_eq!((ran.code, ran.out.lines().count()), (Some(1), 80), "{ran:?}");
+    assert!(ran.err.contains("after 79 readings") && ran.err.contains("end within a record"), "{ran:?}");
+    let ran = run(at, &["record", "--port", "cut.bytes", "--speed", "0"]);
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(ran.err.contains("end within a record"), "{ran:?}");
+    let store = Store::open(&at.join("trials.sqlite")).unwrap();
+    assert_eq!(store.list(false).unwrap()[0].samples, 79);
 }

@@ -89,19 +89,19 @@ impl PortReader {
             let cause = self.listen(port);
             *lock(&self.shared.writer) = None;
             let Some(cause) = cause.filter(|_| !self.shared.is_stopped()) else {
-                return self.shared.set_state(LinkState::Ended { cause: None });
+                return self.shared.set_state(LinkState::Ended { cause: None, cut_short: false });
             };
             let at_s = self.shared.began.elapsed().as_secs_f64();
             self.shared.bytes.push(Captured::Interrupted { at_s, cause: cause.clone() });
             if !self.reconnect {
-                return self.shared.set_state(LinkState::Ended { cause: Some(cause) });
+                return self.shared.set_state(LinkState::Ended { cause: Some(cause), cut_short: false });
             }
             match self.find_again(&cause) {
                 Some(found) => {
                     *lock(&self.shared.writer) = found.try_clone().ok();
                     port = found;
                 }
-                None => return self.shared.set_state(LinkState::Ended { cause: None }),
+                None => return self.shared.set_state(LinkState::Ended { cause: None, cut_short: false }),
             }
             self.shared.reconnects.fetch_add(1, Ordering::Relaxed);
         }

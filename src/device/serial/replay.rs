@@ -30,19 +30,22 @@ impl Replay {
         for piece in self.pieces {
             let piece = match piece {
                 Ok(piece) => piece,
-                Err(error) => return shared.set_state(LinkState::Ended { cause: Some(error.to_string()) }),
+                Err(error) => {
+                    return shared.set_state(LinkState::Ended { cause: Some(error.to_string()), cut_short: true });
+                }
             };
             let since = piece.arrived_s() - *first_s.get_or_insert(piece.arrived_s());
             let due = Duration::try_from_secs_f64(since / self.speed).unwrap_or_default();
             shared.sleep(due.saturating_sub(shared.began.elapsed()));
             if shared.is_stopped() {
-                return shared.set_state(LinkState::Ended { cause: None });
+                return shared.set_state(LinkState::Ended { cause: None, cut_short: false });
             }
             if matches!(piece, Captured::Bytes { .. }) {
                 shared.set_state(LinkState::Listening);
             }
             shared.bytes.push(piece);
         }
-        shared.set_state(LinkState::Ended { cause: Some("end of the captured bytes".to_owned()) });
+        let cause = Some("end of the captured bytes".to_owned());
+        shared.set_state(LinkState::Ended { cause, cut_short: false });
     }
 }

@@ -57,6 +57,8 @@ pub enum LinkState {
     Ended {
         /// Why, where it was not asked for.
         cause: Option<String>,
+        /// Captured bytes that are damaged or end within a record: what followed is missing.
+        cut_short: bool,
     },
 }
 
@@ -68,8 +70,16 @@ impl LinkState {
             Self::Listening => "Listening".to_owned(),
             Self::Silent { hint } | Self::Unreadable { hint } => hint.clone(),
             Self::Lost { cause } => format!("Connection lost: {cause}. Trying again every second"),
-            Self::Ended { cause: Some(cause) } => format!("Ended: {cause}"),
-            Self::Ended { cause: None } => "Ended".to_owned(),
+            Self::Ended { cause: Some(cause), .. } => format!("Ended: {cause}"),
+            Self::Ended { cause: None, .. } => "Ended".to_owned(),
+        }
+    }
+
+    /// Why captured bytes could not be read to their end.
+    pub fn cut_short(&self) -> Option<&str> {
+        match self {
+            Self::Ended { cause: Some(cause), cut_short: true } => Some(cause),
+            _ => None,
         }
     }
 }

@@ -76,6 +76,7 @@ impl DatasetQuery {
         match rows.first() {
             // Loading returns the reason.
             None => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
+            Some(row) if row.damaged => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
             Some(row) if !row.sound => return Err(DatasetError::TrialUnsound { id }),
             Some(_) => {}
         }
@@ -93,6 +94,8 @@ impl DatasetQuery {
     pub(crate) fn refused(&self, row: &TrialRow) -> Option<&'static str> {
         if row.place == TrialPlace::DemoLog {
             Some("in the demo log")
+        } else if row.damaged {
+            Some(DAMAGED)
         } else if !row.sound {
             Some(NOT_SOUND)
         } else if row.pulled {
@@ -128,6 +131,10 @@ impl DatasetQuery {
                             missing = why;
                         }
                         uncalibrated += 1;
+                        continue;
+                    }
+                    Err(DatasetError::Store { cause }) if rows.len() > 1 && cause.is_damage() => {
+                        *left_out.entry(DAMAGED.to_owned()).or_default() += 1;
                         continue;
                     }
                     outcome => outcome?,
@@ -203,6 +210,8 @@ impl DatasetQuery {
 const SEPARATE: &str = "choose one of them with --collection, or collect one of them anew under another --class";
 /// Reason: diverged, did not converge, or did not come to rest.
 const NOT_SOUND: &str = "not sound";
+/// Reason: not what was stored.
+const DAMAGED: &str = "damaged";
 /// Reason: another trial holds the same grasp.
 const COPIES: &str = "copies of other trials";
 

@@ -61,4 +61,9 @@ pub trait Gripper {
 
     /// Lets the air out at once.
     fn vent(&mut self) -> Result<(), GripperError>;
+
+    /// Why it ended before its end: captured bytes that are damaged.
+    fn cut_short(&self) -> Option<String> {
+        None
+    }
 }

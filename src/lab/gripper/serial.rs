@@ -85,6 +85,10 @@ impl Gripper for SerialGripper {
         self.bar = 0.0;
         Ok(self.send("V")?)
     }
+
+    fn cut_short(&self) -> Option<String> {
+        self.stream.status().state.cut_short().map(str::to_owned)
+    }
 }
 
 impl Drop for SerialGripper {

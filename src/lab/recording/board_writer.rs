@@ -50,6 +50,8 @@ pub(super) struct BoardWriter {
     about: BoardInfo,
     chunk: BoardChunk,
     samples: u64,
+    /// Of them, so many are written.
+    written: u64,
     lost: u64,
     gaps: u64,
     interruptions: Vec<String>,
@@ -80,6 +82,7 @@ impl BoardWriter {
             about,
             chunk: BoardChunk::default(),
             samples: 0,
+            written: 0,
             lost: 0,
             gaps: 0,
             interruptions: Vec::new(),
@@ -135,7 +138,13 @@ impl BoardWriter {
     pub(super) fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
         store.append_board(self.id, &self.about, &self.chunk)?;
         self.chunk = BoardChunk::default();
+        self.written = self.samples;
         Ok(())
+    }
+
+    /// What is kept of a trial that cannot be written any further.
+    pub(super) fn kept(&self) -> String {
+        format!("{} of {} samples are kept as trial {} (cut short)", self.written, self.samples, self.id)
     }
 
     /// Writes the rest and closes the trial. Its flags are found in what the store then holds.
@@ -162,6 +171,7 @@ impl BoardWriter {
 
     /// A silence up to the end is a gap as well.
     fn close(&mut self, status: &LinkStatus) {
+        self.interruptions.extend(status.state.cut_short().map(str::to_owned));
         let live = status.baud.is_some();
         let Some((from_s, cause)) = self.last.take().filter(|(t_s, _)| live && status.now_s - t_s > SILENCE_S) else {
             return;

@@ -125,6 +125,7 @@ pub fn record(
     let aborted = recording.controller().abort_cause().map(str::to_owned).or(lost);
     recording.finish(&recorder, gripper, false, None);
     let status = gripper.stream().status();
+    let aborted = aborted.or_else(|| status.state.cut_short().map(str::to_owned));
     drop(recorder);
     for notice in notices.try_iter() {
         match notice {

@@ -184,8 +184,14 @@ impl Writer {
                 Err(RecvTimeoutError::Disconnected) => return,
             };
             if let Err(error) = outcome {
-                self.trial = OpenTrial::None;
-                (self.notify)(RecorderNotice::Failed(error.to_string()));
+                let text = match (std::mem::replace(&mut self.trial, OpenTrial::None), &error) {
+                    // Of a store that is gone nothing is kept.
+                    (OpenTrial::Board(board, _), error) if !matches!(error, StoreError::FileLost { .. }) => {
+                        format!("{error}. {}", board.kept())
+                    }
+                    (_, error) => error.to_string(),
+                };
+                (self.notify)(RecorderNotice::Failed(text));
             }
         }
     }
@@ -267,8 +273,9 @@ impl Writer {
             return Ok(());
         }
         if let OpenTrial::Board(mut board, _) = std::mem::replace(&mut self.trial, OpenTrial::None) {
-            self.with_store(|store| board.flush(store))?;
+            let written = self.with_store(|store| board.flush(store));
             self.trial = OpenTrial::Board(board, Instant::now());
+            return written;
         }
         Ok(())
     }
@@ -278,7 +285,8 @@ impl Writer {
         let OpenTrial::Board(mut board, _) = std::mem::replace(&mut self.trial, OpenTrial::None) else {
             return Ok(());
         };
-        let recorded = self.with_store(|store| board.finish(store, &end.status, &end.notes))?;
+        let recorded = self.with_store(|store| board.finish(store, &end.status, &end.notes));
+        let recorded = recorded.inspect_err(|_| self.trial = OpenTrial::Board(board, Instant::now()))?;
         let id = recorded.id;
         if end.discarded {
             match self.with_store(|store| store.delete(&[id])) {

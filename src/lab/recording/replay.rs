@@ -160,6 +160,11 @@ impl Replay {
         self.identification.as_ref()
     }
 
+    /// Why captured bytes could not be read to their end.
+    pub fn cut_short(&self) -> Option<String> {
+        self.gripper.cut_short()
+    }
+
     /// True for readings of a real gripper.
     pub fn is_of_board(&self) -> bool {
         matches!(self.reader, RowReader::Board(_))

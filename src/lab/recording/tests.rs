@@ -157,6 +157,77 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     Ok(())
 }
 
+/// Records a capture through the recorder; `event` happens once the trial has begun. Returns the last notice.
+fn recorded_amid(
+    path: &Path,
+    bytes: &Path,
+    event: impl Fn() -> Result<(), Box<dyn std::error::Error>>,
+) -> Result<RecorderNotice, Box<dyn std::error::Error>> {
+    let link = replayed(bytes)?;
+    let (sender, notices) = channel();
+    let recorder = Recorder::start(path.to_owned(), move |notice| sender.send(notice).expect("heard"))?;
+    recorder.begin_board(plan(&link, "lemon"));
+    assert_eq!(notices.recv()?, RecorderNotice::Begun(1));
+    event()?;
+    while !link.is_over() {
+        link.take(Duration::from_millis(20)).into_iter().for_each(|event| recorder.board(event));
+    }
+    let end = BoardTrialEnd { status: link.status(), notes: Vec::new(), guess: None, discarded: false };
+    recorder.finish_board(end);
+    drop(recorder);
+    Ok(notices.try_iter().last().ok_or("no notice")?)
+}
+
+#[test]
+fn a_recording_that_cannot_be_stored_says_what_is_kept() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    drop(Store::open(&path)?);
+    let notice = recorded_amid(&path, &bytes, || {
+        // As a full disk does.
+        let full = "CREATE TRIGGER full BEFORE INSERT ON board_chunks BEGIN SELECT raise(ABORT, 'no room'); END";
+        Ok(rusqlite::Connection::open(&path)?.execute_batch(full)?)
+    })?;
+    let RecorderNotice::Failed(text) = notice else { panic!("{notice:?}") };
+    assert!(text.contains("no room") && text.contains("0 of 299 samples are kept as trial 1 (cut short)"), "{text}");
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn a_store_that_is_deleted_while_it_is_recorded_into_is_noticed() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let (bytes, path) = (folder.path().join("grasp.bytes"), folder.path().join("trials.sqlite"));
+    capture(&bytes)?;
+    let notice = recorded_amid(&path, &bytes, || Ok(std::fs::remove_file(&path)?))?;
+    let RecorderNotice::Failed(text) = notice else { panic!("{notice:?}") };
+    assert!(text.contains("was deleted or moved while it was open") && !text.contains("are kept"), "{text}");
+    assert!(!path.exists());
+    Ok(())
+}
+
+#[test]
+fn captured_bytes_that_are_cut_or_joined_are_recorded_with_a_warning() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let bytes = folder.path().join("grasp.bytes");
+    capture(&bytes)?;
+    let whole = std::fs::read(&bytes)?;
+    for (content, readings, said) in [
+        (whole[..whole.len() / 2].to_vec(), 140..160, "end within a record"),
+        ([&*whole, &*whole].concat(), 299..300, "joined"),
+    ] {
+        std::fs::write(&bytes, content)?;
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let recorded = record(&mut store, &bytes)?;
+        let text = recorded.warnings.join("\n");
+        assert!(text.contains(said) && text.contains("what follows is missing"), "{text}");
+        assert!(readings.contains(&store.board_log(recorded.id)?.ok_or("of a board")?.readings.len()), "{said}");
+        assert!(recorded.about.flags.iter().any(|found| found.flag == palpate_store::labels::Flag::Interrupted));
+    }
+    Ok(())
+}
+
 #[test]
 fn a_store_that_another_program_writes_to_holds_up_no_board_and_loses_nothing() -> Result<(), Box<dyn std::error::Error>>
 {

@@ -310,7 +310,7 @@ mod tests {
         labeller.ask(LabelCommand::Refresh);
         let view = until(&labeller, &woken, |_| labeller.is_settled());
         assert!(
-            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v14.sqlite")),
+            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v15.sqlite")),
             "{:?}",
             view.outcomes
         );

@@ -247,19 +247,21 @@ impl Service {
         let signals = SignalDefinition::Parts;
         let layout = SensorLayout::named(EXPORT_LAYOUT)?.shown(signals);
         let folder = new_export_folder(store.path());
-        let is_sound = |id: &&TrialId| self.library.trial(**id).is_none_or(|t| t.quality() != TrialQuality::Unsound);
+        let is_sound = |id: &&TrialId| self.library.trial(**id).is_none_or(|t| t.quality() < TrialQuality::Unsound);
         let sound: Vec<TrialId> = ids.iter().filter(is_sound).copied().collect();
-        let mut written = 0;
+        let (mut written, mut damaged) = (0, 0);
         for id in &sound {
             if stop.load(Ordering::Relaxed) {
                 break;
             }
-            export_trial(store, *id, &folder, (&layout, signals))?;
-            written += 1;
+            match export_trial(store, *id, &folder, (&layout, signals)) {
+                Err(ExportError::Store(error)) if error.is_damage() && ids.len() > 1 => damaged += 1,
+                outcome => written += outcome.map(|_path| 1)?,
+            }
         }
-        let unsound = match ids.len() - sound.len() {
+        let unsound = match ids.len() - sound.len() + damaged {
             0 => String::new(),
-            count => format!("; {count} unsound left out"),
+            count => format!("; {count} unsound or damaged left out"),
         };
         Ok(format!("{written} of {} trials exported into {}{unsound}", ids.len(), folder.display()))
     }
@@ -358,7 +360,7 @@ mod tests {
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
         librarian.ask(LibraryCommand::Export(vec![1, 2, 4]));
         let view = until(&librarian, &woken, |view| view.outcomes.len() == 2);
-        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v14")));
+        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Warning(text)) if text.contains("before-v15")));
         let done = |text: &str| text.starts_with("3 of 3 trials exported");
         assert!(matches!(&view.outcomes[1], (2, LabelOutcome::Done(text)) if done(text)), "{:?}", view.outcomes);
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {

@@ -21,12 +21,7 @@ impl Neighbours {
     pub(super) const DESCRIPTION: &str = "7 nearest by Euclidean distance, votes weighted by one over distance";
 
     pub(super) fn fit(rows: &Rows) -> Self {
-        Self {
-            rows: rows.values.clone(),
-            labels: rows.labels.clone(),
-            columns: rows.columns,
-            classes: rows.classes,
-        }
+        Self { rows: rows.values.clone(), labels: rows.labels.clone(), columns: rows.columns, classes: rows.classes }
     }
 
     pub(super) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, LoadError> {

@@ -134,7 +134,10 @@ mod tests {
         let signs: Vec<f64> = rows.iter().map(|row| row.1).collect();
         let solution = solve(&kernel, &signs, cost, &quick(1)).expect("has a solution");
         let weights = &solution.weights;
-        assert!(weights.iter().zip(&signs).all(|(weight, sign)| (0.0..=cost).contains(&(weight * sign))), "{weights:?}");
+        assert!(
+            weights.iter().zip(&signs).all(|(weight, sign)| (0.0..=cost).contains(&(weight * sign))),
+            "{weights:?}"
+        );
         assert!(weights.iter().sum::<f64>().abs() < 1e-9 * cost, "{weights:?}");
         for (k, of_row) in kernel.chunks(rows.len()).enumerate() {
             let answer = solution.bias + of_row.iter().zip(weights).map(|(x, w)| f64::from(*x) * w).sum::<f64>();

@@ -81,14 +81,16 @@ pub struct LabelledTrial {
     pub seconds: f64,
     /// Deleted, can be restored.
     pub discarded: bool,
+    /// Its row cannot be read or does not match its checksum.
+    pub damaged: bool,
     /// Small plot.
     pub sparkline: Sparkline,
 }
 
 impl LabelledTrial {
-    /// True for a trial that counts: complete, labelled and not deleted.
+    /// True for a trial that counts: complete, labelled, and neither deleted nor damaged.
     pub fn counts(&self) -> bool {
-        self.complete && self.object.is_some() && !self.discarded
+        self.complete && self.object.is_some() && !self.discarded && !self.damaged
     }
 }
 

@@ -13,15 +13,19 @@ pub enum TrialQuality {
     Warned,
     /// Data sets exclude it.
     Unsound,
+    /// Not what was stored: it can only be deleted, or taken from a backup.
+    Damaged,
 }
 
 impl TrialQuality {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Sound, Self::Warned, Self::Unsound];
+    pub const ALL: [Self; 4] = [Self::Sound, Self::Warned, Self::Unsound, Self::Damaged];
 
     /// Quality of a trial.
     pub fn of(row: &TrialRow) -> Self {
-        if !row.sound {
+        if row.damaged {
+            Self::Damaged
+        } else if !row.sound {
             Self::Unsound
         } else if row.warnings > 0 || !row.flags.is_empty() || row.state != "complete" {
             Self::Warned
@@ -36,6 +40,7 @@ impl TrialQuality {
             Self::Sound => "sound",
             Self::Warned => "warned",
             Self::Unsound => "unsound",
+            Self::Damaged => "damaged",
         }
     }
 }

@@ -284,7 +284,7 @@ fn ink(colours: &ThemeColours, trial: &LibraryTrial, column: TrialColumn) -> pal
         TrialColumn::Quality => match trial.quality() {
             TrialQuality::Sound => colours.quiet_text,
             TrialQuality::Warned => colours.warning,
-            TrialQuality::Unsound => colours.error,
+            TrialQuality::Unsound | TrialQuality::Damaged => colours.error,
         },
         TrialColumn::Object if trial.row.object.is_empty() => colours.warning,
         TrialColumn::Object => colours.text,

@@ -189,7 +189,7 @@ impl GripperSession {
         }
         self.start_over();
         self.begin_stretch(0.0);
-        self.outlets.notify(Notice::Failed(format!("recording stopped; readings so far are stored: {cause}")));
+        self.outlets.notify(Notice::Failed(format!("recording stopped: {cause}")));
     }
 
     /// Ends the trial that is recorded, if any. The recorder reports the result.
