@@ -14,11 +14,10 @@ use palpate_lab::inspection::{Alignment, PhaseSpan};
 use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
-    EffectsWorker, ExplainRequest, ExplainedGrasp, GripperView, LabelDraft, LabelView, LibraryView, MeasuredAccuracy,
-    SceneAccuracyJob, Snapshot,
+    EffectsWorker, ExplainRequest, ExplainedGrasp, GhostGrasp, GripperView, LabelDraft, LabelView, LibraryView,
+    MeasuredAccuracy, SceneAccuracyJob, Snapshot,
 };
 use palpate_learn::Model;
-use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::BTreeMap;
@@ -42,8 +41,8 @@ pub struct PanelContext<'a> {
     pub logged: Option<LoggedGrasp>,
     /// Measurement of the effects.
     pub effects: &'a EffectsWorker,
-    /// Frame of the other engine at the same time, where it is drawn.
-    pub ghost: Option<&'a Frame>,
+    /// Last grasp of the other engine, where it is drawn.
+    pub ghost: Option<&'a GhostGrasp>,
     /// Newest state of the real gripper; absent until its thread has begun.
     pub gripper: Option<&'a GripperView>,
     /// Diagnostics, fit and training.

@@ -128,7 +128,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
             .with_app_id("palpate")
             .with_inner_size(FIRST_SIZE)
             .with_min_inner_size(LEAST_SIZE),
-        wgpu_options: viewport::wgpu_options(),
+        wgpu_options: viewport::wgpu_options(None),
         event_loop_builder: surroundings.event_loop_hook(),
         ..Default::default()
     };

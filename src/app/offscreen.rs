@@ -11,7 +11,7 @@ use crate::app::workbench::{Workbench, WorkbenchSetup};
 use egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
-use palpate_render::{Picture, PictureError, describe_adapter, wgpu};
+use palpate_render::{Picture, PictureError, describe_adapter, offscreen_backends, wgpu};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
@@ -195,13 +195,20 @@ fn p95(mut costs: Vec<f64>) -> f64 {
 }
 
 fn render_state(size: [u32; 2], drawing: RendererOptions) -> Result<RenderState, OffscreenError> {
-    let options = wgpu_options();
     let failed = |cause: &dyn std::fmt::Display| OffscreenError::Driver(cause.to_string());
-    let create = async {
+    let create = async |backends| {
+        let options = wgpu_options(backends);
         let instance = options.wgpu_setup.new_instance().await;
         RenderState::create(&options, &instance, None, drawing).await
     };
-    let state = pollster::block_on(create).map_err(|e| failed(&e))?;
+    let mut found = Err(failed(&"there is none"));
+    for backends in offscreen_backends() {
+        found = pollster::block_on(create(Some(backends))).map_err(|e| failed(&e));
+        if found.is_ok() {
+            break;
+        }
+    }
+    let state = found?;
     let most = state.device.limits().max_texture_dimension_2d;
     if size.iter().any(|side| *side > most) {
         return Err(failed(&format!("it draws at most {most} x {most} pixels")));

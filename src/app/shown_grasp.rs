@@ -107,6 +107,11 @@ impl<'a> ShownGrasp<'a> {
         }
     }
 
+    /// True where the load on every taxel is known.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.frame.is_some()
+    }
+
     /// True once it has something to show over time.
     pub(super) fn has_course(&self) -> bool {
         self.frames.len() > 1 || (self.frame.is_none() && self.trace.is_some_and(|trace| trace.t.len() > 1))

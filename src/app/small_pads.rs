@@ -1,5 +1,5 @@
-//! Small pads beside the 3-D view, below the legend that gives their colours: each pad unrolled, or one plain field where
-//! a pad reads one number.
+//! Small pads beside the 3-D view of what no simulation knows, below the legend that gives their colours: one plain field for
+//! each pad, as it reads one number.
 
 use crate::app::context::PanelContext;
 use crate::app::heat_map::pad_ui;
@@ -23,7 +23,7 @@ const BUTTONS: f32 = 620.0;
 
 /// Draws both pads where nothing else is; leaves them out where the view is too small.
 pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: &PictureView) {
-    let Some(grasp) = ShownGrasp::of(context) else { return };
+    let Some(grasp) = ShownGrasp::of(context).filter(|grasp| !grasp.is_simulated()) else { return };
     let legends = legend_room(view);
     let below = rect.height() - legends.y - SCALE_BAR - TEXTS;
     let beside = rect.height() - 18.0 - SCALE_BAR - TEXTS;

@@ -28,9 +28,12 @@ impl Viewport {
     }
 }
 
-/// Requests no more of the graphics driver than the renderer needs.
-pub(super) fn wgpu_options() -> egui_wgpu::WgpuConfiguration {
+/// Requests no more of the graphics driver than the renderer needs; of all interfaces where none is named.
+pub(super) fn wgpu_options(backends: Option<wgpu::Backends>) -> egui_wgpu::WgpuConfiguration {
     let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
+    if let Some(backends) = backends {
+        setup.instance_descriptor.backends = backends;
+    }
     setup.device_descriptor = Arc::new(|adapter| wgpu::DeviceDescriptor {
         label: Some("palpate window"),
         required_limits: palpate_render::wanted_limits(adapter),

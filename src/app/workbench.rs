@@ -11,7 +11,7 @@ use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::{LibraryAction, LibraryFeature};
 use crate::app::features::presenter::PresenterFeature;
 use crate::app::features::recognition::{Recognisers, RecognitionAction, RecognitionFeature};
-use crate::app::features::simulation::{SimulationAction, SimulationFeature, ghost_frame};
+use crate::app::features::simulation::{SimulationAction, SimulationFeature};
 use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::{ViewAction, ViewState};
@@ -366,7 +366,7 @@ impl Workbench {
             scene: self.simulation.scene(),
             logged: self.logged(),
             effects: self.simulation.effects(),
-            ghost: ghost_frame(snapshot, ghost.as_deref()),
+            ghost: ghost.as_deref(),
             gripper,
             tools: &self.tools,
             studies: &self.studies,

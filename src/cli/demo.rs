@@ -9,7 +9,7 @@ use super::recognise::{StageOne, load_model, named, warn_unless_learned};
 use super::setup::{SceneArguments, open_store, within};
 use super::terminal::{say, say_json, warn};
 use glam::Vec2;
-use palpate_geometry::drawing::Camera;
+use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{Advisor, FrameReader, GraspSummary, Identification, Recompute, SHAPES, grasp_soundly};
@@ -413,15 +413,14 @@ impl Painter {
         let held = trial.frames().iter().rfind(|f| f.phase == Phase::Hold).or(trial.frames().last());
         let Some(frame) = held else { return Ok(()) };
         let stage = Stage::new(scene, object, trial.data.world_from_gripper);
-        let (centre, radius) = stage.bounds();
         let view = PictureView {
-            camera: Camera::default().framing(centre, radius),
             theme: Theme::Dark,
             size: Vec2::new(SIZE[0] as f32, SIZE[1] as f32),
             badge: Some("SIMULATED".to_owned()),
             ..PictureView::default()
         };
-        let list = stage.draw(frame, &view);
+        let camera = stage.camera(StandardView::Home, frame, &view);
+        let list = stage.draw(frame, &PictureView { camera, ..view });
         let picture = Picture::draw(&self.gpu, &mut self.renderer, &list, SIZE, 1.0)?;
         write_new(path, FileKind::Png, &picture.to_png()?)
     }

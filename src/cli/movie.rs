@@ -37,8 +37,8 @@ pub(super) struct MovieArguments {
     /// Film so many seconds of presenter mode instead of a trial: object after object, recognised live.
     #[arg(long, value_name = "SECONDS", value_parser = within(0.1..=600.0), conflicts_with_all = ["view", "from", "to", "no_forces", "bare"])]
     demo: Option<f64>,
-    /// View: home, front, back, left, right, top or bottom.
-    #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
+    /// View: hand, front, back, left, right, top or bottom.
+    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = parse_view)]
     view: StandardView,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", default_value = "640x400", value_parser = parse_size)]
@@ -175,7 +175,6 @@ impl Shot<'_> {
         let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
         let [width, height] = arguments.size.map(|side| side as f32);
         let view = PictureView {
-            camera: stage.camera(arguments.view, now, width / height),
             theme: arguments.theme,
             size: Vec2::new(width, height),
             forces: !arguments.no_forces,
@@ -184,6 +183,7 @@ impl Shot<'_> {
             badge: (!arguments.bare).then(|| format!("{}, {t_s:.2} s", open.badge())),
             ..PictureView::default()
         };
+        let view = PictureView { camera: stage.camera(arguments.view, now, &view), ..view };
         Ok(Picture::draw(gpu, renderer, &stage.draw(now, &view), arguments.size, 1.0)?)
     }
 }

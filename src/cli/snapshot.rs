@@ -23,6 +23,7 @@ use std::sync::Arc;
 #[command(after_help = "Examples:
   palpate snapshot cube --view front --theme light --out cube.png
   palpate snapshot --trial 1 --at 2.9 --out held.png
+  palpate snapshot lemon --view touch --out pad.png
   palpate snapshot ball --ghost --bare --out both.png
   palpate snapshot --panels lemon --at 2.9 --out window.png
   palpate snapshot --panels --trial 1 --out inspect.png
@@ -44,9 +45,9 @@ pub(super) struct SnapshotArguments {
     /// Mode of the window: demo, inspect, label or study (default: inspect with --trial, else demo).
     #[arg(long, value_name = "NAME", requires = "panels", value_parser = parse_mode)]
     mode: Option<Mode>,
-    /// View: home, front, back, left, right, top or bottom.
-    #[arg(long, value_name = "NAME", default_value = "home", value_parser = parse_view)]
-    view: StandardView,
+    /// View: hand, front, back, left, right, top or bottom; or touch, from nearby through the finger in front.
+    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = parse_shown)]
+    view: ShownPart,
     /// Width and height in pixels (default: 1280x800; a window 1280x820).
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
@@ -91,9 +92,23 @@ fn parse_mode(text: &str) -> Result<Mode, String> {
     }
 }
 
+/// What a picture shows.
+#[derive(Clone, Copy, Debug)]
+enum ShownPart {
+    Hand(StandardView),
+    Touch,
+}
+
+fn parse_shown(text: &str) -> Result<ShownPart, String> {
+    match text {
+        "touch" => Ok(ShownPart::Touch),
+        _ => parse_view(text).map(ShownPart::Hand).map_err(|choose| format!("{choose}; or touch")),
+    }
+}
+
 pub(super) fn parse_view(text: &str) -> Result<StandardView, String> {
     let found = StandardView::ALL.into_iter().find(|view| view.name() == text);
-    found.ok_or_else(|| "choose home, front, back, left, right, top or bottom".to_owned())
+    found.ok_or_else(|| "choose hand, front, back, left, right, top or bottom".to_owned())
 }
 
 pub(super) fn parse_theme(text: &str) -> Result<Theme, String> {
@@ -211,7 +226,6 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
     let ghost = if arguments.ghost { simulated(arguments, Engine::Other)?.1.pop() } else { None };
     let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
-        camera: stage.camera(arguments.view, frame, size[0] as f32 / size[1] as f32),
         theme: arguments.theme,
         size: Vec2::new(size[0] as f32, size[1] as f32),
         forces: !arguments.no_forces,
@@ -220,7 +234,17 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
         full_scale: stage.full_scale_of(&frames),
         ..PictureView::default()
     };
-    let mut list = stage.draw(frame, &view);
+    let mut list = match arguments.view {
+        ShownPart::Hand(standard) => {
+            let camera = stage.camera(standard, frame, &view);
+            stage.draw(frame, &PictureView { camera, ..view.clone() })
+        }
+        ShownPart::Touch => {
+            let nothing = || format!("nothing is touched at {:.2} s; choose another --at, or --view hand", frame.t);
+            let camera = stage.touch_camera(frame).ok_or_else(nothing)?;
+            stage.draw_touch(frame, &PictureView { camera, ..view.clone() })
+        }
+    };
     if let Some(ghost) = &ghost {
         list.ghosts = stage.ghosts(ghost, view.theme);
     }

@@ -1,11 +1,13 @@
 //! A graphics device without a window.
 
+use std::ffi::OsStr;
+use std::path::Path;
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Limits, Queue};
 
 /// Choice of graphics drivers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriverChoice {
-    /// Whatever there is: Vulkan before OpenGL, hardware before software. `WGPU_BACKEND` overrides it.
+    /// Whatever there is: Vulkan before OpenGL in a session with a display, hardware before software. `WGPU_BACKEND` overrides it.
     #[default]
     Any,
     /// OpenGL only: the same software rasteriser on every machine, for pictures that tests compare.
@@ -46,11 +48,9 @@ pub struct Gpu {
 impl Gpu {
     /// Finds a device for drawing off-screen.
     pub fn headless(choice: DriverChoice) -> Result<Self, GpuError> {
-        // OpenGL is looked for only where nothing better is found: looking for it makes libraries talk on the terminal.
-        let rounds = match (choice, Backends::from_env()) {
-            (DriverChoice::OpenGl, _) => vec![Backends::GL],
-            (DriverChoice::Any, Some(named)) => vec![named],
-            (DriverChoice::Any, None) => vec![Backends::PRIMARY, Backends::GL],
+        let rounds = match choice {
+            DriverChoice::OpenGl => vec![Backends::GL],
+            DriverChoice::Any => offscreen_backends(),
         };
         let adapter = rounds.into_iter().find_map(best_adapter).ok_or(GpuError::NoDriver)?;
         Self::from_adapter(&adapter)
@@ -66,6 +66,23 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| GpuError::NoDevice { driver: driver.clone(), cause: e.to_string() })?;
         Ok(Self { device, queue, driver })
+    }
+}
+
+/// Interfaces in the order in which a driver for pictures without a window is looked for.
+pub fn offscreen_backends() -> Vec<Backends> {
+    backends_for(Backends::from_env(), std::env::var_os("XDG_RUNTIME_DIR").as_deref())
+}
+
+/// Each is looked for only where those before it have no driver, as looking makes libraries talk on the terminal. Mesa's Vulkan
+/// layer that chooses the device asks the Wayland display, which complains where there is no folder for it; OpenGL needs none.
+fn backends_for(named: Option<Backends>, wayland_folder: Option<&OsStr>) -> Vec<Backends> {
+    match named {
+        Some(named) => vec![named],
+        None if wayland_folder.is_some_and(|folder| Path::new(folder).is_absolute()) => {
+            vec![Backends::PRIMARY, Backends::GL]
+        }
+        None => vec![Backends::GL, Backends::PRIMARY],
     }
 }
 
@@ -103,4 +120,19 @@ pub fn describe_adapter(info: &AdapterInfo) -> String {
     let software = if draws_in_software(info) { ", software rendering" } else { "" };
     let name = info.name.split(" (").next().unwrap_or(&info.name);
     format!("{name} ({}{software})", info.backend)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vulkan_is_left_alone_where_it_would_ask_for_a_missing_display() {
+        let first = |named, folder: Option<&str>| backends_for(named, folder.map(OsStr::new))[0];
+        assert_eq!(first(None, Some("/run/user/1000")), Backends::PRIMARY);
+        for folder in [None, Some(""), Some("run")] {
+            assert_eq!(first(None, folder), Backends::GL);
+        }
+        assert_eq!(first(Some(Backends::VULKAN), None), Backends::VULKAN);
+    }
 }

@@ -54,7 +54,7 @@ mod text;
 pub use blit::Blit;
 pub use difference::{PictureDifference, SizeMismatch};
 pub use figure::{FigureError, figure_picture, figure_svg};
-pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, draws_in_software, wanted_limits};
+pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, draws_in_software, offscreen_backends, wanted_limits};
 pub use movie::{MovieError, MovieFormat, MovieWriter};
 pub use picture::{Picture, PictureError};
 pub use renderer::Renderer;

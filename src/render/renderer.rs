@@ -1,10 +1,12 @@
-//! Draws a list: the shadow map and the openness first, then every pass in order, then the resolve.
+//! Draws a list: the shadow map and the openness first, then every pass in order, then the resolve. An inset is drawn before,
+//! and copied in.
 
 use super::ambient::{Ambient, AmbientTargets};
 use super::frame::FrameBindings;
 use super::passes::{self, Pass, PassSetup, Prepare};
 use super::shadow::ShadowMap;
 use super::targets::Targets;
+use glam::Vec2;
 use palpate_geometry::drawing::{Detail, DrawList};
 use wgpu::{BindGroup, CommandEncoder, Device, Queue, Texture, TextureView};
 
@@ -15,7 +17,8 @@ pub struct Renderer {
     shadows: [ShadowMap; 2],
     ambient: Ambient,
     passes: Vec<Box<dyn Pass>>,
-    sized: Option<Sized>,
+    /// The picture, and its inset.
+    sized: [Option<Sized>; 2],
 }
 
 /// What pictures of one size are drawn with.
@@ -29,9 +32,18 @@ struct Sized {
 impl std::fmt::Debug for Renderer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Renderer")
-            .field("size", &self.sized.as_ref().map(|sized| sized.targets.size))
+            .field("size", &self.sized[PICTURE].as_ref().map(|sized| sized.targets.size))
             .finish_non_exhaustive()
     }
+}
+
+/// Places in [`Renderer::sized`].
+const PICTURE: usize = 0;
+const INSET: usize = 1;
+
+/// Whole pixels of a place in a picture.
+fn whole(place: Vec2, pixels_per_point: f32) -> [u32; 2] {
+    (place * pixels_per_point).round().max(Vec2::ONE).as_uvec2().to_array()
 }
 
 /// Pictures are at least this large (pixels); a panel dragged shut would need less.
@@ -45,7 +57,7 @@ impl Renderer {
         let ambient = Ambient::new(device, &frame);
         let setup = PassSetup { device, queue, frame: &frame };
         let passes = passes::ALL.iter().map(|make| make(&setup)).collect();
-        Self { frame, shadows, ambient, passes, sized: None }
+        Self { frame, shadows, ambient, passes, sized: [None, None] }
     }
 
     /// Records the drawing of a list into a picture of `size` pixels, at `pixels_per_point`.
@@ -60,24 +72,52 @@ impl Renderer {
     ) {
         let most = device.limits().max_texture_dimension_2d;
         let size = size.map(|s| s.clamp(SMALLEST, most));
-        self.frame.write(queue, list, size);
         let prepare = Prepare { device, queue, list, pixels_per_point };
+        if let Some(inset) = &list.inset {
+            // Submitted by itself: the passes hold one list at a time.
+            let mut first = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let inner = whole(inset.size, pixels_per_point).map(|s| s.min(most));
+            self.draw(&mut first, &Prepare { list: &inset.list, ..prepare }, inner, INSET);
+            queue.submit([first.finish()]);
+        }
+        self.draw(encoder, &prepare, size, PICTURE);
+        if let Some(inset) = &list.inset {
+            self.copy_inset(encoder, whole(inset.corner, pixels_per_point));
+        }
+    }
+
+    fn draw(&mut self, encoder: &mut CommandEncoder, prepare: &Prepare<'_>, size: [u32; 2], target: usize) {
+        let Prepare { device, queue, list, .. } = *prepare;
+        self.frame.write(queue, list, size);
         for pass in &mut self.passes {
-            pass.prepare(&prepare);
+            pass.prepare(prepare);
         }
         let which = usize::from(list.detail == Detail::Fast);
-        self.draw_shadow(encoder, &self.shadows[which]);
-        if self.sized.as_ref().map(|sized| sized.targets.size) != Some(size) {
+        // The shadows of an inset are those of its picture.
+        if list.inset.is_none() {
+            self.draw_shadow(encoder, &self.shadows[which]);
+        }
+        if self.sized[target].as_ref().map(|sized| sized.targets.size) != Some(size) {
             let ambient = self.ambient.targets(device, size);
             let lit = [0, 1].map(|k| self.frame.lit(device, &self.shadows[k], &ambient.openness));
-            self.sized = Some(Sized { targets: Targets::new(device, size), ambient, lit });
+            self.sized[target] = Some(Sized { targets: Targets::new(device, size), ambient, lit });
         }
-        if let Some(sized) = &self.sized {
+        if let Some(sized) = &self.sized[target] {
             self.ambient.draw(encoder, &self.frame, &sized.ambient, |pass| {
                 self.passes.iter().for_each(|each| each.draw_distance(pass));
             });
             self.draw_picture(encoder, &sized.targets, &sized.lit[which]);
         }
+    }
+
+    /// Copies the inset into the picture.
+    fn copy_inset(&self, encoder: &mut CommandEncoder, corner: [u32; 2]) {
+        let [Some(picture), Some(inset)] = &self.sized else { return };
+        let room = [0, 1].map(|k| inset.targets.size[k].min(picture.targets.size[k].saturating_sub(corner[k])));
+        let mut place = picture.targets.resolved.as_image_copy();
+        place.origin = wgpu::Origin3d { x: corner[0], y: corner[1], z: 0 };
+        let extent = wgpu::Extent3d { width: room[0], height: room[1], depth_or_array_layers: 1 };
+        encoder.copy_texture_to_texture(inset.targets.resolved.as_image_copy(), place, extent);
     }
 
     fn draw_shadow(&self, encoder: &mut CommandEncoder, map: &ShadowMap) {
@@ -125,11 +165,11 @@ impl Renderer {
 
     /// The finished picture as a view that can be sampled; absent before the first drawing.
     pub fn picture_view(&self) -> Option<&TextureView> {
-        self.sized.as_ref().map(|sized| &sized.targets.resolved_view)
+        self.sized[PICTURE].as_ref().map(|sized| &sized.targets.resolved_view)
     }
 
     /// The finished picture and its size in pixels.
     pub(crate) fn picture_texture(&self) -> Option<(&Texture, [u32; 2])> {
-        self.sized.as_ref().map(|sized| (&sized.targets.resolved, sized.targets.size))
+        self.sized[PICTURE].as_ref().map(|sized| (&sized.targets.resolved, sized.targets.size))
     }
 }

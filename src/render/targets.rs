@@ -34,7 +34,8 @@ impl Targets {
         let attached = TextureUsages::RENDER_ATTACHMENT;
         let samples = texture("picture samples", COLOUR, SAMPLES, attached);
         let depth = texture("picture depth", DEPTH, SAMPLES, attached);
-        let shown = attached | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+        let copied = TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
+        let shown = attached | TextureUsages::TEXTURE_BINDING | copied;
         let resolved = texture("picture", COLOUR, 1, shown);
         Self { size, samples: view(&samples), depth: view(&depth), resolved_view: view(&resolved), resolved }
     }

@@ -48,5 +48,6 @@ fn portrait(object: &ObjectModel) -> DrawList {
         arrows: Vec::new(),
         overlay: Overlay::default(),
         detail: Detail::Full,
+        inset: None,
     }
 }

@@ -4,14 +4,16 @@
 use crate::bench::{Bench, BenchSetup};
 use crate::golden::{compare, sheet};
 use crate::inspect::three_trials;
+use crate::presenter::texts;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use image::RgbaImage;
-use palpate::app::{InspectAction, LibraryAction, ViewAction};
-use palpate_geometry::drawing::{DrawList, StandardView};
+use palpate::app::{InspectAction, LibraryAction, SimulationAction, ViewAction};
+use palpate_geometry::drawing::{DrawList, Solid, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::picture::{PictureView, Stage, full_scale_of};
+use palpate_lab::workers::Command;
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Scene, SupportKind};
@@ -56,7 +58,6 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let until = trial.frames().iter().take_while(|frame| frame.t <= shot.at);
     let view = PictureView {
         full_scale: full_scale_of(&scene.gripper, until),
-        camera: stage.camera(shot.view, frame, shot.size[0] as f32 / shot.size[1] as f32),
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
@@ -64,7 +65,8 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
         badge: shot.annotations.then(|| "SIMULATED".to_owned()),
         ..PictureView::default()
     };
-    let mut list = stage.draw(frame, &view);
+    let camera = stage.camera(shot.view, frame, &view);
+    let mut list = stage.draw(frame, &PictureView { camera, ..view });
     if shot.ghost {
         scene.solver.engine = scene.solver.engine.other();
         let other = grasp(&scene, object.as_ref(), 0);
@@ -124,7 +126,6 @@ fn coloured_share(gpu: &Gpu, renderer: &mut Renderer, list: &DrawList, size: [u3
 fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
     let gpu = driver();
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let size = [640, 400];
     let mut shares = Vec::new();
     for built_in in catalogue() {
         let mut scene = Scene::default();
@@ -133,16 +134,91 @@ fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
         let trial = grasp(&scene, object.as_ref(), 0);
         let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
         let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-        let camera = stage.camera(StandardView::Home, frame, size[0] as f32 / size[1] as f32);
-        let size_points = Vec2::from(size.map(|side| side as f32));
         let until = trial.frames().iter().take_while(|frame| frame.t <= HELD.at);
         let full_scale = full_scale_of(&scene.gripper, until);
-        let (forces, annotations) = (false, false);
-        let view = PictureView { camera, size: size_points, forces, annotations, full_scale, ..PictureView::default() };
-        let share = coloured_share(&gpu, &mut renderer, &stage.draw(frame, &view), size);
+        let view = PictureView { size: Vec2::new(1280.0, 800.0), full_scale, ..PictureView::default() };
+        let camera = stage.camera(StandardView::Home, frame, &view);
+        let inset = stage.draw(frame, &PictureView { camera, ..view }).inset.expect("something is touched");
+        let size = inset.size.round().as_uvec2().to_array();
+        let share = coloured_share(&gpu, &mut renderer, &inset.list, size);
         shares.push((built_in.name.clone(), share));
     }
     assert!(shares.iter().all(|(_, share)| *share >= 0.01), "{shares:?}");
+}
+
+/// Corners of everything in the hand and below it, in a picture of this size (points).
+fn hand_in_picture(list: &DrawList, size: Vec2) -> Vec<Vec2> {
+    let solid = |solid: &Solid| -> Vec<Vec3> {
+        let place = solid.world_from_mesh;
+        solid.mesh.vertices.iter().map(|vertex| place.transform_point3(vertex.position.into())).collect()
+    };
+    let mut points: Vec<Vec3> = list.solids.iter().flat_map(solid).collect();
+    for finger in &list.fingers {
+        let (half, section) = (0.5 * finger.section.width, finger.section);
+        for frame in &finger.frames {
+            let across = frame.inward.cross(frame.along) * half;
+            for inward in [section.pad, -section.back] {
+                points.extend([-1.0, 1.0].map(|sign| frame.position + across * sign + frame.inward * inward));
+            }
+        }
+    }
+    points.into_iter().map(|point| list.camera.project(point, size).expect("in front of the eye")).collect()
+}
+
+#[test]
+fn the_home_view_shows_the_whole_hand_beside_the_inset() {
+    for (k, built_in) in catalogue().iter().enumerate() {
+        let mut scene = Scene::default();
+        built_in.name.clone_into(&mut scene.object.source);
+        scene.gripper.mount.yaw_deg = [0.0, 35.0, -50.0, 80.0][k % 4];
+        let object = scene.load_object().unwrap();
+        let trial = grasp(&scene, object.as_ref(), 0);
+        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
+        let held = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
+        for frame in [&trial.frames()[0], held] {
+            for size in
+                [[640.0, 400.0], [1000.0, 420.0], [720.0, 660.0], [440.0, 260.0], [1280.0, 800.0], [360.0, 520.0]]
+            {
+                let size = Vec2::from(size);
+                let view = PictureView { size, ..PictureView::default() };
+                let camera = stage.camera(StandardView::Home, frame, &view);
+                let list = stage.draw(frame, &PictureView { camera, ..view });
+                let hand = hand_in_picture(&list, size);
+                let low = hand.iter().copied().reduce(Vec2::min).unwrap();
+                let high = hand.iter().copied().reduce(Vec2::max).unwrap();
+                let told = format!("{} at {:.1} s in {size}: {low} to {high}", built_in.name, frame.t);
+                assert!(low.min_element() > 0.0 && high.cmplt(size).all(), "cut: {told}");
+                let filled = ((high - low) / size).max_element();
+                assert!((0.7..=0.9).contains(&filled), "fills {filled}: {told}");
+                // A pad faces the eye.
+                let back = list.camera.axes()[2];
+                assert!(list.fingers.iter().any(|finger| finger.frames[0].inward.dot(back) > 0.4), "{told}");
+                // High and narrow pictures may have no room for it.
+                assert!(list.inset.is_some() == !frame.taxels.is_empty() || size.x < size.y, "{told}");
+                let Some(inset) = &list.inset else { continue };
+                let end = inset.corner + inset.size;
+                assert!(inset.corner.min_element() > 0.0 && end.cmplt(size).all(), "{told}");
+                let covered = hand.iter().find(|at| at.cmpgt(inset.corner).all() && at.cmplt(end).all());
+                assert_eq!(covered, None, "inset at {} to {end}: {told}", inset.corner);
+                assert!(inset.size.y >= 0.2 * size.y || size.x < size.y, "{}: {told}", inset.size);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_ghost_of_a_finished_grasp_has_both_captions() {
+    let mut bench = window(Theme::Dark, [1280.0, 820.0]);
+    bench.tell(SimulationAction::SetGhost(true));
+    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(Command::Play);
+    bench.until(|s| s.status.finished);
+    let says = |bench: &Bench| {
+        texts(bench).iter().any(|(.., text)| text == "The same grasp by rapier. As it was held, at 3.0\u{2009}s")
+    };
+    while !says(&bench) {
+        bench.wait();
+    }
 }
 
 /// The window through the driver that the pictures above are drawn with.

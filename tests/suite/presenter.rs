@@ -93,7 +93,7 @@ fn a_hard_pose_is_said_to_be_one() {
 }
 
 /// Texts on the screen: where, how high their letters are (points), and what they say.
-fn texts(bench: &Bench) -> Vec<(Rect, f32, String)> {
+pub(crate) fn texts(bench: &Bench) -> Vec<(Rect, f32, String)> {
     fn add(shape: &Shape, found: &mut Vec<(Rect, f32, String)>) {
         match shape {
             Shape::Text(text) => {

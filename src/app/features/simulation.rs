@@ -8,7 +8,6 @@ use palpate_lab::study::accuracy::{AccuracyStudy, stored_accuracy};
 use palpate_lab::workers::{
     Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
 };
-use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Auto;
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::{PoseSpread, Scene};
@@ -352,10 +351,4 @@ pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
         Notice::Kept(id) => notices.info(format!("Trial {id} of the demo log is the same grasp: kept in the store.")),
         Notice::Logged(..) => {}
     }
-}
-
-/// Frame of the other engine at the snapshot's time, if it belongs to the same grasp.
-pub(in crate::app) fn ghost_frame<'a>(snapshot: Option<&Snapshot>, ghost: Option<&'a GhostGrasp>) -> Option<&'a Frame> {
-    let (snapshot, ghost) = (snapshot?, ghost?);
-    ghost.at(snapshot.frame.t).filter(|_| ghost.grasp == snapshot.grasp)
 }

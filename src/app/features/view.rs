@@ -250,11 +250,10 @@ impl ViewState {
         }
     }
 
-    /// True while the camera is where it begins, in the home view of the whole scene: it then comes nearer to what is touched.
-    pub(in crate::app) fn follows_touch(&self) -> bool {
-        let parallel = self.camera.parallel;
-        let is_as_framed = self.framed.is_some_and(|framed| Camera { parallel, ..framed } == self.camera);
-        is_as_framed && self.camera == self.camera.turned_to(StandardView::Home)
+    /// The standard view in which the camera is, while nobody has moved it from there.
+    pub(in crate::app) fn standard_view(&self) -> Option<StandardView> {
+        let framed = Camera { parallel: self.camera.parallel, ..self.framed? };
+        StandardView::ALL.into_iter().find(|view| framed.turned_to(*view) == self.camera)
     }
 
     /// Shows the whole scene.

@@ -18,12 +18,16 @@ use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Align, Camera, Detail, DrawList, Overlay, Shape2, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::picture::{GhostKind, PAD_FULL_SCALE, PictureView, Stage};
-use palpate_lab::workers::Command;
+use palpate_lab::workers::{Command, GhostGrasp};
+use palpate_sim::frame::Frame;
 use palpate_sim::objects::object_title;
 use palpate_tactile::SensorLayout;
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
+
+/// Height of the inset with the touch in presenter mode, as a share of the picture's.
+const PRESENTED: f32 = 0.38;
 
 /// Smallest visible change of curvature (1/m): 0.25 mm at the tip of a 100 mm finger.
 const SEEN_PER_M: f64 = 0.05;
@@ -80,7 +84,7 @@ fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, moment:
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
-    let camera = shown_camera(context, moment, Vec2::new(response.rect.width(), height));
+    let camera = picture_view(context, moment, Vec2::new(response.rect.width(), height)).camera;
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
     // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
@@ -115,11 +119,29 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
     along.as_dvec3() * PULL
 }
 
-/// The camera of a view of this size; the one that nobody has moved comes nearer to the touch.
-fn shown_camera(context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Camera {
-    let camera = context.view.camera;
-    let aspect = size.x / size.y.max(1.0);
-    if context.view.follows_touch() { moment.stage.nearer_to_touch(camera, moment.frame, aspect) } else { camera }
+/// What a picture of this size shows. A camera that nobody has moved from a standard view shows the whole hand.
+fn picture_view(context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> PictureView {
+    let inset = match context.source {
+        // Nothing is known of where a real gripper touched.
+        ViewSource::Gripper => 0.0,
+        ViewSource::Trial if context.inspected.is_none_or(|own| own.trial.simulated.is_none()) => 0.0,
+        ViewSource::Trial | ViewSource::Simulation if context.view.presents => PRESENTED,
+        ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
+    };
+    let view = PictureView {
+        camera: context.view.camera,
+        theme: context.view.theme,
+        size,
+        forces: context.view.forces,
+        layout: SensorLayout::named(&context.view.sensors.layout).ok(),
+        circles: context.view.circles,
+        inset,
+        ..PictureView::default()
+    };
+    match context.view.standard_view() {
+        Some(standard) => PictureView { camera: moment.stage.camera(standard, moment.frame, &view), ..view },
+        None => view,
+    }
 }
 
 /// Draw list of a moment, and the view that it was made for.
@@ -134,23 +156,13 @@ struct Drawn {
 
 fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
     let Moment { stage, frame, .. } = moment;
-    // Nothing is known of where a real gripper touched.
     let shown = ShownGrasp::of(context);
     let full_scale = shown.as_ref().map_or(PAD_FULL_SCALE, |shown| shown.full_scale);
     let course = shown.filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
     let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
-    let view = PictureView {
-        camera: shown_camera(context, moment, size),
-        theme: context.view.theme,
-        size,
-        forces: context.view.forces,
-        full_scale,
-        path: grasp_path.as_ref().map(|(_, colour)| *colour),
-        layout: SensorLayout::named(&context.view.sensors.layout).ok(),
-        circles: context.view.circles,
-        ..PictureView::default()
-    };
-    let ghost = context.ghost.filter(|_| context.source != ViewSource::Trial && !context.shown().looks_back());
+    let path = grasp_path.as_ref().map(|(_, colour)| *colour);
+    let view = PictureView { full_scale, path, ..picture_view(context, moment, size) };
+    let ghost = ghost_frame(context.ghost, moment);
     let real = real_curvature(context);
     let mut list = stage.draw(frame, &view);
     if let Some(ghost) = ghost {
@@ -160,10 +172,19 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
         list.ghosts.extend(stage.reconstructed(curvature, context.view.theme));
     }
     if let Some((shown, colour)) = &grasp_path {
-        list.solids.extend(stage.path(&path_mesh(ctx, stage, shown, *colour), frame));
+        let path = stage.path(&path_mesh(ctx, stage, shown, *colour), frame);
+        if let Some(inset) = &mut list.inset {
+            inset.list.solids.extend(path.clone());
+        }
+        list.solids.extend(path);
         Stage::unveil(&mut list, context.view.theme);
     }
     Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
+}
+
+/// Frame of the other engine at the time of a moment, if it belongs to the same grasp.
+fn ghost_frame<'a>(ghost: Option<&'a GhostGrasp>, moment: Moment<'_>) -> Option<&'a Frame> {
+    ghost.filter(|ghost| ghost.grasp == moment.grasp)?.at(moment.frame.t)
 }
 
 /// Size of exported pictures (points).
@@ -199,6 +220,7 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
     let Drawn { mut list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
     if context.resolution() < 1.0 {
         list.detail = Detail::Fast;
+        list.inset.iter_mut().for_each(|inset| inset.list.detail = Detail::Fast);
     }
     let per_point = context.resolution() * ui.ctx().pixels_per_point();
     let pixels = [rect.width(), rect.height()].map(|side| (side * per_point).round().max(1.0) as u32);
@@ -206,28 +228,40 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
     let (grasp, sample) = (moment.grasp, moment.frame.t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
     let theme = context.view.theme;
-    let (caption, ghosted) = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
-        Some(inspected) => (inspected.trial.remarks.join(" "), None),
-        None if key.real.is_some() => {
-            ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
-        }
-        None if key.ghost.is_some() => {
-            let text = format!("The same grasp by {}", context.scene.solver.engine.other().name());
-            (text, Some(GhostKind::Engine.colour(theme)))
-        }
-        None => {
-            (context.shown().held_s().map_or_else(String::new, |t| format!("As it was held, at {t:.1}\u{2009}s")), None)
-        }
-    };
+    let (caption, ghosted) = caption(context, &key);
     // Texts keep their sharpness where the picture has fewer pixels.
-    let overlay = std::mem::take(&mut list.overlay);
+    let mut overlays = vec![(rect.min, std::mem::take(&mut list.overlay))];
+    if let Some(inset) = &mut list.inset {
+        let corner = rect.min + letters * egui::vec2(inset.corner.x, inset.corner.y);
+        overlays.push((corner, std::mem::take(&mut inset.list.overlay)));
+    }
     ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, Paint { key, list }));
-    overlay_ui(&ui.painter().with_clip_rect(rect), rect.min, &overlay, letters);
+    for (corner, overlay) in overlays {
+        overlay_ui(&ui.painter().with_clip_rect(rect), corner, &overlay, letters);
+    }
     // Presenter mode says it in its own words.
     if !caption.is_empty() && letters == 1.0 {
         caption_ui(ui, rect, theme, caption, ghosted);
     }
     view
+}
+
+/// What is said about a picture, and the colour of the ghost in it.
+fn caption(context: &PanelContext<'_>, key: &PictureKey) -> (String, Option<Rgb>) {
+    let theme = context.view.theme;
+    if let Some(inspected) = context.inspected.filter(|_| context.source == ViewSource::Trial) {
+        return (inspected.trial.remarks.join(" "), None);
+    }
+    let held = context.shown().held_s().map(|t| format!("As it was held, at {t:.1}\u{2009}s"));
+    if key.real.is_some() {
+        ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
+    } else if key.ghost.is_some() {
+        let engine = context.scene.solver.engine.other().name();
+        let texts: Vec<String> = std::iter::once(format!("The same grasp by {engine}")).chain(held).collect();
+        (texts.join(". "), Some(GhostKind::Engine.colour(theme)))
+    } else {
+        (held.unwrap_or_default(), None)
+    }
 }
 
 /// Paints annotations over the picture, with letters of a size relative to the usual one.
@@ -353,5 +387,25 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         .on_hover_text(format!("Result of the other engine, {other}, translucent (G)"));
     if ghost.clicked() {
         actions.push(SimulationAction::SetGhost(!context.view.ghost));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_geometry::Pose;
+    use palpate_lab::grasping::grasp;
+    use palpate_sim::scene::Scene;
+
+    #[test]
+    fn the_ghost_is_that_of_the_time_shown() {
+        let scene = Scene::default();
+        let frames = grasp(&scene, None, 0).frames().to_vec();
+        let held = frames[frames.len() / 2].clone();
+        let ghost = GhostGrasp { grasp: 7, engine: scene.solver.engine.other(), frames };
+        let stage = Stage::new(&scene, None, Pose::IDENTITY);
+        let moment = |grasp| Moment { grasp, stage: &stage, frame: &held };
+        assert_eq!(ghost_frame(Some(&ghost), moment(7)).map(|frame| frame.t), Some(held.t));
+        assert_eq!(ghost_frame(Some(&ghost), moment(8)), None);
     }
 }

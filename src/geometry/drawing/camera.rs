@@ -33,7 +33,7 @@ pub struct Camera {
 /// Views that have a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StandardView {
-    /// From three quarters, a little above: the view to begin with.
+    /// The whole hand from three quarters, a little above: the view to begin with.
     Home,
     /// Along +y: both fingers side by side.
     Front,
@@ -56,7 +56,7 @@ impl StandardView {
     /// The name used on the command line and in menus.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Home => "home",
+            Self::Home => "hand",
             Self::Front => "front",
             Self::Back => "back",
             Self::Left => "left",
@@ -78,6 +78,17 @@ impl StandardView {
             Self::Bottom => (0.0, -STEEPEST),
         }
     }
+}
+
+/// Part of a picture that things are to fill, in shares of its width and height from the top left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureRoom {
+    /// Upper left corner.
+    pub min: Vec2,
+    /// Lower right corner.
+    pub max: Vec2,
+    /// Share of the width beyond which nothing reaches where the rest leaves the choice.
+    pub clear_of: f32,
 }
 
 /// Straight up or down, less a hair, so that "up" in the picture stays defined (rad).
@@ -103,6 +114,37 @@ impl Camera {
     pub fn framing(self, centre: Vec3, radius: f32) -> Self {
         let distance = radius / (0.5 * self.angle_of_view).sin();
         Self { target: centre, distance: distance.clamp(DISTANCES.0, DISTANCES.1), ..self }
+    }
+
+    /// Moved, not turned, so that points fill a room of a picture of this width over height and none is outside.
+    pub fn containing(self, points: &[Vec3], room: &PictureRoom, aspect: f32) -> Self {
+        let [right, up, back] = self.axes();
+        let ends = |values: &dyn Fn(&Vec3) -> f32| {
+            points.iter().map(values).fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)])
+        };
+        let [near, far] = ends(&|point: &Vec3| -point.dot(back));
+        let middle = 0.5 * (near + far);
+        // In a parallel projection what is farther away is no smaller.
+        let depth = |point: &Vec3| if self.parallel { 0.0 } else { -point.dot(back) - middle };
+        // An edge of the room is a plane through the eye: its slope is the way to the side for each step ahead.
+        let slope = |share: f32| (2.0 * share - 1.0) * (0.5 * self.angle_of_view).tan();
+        let behind = |axis: Vec3, slope: f32| {
+            let [low, high] = ends(&|point: &Vec3| point.dot(axis) - slope * depth(point));
+            if slope < 0.0 { low } else { high }
+        };
+        let across = [room.min.x, room.max.x].map(|share| slope(share) * aspect);
+        let upwards = [1.0 - room.max.y, 1.0 - room.min.y].map(slope);
+        let [[left, rightmost], [lowest, top]] =
+            [(right, across), (up, upwards)].map(|(axis, s)| s.map(|s| behind(axis, s)));
+        let distance = ((rightmost - left) / (across[1] - across[0])).max((top - lowest) / (upwards[1] - upwards[0]));
+        let distance = distance.clamp(DISTANCES.0, DISTANCES.1);
+        // Where the eye is: in the middle of where it can be, or as far to the side as keeps the rest of the picture clear.
+        let beside = slope(room.clear_of) * aspect;
+        let [least, most] = [rightmost - across[1] * distance, left - across[0] * distance];
+        let wanted = behind(right, beside) - beside * distance;
+        let side = (0.5 * (least + most)).max(wanted.min(most));
+        let height = 0.5 * (top - upwards[1] * distance + lowest - upwards[0] * distance);
+        Self { target: right * side + up * height - back * middle, distance, ..self }
     }
 
     /// Turned by a drag of the mouse, in shares of the picture's height.

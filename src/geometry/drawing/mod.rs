@@ -10,14 +10,14 @@ mod heat_map;
 mod overlay;
 
 pub use axis::PlotAxis;
-pub use camera::{Camera, StandardView};
+pub use camera::{Camera, PictureRoom, StandardView};
 pub use figure::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, ReferenceLine, SpreadBand};
 pub use heat_map::{CellAxis, ColourScale, HeatMap};
 pub use overlay::{Align, Overlay, Shape2};
 
 use crate::SurfaceMesh;
 use crate::palette::Rgb;
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Everything in one picture.
@@ -43,6 +43,19 @@ pub struct DrawList {
     pub overlay: Overlay,
     /// How finely light is computed.
     pub detail: Detail,
+    /// Picture within the picture.
+    pub inset: Option<Box<Inset>>,
+}
+
+/// Picture within a picture: the same shadows from another side.
+#[derive(Clone, Debug)]
+pub struct Inset {
+    /// What is in it; its overlay begins at its own corner.
+    pub list: DrawList,
+    /// Its upper left corner in the picture (points).
+    pub corner: Vec2,
+    /// Width and height (points).
+    pub size: Vec2,
 }
 
 /// How finely the light of a picture is computed.

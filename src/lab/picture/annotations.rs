@@ -3,12 +3,14 @@
 use super::contact_path::PathColour;
 use super::{PictureView, ink};
 use glam::{Vec2, Vec3};
-use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
+use palpate_geometry::drawing::{Align, Camera, Inset, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
 use palpate_geometry::units::three_digits;
 
 /// Distance of annotations from the edges (points).
-const MARGIN: f32 = 18.0;
+pub(super) const MARGIN: f32 = 18.0;
+/// Height of the scale bar with its distance from the lower edge (points).
+pub(super) const SCALE_BAR: f32 = 46.0;
 /// Height of its text (points).
 const TEXT: f32 = 14.0;
 /// Least size of a picture with scale bar and legends (points).
@@ -16,6 +18,10 @@ const LEAST_SIZE: Vec2 = Vec2::new(340.0, 200.0);
 /// Width of a legend, and its height with its texts (points).
 const LEGEND_WIDTH: f32 = 132.0;
 const LEGEND_HEIGHT: f32 = 50.0;
+/// Greatest length of the scale bar, as a share of the width of the picture.
+const SCALE_BAR_SHARE: f32 = 0.16;
+/// Height of the texts in an inset (points).
+const INSET_TEXT: f32 = 12.0;
 /// Lengths that the scale bar may stand for (mm).
 pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
@@ -30,7 +36,7 @@ pub(super) struct Plate {
 const AXES: Vec2 = Vec2::new(96.0, 104.0);
 
 impl Plate {
-    fn between(low: Vec2, high: Vec2) -> Self {
+    pub(super) fn between(low: Vec2, high: Vec2) -> Self {
         Self { middle: 0.5 * (low + high), half: 0.5 * (high - low) }
     }
 
@@ -54,8 +60,8 @@ pub(super) struct Annotator<'a> {
 }
 
 impl<'a> Annotator<'a> {
-    /// Begins with axes, scale bar, legends and badge, where the view has annotations.
-    pub(super) fn new(view: &'a PictureView) -> Self {
+    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset.
+    pub(super) fn new(view: &'a PictureView, inset: Option<&Inset>) -> Self {
         let mut overlay = Overlay::default();
         if view.annotations {
             add(&mut overlay, view);
@@ -63,7 +69,9 @@ impl<'a> Annotator<'a> {
         let (size, legends) = (view.size, legend_room(view));
         let axes = Plate::between(Vec2::new(0.0, size.y - AXES.y), Vec2::new(AXES.x, size.y));
         let legends = Plate::between(Vec2::new(size.x - legends.x, 0.0), Vec2::new(size.x, legends.y));
-        Self { view, overlay, plates: vec![axes, legends] }
+        let scale_bar = Plate::between(size - Vec2::new(SCALE_BAR_SHARE * size.x + MARGIN, SCALE_BAR), size);
+        let inset = inset.map(|inset| Plate::between(inset.corner, inset.corner + inset.size));
+        Self { view, overlay, plates: [axes, legends, scale_bar].into_iter().chain(inset).collect() }
     }
 
     /// True where a plate would cover nothing.
@@ -73,10 +81,7 @@ impl<'a> Annotator<'a> {
 
     /// Adds the ground of a text.
     pub(super) fn add_plate(&mut self, plate: Plate) {
-        let Plate { middle, half } = plate;
-        let colours = [self.view.theme.colours().background; 2];
-        let (min, max) = (middle - half, middle + half);
-        self.overlay.shapes.push(Shape2::Rectangle { min, max, colours, opacity: 0.72 });
+        add_ground(&mut self.overlay, self.view.theme, plate.middle, plate.half);
         self.plates.push(plate);
     }
 }
@@ -87,8 +92,8 @@ fn add(overlay: &mut Overlay, view: &PictureView) {
     if size.x >= 160.0 && size.y >= 120.0 {
         add_gizmo(overlay, &view.camera, Vec2::new(MARGIN + 26.0, size.y - MARGIN - 26.0), view.theme);
     }
-    if size.x >= LEAST_SIZE.x && size.y >= LEAST_SIZE.y {
-        add_scale_bar(overlay, view);
+    if shows_legends(view) {
+        add_scale_bar(overlay, view, [MARGIN, TEXT]);
         let full = f64::from(view.full_scale) * 1e-3;
         add_legend(overlay, view, MARGIN, "pad pressure, kPa", [0.0, full]);
         if let Some(PathColour::Time(span)) = view.path {
@@ -128,29 +133,61 @@ fn add_gizmo(overlay: &mut Overlay, camera: &Camera, centre: Vec2, theme: Theme)
     overlay.shapes.push(Shape2::Disc { centre, radius: 2.2, colour: ink(theme) });
 }
 
-/// A bar of a round length at the distance of the target.
-fn add_scale_bar(overlay: &mut Overlay, view: &PictureView) {
+/// True where a view has scale bar and legends.
+pub(super) fn shows_legends(view: &PictureView) -> bool {
+    view.annotations && view.size.cmpge(LEAST_SIZE).all()
+}
+
+/// Border, title and scale bar of an inset.
+pub(super) fn frame_inset(overlay: &mut Overlay, view: &PictureView, title: &str) {
+    let ink = ink(view.theme);
+    let corners = [Vec2::ZERO, Vec2::new(view.size.x, 0.0), view.size, Vec2::new(0.0, view.size.y)];
+    for k in 0..4 {
+        overlay.line(corners[k], corners[(k + 1) % 4], 1.5, view.theme.colours().border);
+    }
+    // Legible on whatever is touched.
+    let half = Vec2::new(0.25 * INSET_TEXT * title.chars().count() as f32 + 4.0, 0.5 * INSET_TEXT + 3.0);
+    add_ground(overlay, view.theme, half + 4.0, half);
+    overlay.text(half + 4.0, Align::Centre, INSET_TEXT, ink, title);
+    let bar = Vec2::new(0.5 * SCALE_BAR_SHARE * view.size.x + 14.0, 15.0);
+    add_ground(overlay, view.theme, view.size - bar - 3.0, bar);
+    add_scale_bar(overlay, view, [11.0, INSET_TEXT]);
+}
+
+/// Translucent ground of a text about a place.
+fn add_ground(overlay: &mut Overlay, theme: Theme, middle: Vec2, half: Vec2) {
+    let (min, max, colours) = (middle - half, middle + half, [theme.colours().background; 2]);
+    overlay.shapes.push(Shape2::Rectangle { min, max, colours, opacity: 0.72 });
+}
+
+/// A bar of a round length at the distance of the target, so far from the lower right corner, and the height of its text.
+fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [f32; 2]) {
     let points_per_mm = view.size.y / (view.camera.height_at_target() * 1e3);
-    let wanted = 0.16 * view.size.x.min(900.0);
+    let wanted = SCALE_BAR_SHARE * view.size.x.min(900.0);
     let Some(mm) = SCALE_STEPS.into_iter().rfind(|mm| mm * points_per_mm <= wanted) else {
         return;
     };
     let length = mm * points_per_mm;
-    let right = Vec2::new(view.size.x - MARGIN, view.size.y - MARGIN);
+    let right = view.size - margin;
     let left = right - Vec2::new(length, 0.0);
     let colour = ink(view.theme);
     overlay.line(left, right, 1.6, colour);
     for end in [left, right] {
         overlay.line(end - Vec2::new(0.0, 4.5), end + Vec2::new(0.0, 4.5), 1.6, colour);
     }
-    overlay.text((left + right) * 0.5 - Vec2::new(0.0, 12.0), Align::Centre, TEXT, colour, format!("{mm}\u{2009}mm"));
+    overlay.text(
+        (left + right) * 0.5 - Vec2::new(0.0, 12.0),
+        Align::Centre,
+        letters,
+        colour,
+        format!("{mm}\u{2009}mm"),
+    );
 }
 
 /// Room of the legends in the top right corner of a picture (points): width from the right edge, height from the top.
 pub fn legend_room(view: &PictureView) -> Vec2 {
     let timed = matches!(view.path, Some(PathColour::Time(_)));
-    let count =
-        if view.size.x < LEAST_SIZE.x || view.size.y < LEAST_SIZE.y { 0.0 } else { 1.0 + f32::from(u8::from(timed)) };
+    let count = if view.size.cmplt(LEAST_SIZE).any() { 0.0 } else { 1.0 + f32::from(u8::from(timed)) };
     Vec2::new(MARGIN + LEGEND_WIDTH, MARGIN + count * LEGEND_HEIGHT)
 }
 

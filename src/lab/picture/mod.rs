@@ -8,6 +8,7 @@ mod fingers;
 mod forces;
 mod ghost;
 mod gripper_model;
+mod hand;
 mod heat_maps;
 mod portrait;
 mod reconstructed;
@@ -58,6 +59,8 @@ pub struct PictureView {
     pub layout: Option<SensorLayout>,
     /// Draw the circle that each flex strip reads.
     pub circles: bool,
+    /// Height of the inset with the touch, as a share of the picture's; 0 for none.
+    pub inset: f32,
 }
 
 impl Default for PictureView {
@@ -73,9 +76,13 @@ impl Default for PictureView {
             path: None,
             layout: Some(CATALOGUE[0].clone()),
             circles: true,
+            inset: INSET,
         }
     }
 }
+
+/// Usual height of the inset with the touch, as a share of the picture's.
+const INSET: f32 = 0.27;
 
 /// What a ghost stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,6 +117,7 @@ pub struct Stage {
     pedestal: Option<Arc<SurfaceMesh>>,
     has_table: bool,
     palm: Arc<SurfaceMesh>,
+    outlines: hand::Outlines,
 }
 
 /// Radius of the ball in which shadows are cast (m), and the height of its middle above the table.
@@ -119,22 +127,31 @@ impl Stage {
     /// Prepares the meshes of a scene.
     pub fn new(scene: &Scene, object: Option<&ObjectModel>, world_from_gripper: Pose) -> Self {
         let support = &scene.support;
+        let palm = Arc::new(gripper_model::palm(&scene.gripper));
+        let pedestal = (support.kind == SupportKind::Pedestal).then(|| Arc::new(gripper_model::pedestal(support)));
+        let outlines = hand::Outlines {
+            palm: hand::outline(&palm),
+            object: object.map_or_else(Vec::new, |o| hand::outline(&o.surface)),
+            pedestal: pedestal.as_ref().map_or_else(Vec::new, |mesh| hand::outline(mesh)),
+        };
         Self {
             gripper: scene.gripper.clone(),
             world_from_gripper,
             object: object.map(|o| Arc::clone(&o.surface)),
             object_radius: object.map_or(0.0, |o| 0.5 * o.bounds.size().length() as f32),
             object_extent: object.map_or(0.0, |o| o.bounds.size().max_element() as f32),
-            pedestal: (support.kind == SupportKind::Pedestal).then(|| Arc::new(gripper_model::pedestal(support))),
+            pedestal,
             has_table: support.kind != SupportKind::None,
-            palm: Arc::new(gripper_model::palm(&scene.gripper)),
+            palm,
+            outlines,
         }
     }
 
     /// Everything in one picture of a frame.
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
-        let mut annotator = Annotator::new(view);
+        let inset = self.touch_inset(frame, view);
+        let mut annotator = Annotator::new(view, inset.as_ref());
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         if let Some(layout) = view.layout.as_ref().filter(|_| view.circles && view.annotations) {
@@ -148,7 +165,6 @@ impl Stage {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
             fingers.iter_mut().for_each(|finger| finger.sensors = drawn.clone());
         }
-        fingers.iter_mut().for_each(|finger| touch::clear_the_view(finger, &view.camera));
         DrawList {
             camera: view.camera,
             backdrop: [colours.sky, colours.horizon],
@@ -169,6 +185,7 @@ impl Stage {
             },
             overlay: annotator.overlay,
             detail: Detail::Full,
+            inset: inset.map(Box::new),
         }
     }
 
@@ -231,20 +248,12 @@ impl Stage {
         full_scale_of(&self.gripper, frames)
     }
 
-    /// Camera of a picture of the whole scene, of this width over height; from the home view it comes nearer to what the pads
-    /// touch.
-    pub fn camera(&self, view: StandardView, frame: &Frame, aspect: f32) -> Camera {
-        let (centre, radius) = self.bounds();
-        let camera = Camera::default().turned_to(view).framing(centre, radius);
-        if view == StandardView::Home { self.nearer_to_touch(camera, frame, aspect) } else { camera }
-    }
-
-    /// This camera, moved towards what the pads touch as the grip tightens, for pictures of this width over height.
-    pub fn nearer_to_touch(&self, camera: Camera, frame: &Frame, aspect: f32) -> Camera {
-        match self.touch(frame) {
-            Some(touch) => touch::nearer(camera, &touch, self.object_extent, aspect),
-            None => camera,
-        }
+    /// Camera of a standard view of the whole hand, beside the annotations of a picture. The home view turns so far that a pad
+    /// faces it.
+    pub fn camera(&self, standard: StandardView, frame: &Frame, view: &PictureView) -> Camera {
+        let camera = Camera { parallel: view.camera.parallel, ..Camera::default() }.turned_to(standard);
+        let yaw = if standard == StandardView::Home { self.home_yaw(camera.yaw) } else { camera.yaw };
+        self.showing_hand(Camera { yaw, ..camera }, frame, view)
     }
 
     /// Force of both pads on the object (N); none where they do not touch it.
@@ -257,7 +266,7 @@ impl Stage {
         touch::Touch::of(&self.gripper, &frame.world_from_gripper(&self.world_from_gripper), frame)
     }
 
-    /// A ball around what matters, to be framed by a camera: centre and radius (m).
+    /// A ball around what matters, to be framed by a camera turned by hand: centre and radius (m).
     pub fn bounds(&self) -> (Vec3, f32) {
         let palm = self.world_from_gripper.position.as_vec3();
         let length = self.gripper.finger.length as f32;

@@ -1,34 +1,23 @@
-//! The touch in full view: the camera comes nearer as the grip tightens, and a finger that hides its own pad turns translucent
-//! there.
+//! The touch from nearby: through the finger in front, which turns translucent where it hides its loaded pad.
 
+use super::{PictureView, Stage};
 use glam::{DVec3, Vec3};
 use palpate_geometry::Pose;
-use palpate_geometry::drawing::{Camera, SoftFinger, Veil};
+use palpate_geometry::drawing::{Camera, DrawList, FingerFrame, Inset, SoftFinger, StandardView, Veil};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
-use std::f32::consts::{FRAC_PI_2, PI};
 
-/// Force on both pads at which the camera is half way (N).
-const HALF_WAY: f32 = 0.05;
-/// Share of the picture that is pad coloured by its load in the end; less where a large object would be cut, down to the
-/// second.
-const SHARES: [f32; 2] = [0.0150, 0.0128];
-/// Area that is coloured over that of the coloured taxels, at least: colours are blended beyond them.
-const SPREAD: f32 = 2.1;
-/// Least and greatest height of the picture at the distance of the touch (m). The width is at least this share of the
-/// object's largest side; so is the height, where that costs no colour, in pictures at least so much wider than high.
-const HEIGHTS: [f32; 2] = [0.04, 0.11];
-const OF_OBJECT: f32 = 0.95;
-const WIDE: f32 = 1.5;
-/// Forces on both pads between which the camera gives up the whole object for the load (N).
-const FIRM: [f32; 2] = [0.12, 0.38];
-/// Pressures between which a taxel comes to count as coloured, as shares of the largest.
-const COLOURED: [f32; 2] = [0.015, 0.06];
+/// Force on both pads from which the touch is shown (N).
+const FAINTEST: f32 = 0.01;
+/// Height of the picture as a share of the object's largest side, and its least and greatest (m).
+const OF_OBJECT: f32 = 0.9;
+const HEIGHTS: [f32; 2] = [0.042, 0.078];
+/// Way of the picture's middle from that of the touch to that of the pad in front.
+const TOWARDS_PAD: f32 = 0.5;
 /// Least height of the eye (m).
 const ABOVE_GROUND: f32 = 0.006;
-/// Yaw against the gripper, and pitch, in the end (rad): from the side, where a pad is seen from behind, and low, as
-/// fingertips curl up.
-const ANGLES: [f32; 2] = [-1.05, -0.16];
+/// Yaw from beside the hand, where a finger is seen from behind, and pitch (rad): low, as fingertips curl up.
+const ANGLES: [f32; 2] = [1.05, -0.16];
 /// Pressure of a loaded taxel, as a share of the brightest colour.
 const LOADED: f32 = 0.02;
 /// Translucent stretch beyond the loaded taxels, towards the palm, whose bellows stand in the way, and the tip (m).
@@ -40,22 +29,33 @@ const NEAR_OBJECT: f32 = 0.006;
 
 /// What both pads touch in a frame.
 pub(super) struct Touch {
-    pads: [LoadedPad; 2],
     /// Sum of the normal forces (N), and their middle (m).
     force: f32,
     middle: Vec3,
-    /// Direction in which the left finger closes.
-    closing: Vec3,
+    /// Their middle on each pad, where it is loaded (m).
+    on_pads: [Option<Vec3>; 2],
 }
 
 impl Touch {
     /// None where nothing is touched.
     pub(super) fn of(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Option<Self> {
-        let pads = Side::BOTH.map(|side| LoadedPad::of(gripper, world_from_gripper, frame, side));
-        let force = pads[0].force + pads[1].force;
-        let middle = (pads[0].moment + pads[1].moment) / force;
-        let closing = world_from_gripper.direction(DVec3::X).as_vec3();
-        (force > 0.0).then_some(Self { pads, force, middle, closing })
+        let grid = gripper.taxels();
+        let mut sums = [(0.0, DVec3::ZERO); 2];
+        for side in Side::BOTH {
+            let placed = frame.placed(gripper, side);
+            let (force, moment) = &mut sums[side.index()];
+            for (taxel, load) in frame.loads(side, grid.count()) {
+                let (segment, along) = grid.place(taxel, &gripper.finger);
+                let normal = load.normal.max(0.0);
+                *force += normal;
+                *moment += placed.point(segment, along, grid.across(taxel), grid.height(taxel)) * f64::from(normal);
+            }
+        }
+        let place = |(force, moment): (f32, DVec3)| {
+            (force > 0.0).then(|| world_from_gripper.point(moment / f64::from(force)).as_vec3())
+        };
+        let both = (sums[0].0 + sums[1].0, sums[0].1 + sums[1].1);
+        Some(Self { force: both.0, middle: place(both)?, on_pads: sums.map(place) })
     }
 
     /// Force on an object (N) that a ball about this place holds; none where the fingers touch something else, such as each
@@ -65,74 +65,56 @@ impl Touch {
     }
 }
 
-/// A camera moved towards the middle of what the pads touch, for pictures of this width over height, of an object whose
-/// largest side is `extent` (m).
-pub(super) fn nearer(camera: Camera, touch: &Touch, extent: f32, aspect: f32) -> Camera {
-    let Touch { pads, force, middle, closing } = touch;
-    let tightness = (force / HALF_WAY).powf(1.5);
-    let share = tightness / (1.0 + tightness);
-    // One of the fingers is seen from behind, whichever is nearer.
-    let from_side = closing.y.atan2(closing.x) + ANGLES[0];
-    let turn = (from_side - camera.yaw + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
-    let [yaw, pitch] = [camera.yaw + turn, ANGLES[1]];
-    // What its pad shows of colour there decides how near.
-    let towards_eye = Camera { yaw, pitch, ..camera }.axes()[2];
-    let shown = pads.iter().map(|pad| pad.area_from_behind(towards_eye)).fold(0.0, f32::max);
-    let [usual, farthest] = SHARES.map(|share| (SPREAD * shown / (share * aspect)).sqrt());
-    let whole = usual.max(OF_OBJECT * extent * (WIDE / aspect).max(1.0)).clamp(HEIGHTS[0], HEIGHTS[1]);
-    let near = whole.min(farthest).max(OF_OBJECT * extent / aspect).clamp(HEIGHTS[0], HEIGHTS[1]);
-    // A light touch loads little of a pad: it is no reason to come nearer than the grip will.
-    let height = whole * (near / whole).powf(smoothstep(FIRM[0], FIRM[1], *force));
-    let nearest = height / (2.0 * (0.5 * camera.angle_of_view).tan());
-    let target = camera.target.lerp(*middle, share);
-    let distance = camera.distance * (nearest / camera.distance).powf(share);
-    // Not below the ground.
-    let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();
-    Camera {
-        target,
-        distance,
-        yaw: camera.yaw + share * turn,
-        pitch: (camera.pitch + share * (pitch - camera.pitch)).max(lowest),
-        ..camera
-    }
-}
-
-/// Load on a pad.
-struct LoadedPad {
-    /// Sum of the normal forces (N), and their moment about the origin of the world (N m).
-    force: f32,
-    moment: Vec3,
-    /// For each loaded taxel the area that is coloured (m²), and the direction out of the pad.
-    coloured: Vec<(f32, Vec3)>,
-}
-
-impl LoadedPad {
-    fn of(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, side: Side) -> Self {
-        let grid = gripper.taxels();
-        let placed = frame.placed(gripper, side);
-        let largest = frame.loads(side, grid.count()).map(|(_, load)| load.normal).fold(0.0, f32::max);
-        let mut pad = Self { force: 0.0, moment: Vec3::ZERO, coloured: Vec::new() };
-        for (taxel, load) in frame.loads(side, grid.count()) {
-            let (segment, along) = grid.place(taxel, &gripper.finger);
-            let normal = load.normal.max(0.0);
-            let at = placed.point(segment, along, grid.across(taxel), grid.height(taxel));
-            pad.force += normal;
-            pad.moment += world_from_gripper.point(at).as_vec3() * normal;
-            let coloured = smoothstep(COLOURED[0], COLOURED[1], normal / largest.max(f32::MIN_POSITIVE));
-            let outwards = world_from_gripper.direction(placed.axes(segment).z_axis).as_vec3();
-            pad.coloured.push((grid.area() as f32 * coloured, outwards));
-        }
-        pad
+impl Stage {
+    /// Camera of the touch in a frame; none where nothing is touched.
+    pub fn touch_camera(&self, frame: &Frame) -> Option<Camera> {
+        let touch = self.touch(frame).filter(|touch| touch.force >= FAINTEST)?;
+        let usual = Camera::default().turned_to(StandardView::Home);
+        let from_side = self.yaw_from_side(usual.yaw);
+        let yaw = usual.yaw + ANGLES[0].copysign(from_side) - from_side;
+        let near = touch.on_pads[self.near_side(&Camera { yaw, ..usual }).index()];
+        let target = touch.middle.lerp(near.unwrap_or(touch.middle), TOWARDS_PAD);
+        let height = (OF_OBJECT * self.object_extent).clamp(HEIGHTS[0], HEIGHTS[1]);
+        let distance = height / (2.0 * (0.5 * usual.angle_of_view).tan());
+        let lowest = ((ABOVE_GROUND - target.z) / distance).clamp(-1.0, 1.0).asin();
+        Some(Camera { target, distance, yaw, pitch: ANGLES[1].max(lowest), ..usual })
     }
 
-    /// Coloured area as seen through the back of the finger (m²).
-    fn area_from_behind(&self, towards_eye: Vec3) -> f32 {
-        self.coloured.iter().map(|(area, outwards)| area * (-outwards.dot(towards_eye)).max(0.0)).sum()
+    /// The finger that is nearer to the camera.
+    fn near_side(&self, camera: &Camera) -> Side {
+        let closing = self.world_from_gripper.direction(DVec3::X).as_vec3();
+        if camera.axes()[2].dot(closing) < 0.0 { Side::Left } else { Side::Right }
+    }
+
+    /// A picture of the touch: a finger whose back hides its loaded pad is translucent there.
+    pub fn draw_touch(&self, frame: &Frame, view: &PictureView) -> DrawList {
+        let mut list = self.draw(frame, &PictureView { inset: 0.0, ..view.clone() });
+        list.fingers.iter_mut().for_each(|finger| clear_the_view(finger, &view.camera));
+        list
+    }
+
+    /// The touch as a picture within a picture; none where nothing is touched.
+    pub(super) fn touch_inset(&self, frame: &Frame, view: &PictureView) -> Option<Inset> {
+        let place = self.inset_place(frame, view)?;
+        let (corner, size) = (place.middle - place.half, 2.0 * place.half);
+        let inner = PictureView {
+            camera: self.touch_camera(frame)?,
+            size,
+            forces: false,
+            annotations: false,
+            path: None,
+            badge: None,
+            ..view.clone()
+        };
+        let mut list = self.draw_touch(frame, &inner);
+        let near = self.near_side(&inner.camera);
+        super::annotations::frame_inset(&mut list.overlay, &inner, &format!("{} pad", near.name()));
+        Some(Inset { list, corner, size })
     }
 }
 
 /// Makes a finger translucent where its back hides its loaded pad from the camera.
-pub(super) fn clear_the_view(finger: &mut SoftFinger, camera: &Camera) {
+fn clear_the_view(finger: &mut SoftFinger, camera: &Camera) {
     let (rows, columns) = (finger.taxels.rows as usize, finger.taxels.columns as usize);
     let Some(length) = finger.frames.last().map(|frame| frame.arc).filter(|_| rows > 0 && columns > 0) else { return };
     let loads: Vec<f32> = finger
@@ -146,7 +128,7 @@ pub(super) fn clear_the_view(finger: &mut SoftFinger, camera: &Camera) {
     let arc = |row: usize| length * row as f32 / rows as f32;
     let stretch = [arc(first) - MARGINS[0], arc(last + 1) + MARGINS[1]];
     let middle = 0.5 * (arc(first) + arc(last + 1));
-    let near = |frame: &&palpate_geometry::drawing::FingerFrame| (frame.arc - middle).abs();
+    let near = |frame: &&FingerFrame| (frame.arc - middle).abs();
     let Some(frame) = finger.frames.iter().min_by(|a, b| near(a).total_cmp(&near(b))) else { return };
     let towards_eye: Vec3 =
         if camera.parallel { camera.axes()[2] } else { (camera.eye() - frame.position).normalize_or_zero() };

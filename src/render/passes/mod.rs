@@ -21,6 +21,7 @@ pub(crate) struct PassSetup<'a> {
 }
 
 /// Inputs of preparing a pass for one picture.
+#[derive(Clone, Copy)]
 pub(crate) struct Prepare<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
