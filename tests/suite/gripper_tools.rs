@@ -21,7 +21,7 @@ use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, Examine, FitTria
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardInfo, Store};
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, Detected, Format, Reading, Sensor, TimeSource};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::trial::{TrialHeader, TrialId};
 use serde_json::Value;
@@ -41,19 +41,28 @@ fn pairs<const N: usize>(dark: [RgbaImage; N], light: [RgbaImage; N]) -> impl It
     dark.into_iter().zip(light).map(|(dark, light)| [dark, light])
 }
 
-/// A sound gripper, its left finger bent and its pads pressed meanwhile.
+/// A sound gripper, its fingers bent and its pads pressed meanwhile.
 fn sound() -> Observations {
     let usb = UsbIdentity { vid: 0x2341, pid: 0x003e, serial: None };
     let (title, kind) = ("Arduino Due, native port".to_owned(), BoardKind { rank: 3, native: true });
     let port = PortInfo { path: PathBuf::from("/dev/ttyACM0"), title, usb: Some(usb), kind };
+    let (rate_hz, drift_ppm) = (50.0, Some(20.0));
+    let board = Board {
+        rate_hz: Some(rate_hz),
+        divider_ohm: vec![47e3, 47e3, 4.7e3, 4.7e3],
+        firmware: Some("1".to_owned()),
+        ..Board::default()
+    };
     let cadence =
-        Cadence { samples: 400, rate_hz: 50.0, printable_share: 1.0, drift_ppm: Some(20.0), ..Cadence::default() };
+        Cadence { samples: 400, bytes: 40_000, rate_hz, printable_share: 1.0, drift_ppm, ..Cadence::default() };
+    let why = "each number follows its name".to_owned();
+    let detected = Some(Detected { format: Format::Plotter, why, time: TimeSource::Device });
     let link = LinkStatus {
         state: LinkState::Listening,
         port: port.clone(),
         baud: Some(115_200),
-        board: Board { rate_hz: Some(50.0), firmware: Some("1".to_owned()), ..Board::default() },
-        detected: None,
+        board,
+        detected,
         cadence,
         saturation: vec![None; 4],
         adc_range: AdcRange::Fits,
@@ -62,10 +71,11 @@ fn sound() -> Observations {
         dropped: [0; 2],
     };
     let mut traces = ChannelTraces::default();
-    for k in 0..100_u8 {
-        let bend = 4.0 * f32::from(k);
-        let counts = [1400.0 + bend, 1500.0, 3.0 * bend, bend].map(Some).to_vec();
-        traces.add(&Reading { t_s: 0.0, arrived_s: 0.0, seq: None, counts, line_bar: None });
+    for k in 0..400_u16 {
+        let bend = 400.0 - (400.0 - 8.0 * f32::from(k % 100)).abs();
+        let counts = [1400.0 + bend, 1500.0 + bend, 3.0 * bend, bend].map(Some).to_vec();
+        let t_s = 0.02 * f64::from(k);
+        traces.add(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
     }
     Observations {
         ports: vec![port],
@@ -281,7 +291,7 @@ fn wiring_and_sketch_come_with_the_program() {
     crate::program::misused(at, &["doctor", "--sketch", "foo"], &["a folder named due_gripper"]);
     refused(at, &["doctor", "--sketch", "due_gripper"], &["due_gripper.ino", "nothing was written", "another folder"]);
     let [dark, light] = Theme::ALL.map(|theme| {
-        let setup = BenchSetup { size: [320.0, 680.0], ..BenchSetup::default() };
+        let setup = BenchSetup { size: [320.0, 720.0], ..BenchSetup::default() };
         let mut bench = bench("doctor", theme, setup);
         bench.harness.get_by_label("Wiring and firmware").click();
         bench.harness.run_steps(30);
@@ -463,4 +473,69 @@ fn trials_that_cannot_be_fitted_say_why() {
     bench.harness.get_by_label("Fit").click();
     bench.harness.step();
     bench.until_shown(true, "trial 1 has no curvature of either finger");
+}
+
+/// A captured file of 50 readings a second, in lines made of time, strips and pads: each finger is bent and pressed in turn.
+fn captured(line: impl Fn(u32, [u32; 4]) -> String) -> Vec<u8> {
+    let wave = |k: u32, from: u32| k.checked_sub(from).filter(|k| *k < 60).map_or(0, |k| 30 - k.abs_diff(30));
+    let counts = |k: u32| {
+        let [left, right] = [wave(k, 20), wave(k, 100)];
+        // Strips are never quite still.
+        [1300 + 20 * left + k % 3, 1150 + 18 * right + k % 3, 25 * wave(k, 200), 30 * wave(k, 270)]
+    };
+    (0..400).map(|k| line(k, counts(k)) + "\n").collect::<String>().into_bytes()
+}
+
+#[test]
+fn the_doctor_calls_sound_only_what_it_has_seen() {
+    let named = |[a, b, c, d]: [u32; 4]| format!("flexL:{a},flexR:{b},fsrL:{c},fsrR:{d}");
+    let timed = |k: u32, counts: [u32; 4]| format!("t_us:{},seq:{k},{}", k * 20_000, named(counts));
+    let mut seed = 1_u32;
+    let noise = (0..20_000).map(|_| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        seed.to_be_bytes()[0]
+    });
+    let cases: [(Vec<u8>, Option<(&str, &str)>); 9] = [
+        (captured(timed), None),
+        (noise.collect(), Some(("lines", "no line understood"))),
+        (Vec::new(), Some(("silence", "empty"))),
+        (captured(|_, [a, b, c, d]| format!("{a},{b},{c},{d},7")), Some(("sensors", "none of flexL"))),
+        (
+            captured(|_, [a, b, c, d]| format!("left_flex:{a},right_flex:{b},left_fsr:{c},right_fsr:{d}")),
+            Some(("sensors", "left_flex")),
+        ),
+        (captured(|k, [a, _, c, d]| timed(k, [a, 1433, c, d])), Some(("movement", "flexR stays at 1433"))),
+        // After each restart the board counts from the beginning.
+        (captured(|k, counts| timed(k % 100, counts)), Some(("restarts", "restarted 3 times"))),
+        (captured(|_, [a, b, ..]| format!("flexL:0x{a:x},flexR:0x{b:x}")), Some(("lines", "flexL:0x"))),
+        (
+            captured(|_, [a, b, c, d]| format!("{{\"flex\": [{a}, {b}], \"fsr\": [{c}, {d}]}}")),
+            Some(("lines", "nested")),
+        ),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (bytes, wrong) in cases {
+        std::fs::write(at.join("hand.bytes"), bytes).unwrap();
+        let ran = run(at, &["doctor", "hand.bytes"]);
+        assert_eq!(ran.code, Some(i32::from(wrong.is_some())), "{ran:?}");
+        assert_eq!(ran.out.contains("no faults found"), wrong.is_none(), "{ran:?}");
+        if let Some((check, words)) = wrong {
+            let line = ran.out.lines().find(|line| line.starts_with("FAILED")).unwrap();
+            assert!(line.contains(check) && line.contains(words), "{ran:?}");
+        }
+    }
+    // A hand that nobody moved: no fault, and not called sound.
+    std::fs::write(at.join("hand.bytes"), captured(|k, _| timed(k, [1300, 1150, 0, 0]))).unwrap();
+    let ran = run(at, &["doctor", "hand.bytes"]);
+    assert!(ran.out.contains("not checked movement") && !ran.out.contains("no faults found\n"), "{ran:?}");
+    // A beginning too short to tell.
+    let begun = captured(timed).into_iter().take(900).collect::<Vec<u8>>();
+    std::fs::write(at.join("hand.bytes"), begun).unwrap();
+    let ran = run(at, &["doctor", "hand.bytes", "--json"]);
+    let result: Value = serde_json::from_str(&ran.out).unwrap();
+    assert!(result["not_checked"].as_array().is_some_and(|names| names.len() > 2), "{ran:?}");
+    // A file of text that no board sends.
+    std::fs::write(at.join("hostname"), "vm\n").unwrap();
+    assert_eq!(run(at, &["doctor", "hostname"]).code, Some(1));
 }
