@@ -93,13 +93,18 @@ pub(super) fn add_triggers(connection: &Connection) -> rusqlite::Result<()> {
     ))
 }
 
+/// CRC-32 of bytes alone, as older versions stored it.
+pub(super) fn of_bytes<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    parts.into_iter().for_each(|bytes| hasher.update(bytes));
+    hasher.finalize()
+}
+
 /// Gives the rows of older versions checksums. Their blobs had a CRC-32 of their bytes alone, or none; a mismatch stays one.
 pub(super) fn add_to_old(connection: &Connection) -> rusqlite::Result<()> {
     let flags = FunctionFlags::SQLITE_UTF8 | FunctionFlags::SQLITE_DETERMINISTIC;
     connection.create_scalar_function("of_bytes", -1, flags, |context| {
-        let mut hasher = crc32fast::Hasher::new();
-        values(context).filter_map(|value| value.as_bytes().ok()).for_each(|bytes| hasher.update(bytes));
-        Ok(hasher.finalize())
+        Ok(of_bytes(values(context).filter_map(|value| value.as_bytes().ok())))
     })?;
     let set = |table: &str, checksum: &str, key: &str, columns: &str| {
         format!(

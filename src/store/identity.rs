@@ -64,7 +64,7 @@ pub(super) fn identify_old(transaction: &Transaction<'_>) -> rusqlite::Result<()
         let summed = chunks.query_map([id], |row| {
             let (length, stored, frames) =
                 (row.get::<_, i64>(0)?, row.get::<_, Option<u32>>(1)?, row.get::<_, Option<Vec<u8>>>(2)?);
-            let sum = frames.map_or_else(|| stored.unwrap_or_default(), |frames| crc32fast::hash(&frames));
+            let sum = frames.map_or_else(|| stored.unwrap_or_default(), |frames| super::checksum::of_bytes([&*frames]));
             Ok([length.to_le_bytes(), u64::from(sum).to_le_bytes()])
         })?;
         let sums: Vec<[[u8; 8]; 2]> = summed.collect::<Result<_, _>>()?;
