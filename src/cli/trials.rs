@@ -187,7 +187,7 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
                 if !merged.damaged.is_empty() {
                     let (other, damaged) = (other.display(), numbers(&merged.damaged));
                     warn(&format!(
-                        "{other}: trial {damaged} damaged, and left out; `palpate trials list --store {other}` shows them"
+                        "{other}: left out because damaged: trial {damaged}; `palpate trials list --store {other}` shows what to do"
                     ));
                 }
                 say(format!("{}: {added} trial(s) added, {known} already there", other.display()))?;

@@ -184,6 +184,8 @@ fn missing_and_exchanged_chunks_are_found() -> Outcome {
         Connection::open(&path)?.execute_batch(sql)?;
         let error = store.load(id).expect_err(sql);
         assert!(error.is_damage() && error.to_string().contains(text), "{sql}: {error}");
+        let listed = store.list(false)?.iter().any(|row| row.id == id && row.damaged);
+        assert_eq!(listed, !sql.starts_with("UPDATE"), "a list does not read the data: {sql}");
         let mut other = Store::open(&folder.path().join("other.sqlite"))?;
         let merged = other.merge_from(&path)?;
         assert_eq!((merged.added, merged.damaged), (2, vec![id]), "{sql}");
@@ -216,7 +218,8 @@ fn older_stores_get_checksums_that_hide_no_damage() -> Outcome {
          DELETE FROM chunks WHERE trial = 2 AND number = 1",
     )?;
     let mut store = Store::open(&path)?;
-    assert!(store.list(false)?.iter().all(|row| !row.damaged));
+    let damaged: Vec<bool> = store.list(false)?.iter().map(|row| row.damaged).collect();
+    assert_eq!(damaged, [false, false, false], "what was lost before was not counted");
     assert!(matches!(store.load(1), Err(StoreError::Checksum { chunk: 1, .. })));
     assert!(matches!(store.load(2), Err(StoreError::Incomplete { what: "frames", found: 75, wanted: 120, .. })));
     assert_eq!(store.board_log(3)?.map(|log| log.readings.len()), Some(2));

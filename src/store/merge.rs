@@ -71,7 +71,7 @@ const COPY_JOURNAL: &str = "
     WHERE theirs.uid NOT IN (SELECT uid FROM main.journal) ORDER BY theirs.number;
 ";
 
-/// Takes damaged trials out of those that are copied: those with these numbers, and those whose chunks are damaged or missing.
+/// Takes damaged trials out of those that are copied: those with these numbers, and those whose chunks are damaged.
 fn leave_out_damaged(transaction: &Transaction<'_>, rows: &[TrialId]) -> rusqlite::Result<Vec<TrialId>> {
     let of_chunks = [FRAMES, READINGS, BYTES].map(|kind| {
         let (table, intact) = (kind.table, kind.intact("theirs"));
@@ -81,9 +81,7 @@ fn leave_out_damaged(transaction: &Transaction<'_>, rows: &[TrialId]) -> rusqlit
         "CREATE TEMP TABLE damaged AS SELECT theirs.id FROM temp.incoming JOIN other.trials AS theirs ON theirs.id = incoming.id
          WHERE theirs.id IN (SELECT value FROM json_each('{}')) OR {}
          OR EXISTS (SELECT 1 FROM other.readings WHERE trial = theirs.id
-             AND checksum(theirs.uid, channels, readings.samples) IS NOT readings.checksum)
-         OR theirs.chunks <> (SELECT count(*) FROM other.chunks WHERE trial = theirs.id)
-             + (SELECT count(*) FROM other.board_chunks WHERE trial = theirs.id);
+             AND checksum(theirs.uid, channels, readings.samples) IS NOT readings.checksum);
          DELETE FROM temp.incoming WHERE id IN (SELECT id FROM temp.damaged);",
         json(rows),
         of_chunks.join(" OR ")

@@ -8,7 +8,7 @@ use crate::labels::{Flag, FlagRemark, flaws};
 use palpate_sim::frame::Quality;
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
 use palpate_tactile::trial::{GraspOrigin, TrialId, TrialSource, UnknownSource};
-use rusqlite::types::Type;
+use rusqlite::types::{Type, ValueRef};
 use rusqlite::{Params, Row};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -58,7 +58,7 @@ pub struct TrialRow {
     pub properties: Option<(String, String)>,
     /// Samples stored.
     pub samples: i64,
-    /// Its row cannot be read or does not match its checksum.
+    /// Its row cannot be read or does not match its checksum, or a part of its data is missing.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub damaged: bool,
     /// Whether it stayed finite and converged, and is not damaged.
@@ -110,7 +110,9 @@ const ROWS: &str =
         WHERE first.identity = trials.identity AND first.state = 'complete' AND first.deleted IS NULL
         AND first.id < trials.id) END,
     rig = 'serial' AND earlier IS NOT NULL, demo,
-    (rig <> 'serial' OR about IS NOT NULL AND checksum(uid, about) IS board_trials.checksum)";
+    (rig <> 'serial' OR about IS NOT NULL AND checksum(uid, about) IS board_trials.checksum)
+    AND trials.chunks = (SELECT count(*) FROM chunks WHERE chunks.trial = trials.id)
+        + (SELECT count(*) FROM board_chunks WHERE board_chunks.trial = trials.id)";
 
 /// Reads rows; presets are looked up once per text.
 #[derive(Default)]
@@ -145,7 +147,8 @@ impl RowReader {
         Ok(TrialRow {
             id: row.get(0)?,
             created: row.get(1)?,
-            local: row.get(17)?,
+            damaged: row.get_ref(17)? == ValueRef::Null,
+            local: row.get::<_, Option<String>>(17)?.unwrap_or_default(),
             state: row.get(2)?,
             source,
             seed: row.get::<_, i64>(5)?.cast_unsigned(),
@@ -168,7 +171,6 @@ impl RowReader {
             place: TrialPlace::of_column(row.get(25)?),
             pulled,
             deleted: row.get(9)?,
-            damaged: false,
             object,
         })
     }

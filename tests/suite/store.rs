@@ -203,7 +203,7 @@ fn a_damaged_trial_is_listed_as_such_and_holds_up_no_other() {
     assert_eq!(run(at, &["recognise", "2"]).code, Some(0));
     let merged = run(at, &["trials", "merge", "trials.sqlite", "--store", "all.sqlite"]);
     assert!(merged.out.contains("1 trial(s) added, 0 already there"), "{merged:?}");
-    assert!(merged.err.contains("trial 1 damaged, and left out"), "{merged:?}");
+    assert!(merged.err.contains("left out because damaged: trial 1;"), "{merged:?}");
     assert_eq!(run(at, &["trials", "delete", "1"]).code, Some(0));
     assert_eq!(run(at, &["trials", "list"]).out.lines().count(), 2);
 }
