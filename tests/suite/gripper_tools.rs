@@ -497,7 +497,7 @@ fn the_doctor_calls_sound_only_what_it_has_seen() {
     });
     let cases: [(Vec<u8>, Option<(&str, &str)>); 9] = [
         (captured(timed), None),
-        (noise.collect(), Some(("lines", "no line understood"))),
+        (noise.collect(), Some(("lines", "none of"))),
         (Vec::new(), Some(("silence", "empty"))),
         (captured(|_, [a, b, c, d]| format!("{a},{b},{c},{d},7")), Some(("sensors", "none of flexL"))),
         (
@@ -521,8 +521,8 @@ fn the_doctor_calls_sound_only_what_it_has_seen() {
         assert_eq!(ran.code, Some(i32::from(wrong.is_some())), "{ran:?}");
         assert_eq!(ran.out.contains("no faults found"), wrong.is_none(), "{ran:?}");
         if let Some((check, words)) = wrong {
-            let line = ran.out.lines().find(|line| line.starts_with("FAILED")).unwrap();
-            assert!(line.contains(check) && line.contains(words), "{ran:?}");
+            let failed = |line: &str| line.starts_with("FAILED") && line.contains(check) && line.contains(words);
+            assert!(ran.out.lines().any(failed), "{ran:?}");
         }
     }
     // A hand that nobody moved: no fault, and not called sound.

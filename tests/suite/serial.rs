@@ -62,6 +62,12 @@ impl Board {
                 count.store(i, Ordering::Relaxed);
                 if let Ok(n) = board.read(&mut buffer) {
                     result.extend_from_slice(&buffer[..n]);
+                    // It acknowledges each command for the fingers.
+                    let lines = buffer[..n].split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
+                    for command in lines.filter(|line| line.starts_with('P') || *line == "V") {
+                        let bar: f64 = command[1..].trim().parse().unwrap_or(0.0);
+                        let _unheard = board.write_all(format!("# ok p={bar:.2}\n").as_bytes());
+                    }
                 }
                 let due = start + Duration::from_millis(10) * (i - first);
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));

@@ -1,7 +1,7 @@
 //! Checks of the connection: port, line, firmware and clock of the board.
 
 use super::Observations;
-use super::checks::{Outcome, either, link, readings};
+use super::outcome::{Outcome, either, link, readings};
 use crate::protocol::LineKind;
 use crate::serial::{LinkState, LinkStatus, MODEM_MANAGER_COMMAND, PortTrouble};
 use palpate_geometry::units::three_digits;

@@ -8,6 +8,7 @@ mod checks;
 mod connection;
 mod crosstalk;
 mod examine;
+mod outcome;
 mod sensors;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Checks of the sensors: converter, wiring, movement and crosstalk.
 
-use super::checks::{Outcome, either, readings};
+use super::outcome::{Outcome, either, readings};
 use super::{ChannelTrace, Observations};
 use crate::protocol::{AdcRange, Saturation};
 use crate::serial::LinkStatus;
@@ -227,8 +227,8 @@ pub(super) fn movement(seen: &Observations) -> Outcome {
                 "Compare the sketch's pin with the wiring, and measure the pin while the finger is bent",
             );
         }
-        let strips = named(link, |channel, sensor| sensor.is_flex() && trace(channel).numbers > 0);
-        let still = named(link, |channel, sensor| sensor.is_flex() && !trace(channel).moves());
+        let strips = named(link, |channel, s| s.is_flex() && shows(channel, s) && trace(channel).numbers > 0);
+        let still = named(link, |channel, s| s.is_flex() && shows(channel, s) && !trace(channel).moves());
         let range = traces(seen, link, true).into_iter().map(|trace| format!("{:.0}", trace.range()));
         let range = range.collect::<Vec<_>>().join(" and ");
         if still.is_empty() && !strips.is_empty() {
