@@ -314,10 +314,12 @@ fn the_library_marks_the_demo_log_and_keeps_the_selection() {
     bench.until_shown(true, "Trial 2, Tomato");
     assert!(bench.harness.query_by_label("Trial 1, Lemon").is_some(), "both are listed");
     bench.harness.get_by_label("demo log 1").click();
+    bench.harness.step();
     bench.until_shown(false, "Trial 1, Lemon");
     bench.harness.get_by_label("Trial 2, Tomato").click();
     bench.harness.run_steps(3);
     bench.harness.get_by_label("Keep").click();
+    bench.harness.step();
     bench.until_told("1 trial kept in the store");
     bench.until_shown(false, "Trial 2, Tomato");
     assert!(bench.store().list(false).unwrap().iter().all(|row| row.place == TrialPlace::Store));
