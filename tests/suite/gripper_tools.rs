@@ -495,7 +495,7 @@ fn the_doctor_calls_sound_only_what_it_has_seen() {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         seed.to_be_bytes()[0]
     });
-    let cases: [(Vec<u8>, Option<(&str, &str)>); 9] = [
+    let cases = [
         (captured(timed), None),
         (noise.collect(), Some(("lines", "none of"))),
         (Vec::new(), Some(("silence", "empty"))),
