@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 use crate::program::{Ran, palpate, ran, refused, run};
-use crate::serial::start;
+use crate::serial::{HANG, finished, start};
 use palpate_store::Store;
 use palpate_tactile::calibration::{Curve, Readout};
 use palpate_tactile::trial::TrialData;
@@ -30,7 +30,7 @@ impl Emulator {
         let child = start(command);
         let began = Instant::now();
         while std::fs::symlink_metadata(&port).is_err() {
-            assert!(began.elapsed() < Duration::from_secs(20), "no link appeared");
+            assert!(began.elapsed() < HANG, "no link appeared");
             std::thread::sleep(Duration::from_millis(10));
         }
         Self { child, port }
@@ -44,20 +44,14 @@ impl Drop for Emulator {
     }
 }
 
-/// Runs a command on a fresh emulator; again where the machine was too busy for its board to answer in time, upon which the
-/// fingers are vented, as they should be.
+/// Runs a command on a fresh emulator.
 fn on_emulator(folder: &Path, emulate: &[&str], arguments: &[&str]) -> (Emulator, Ran) {
-    for _ in 0..10 {
+    finished(|| {
         let emulator = Emulator::start(folder, emulate);
         let mut command = palpate(&folder.join("trials.sqlite"));
         command.args(arguments).arg("--port").arg(&emulator.port);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let ran = ran(&start(command).wait_with_output().unwrap());
-        if !["did not acknowledge", "no readable line came"].iter().any(|text| ran.err.contains(text)) {
-            return (emulator, ran);
-        }
-    }
-    panic!("the machine is too busy for the board of an emulator");
+        (emulator, command)
+    })
 }
 
 fn adapted(folder: &Path, emulate: &[&str]) -> (Emulator, Value) {
@@ -67,10 +61,11 @@ fn adapted(folder: &Path, emulate: &[&str]) -> (Emulator, Value) {
 }
 
 fn json_at_port(folder: &Path, arguments: &[&str], port: &Path) -> Value {
-    let mut command = palpate(&folder.join("trials.sqlite"));
-    command.args(arguments).arg("--json").arg("--port").arg(port);
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let ran = ran(&start(command).wait_with_output().unwrap());
+    let (_, ran) = finished(|| {
+        let mut command = palpate(&folder.join("trials.sqlite"));
+        command.args(arguments).arg("--json").arg("--port").arg(port);
+        ((), command)
+    });
     assert_eq!(ran.code, Some(0), "{ran:?}");
     serde_json::from_str(&ran.out).unwrap()
 }

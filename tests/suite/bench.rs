@@ -136,7 +136,7 @@ impl Bench {
                 self.harness.step();
                 return snapshot;
             }
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the simulation is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the simulation is alive");
         }
     }
 
@@ -152,7 +152,7 @@ impl Bench {
     /// Draws until the effects of the scene at hand have been measured.
     pub(crate) fn until_effects_are_measured(&mut self) {
         while self.harness.query_by_label_contains("of CPU time").is_none() {
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the measurement is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the measurement is alive");
             self.harness.step();
         }
     }
@@ -181,7 +181,7 @@ impl Bench {
 
     /// Waits until something has happened, and draws.
     pub(crate) fn wait(&mut self) {
-        self.woken.recv_timeout(Duration::from_secs(60)).expect("something goes on");
+        self.woken.recv_timeout(Duration::from_secs(600)).expect("something goes on");
         self.harness.step();
     }
 

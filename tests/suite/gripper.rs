@@ -115,7 +115,7 @@ impl Desk {
             if let Some(view) = self.worker.view().filter(|view| wanted(view)) {
                 return view;
             }
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
         }
         panic!(
             "never so: {:?}, {:?}",
@@ -130,7 +130,7 @@ impl Desk {
             if self.notices.iter().any(|notice| format!("{notice:?}").contains(text)) {
                 return;
             }
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
         }
         panic!("never said: {text}; {:?}", self.notices)
     }

@@ -9,6 +9,7 @@ use palpate_lab::gripper::BoardStream;
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// How a link stands that listens.
@@ -110,6 +111,8 @@ pub(crate) struct Emulated {
     t_s: f64,
     /// How long a look takes in truth.
     look: Duration,
+    /// What its board has printed, before any fault.
+    printed: Arc<Mutex<String>>,
 }
 
 /// Time that passes with each look (s).
@@ -118,7 +121,12 @@ const LOOK_S: f64 = 0.01;
 impl Emulated {
     pub(crate) fn new(setup: EmulatorSetup, look: Duration) -> Self {
         let gripper = EmulatedGripper::new(setup).unwrap();
-        Self { gripper, decoder: Decoder::default(), t_s: 0.0, look }
+        Self { gripper, decoder: Decoder::default(), t_s: 0.0, look, printed: Arc::default() }
+    }
+
+    /// What its board prints, before any fault.
+    pub(crate) fn printed(&self) -> Arc<Mutex<String>> {
+        Arc::clone(&self.printed)
     }
 
     /// Lets a fault begin now: `NAME[=VALUE]`, and how long it lasts (s).
@@ -134,6 +142,7 @@ impl BoardStream for Emulated {
         std::thread::sleep(self.look);
         self.t_s += LOOK_S;
         self.gripper.advance(self.t_s);
+        self.printed.lock().unwrap().push_str(&self.gripper.take_printed());
         let (bytes, mut decoded) = (self.gripper.take_bytes(), Vec::new());
         if bytes.is_empty() {
             return Vec::new();

@@ -112,7 +112,7 @@ fn until(trainer: &Trainer, woken: &Receiver<()>, wanted: impl Fn(&TrainerView) 
         if let Some(view) = trainer.view().filter(|view| wanted(view)) {
             return view;
         }
-        woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+        woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
     }
 }
 

@@ -14,8 +14,8 @@ use palpate_tactile::trial::{Control, PhaseMark};
 
 /// Readings from before the start that belong to the trial (s).
 pub(super) const BEFORE_S: f64 = 0.3;
-/// A board that is silent at the end is not waited for longer than this (s).
-const LATE_S: f64 = 1.0;
+/// A board that is silent at the end is not waited for longer than this (s): a busy computer hears it that late.
+const LATE_S: f64 = 5.0;
 
 /// Request of a trial.
 #[derive(Clone, Debug, PartialEq)]

@@ -147,7 +147,7 @@ pub(super) mod watch {
             if let Some(view) = job.view().filter(|view| wanted(view)) {
                 return view;
             }
-            woken.recv_timeout(Duration::from_secs(60)).expect("the thread is alive");
+            woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
         }
     }
 }
@@ -176,7 +176,7 @@ mod tests {
         assert!(!job.is_settled());
         job.give_up();
         while !job.is_settled() {
-            woken.recv_timeout(std::time::Duration::from_secs(60)).expect("the thread is alive");
+            woken.recv_timeout(std::time::Duration::from_secs(600)).expect("the thread is alive");
         }
         job.ask(7);
         until(&job, &woken, |n| *n == 7);

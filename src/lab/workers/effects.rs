@@ -199,7 +199,7 @@ mod tests {
 
     fn measured(worker: &EffectsWorker, woken: &Receiver<()>, scene: &Scene) -> Arc<Explanation> {
         loop {
-            woken.recv_timeout(Duration::from_secs(60)).expect("something happens");
+            woken.recv_timeout(Duration::from_secs(600)).expect("something happens");
             let view = worker.view().expect("published");
             match &view.state {
                 EffectsState::Ready(explanation) if *view.scene == *scene => return Arc::clone(explanation),
@@ -229,7 +229,7 @@ mod tests {
         "/nowhere/at/all.obj".clone_into(&mut scene.object.source);
         worker.ask(&scene);
         let cause = loop {
-            woken.recv_timeout(Duration::from_secs(60)).expect("something happens");
+            woken.recv_timeout(Duration::from_secs(600)).expect("something happens");
             if let Some(EffectsState::Failed(cause)) = worker.view().map(|view| view.state.clone()) {
                 break cause;
             }
@@ -243,7 +243,7 @@ mod tests {
         let mut scene = empty_hand(1.0);
         scene.timing.duration_s = 3600.0;
         worker.ask(&scene);
-        woken.recv_timeout(Duration::from_secs(60)).expect("it has begun");
+        woken.recv_timeout(Duration::from_secs(600)).expect("it has begun");
         drop(worker);
     }
 }

@@ -119,7 +119,7 @@ mod tests {
         explainer.ask(ExplainRequest { grasp: other, trial: None });
         explainer.give_up();
         while !explainer.is_settled() {
-            woken.recv_timeout(std::time::Duration::from_secs(60)).expect("the thread is alive");
+            woken.recv_timeout(std::time::Duration::from_secs(600)).expect("the thread is alive");
         }
         let shown = explainer.view().unwrap();
         assert!(Arc::ptr_eq(&shown.request.grasp, &asked) || shown.request.grasp.hold_s == Some(1.0));

@@ -105,7 +105,7 @@ mod tests {
         let mut long = empty_hand();
         long.timing.duration_s = 3000.0;
         job.ask(long);
-        woken.recv_timeout(Duration::from_secs(60)).expect("it has begun");
+        woken.recv_timeout(Duration::from_secs(600)).expect("it has begun");
         job.give_up();
         until(&job, &woken, |view| matches!(view.state, SceneAccuracyState::Stopped));
     }

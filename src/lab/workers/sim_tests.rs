@@ -59,7 +59,7 @@ impl Watched {
             if let Some(refusal) = refused {
                 return refusal;
             }
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the worker is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the worker is alive");
         }
     }
 
@@ -69,7 +69,7 @@ impl Watched {
             if let Some(snapshot) = self.worker.snapshot().filter(|s| wanted(s)) {
                 return snapshot;
             }
-            self.woken.recv_timeout(Duration::from_secs(60)).expect("the worker is alive");
+            self.woken.recv_timeout(Duration::from_secs(600)).expect("the worker is alive");
         }
     }
 }
@@ -235,7 +235,7 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     let before = loop {
         match watched.worker.accuracy() {
             Some(measured) => break measured,
-            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the accuracy job runs"),
+            None => watched.woken.recv_timeout(Duration::from_secs(600)).expect("the accuracy job runs"),
         }
     };
     assert_eq!(before.scene, ball());
@@ -245,7 +245,7 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     let after = loop {
         match watched.worker.accuracy().filter(|measured| measured.scene == finer) {
             Some(measured) => break measured,
-            None => watched.woken.recv_timeout(Duration::from_secs(60)).expect("the accuracy job runs"),
+            None => watched.woken.recv_timeout(Duration::from_secs(600)).expect("the accuracy job runs"),
         }
     };
     assert!(after.cost.error.curvature_per_m < 0.5 * before.cost.error.curvature_per_m);
