@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 use crate::program::{Ran, palpate, ran, refused, run};
-use crate::serial::{HANG, finished, start};
+use crate::serial::{HANG, TOO_BUSY, finished, start};
 use palpate_store::Store;
 use palpate_tactile::calibration::{Curve, Readout};
 use palpate_tactile::trial::TrialData;
@@ -46,7 +46,7 @@ impl Drop for Emulator {
 
 /// Runs a command on a fresh emulator.
 fn on_emulator(folder: &Path, emulate: &[&str], arguments: &[&str]) -> (Emulator, Ran) {
-    finished(|| {
+    finished(&TOO_BUSY, || {
         let emulator = Emulator::start(folder, emulate);
         let mut command = palpate(&folder.join("trials.sqlite"));
         command.args(arguments).arg("--port").arg(&emulator.port);
@@ -61,7 +61,7 @@ fn adapted(folder: &Path, emulate: &[&str]) -> (Emulator, Value) {
 }
 
 fn json_at_port(folder: &Path, arguments: &[&str], port: &Path) -> Value {
-    let (_, ran) = finished(|| {
+    let (_, ran) = finished(&TOO_BUSY, || {
         let mut command = palpate(&folder.join("trials.sqlite"));
         command.args(arguments).arg("--json").arg("--port").arg(port);
         ((), command)

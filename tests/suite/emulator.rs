@@ -7,7 +7,7 @@
 use crate::calibration::{capture, parts};
 use crate::gripper::scene;
 use crate::program::{palpate, ran, refused};
-use crate::serial::{HANG, finished, interrupt, start};
+use crate::serial::{HANG, TOO_BUSY, finished, interrupt, start};
 use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, parse_faults};
 use palpate_device::protocol::DecodedEvent;
@@ -322,7 +322,7 @@ fn a_thousand_samples_a_second_on_eight_channels_are_all_recorded() {
 fn a_host_drives_the_fingers_through_a_programme() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path().join("trials.sqlite");
-    let (emulated, ran) = finished(|| {
+    let (emulated, ran) = finished(&TOO_BUSY, || {
         // An earlier one was killed.
         let _old = [&store, &folder.path().join("port")].map(std::fs::remove_file);
         let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--without", "hysteresis,drift"]);
@@ -347,10 +347,14 @@ fn a_host_drives_the_fingers_through_a_programme() {
 #[test]
 fn a_command_that_drives_a_silent_board_vents_it_and_fails() {
     let folder = tempfile::tempdir().unwrap();
-    let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--faults", "silent@3/60"]);
-    let mut command = palpate(&folder.path().join("trials.sqlite"));
-    command.args(["record", "--drive", "--port"]).arg(emulated.port()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let ran = ran(&start(command).wait_with_output().unwrap());
+    let (emulated, ran) = finished(&TOO_BUSY[..2], || {
+        // An earlier one was killed.
+        let _old = std::fs::remove_file(folder.path().join("port"));
+        let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--faults", "silent@3/60"]);
+        let mut command = palpate(&folder.path().join("trials.sqlite"));
+        command.args(["record", "--drive", "--port"]).arg(emulated.port());
+        (emulated, command)
+    });
     assert!(ran.code == Some(1) && ran.err.contains("no readable line came from the board for 0."), "{ran:?}");
     assert!(ran.err.contains("palpate doctor") && ran.out.contains("flagged"), "{ran:?}");
     let bars = std::fs::read_to_string(folder.path().join("sent.txt")).unwrap();

@@ -123,14 +123,17 @@ pub(crate) fn interrupt(child: &Child) {
     assert!(sent.success());
 }
 
-/// Runs a command that drives a board to its end. Again where the machine was too busy for the board to answer in time, upon
-/// which the fingers are vented, as they should be.
-pub(crate) fn finished<B>(mut begin: impl FnMut() -> (B, Command)) -> (B, Ran) {
+/// What ends a driven grasp where the machine is too busy for board and host to hear each other in time: the fingers are
+/// vented, as they should be.
+pub(crate) const TOO_BUSY: [&str; 3] = ["did not acknowledge", "vented on its own", "no readable line came"];
+
+/// Runs a command that drives a board to its end, and again where it ended by one of these causes.
+pub(crate) fn finished<B>(too_busy: &[&str], mut begin: impl FnMut() -> (B, Command)) -> (B, Ran) {
     for _ in 0..10 {
         let (board, mut command) = begin();
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let ran = ran(&start(command).wait_with_output().unwrap());
-        if !["did not acknowledge", "no readable line came"].iter().any(|text| ran.err.contains(text)) {
+        if !too_busy.iter().any(|cause| ran.err.contains(cause)) {
             return (board, ran);
         }
     }
@@ -316,7 +319,7 @@ fn a_driven_grasp_tells_the_board_each_pressure_and_vents() {
     std::fs::write(&scene, programme).unwrap();
     let scene = scene.to_string_lossy().into_owned();
     let store = folder.path().join("trials.sqlite");
-    let (board, ran) = finished(|| {
+    let (board, ran) = finished(&TOO_BUSY, || {
         let _old = std::fs::remove_file(&store);
         (Board::plug_in(&port, 0), record(folder.path(), &port, &["--drive", "--scene", &scene]))
     });
