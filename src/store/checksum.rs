@@ -4,9 +4,9 @@
 //! it by the function `checksum`. Triggers of each connection keep the checksum of a row of `trials`: a change carries a
 //! mismatch on, so that an edit does not hide damage.
 
-use rusqlite::Connection;
 use rusqlite::functions::{Context, FunctionFlags};
 use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Row};
 
 /// Columns of `trials` whose change would falsify a trial. The number differs between stores, and `deleted`, `demo` and
 /// `reviewed` say nothing of the grasp.
@@ -40,10 +40,25 @@ impl Chunks {
     }
 }
 
-/// SQL of the checksum of a row of `trials`, under the name that the row has in the statement.
-pub(super) fn of_trial(row: &str) -> String {
+/// SQL of the columns that a row's checksum covers, under the name that the row has in the statement.
+pub(super) fn columns(row: &str) -> String {
     let columns: Vec<String> = COLUMNS.split_whitespace().map(|column| format!("{row}.{column}")).collect();
-    format!("checksum({})", columns.join(", "))
+    columns.join(", ")
+}
+
+/// The checksum of a row whose last columns are [`columns`]. For lists: SQLite reads each use of a long column anew.
+pub(super) fn of_row(row: &Row<'_>) -> rusqlite::Result<u32> {
+    let count = row.as_ref().column_count();
+    let mut hasher = crc32fast::Hasher::new();
+    for index in count - COLUMNS.split_whitespace().count()..count {
+        add(&mut hasher, row.get_ref(index)?);
+    }
+    Ok(hasher.finalize())
+}
+
+/// SQL of the checksum of a row of `trials`.
+fn of_trial(row: &str) -> String {
+    format!("checksum({})", columns(row))
 }
 
 /// SQL that is true for an intact row of `trials`.

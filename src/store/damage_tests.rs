@@ -203,7 +203,7 @@ fn version_14(path: &std::path::Path) -> Result<Connection, Box<dyn std::error::
     old.execute_batch(
         "UPDATE chunks SET checksum = crc(frames); UPDATE board_chunks SET checksum = crc(CAST(readings || gaps AS BLOB)),
              bytes_checksum = crc(bytes);
-         ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
+         DROP INDEX chunks_by_trial; DROP INDEX board_chunks_by_trial; ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
          ALTER TABLE board_trials DROP COLUMN checksum; PRAGMA user_version = 14;",
     )?;
     Ok(old)

@@ -277,7 +277,7 @@ fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
     drop(store);
     rusqlite::Connection::open(&path)?.execute_batch(
         "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
-         ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
+         DROP INDEX chunks_by_trial; DROP INDEX board_chunks_by_trial; ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
          ALTER TABLE board_trials DROP COLUMN checksum; ALTER TABLE chunks DROP COLUMN checksum; ALTER TABLE readings DROP COLUMN checksum;
          ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
          ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;

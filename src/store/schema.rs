@@ -168,8 +168,10 @@ pub(super) const MIGRATIONS: [&str; 15] = [
     // 1 for a trial of the demo log; see the module `demo_log`.
     "ALTER TABLE trials ADD COLUMN demo INTEGER NOT NULL DEFAULT 0;
      CREATE INDEX trials_of_demo_log ON trials (demo) WHERE demo = 1;",
-    // The module `checksum` fills them in for older trials.
-    "ALTER TABLE trials ADD COLUMN chunks INTEGER NOT NULL DEFAULT 0;
+    // The module `checksum` fills them in for older trials. The indexes count chunks without reading their blobs.
+    "CREATE INDEX chunks_by_trial ON chunks (trial, number);
+     CREATE INDEX board_chunks_by_trial ON board_chunks (trial, number);
+     ALTER TABLE trials ADD COLUMN chunks INTEGER NOT NULL DEFAULT 0;
      ALTER TABLE trials ADD COLUMN checksum INTEGER;
      ALTER TABLE board_trials ADD COLUMN checksum INTEGER;",
 ];

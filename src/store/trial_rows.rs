@@ -1,6 +1,6 @@
 //! The list of trials: what is known of each without its data. A damaged row is listed as such, with what can be read of it.
 
-use super::checksum::is_intact;
+use super::checksum::{columns, of_row};
 use super::demo_log::TrialPlace;
 use super::store::Store;
 use super::store_error::StoreError;
@@ -93,12 +93,12 @@ impl TrialRow {
     }
 }
 
-/// Columns that [`RowReader`] reads, followed by whether the row is intact. Sensors: the parts of a board, else its channels; or the imported channels.
+/// Columns that [`RowReader`] reads, followed by those that the checksum covers. Sensors: the parts of a board, else its channels; or the imported channels.
 const ROWS: &str =
     "SELECT id, created, state, rig, object, seed, samples, quality, warnings, deleted, collection, size,
     shape, note, tags, unsure, CASE WHEN json_valid(about) THEN about ->> '$.flags' END,
     strftime('%Y-%m-%dT%H:%M', created, 'localtime'),
-    CASE rig WHEN 'sim' THEN substr(scene, instr(scene, '[pose]'), 400) END,
+    trials.checksum,
     CASE rig
         WHEN 'serial' THEN coalesce((SELECT group_concat(part, ' ') FROM parts WHERE parts.trial = trials.id),
             CASE WHEN json_valid(about) THEN about ->> '$.board.channels' END)
@@ -111,8 +111,9 @@ const ROWS: &str =
         AND first.id < trials.id) END,
     rig = 'serial' AND earlier IS NOT NULL, demo,
     (rig <> 'serial' OR about IS NOT NULL AND checksum(uid, about) IS board_trials.checksum)
-    AND trials.chunks = (SELECT count(*) FROM chunks WHERE chunks.trial = trials.id)
-        + (SELECT count(*) FROM board_chunks WHERE board_chunks.trial = trials.id)";
+    AND trials.chunks = (SELECT count(*) FROM chunks INDEXED BY chunks_by_trial WHERE chunks.trial = trials.id)
+        + (SELECT count(*) FROM board_chunks INDEXED BY board_chunks_by_trial
+            WHERE board_chunks.trial = trials.id)";
 
 /// Reads rows; presets are looked up once per text.
 #[derive(Default)]
@@ -124,7 +125,8 @@ impl RowReader {
     /// A row of [`ROWS`].
     fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<TrialRow> {
         let read = self.read_intact(row).or_else(|_damage| TrialRow::unreadable(row))?;
-        let damaged = read.damaged || !row.get::<_, bool>(26)?;
+        let matches = row.get_ref(18)? == ValueRef::Integer(of_row(row)?.into());
+        let damaged = read.damaged || !matches || !row.get::<_, bool>(26)?;
         Ok(TrialRow { damaged, sound: read.sound && !damaged, ..read })
     }
 
@@ -153,7 +155,7 @@ impl RowReader {
             source,
             seed: row.get::<_, i64>(5)?.cast_unsigned(),
             collection: row.get(10)?,
-            preset: row.get::<_, Option<String>>(18)?.and_then(|text| self.preset(&text)),
+            preset: if source == TrialSource::Simulated { self.preset(row.get_ref("scene")?.as_str()?) } else { None },
             sensors: sensors(row.get::<_, Option<String>>(19)?.unwrap_or_default()),
             properties: row.get::<_, Option<String>>(11)?.zip(row.get(12)?),
             samples: row.get(6)?,
@@ -175,8 +177,9 @@ impl RowReader {
         })
     }
 
-    /// Preset of a scene, from the text of its table of poses.
-    fn preset(&mut self, text: &str) -> Option<&'static str> {
+    /// Preset of a scene, from its table of poses.
+    fn preset(&mut self, scene: &str) -> Option<&'static str> {
+        let text = scene.find("[pose]").map_or(scene, |begin| &scene[begin..]);
         let table = text.find("\n[").map_or(text, |end| &text[..end]);
         if let Some(known) = self.presets.get(table) {
             return *known;
@@ -209,9 +212,9 @@ impl Store {
     /// Rows that a condition in SQL chooses.
     pub(super) fn rows(&self, condition: &str, values: impl Params) -> Result<Vec<TrialRow>, StoreError> {
         let mut reader = RowReader::default();
-        let intact = is_intact();
+        let columns = columns("trials");
         let sql = format!(
-            "{ROWS} AND {intact} FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id {condition}"
+            "{ROWS}, {columns} FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id {condition}"
         );
         let rows = self
             .connection
