@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
         Some(path) => Scene::named_or_from_file(path)?,
         None => Scene::default(),
     };
-    let store = open_store(store)?;
+    let mut store = open_store(store)?;
     let mut weights = [None; 2];
     if let Some(kg) = arguments.weight {
         for (weight, sensor) in weights.iter_mut().zip([Sensor::PadLeft, Sensor::PadRight]) {
@@ -95,11 +95,13 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
             *weight = Some(KnownWeight { force: point.stimulus, counts: point.counts });
         }
     }
-    let trial = match arguments.trial {
-        Some(trial) => trial,
-        None => close_empty(arguments, &scene, store.path())?,
+    let (trial, adaptation) = match arguments.trial {
+        Some(id) => (id, Adaptation::from_trial(&store, id, &scene, weights, arguments.replace)?),
+        None => {
+            let id = close_empty(arguments, &scene, store.path())?;
+            (id, Adaptation::from_close(&mut store, id, &scene, weights, arguments.replace)?)
+        }
     };
-    let adaptation = Adaptation::from_trial(&store, trial, &scene, weights, arguments.replace)?;
     if !arguments.dry_run {
         adaptation.keep(&store)?;
     }

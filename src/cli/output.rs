@@ -39,10 +39,15 @@ pub(super) fn trials_target() -> impl TypedValueParser<Value = PathBuf> {
 
 const UNKNOWN: &str = "no format has this ending; ";
 
-/// Refuses a name with an ending that none of the kinds has. A folder's name has none, unless the folder exists.
+/// Refuses a name with an ending that none of the kinds has. A folder's name has none, unless the folder exists, or nothing but
+/// a folder can be meant: then only the ending of a known kind is refused.
 fn checked(path: PathBuf, kinds: &[FileKind], folder: bool) -> Result<PathBuf, String> {
-    if FileKind::of(&path, kinds).is_some() || (folder && names_folder(&path)) {
+    let is_folder = || names_folder(&path) || (kinds.is_empty() && FileKind::of(&path, &FileKind::ALL).is_none());
+    if FileKind::of(&path, kinds).is_some() || (folder && is_folder()) {
         return Ok(path);
+    }
+    if kinds.is_empty() {
+        return Err("it is the name of a file; choose that of a folder".to_owned());
     }
     let mut choices: Vec<String> =
         kinds.iter().flat_map(|kind| kind.endings()).map(|ending| format!(".{ending}")).collect();

@@ -56,6 +56,24 @@ enum Refusal {
 const HEAD: u64 = 4096;
 
 impl FileKind {
+    /// All kinds.
+    pub const ALL: [Self; 14] = [
+        Self::Apng,
+        Self::BoardLines,
+        Self::Capture,
+        Self::Contacts,
+        Self::Csv,
+        Self::Gif,
+        Self::Json,
+        Self::Mcap,
+        Self::Model,
+        Self::Npz,
+        Self::Parquet,
+        Self::Png,
+        Self::Scene,
+        Self::Svg,
+    ];
+
     /// Endings of its names, without the dot.
     pub fn endings(self) -> &'static [&'static str] {
         match self {
@@ -185,23 +203,6 @@ fn head(path: &Path, length: u64) -> io::Result<Vec<u8>> {
 mod tests {
     use super::*;
 
-    const ALL: [FileKind; 14] = [
-        FileKind::Apng,
-        FileKind::BoardLines,
-        FileKind::Capture,
-        FileKind::Contacts,
-        FileKind::Csv,
-        FileKind::Gif,
-        FileKind::Json,
-        FileKind::Mcap,
-        FileKind::Model,
-        FileKind::Npz,
-        FileKind::Parquet,
-        FileKind::Png,
-        FileKind::Scene,
-        FileKind::Svg,
-    ];
-
     #[test]
     fn stores_and_what_belongs_to_them_are_never_a_target() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
@@ -211,7 +212,7 @@ mod tests {
         std::fs::write(at("fresh.json-wal"), "pages")?;
         #[cfg(unix)]
         std::os::unix::fs::symlink("own.csv", at("link.csv"))?;
-        for kind in ALL {
+        for kind in FileKind::ALL {
             let message = |name: &str| check_target(&at(name), kind).err().map(|error| error.to_string());
             assert!(message("own.csv").is_some_and(|text| text.contains("is a store")), "{kind:?}");
             assert!(message("fresh.json").is_some_and(|text| text.contains("is a store")), "{kind:?}");
@@ -246,13 +247,16 @@ mod tests {
         let foreign: [&[u8]; 3] = [b"dear diary", b"\x40\0\0\0\0\0\0\0{\"a\":{\"dtype\":\"F32\"}}", b"\x7fELF\x02\0,,"];
         for (kinds, bytes) in own.into_iter().chain(foreign.map(|bytes| (&[][..], bytes))) {
             std::fs::write(&path, bytes)?;
-            for kind in ALL {
+            for kind in FileKind::ALL {
                 let outcome = check_target(&path, kind);
                 assert_eq!(outcome.is_ok(), kinds.contains(&kind), "{kind:?} over {bytes:?}: {outcome:?}");
             }
         }
         std::fs::write(&path, "")?;
-        assert!(ALL.into_iter().all(|kind| check_target(&path, kind).is_ok()), "nothing is lost with an empty file");
+        assert!(
+            FileKind::ALL.into_iter().all(|kind| check_target(&path, kind).is_ok()),
+            "nothing is lost with an empty file"
+        );
         Ok(())
     }
 

@@ -144,5 +144,11 @@ fn adapt_works_as_the_readme_prints_it_and_refuses_a_ball() {
     let (_holding, ran) = on_emulator(second.path(), &["--object", "ball"], &["adapt"]);
     let refused = ["something is in the hand", "Take it out and close again"].iter().all(|text| ran.err.contains(text));
     assert!(ran.code == Some(1) && refused, "{ran:?}");
-    assert_eq!(kept(&Store::open(&second.path().join("trials.sqlite")).unwrap()), 0, "nothing is calibrated by a ball");
+    assert!(ran.err.contains("`palpate trials restore 1`"), "{ran:?}");
+    let store = Store::open(&second.path().join("trials.sqlite")).unwrap();
+    assert_eq!(
+        (kept(&store), store.list(false).unwrap().len()),
+        (0, 0),
+        "nothing is calibrated by a ball, nor learned"
+    );
 }

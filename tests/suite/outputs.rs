@@ -93,7 +93,7 @@ fn a_name_that_no_format_claims_is_refused() {
     let at = folder.path();
     let before = contents(at);
     let parquet = if cfg!(feature = "parquet") { "choose" } else { "this build writes no Parquet" };
-    let names: [(&[&str], &str); 11] = [
+    let names: [(&[&str], &str); 8] = [
         (&["grasp", "ball", "--no-store", "--out", "a.xlsx"], "choose .csv"),
         (&["trials", "export", "1", "--out", "a.xyz"], "choose .csv, .mcap, .npz"),
         (&["trials", "export", "1", "--out", "a.parquets"], "a folder, whose name has no ending"),
@@ -102,12 +102,13 @@ fn a_name_that_no_format_claims_is_refused() {
         (&["teach", "a.urdf", "--out", "a.onnx"], "choose .safetensors"),
         (&["fit", "1", "--out", "a.json"], "choose .toml"),
         (&["calibrate", "export", "--out", "a.csv"], "choose .json"),
-        (&["demo", "--out", "a.png"], "choose a folder"),
-        (&["study", "accuracy", "--out", "a.svg"], "choose a folder"),
-        (&["study", "grasps", "--out", "a.csv"], "choose a folder"),
     ];
     for (command, wanted) in names {
         misused(at, command, &[wanted, "no format has this ending"]);
+    }
+    for (command, name) in [("demo", "a.png"), ("study accuracy", "a.svg"), ("study grasps", "a.csv")] {
+        let command: Vec<&str> = command.split(' ').chain(["--out", name]).collect();
+        misused(at, &command, &["name of a file; choose that of a folder"]);
     }
     if cfg!(not(feature = "parquet")) {
         misused(at, &["trials", "export", "1", "--out", "a.parquet"], &[parquet, "--features parquet", ".npz"]);
@@ -115,6 +116,8 @@ fn a_name_that_no_format_claims_is_refused() {
     refused(at, &["trials", "export", "--labelled", "--out", "a.csv"], &["need a folder"]);
     assert!(contents(at) == before && std::fs::read_dir(at).unwrap().all(|entry| entry.unwrap().path().is_file()));
     std::fs::create_dir(at.join("v1.2")).unwrap();
+    let ran = run(at, &["demo", "--object", "ball", "--grasps", "1", "--out", "demo-0.2"]);
+    assert!(ran.code == Some(0) && at.join("demo-0.2").is_dir(), "{ran:?}");
     for out in ["v1.2", "new.set/", "plain"] {
         let ran = run(at, &["trials", "export", "1", "--out", out]);
         assert!(ran.code == Some(0) && at.join(out).join("trial_1_lemon.csv").is_file(), "{ran:?}");

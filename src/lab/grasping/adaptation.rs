@@ -5,7 +5,7 @@ use super::run::grasp;
 use palpate_sim::gripper::{Phase, Side};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
-use palpate_store::{Store, StoreError};
+use palpate_store::{Store, StoreError, TrialEdit};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyHand, KnownWeight, Readout, SensorKind};
 use palpate_tactile::trial::{BoardLog, TrialId};
@@ -82,8 +82,9 @@ pub enum AdaptError {
     /// The fingers did not close as empty ones do.
     #[error(
         "something is in the hand: the {finger} finger {how}. Take it out and close again. If the hand was empty, its fingers \
-         bend otherwise than the modelled ones: `palpate fit {id} --out fitted.toml`, then `palpate adapt --trial {id} --scene \
-         fitted.toml`"
+         bend otherwise than the modelled ones: {restore}`palpate fit {id} --out fitted.toml`, then `palpate adapt --trial {id} \
+         --scene fitted.toml`",
+        restore = if *deleted { format!("`palpate trials restore {id}`, ") } else { String::new() }
     )]
     Held {
         /// The trial.
@@ -92,6 +93,8 @@ pub enum AdaptError {
         finger: &'static str,
         /// What it did.
         how: &'static str,
+        /// The trial was deleted, since it is none of an empty hand.
+        deleted: bool,
     },
 }
 
@@ -121,7 +124,7 @@ impl Adaptation {
             return Err(AdaptError::NotEmpty { id, object });
         }
         if let Some((side, how)) = held(&log, scene) {
-            return Err(AdaptError::Held { id, finger: side.name(), how });
+            return Err(AdaptError::Held { id, finger: side.name(), how, deleted: false });
         }
         let parts = store.calibrations().mounted()?;
         let serving = store.calibrations().serving(None, &[])?;
@@ -132,6 +135,23 @@ impl Adaptation {
     /// The same by readings that are not stored, of parts without names.
     pub fn of_log(log: &BoardLog, scene: &Scene) -> Self {
         Self::new(log, scene, &[const { None }; 4], &[], [None; 2])
+    }
+
+    /// The same by a close that was recorded for it, as one of the empty hand. If something was in it, it is deleted.
+    pub fn from_close(
+        store: &mut Store,
+        id: TrialId,
+        scene: &Scene,
+        weights: [Option<KnownWeight>; 2],
+        replace: bool,
+    ) -> Result<Self, AdaptError> {
+        match Self::from_trial(store, id, scene, weights, replace) {
+            Err(AdaptError::Held { id, finger, how, .. }) => {
+                store.labels().edit(&[id], &TrialEdit::Discard)?;
+                Err(AdaptError::Held { id, finger, how, deleted: true })
+            }
+            adapted => adapted,
+        }
     }
 
     fn new(

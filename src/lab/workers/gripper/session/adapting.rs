@@ -24,7 +24,7 @@ impl GripperSession {
         }
         let scene = self.scene.clone();
         let adapted = open(&mut self.store, &self.path).map_err(AdaptError::from).and_then(|store: &mut Store| {
-            let adaptation = Adaptation::from_trial(store, id, &scene, [None; 2], false)?;
+            let adaptation = Adaptation::from_close(store, id, &scene, [None; 2], false)?;
             adaptation.keep(store)?;
             Ok(adaptation)
         });
