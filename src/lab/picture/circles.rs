@@ -20,6 +20,8 @@ const PIECE: f64 = 0.0025;
 /// Width of the line and height of the number (points).
 const WIDTH: f32 = 2.0;
 const TEXT: f32 = 14.0;
+/// Distance of a number from the finger's back (points).
+const GAP: f32 = 14.0;
 /// Least height of a picture with numbers (points).
 const LEAST_HEIGHT: f32 = 240.0;
 
@@ -50,8 +52,12 @@ pub(super) fn add(
                 annotator.overlay.line(*a, *b, WIDTH, colour);
             }
         }
-        if let Some(Some(end)) = points.last() {
-            number(annotator, *end, curvature, colour);
+        if let (Some(Some(begin)), Some(Some(middle)), Some(Some(end))) =
+            (points.first(), points.get(points.len() / 2), points.last())
+        {
+            let outward = (*middle - 0.5 * (*begin + *end)).normalize_or(Vec2::X);
+            let back = (gripper.finger.back as f32) * view.size.y / view.camera.height_at_target();
+            number(annotator, [*middle + outward * back, outward], curvature, colour);
         }
     }
 }
@@ -80,12 +86,13 @@ fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], 
         .collect()
 }
 
-/// Writes the curvature at the end of an arc, inside the picture, where it covers nothing.
-fn number(annotator: &mut Annotator<'_>, end: Vec2, curvature: f64, colour: Rgb) {
+/// Writes the curvature outside of a place at the finger's back, inside the picture, where it covers nothing.
+fn number(annotator: &mut Annotator<'_>, [back, outward]: [Vec2; 2], curvature: f64, colour: Rgb) {
     let text = format!("{curvature:.2}\u{2009}1/m");
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
     let low = half + Vec2::splat(10.0);
-    let middle = (end + Vec2::new(0.0, half.y + 4.0)).clamp(low, (annotator.view.size - low).max(low));
+    let aside = outward * (GAP + half.dot(outward.abs()));
+    let middle = (back + aside).clamp(low, (annotator.view.size - low).max(low));
     let plate = Plate { middle, half };
     if annotator.view.size.y >= LEAST_HEIGHT && annotator.is_free(&plate) {
         annotator.add_plate(plate);
