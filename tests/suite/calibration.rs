@@ -483,6 +483,8 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
 struct OnTheBench {
     counts: [f64; 4],
     bends: Option<f64>,
+    /// Seconds of readings that were sent.
+    seconds: u32,
 }
 
 /// A strip of 24 kOhm that rises to 2.2 times that.
@@ -519,6 +521,11 @@ fn take_points<'a>(
 ) {
     for (instruction, wanted) in holds {
         hand.lock().unwrap().counts[sensor as usize] = wanted;
+        // Nothing from before it is among the readings whose mean is taken.
+        let settled = hand.lock().unwrap().seconds + 5;
+        while hand.lock().unwrap().seconds < settled {
+            bench.wait();
+        }
         bench.until_shown(true, instruction);
         bench.until_shown(true, &format!("{wanted:.0} counts, settled"));
         bench.harness.get_by_label("Take point").click();
@@ -530,12 +537,14 @@ fn take_points<'a>(
 
 #[test]
 fn the_window_calibrates_step_by_step() {
-    let hand = Arc::new(Mutex::new(OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None }));
+    let hand =
+        Arc::new(Mutex::new(OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None, seconds: 0 }));
     let read = Arc::clone(&hand);
     let listen: Listen = Arc::new(move |_| {
         let read = Arc::clone(&read);
         let counts = move || {
             let mut hand = read.lock().unwrap();
+            hand.seconds += 1;
             // Bending alone presses on the pad: 5 mN a degree. It opens again, and closes, and opens.
             if let Some(degrees) = hand.bends {
                 let now = 45.0 - (45.0 - degrees).abs();
@@ -572,11 +581,11 @@ fn the_window_calibrates_step_by_step() {
         .collect();
     take_points(&mut bench, &hand, Sensor::PadRight, asked.iter().map(|(asked, counts)| (asked.as_str(), *counts)));
     bench.until_shown(true, "let the empty hand close once");
-    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0) };
+    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0), seconds: 0 };
     bench.harness.get_by_label("Empty close").click();
     bench.harness.step();
     bench.until_shown(true, "zero shift by bending, up to");
-    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None };
+    *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None, seconds: 0 };
     bench.until_shown(true, "0 counts, settled");
     // A plot knows the width of its labels after it has been drawn.
     bench.harness.run_steps(4);
