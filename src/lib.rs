@@ -52,6 +52,18 @@
 //! 9. [`palpate_lab::workers::SimWorker`] and [`palpate_lab::workers::GripperWorker`]: the threads of the simulated and
 //!    the real gripper; [`app::Workbench`] shows both.
 //!
+//! # Programs to begin with
+//!
+//! | program | shows |
+//! |---|---|
+//! | `src/lab/examples/grasp_to_csv.rs` | a simulated grasp of an object, as a table |
+//! | `src/lab/examples/recognise_trial.rs` | the answer of the shipped model to a stored trial |
+//! | `src/learn/examples/plain_candle.rs` | a network in plain candle, judged like the built-in recognisers |
+//! | `src/device/examples/read_board.rs` | readings of a board on a serial port |
+//! | `src/render/examples/draw_trial.rs` | a picture of a stored trial |
+//!
+//! Each runs with `cargo run --release -p PACKAGE --example NAME`.
+//!
 //! # Where to add what
 //!
 //! | what | the one place |

@@ -19,7 +19,7 @@ impl Sources {
         let mut files = BTreeMap::new();
         gather(&folder, &folder, skipped, &mut files);
         let tests: BTreeSet<String> = files.iter().flat_map(|(file, text)| test_files(file, text)).collect();
-        files.retain(|file, _| !tests.contains(file));
+        files.retain(|file, _| !tests.contains(file) && !file.starts_with("examples/"));
         files.values_mut().for_each(|text| *text = code(text));
         Self { folder, module, files }
     }
