@@ -1,6 +1,6 @@
 //! The maps in the documentation hold: packages and modules import only from lower ones, third-party crates stay at home.
 
-use crate::imports::{Sources, names_in, related, rows};
+use crate::imports::{Sources, gather, names_in, related, rows};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -99,6 +99,8 @@ struct Package {
     /// Last word of `palpate-NAME`; `palpate` for the root package.
     name: String,
     uses: BTreeSet<String>,
+    /// Production lines that it may have.
+    most_lines: usize,
 }
 
 fn packages() -> Vec<Package> {
@@ -107,7 +109,11 @@ fn packages() -> Vec<Package> {
     assert_eq!(rows.len(), PACKAGES.len() + 1, "packages in the table of src/lib.rs");
     let short = |name: &str| name.strip_prefix("palpate-").unwrap_or(name).to_owned();
     rows.iter()
-        .map(|row| Package { name: short(&names_in(&row[0])[0]), uses: names_in(&row[3]).into_iter().collect() })
+        .map(|row| Package {
+            name: short(&names_in(&row[0])[0]),
+            uses: names_in(&row[3]).into_iter().collect(),
+            most_lines: row[4].parse().unwrap(),
+        })
         .collect()
 }
 
@@ -120,9 +126,13 @@ fn folder(package: &str) -> String {
     if package == "palpate" { "src".to_owned() } else { format!("src/{package}") }
 }
 
+/// Folders below that of a package which belong to other packages.
+fn skipped(package: &str) -> &'static [&'static str] {
+    if package == "palpate" { &PACKAGES } else { &[] }
+}
+
 fn sources(package: &str) -> Sources {
-    let skipped: &[&str] = if package == "palpate" { &PACKAGES } else { &[] };
-    Sources::read(&folder(package), "crate", skipped)
+    Sources::read(&folder(package), "crate", skipped(package))
 }
 
 /// All packages, with their sources.
@@ -146,6 +156,48 @@ fn names_crate(code: &str, name: &str) -> bool {
         let before = code[..at].chars().next_back();
         before.is_none_or(|c| !c.is_alphanumeric() && c != '_' && c != ':')
     })
+}
+
+/// Lines of a source that ship: neither blank, nor a comment, nor of an item that is built for tests only.
+fn production_lines(text: &str) -> usize {
+    let (mut lines, mut count) = (text.lines().map(str::trim), 0);
+    while let Some(line) = lines.next() {
+        if line.starts_with("#[cfg(test)]") {
+            let (mut opened, mut closed) = (0, 0);
+            lines.by_ref().any(|line| {
+                (opened, closed) = (opened + line.matches('{').count(), closed + line.matches('}').count());
+                opened <= closed && (opened > 0 || line.ends_with(';'))
+            });
+        } else if !line.is_empty() && !line.starts_with("//") {
+            count += 1;
+        }
+    }
+    count
+}
+
+/// Production lines of a package, with its macros and without its files of tests.
+fn lines_of(package: &str) -> usize {
+    let (top, mut files) = (root().join(folder(package)), BTreeMap::new());
+    gather(&top, &top, skipped(package), &mut files);
+    let is_test = |file: &str| {
+        file.ends_with("_tests.rs")
+            || format!("/{file}").ends_with("/tests.rs")
+            || format!("/{file}").contains("/tests/")
+    };
+    files.iter().filter(|(file, _)| !is_test(file)).map(|(_, text)| production_lines(text)).sum()
+}
+
+#[test]
+fn packages_keep_to_their_budgets_of_lines() {
+    let sample = "//! a\nuse b;\n\n#[cfg(test)]\nmod c;\n#[cfg(test)]\nmod d {\n    fn e() {}\n}\nfn f() {} // g\n";
+    assert_eq!(production_lines(sample), 2);
+    for Package { name, most_lines, .. } in packages() {
+        let lines = lines_of(&name);
+        assert!(
+            lines <= most_lines,
+            "{name} has {lines} production lines; the table of src/lib.rs allows {most_lines}"
+        );
+    }
 }
 
 #[test]

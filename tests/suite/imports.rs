@@ -147,7 +147,8 @@ pub(crate) fn related(a: &str, b: &str) -> bool {
     a.starts_with(&b) || b.starts_with(&a)
 }
 
-fn gather(folder: &Path, top: &Path, skipped: &[&str], found: &mut BTreeMap<String, String>) {
+/// Sources below a folder: text by path below `top`.
+pub(crate) fn gather(folder: &Path, top: &Path, skipped: &[&str], found: &mut BTreeMap<String, String>) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let below = path.strip_prefix(top).unwrap().to_str().unwrap().replace('\\', "/");

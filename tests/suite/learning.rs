@@ -1,6 +1,7 @@
 //! From nothing to a recogniser on the command line: collect, train, evaluate, recognise; anybody's data; refusals.
 
 use crate::allocations::allocations_in;
+use crate::frozen::{compare_numbers, pretty};
 use crate::program::{json, refused, run};
 use palpate_lab::datasets::{DatasetQuery, save_model};
 use palpate_learn::Shipped;
@@ -314,6 +315,7 @@ fn a_model_is_taught_an_object_by_its_file() {
     let at = folder.path();
     std::fs::write(at.join("carton.urdf"), CARTON).unwrap();
     let taught = json(at, &["teach", "carton.urdf", "--grasps", "30", "--out", "m.safetensors", "--json"]);
+    compare_numbers("json_teach", &pretty(taught.clone()));
     assert_eq!(taught["taught"], serde_json::json!(["carton"]));
     let classes: Vec<&str> = taught["classes"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
     assert!(

@@ -5,6 +5,7 @@
 //! - `physics`: whole grasps of every object; no allocation in a step.
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
+//! - `frozen`: JSON, help pages, studies, answers of the shipped models, frames and columns of exports, as texts.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
 //! - `adapting`: a gripper recognises without labels, after one close of its empty hand.
@@ -35,7 +36,7 @@
 //! - `signatures`: pads and heat maps over time in the window, clicked and switched.
 //! - `pictures`: golden pictures of the off-screen view and of the window.
 //!
-//! Golden pictures are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
+//! Golden pictures and frozen texts are made anew by `UPDATE_SCREENSHOTS=1 cargo test --test suite`.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on stops where it stands")]
 
@@ -53,6 +54,7 @@ mod determinism;
 mod emulator;
 mod exports;
 mod files;
+mod frozen;
 mod fuzz;
 mod golden;
 mod gripper;

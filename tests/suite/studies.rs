@@ -78,11 +78,13 @@ fn without_times(report: &StudyReport) -> Vec<(String, Vec<StudyRow>)> {
 #[test]
 fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
     let folder = tempfile::tempdir()?;
+    let mut frozen = String::new();
     for study in PAPER_STUDIES {
         let card = study.card();
         assert!(sample(*study, folder.path(), 2, Some(1))?.is_none(), "{}: stopped after a unit", card.key);
         let stored = sample(*study, folder.path(), 2, Some(usize::MAX))?.expect("finished");
         let report = &stored.result;
+        frozen += &crate::frozen::study(&stored);
         assert!(!report.data.is_empty() && !report.tables.is_empty(), "{}: {report:?}", card.key);
         assert!(report.data.iter().all(|line| line.contains("preset")), "{}: {:?}", card.key, report.data);
         for table in &report.tables {
@@ -114,5 +116,6 @@ fn studies_of_the_paper_run_resume_and_repeat() -> TestResult {
         let again = sample(*study, folder.path(), 1, None)?.expect("finished");
         assert_eq!(without_times(&again.result), without_times(report), "{} on one thread", card.key);
     }
+    crate::frozen::compare_numbers("studies", &frozen);
     Ok(())
 }
