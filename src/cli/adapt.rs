@@ -1,11 +1,8 @@
 //! `palpate adapt`: adapts to a real gripper without labels, by one close of its empty hand.
 
-use super::Failure;
 use super::calibrate::weigh;
-use super::interrupt::stop_flag;
 use super::link;
-use super::setup::{open_store, within};
-use super::terminal::{note, say, say_json, table, warn};
+use super::prelude::*;
 use palpate_device::serial::LinkOptions;
 use palpate_geometry::units::three_digits;
 use palpate_lab::grasping::{Adaptation, AdaptedSensor};
@@ -15,10 +12,7 @@ use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Curve, KnownWeight};
-use palpate_tactile::trial::{Control, TrialId};
-use serde::Serialize;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use palpate_tactile::trial::Control;
 
 /// Arguments of `palpate adapt`.
 #[derive(Debug, clap::Args)]
@@ -63,18 +57,23 @@ pub(super) struct AdaptArguments {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct AdaptReport {
     trial: TrialId,
     line_bar: f64,
     modelled_curvature_per_m: f64,
     sensors: Vec<SensorReport>,
     warnings: Vec<String>,
     stored: bool,
+    /// What was assumed, in a sentence.
+    #[serde(skip)]
+    assumed: String,
 }
 
 #[derive(Serialize)]
 struct SensorReport {
     channel: &'static str,
+    #[serde(skip)]
+    label: &'static str,
     part: Option<String>,
     /// `kept`, `adapted` or `failed`.
     outcome: &'static str,
@@ -105,11 +104,7 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
     if !arguments.dry_run {
         adaptation.keep(&store)?;
     }
-    if arguments.json {
-        say_json(&report(&adaptation, trial, !arguments.dry_run))?;
-    } else {
-        print(&adaptation, arguments)?;
-    }
+    report(&adaptation, trial, arguments).print(arguments.json)?;
     if adaptation.is_complete() { Ok(()) } else { Err("not every sensor could be calibrated".into()) }
 }
 
@@ -160,45 +155,40 @@ fn about(sensor: &AdaptedSensor) -> String {
     }
 }
 
-fn outcome(sensor: &AdaptedSensor) -> &'static str {
-    match sensor {
-        AdaptedSensor::Kept(_) => "kept",
-        AdaptedSensor::Adapted(_) => "adapted",
-        AdaptedSensor::Failed(_) => "failed",
-    }
-}
-
-fn report(adaptation: &Adaptation, trial: TrialId, stored: bool) -> Report {
+fn report(adaptation: &Adaptation, trial: TrialId, arguments: &AdaptArguments) -> AdaptReport {
     let sensors = Sensor::ALL.into_iter().zip(&adaptation.sensors).map(|(sensor, adapted)| SensorReport {
         channel: sensor.channel(),
+        label: sensor.label(),
         part: adapted.calibration().map(|own| own.record.part.clone()),
-        outcome: outcome(adapted),
+        outcome: match adapted {
+            AdaptedSensor::Kept(_) => "kept",
+            AdaptedSensor::Adapted(_) => "adapted",
+            AdaptedSensor::Failed(_) => "failed",
+        },
         about: about(adapted),
     });
-    Report {
+    let pads = if arguments.weight.is_some() { "" } else { ", pads are nominal (--weight measures them)" };
+    let scene = if arguments.scene.is_none() { " (`palpate fit` models yours)" } else { "" };
+    let (bar, modelled) = (adaptation.bar, adaptation.modelled);
+    AdaptReport {
         trial,
-        line_bar: adaptation.bar,
-        modelled_curvature_per_m: adaptation.modelled,
+        line_bar: bar,
+        modelled_curvature_per_m: modelled,
         sensors: sensors.collect(),
         warnings: adaptation.warnings.clone(),
-        stored,
+        stored: !arguments.dry_run,
+        assumed: format!("at {bar:.2} bar the fingers bend to {modelled:.1} 1/m as the modelled one{scene}{pads}"),
     }
 }
 
-fn print(adaptation: &Adaptation, arguments: &AdaptArguments) -> Result<(), Failure> {
-    let rows: Vec<Vec<String>> = Sensor::ALL
-        .into_iter()
-        .zip(&adaptation.sensors)
-        .map(|(sensor, adapted)| vec![sensor.label().to_owned(), outcome(adapted).to_owned(), about(adapted)])
-        .collect();
-    table(&["sensor", "", "calibration"], &rows)?;
-    adaptation.warnings.iter().for_each(|warning| warn(warning));
-    let pads = if arguments.weight.is_some() { "" } else { ", pads are nominal (--weight measures them)" };
-    say(format!(
-        "assumed: at {:.2} bar the fingers bend to {:.1} 1/m as the modelled one{}{pads}",
-        adaptation.bar,
-        adaptation.modelled,
-        if arguments.scene.is_none() { " (`palpate fit` models yours)" } else { "" },
-    ))?;
-    if arguments.dry_run { say("not stored") } else { Ok(()) }
+impl Report for AdaptReport {
+    fn text(&self, page: &mut Page) {
+        let row = |sensor: &SensorReport| [sensor.label, sensor.outcome, &sensor.about].map(str::to_owned);
+        page.table(&["sensor", "", "calibration"], self.sensors.iter().map(row));
+        self.warnings.iter().for_each(|warning| page.warn(warning));
+        page.line(format!("assumed: {}", self.assumed));
+        if !self.stored {
+            page.line("not stored");
+        }
+    }
 }

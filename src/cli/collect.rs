@@ -1,17 +1,11 @@
 //! `palpate collect`: collects a simulated data set in parallel, resumable, in parts.
 
-use super::Failure;
-use super::interrupt::stop_flag;
-use super::setup::{RecomputeArguments, SceneArguments, classes_of, open_store};
-use super::terminal::{say, say_json};
-use indicatif::{ProgressBar, ProgressStyle};
+use super::prelude::*;
+use super::setup::{RecomputeArguments, classes_of, threads};
 use palpate_lab::grasping::{CollectionError, CollectionPlan, CollectionReport, Shard, all_objects};
 use palpate_sim::objects::titled;
 use palpate_store::StoreError;
-use serde::Serialize;
 use std::ops::ControlFlow;
-use std::path::Path;
-use std::sync::atomic::Ordering;
 
 /// Arguments of `palpate collect`.
 #[derive(Debug, clap::Args)]
@@ -59,12 +53,14 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct CollectReport {
     #[serde(flatten)]
     collection: CollectionReport,
     /// CPU time of the whole command (s).
     cpu_s: f64,
     threads: usize,
+    #[serde(skip)]
+    store: PathBuf,
 }
 
 pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -78,37 +74,30 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
         shard: arguments.shard.unwrap_or(Shard::WHOLE),
         recompute: arguments.recompute.chosen(),
     };
-    let threads = match arguments.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let threads = threads(arguments.threads);
     // Before the store, which is made where there is none.
     let ready = plan.ready()?;
     let mut store = open_store(store)?;
     let stop = stop_flag()?;
-    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} {eta} left")?);
+    let bar = Progress::new("{bar:40} {pos}/{len} {msg} {eta} left");
     let start = cpu_time::ProcessTime::now();
     let (mut kept, mut of) = (0, 0);
     let outcome = ready.collect(&mut store, threads, &mut |progress| {
-        bar.set_length(u64::from(progress.of));
-        bar.set_message(titled(&progress.object));
-        bar.set_position(u64::from(progress.done));
+        bar.0.set_message(titled(&progress.object));
+        bar.show(progress.done as usize, progress.of as usize);
         (kept, of) = (progress.done, progress.of);
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    bar.finish_and_clear();
+    drop(bar);
     let collection = outcome.map_err(|error| match error {
         // Of a store that is gone nothing is kept.
         CollectionError::Store(StoreError::FileLost { .. }) => error.to_string(),
         _ if kept == 0 => error.to_string(),
         error => format!("{error}. {kept} of {of} trials are kept; the same command resumes with the rest"),
     })?;
-    let report = Report { collection, cpu_s: start.elapsed().as_secs_f64(), threads };
-    if arguments.json {
-        say_json(&report)?;
-    } else {
-        print(&report, store.path())?;
-    }
+    let cpu_s = start.elapsed().as_secs_f64();
+    let report = CollectReport { collection, cpu_s, threads, store: store.path().to_owned() };
+    report.print(arguments.json)?;
     let CollectionReport { interrupted, known, stored, .. } = report.collection;
     if interrupted {
         let (kept, path) = (known + stored, store.path().display());
@@ -118,20 +107,22 @@ pub(super) fn run(arguments: &CollectArguments, store: Option<&Path>) -> Result<
     Ok(())
 }
 
-fn print(report: &Report, store: &Path) -> Result<(), Failure> {
-    let Report { collection, cpu_s, threads } = report;
-    say(format!("collection    {} in {}", collection.collection, store.display()))?;
-    say(format!("stored        {} new trials, {} already there", collection.stored, collection.known))?;
-    say(format!("poses         {} redrawn because the open fingers had no room", collection.redrawn))?;
-    if collection.recomputed > 0 {
-        say(format!("recomputed    {} trials at a finer accuracy than the scene asks for", collection.recomputed))?;
+impl Report for CollectReport {
+    fn text(&self, page: &mut Page) {
+        let Self { collection, cpu_s, threads, store } = self;
+        let CollectionReport { stored, known, redrawn, recomputed, unsound, .. } = collection;
+        page.fact("collection", format!("{} in {}", collection.collection, store.display()));
+        page.fact("stored", format!("{stored} new trials, {known} already there"));
+        page.fact("poses", format!("{redrawn} redrawn because the open fingers had no room"));
+        let finer = || format!("{recomputed} trials at a finer accuracy than the scene asks for");
+        page.fact("recomputed", (*recomputed > 0).then(finer));
+        let unsound_ones = || {
+            format!(
+                "{unsound} trials did not converge in every step or did not come to rest at any accuracy; they are marked, \
+                 and data sets exclude them"
+            )
+        };
+        page.fact("unsound", (*unsound > 0).then(unsound_ones));
+        page.fact("cost", format!("{cpu_s:.1} s CPU on {threads} threads"));
     }
-    if collection.unsound > 0 {
-        say(format!(
-            "unsound       {} trials did not converge in every step or did not come to rest at any accuracy; they are \
-             marked, and data sets exclude them",
-            collection.unsound
-        ))?;
-    }
-    say(format!("cost          {cpu_s:.1} s CPU on {threads} threads"))
 }

@@ -2,33 +2,15 @@
 //! it. Needs no display. With a port, the same with the real gripper.
 
 mod real;
+mod simulated;
 
-use super::Failure;
-use super::output::{file_or_folder, make_folder, write_new};
-use super::recognise::{StageOne, load_model, named, warn_unless_learned};
-use super::setup::{SceneArguments, open_store, within};
-use super::terminal::{say, say_json, warn};
-use glam::Vec2;
-use palpate_geometry::drawing::StandardView;
-use palpate_geometry::palette::Theme;
+use super::prelude::*;
+use super::recognise::{StageOne, named};
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{Advisor, FrameReader, GraspSummary, Identification, Recompute, SHAPES, grasp_soundly};
-use palpate_lab::picture::{PictureView, Stage};
-use palpate_learn::{Measure, OTHER, Shipped, StopReason, StopRule};
-use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
-use palpate_sim::frame::Frame;
-use palpate_sim::gripper::Phase;
-use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
-use palpate_sim::poses::PoseSampler;
-use palpate_sim::scene::{Between, Scene};
-use palpate_store::{FileKind, Stored, file_name_of};
-use palpate_tactile::Channel;
-use palpate_tactile::trial::{SimulatedTrial, TrialId};
-use rand::{RngExt, SeedableRng};
-use serde::Serialize;
+use palpate_lab::grasping::{GraspSummary, Identification, SHAPES};
+use palpate_learn::{Measure, Model, OTHER, StopReason, StopRule};
+use palpate_sim::objects::titled;
 use std::collections::BTreeMap;
-use std::hash::{BuildHasher, RandomState};
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Arguments of `palpate demo`.
@@ -84,216 +66,164 @@ pub(super) struct DemoArguments {
     json: bool,
 }
 
-/// Output of `--json`.
+/// Output of `--json`. What is optional is absent for a real gripper.
 #[derive(Serialize)]
-struct Report {
-    /// Object in the hand.
-    truth: String,
+struct DemoReport {
+    /// Object in the hand, where it is known.
+    truth: Option<String>,
     /// Recognised class, or `unknown`.
     decided: String,
-    /// `sure`, `grasp-limit` or `unknown`.
-    stopped_because: &'static str,
+    stopped_because: StopReason,
     threshold: f64,
     /// Size and shape of the last grasp.
-    stage_one: Option<StageOne>,
-    seed: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stage_one: Option<Option<StageOne>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seed: Option<u64>,
     grasps: Vec<GraspReport>,
+    #[serde(skip)]
+    is_right: Option<bool>,
 }
 
 /// One grasp.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct GraspReport {
+    #[serde(flatten)]
+    pose: Option<PoseReport>,
+    trial_id: Option<TrialId>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stage_one: Option<Option<StageOne>>,
+    /// Estimated size of what was touched.
+    touch: Option<Touched>,
+    /// Belief after this grasp and those before it.
+    pmf: BTreeMap<String, f64>,
+    #[serde(flatten)]
+    summary: Option<GraspSummary>,
+    #[serde(skip)]
+    number: usize,
+    #[serde(skip)]
+    warnings: Vec<String>,
+}
+
+/// Pose of a simulated grasp.
+#[derive(Serialize)]
+struct PoseReport {
     seed: u64,
     offset_mm: [f64; 3],
     yaw_deg: f64,
     /// Move of the gripper by which a guided grasp was chosen.
     guided: Option<String>,
     picture: Option<PathBuf>,
-    trial_id: Option<TrialId>,
-    stage_one: Option<StageOne>,
-    /// Estimated size of what was touched.
-    touch: Option<Touched>,
-    /// Belief after this grasp and those before it.
-    pmf: BTreeMap<String, f64>,
-    #[serde(flatten)]
-    summary: GraspSummary,
 }
 
-/// Pixels of a picture.
-const SIZE: [u32; 2] = [1280, 800];
+/// A gripper that closes on an object again and again.
+trait Hand {
+    /// Grasps once, and lets the model read it; everything of the report but the recognition.
+    fn grasp(&mut self, identification: &mut Identification) -> Result<GraspReport, Failure>;
+}
 
 pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(), Failure> {
-    if let Some(port) = &arguments.port {
-        return real::run(arguments, port, store);
+    match &arguments.port {
+        Some(port) => real::run(arguments, port, store),
+        None => simulated::run(arguments, store),
     }
-    let seed = arguments.seed.unwrap_or_else(|| RandomState::new().hash_one(0) % 1_000_000);
-    let random = (arguments.object.is_none() && arguments.scene.scene.is_none()).then(|| random_object(seed));
-    let mut nominal = arguments.scene.scene(arguments.object.as_deref().or(random.as_deref()))?;
-    if arguments.as_released {
-        nominal.pose.between = Between::AsReleased;
-    }
-    if arguments.guided {
-        nominal.pose.between = Between::Guided;
-    }
-    let object = nominal.load_object()?;
-    let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
-    warn_unless_learned(&model, nominal.holds_object());
+}
+
+/// Grasps until the object is recognised. `truth` is its class where known, `seed` that of a simulation.
+fn grasp_until_recognised(
+    hand: &mut dyn Hand,
+    model: &Arc<Model>,
+    arguments: &DemoArguments,
+    truth: Option<String>,
+    seed: Option<u64>,
+) -> Result<(), Failure> {
     let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
-    let mut identification = Identification::new(Arc::clone(&model), rule);
-    let mut painter = if arguments.no_pictures { None } else { Painter::find() };
-    if painter.is_some() {
-        make_folder(&arguments.out)?;
-    }
-    let mut store = if arguments.no_store { None } else { Some(open_store(store)?) };
-    let truth = object.as_ref().map_or_else(|| EMPTY.to_owned(), |o| o.name.clone());
-    if !arguments.json {
-        introduce(&nominal.object.source, object.as_ref(), seed)?;
-    }
-    let sampler = PoseSampler::new(&nominal, object.as_ref());
+    let mut identification = Identification::new(Arc::clone(model), rule);
+    let stage_one = |identification: &Identification| {
+        seed.map(|_| identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)))
+    };
     let mut grasps: Vec<GraspReport> = Vec::new();
-    let mut before: Option<(Scene, Frame)> = None;
-    let mut advisor = Advisor::default();
-    let stopped = loop {
-        let pose_seed = seed.wrapping_add(grasps.len() as u64).wrapping_add(1);
-        let released = before.as_ref().map(|(_, released)| released);
-        let (drawn, _) = sampler.draw_after(object.as_ref(), pose_seed, released);
-        let guided = before
-            .as_ref()
-            .zip(identification.last())
-            .and_then(|((last, _), grasp)| advisor.next(grasp, [last, &drawn], &sampler, object.as_ref()));
-        let (guided, scene) = guided.map_or((None, drawn), |(by, scene)| (Some(by), scene));
-        let trial = grasp_soundly(&scene, object.as_ref(), pose_seed, Recompute::Unsettled);
-        let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
-        identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
-        for row in trial.frames().iter().map(|frame| reader.row(frame)) {
-            identification.push(row.t_s, &row);
-        }
-        identification.end_grasp();
-        let report = GraspReport {
-            stage_one: identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)),
-            touch: Touched::of(&identification),
-            pmf: identification.belief().now().map(|pmf| named(&model, pmf)).unwrap_or_default(),
-            ..motion_report(&trial, &scene, pose_seed)
-        };
-        let trial_id = store.as_mut().map(|store| store.insert(&trial)).transpose()?.map(Stored::id);
-        let picture = match &mut painter {
-            Some(painter) => {
-                let number = grasps.len() + 1;
-                let path = arguments.out.join(format!("{}_grasp_{number}.png", file_name_of(&trial.header.object)));
-                painter.paint(&scene, object.as_ref(), &trial, &path)?;
-                Some(path)
+    let stopped_because = loop {
+        let mut grasp = hand.grasp(&mut identification)?;
+        (grasp.number, grasp.stage_one) = (grasps.len() + 1, stage_one(&identification));
+        grasp.touch = Touched::of(&identification);
+        grasp.pmf = identification.belief().now().map(|pmf| named(model, pmf)).unwrap_or_default();
+        let decision = identification.decision();
+        if !arguments.json {
+            let mut page = Page::default();
+            grasp.text(&mut page);
+            if decision.is_none() {
+                page.line(format!("  Below the threshold of {:.0} %: grasping again.", 100.0 * rule.threshold));
             }
-            None => None,
-        };
-        let guided = guided.map(|by| by.to_string());
-        let report = GraspReport { picture, trial_id, guided, ..report };
-        if !arguments.json {
-            print_grasp(grasps.len() + 1, &report, object.as_ref().map_or(&[], |o| &o.warnings))?;
+            page.print()?;
         }
-        grasps.push(report);
-        before = trial.frames().last().map(|released| (scene, released.clone()));
-        if let Some(reason) = identification.decision() {
+        grasps.push(grasp);
+        if let Some(reason) = decision {
             break reason;
-        }
-        if !arguments.json {
-            say(format!("  Below the threshold of {:.0} %: grasping again.", 100.0 * rule.threshold))?;
         }
     };
     let view = identification.view();
-    let report = Report {
+    let report = DemoReport {
+        is_right: truth.as_ref().and_then(|truth| view.is_right(truth)),
         truth,
         decided: view.decided().unwrap_or("unknown").to_owned(),
-        stopped_because: stopped.name(),
+        stopped_because,
         threshold: rule.threshold,
-        stage_one: identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)),
+        stage_one: stage_one(&identification),
         seed,
         grasps,
     };
-    if arguments.json {
-        say_json(&report)?;
-    } else {
-        print_conclusion(&report, stopped)?;
-    }
-    if report.grasps.iter().all(|grasp| grasp.summary.finite) {
-        Ok(())
-    } else {
-        Err("the simulation of a grasp diverged; see the warnings".into())
+    report.print(arguments.json)?;
+    let diverged = report.grasps.iter().any(|grasp| grasp.summary.as_ref().is_some_and(|summary| !summary.finite));
+    if diverged { Err("the simulation of a grasp diverged; see the warnings".into()) } else { Ok(()) }
+}
+
+impl Report for GraspReport {
+    fn text(&self, page: &mut Page) {
+        page.line("");
+        match (&self.pose, self.trial_id) {
+            (Some(pose), _) => {
+                let [x, y, z] = pose.offset_mm.map(|v| format!("{v:+.1}"));
+                let (number, turned) = (self.number, pose.yaw_deg);
+                page.line(format!(
+                    "Grasp {number}: gripper shifted by {x} {y} {z} mm, turned by {turned:+.0} degrees."
+                ));
+                pose.guided.iter().for_each(|by| page.line(format!("  Chosen to learn most: gripper {by}.")));
+            }
+            (None, id) => page.line(format!("Grasp {} (trial {}).", self.number, id.unwrap_or_default())),
+        }
+        if let Some(summary) = &self.summary {
+            summary_text(summary, page);
+        }
+        self.warnings.iter().for_each(|warning| page.warn(warning));
+        if let Some(Some(StageOne { size, size_probability, shape, shape_probability })) = &self.stage_one {
+            let [sure, formed] = [size_probability, shape_probability].map(|p| format!("{:.0} %", 100.0 * p));
+            page.line(format!("  Stage one: {size} ({sure}), {shape} ({formed})."));
+        }
+        self.touch.iter().for_each(|touch| page.line(format!("  Felt: {touch}.")));
+        page.line(format!("  Most likely: {}.", likely(&self.pmf)));
     }
 }
 
-/// The part of a report that does not depend on recognition.
-fn motion_report(trial: &SimulatedTrial, scene: &Scene, seed: u64) -> GraspReport {
-    let mount = &scene.gripper.mount;
-    GraspReport {
-        seed,
-        offset_mm: mount.offset.map(|x| (x * 1e5).round() * 1e-2),
-        yaw_deg: (mount.yaw_deg * 10.0).round() * 0.1,
-        guided: None,
-        picture: None,
-        trial_id: None,
-        stage_one: None,
-        touch: None,
-        pmf: BTreeMap::new(),
-        summary: GraspSummary::new(trial, scene),
-    }
-}
-
-fn random_object(seed: u64) -> String {
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let all = catalogue();
-    all[random.random_range(0..all.len())].name.clone()
-}
-
-fn introduce(name: &str, object: Option<&ObjectModel>, seed: u64) -> Result<(), Failure> {
-    let Some(object) = object else { return say("Object: none, an empty hand.") };
-    let built_in = catalogue().iter().any(|b| b.name == name);
-    let title = if built_in { titled(name) } else { object.name.clone() };
-    let size = object.bounds.size().to_array().map(|side| format!("{:.0}", mm(side)));
-    let grams = three_digits(object.mass.mass * 1e3);
-    say(format!("Object: {title} ({} mm, {grams} g). Seed {seed}.", size.join(" x ")))?;
-    for warning in &object.warnings {
-        warn(warning);
-    }
-    Ok(())
-}
-
-/// Prints a grasp; warnings in `known` were printed before.
-fn print_grasp(number: usize, report: &GraspReport, known: &[String]) -> Result<(), Failure> {
-    let [x, y, z] = report.offset_mm.map(|v| format!("{v:+.1}"));
-    say("")?;
-    say(format!("Grasp {number}: gripper shifted by {x} {y} {z} mm, turned by {:+.0} degrees.", report.yaw_deg))?;
-    if let Some(by) = &report.guided {
-        say(format!("  Chosen to learn most: gripper {by}."))?;
-    }
-    let summary = &report.summary;
+/// What a simulated grasp did.
+fn summary_text(summary: &GraspSummary, page: &mut Page) {
     match summary.contact_onset_s {
-        Some(onset) => say(format!("  First contact after {onset:.2} s."))?,
-        None => say("  No contact.")?,
+        Some(onset) => page.line(format!("  First contact after {onset:.2} s.")),
+        None => page.line("  No contact."),
     }
     if let Some(hold) = &summary.hold {
         let [left, right] = hold.curvature_per_m.map(three_digits);
-        say(format!("  Hold: curvature {left} and {right} 1/m,"))?;
+        page.line(format!("  Hold: curvature {left} and {right} 1/m,"));
         let [left, right] = hold.force_n.map(three_digits);
         let [low, high] = hold.pressure_pa.map(|p| three_digits(p * 1e-3));
-        say(format!("  force {left} and {right} N, pressure {low} and {high} kPa."))?;
+        page.line(format!("  force {left} and {right} N, pressure {low} and {high} kPa."));
         if summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
-            say("  The object slipped out of the grasp.")?;
+            page.line("  The object slipped out of the grasp.");
         }
     }
     if let Some(moved) = summary.object_moved_m.filter(|moved| *moved > 1e-4) {
-        say(format!("  The object moved by {} mm.", three_digits(mm(moved))))?;
+        page.line(format!("  The object moved by {} mm.", three_digits(mm(moved))));
     }
-    for warning in summary.warnings.iter().filter(|w| !known.contains(w)) {
-        warn(warning);
-    }
-    if let Some(stage) = &report.stage_one {
-        let percent = [stage.size_probability, stage.shape_probability].map(|p| format!("{:.0} %", 100.0 * p));
-        say(format!("  Stage one: {} ({}), {} ({}).", stage.size, percent[0], stage.shape, percent[1]))?;
-    }
-    if let Some(touch) = &report.touch {
-        say(format!("  Felt: {touch}."))?;
-    }
-    say(format!("  Most likely: {}.", likely(&report.pmf)))
 }
 
 /// The most likely classes with their probabilities.
@@ -339,89 +269,35 @@ impl std::fmt::Display for Touched {
     }
 }
 
-/// `1 grasp`, `2 grasps`.
-fn grasps_in_words(count: usize) -> String {
-    if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") }
-}
-
-fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
-    let count = report.grasps.len();
-    let grasps = grasps_in_words(count);
-    let known = report.grasps.last().is_some_and(|grasp| grasp.pmf.contains_key(&report.truth));
-    let is_right = if report.decided == OTHER { !known } else { report.decided == report.truth };
-    let right = if is_right { "Correct" } else { "Wrong" };
-    let [decided, true_object] = [&report.decided, &report.truth].map(|name| titled(name));
-    say("")?;
-    match stopped {
-        StopReason::Sure if report.decided == OTHER => {
-            say(format!("None of the known objects, after {grasps}. {right} (true object: {true_object})."))?;
-        }
-        StopReason::Sure => {
-            say(format!("Recognised after {grasps}: {decided}. {right} (true object: {true_object})."))?;
-        }
-        StopReason::GraspLimit => {
-            say(format!(
-                "Grasp limit reached ({count}). Best guess: {decided}. {right} (true object: {true_object})."
-            ))?;
-        }
-        StopReason::Unknown => {
-            let right = if known { "Wrong" } else { "Correct: the model does not know this object" };
-            say(format!("Unknown object after {grasps}. {right} (true object: {true_object})."))?;
-            say("The grasps match none of the objects the model knows.")?;
-        }
-    }
-    let pictures: Vec<String> =
-        report.grasps.iter().filter_map(|g| Some(g.picture.as_ref()?.display().to_string())).collect();
-    if !pictures.is_empty() {
-        say(format!("Pictures: {}", pictures.join(", ")))?;
-    }
-    let trials: Vec<String> = report.grasps.iter().filter_map(|g| Some(g.trial_id?.to_string())).collect();
-    if !trials.is_empty() {
-        say(format!("Trials: {} (see `palpate trials list`)", trials.join(", ")))?;
-    }
-    Ok(())
-}
-
-/// Off-screen renderer of the end of the hold.
-struct Painter {
-    gpu: Gpu,
-    renderer: Renderer,
-}
-
-impl Painter {
-    /// Finds a graphics driver, or warns that there is none.
-    fn find() -> Option<Self> {
-        match Gpu::headless(DriverChoice::Any) {
-            Ok(gpu) => {
-                let renderer = Renderer::new(&gpu.device, &gpu.queue);
-                Some(Self { gpu, renderer })
-            }
-            Err(error) => {
-                warn(&format!("no pictures: {error}"));
-                None
-            }
-        }
-    }
-
-    fn paint(
-        &mut self,
-        scene: &Scene,
-        object: Option<&ObjectModel>,
-        trial: &SimulatedTrial,
-        path: &Path,
-    ) -> Result<(), Failure> {
-        let held = trial.frames().iter().rfind(|f| f.phase == Phase::Hold).or(trial.frames().last());
-        let Some(frame) = held else { return Ok(()) };
-        let stage = Stage::new(scene, object, trial.data.world_from_gripper);
-        let view = PictureView {
-            theme: Theme::Dark,
-            size: Vec2::new(SIZE[0] as f32, SIZE[1] as f32),
-            badge: Some("SIMULATED".to_owned()),
-            ..PictureView::default()
+impl Report for DemoReport {
+    fn text(&self, page: &mut Page) {
+        let count = self.grasps.len();
+        let grasps = if count == 1 { "1 grasp".to_owned() } else { format!("{count} grasps") };
+        let decided = titled(&self.decided);
+        let found = match self.stopped_because {
+            StopReason::Sure if self.decided == OTHER => format!("None of the known objects, after {grasps}."),
+            StopReason::Sure => format!("Recognised after {grasps}: {decided}."),
+            StopReason::GraspLimit => format!("Grasp limit reached ({count}). Best guess: {decided}."),
+            StopReason::Unknown => format!("Unknown object after {grasps}."),
         };
-        let camera = stage.camera(StandardView::Home, frame, &view);
-        let list = stage.draw(frame, &PictureView { camera, ..view });
-        let picture = Picture::draw(&self.gpu, &mut self.renderer, &list, SIZE, 1.0)?;
-        write_new(path, FileKind::Png, &picture.to_png()?)
+        let verdict = match self.is_right {
+            Some(true) if self.stopped_because == StopReason::Unknown => "Correct: the model does not know this object",
+            Some(true) => "Correct",
+            _ => "Wrong",
+        };
+        let truth = self.truth.as_ref().map(|truth| format!(" {verdict} (true object: {}).", titled(truth)));
+        page.line(format!("\n{found}{}", truth.unwrap_or_default()));
+        if self.stopped_because == StopReason::Unknown {
+            page.line("The grasps match none of the objects the model knows.");
+        }
+        let poses = self.grasps.iter().filter_map(|grasp| grasp.pose.as_ref());
+        let pictures: Vec<_> = poses.filter_map(|pose| Some(pose.picture.as_ref()?.display().to_string())).collect();
+        if !pictures.is_empty() {
+            page.line(format!("Pictures: {}", pictures.join(", ")));
+        }
+        let trials: Vec<_> = self.grasps.iter().filter_map(|grasp| Some(grasp.trial_id?.to_string())).collect();
+        if !trials.is_empty() {
+            page.line(format!("Trials: {} (see `palpate trials list`)", trials.join(", ")));
+        }
     }
 }

@@ -1,17 +1,12 @@
 //! `palpate emulate`: emulates the gripper on a pseudo-terminal. Unix only.
 
-use super::Failure;
-use super::output::file_of;
-use super::setup::{SceneArguments, within};
-use super::terminal::{say, say_json};
+use super::prelude::*;
 use palpate_device::emulator::{
     EmulatedFault, EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
 };
 #[cfg(unix)]
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
 use palpate_sim::objects::anchored;
-use palpate_store::FileKind;
-use std::path::PathBuf;
 
 /// Arguments of `palpate emulate`.
 #[derive(Debug, clap::Args)]
@@ -157,7 +152,12 @@ fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
     let Some(given) = arguments.script.as_deref().filter(|script| *script != "-") else { return Ok(Vec::new()) };
     let path = std::path::Path::new(given);
     let text = if path.is_file() { std::fs::read_to_string(path)? } else { given.to_owned() };
-    let mut steps = parse_script(&text)?;
+    steps(&text)
+}
+
+/// Steps of a text, with objects by their full paths.
+fn steps(text: &str) -> Result<Vec<Step>, Failure> {
+    let mut steps = parse_script(text)?;
     for step in &mut steps {
         if let Step::Grasp { object, .. } = step {
             *object = anchored(object);
@@ -176,8 +176,8 @@ fn emulate(arguments: &EmulateArguments, mut gripper: EmulatedGripper) -> Result
     use std::io::Write as _;
 
     let Some(link) = arguments.link.clone() else { return Err("name the link: --link FILE".into()) };
-    let stop = super::interrupt::stop_flag()?;
-    let typed = (arguments.script.as_deref() == Some("-")).then(typed_steps);
+    let stop = stop_flag()?;
+    let typed = (arguments.script.as_deref() == Some("-")).then(typed_lines).transpose()?;
     let begun = |path: &std::path::PathBuf| {
         let file = palpate_store::NewFile::create(path, FileKind::BoardLines).and_then(palpate_store::NewFile::appear);
         file.map_err(|cause| super::output::cannot(path, &cause))
@@ -203,47 +203,20 @@ fn emulate(arguments: &EmulateArguments, mut gripper: EmulatedGripper) -> Result
                 file.write_all(printed.as_bytes())?;
             }
             while let Some(line) = typed.as_ref().and_then(|lines| lines.try_recv().ok()) {
-                take_steps(gripper, &line)?;
+                // A line with an error adds none.
+                match steps(&line) {
+                    Ok(steps) => steps.into_iter().try_for_each(|step| gripper.add_step(step))?,
+                    Err(error) => warn(&error.to_string()),
+                }
             }
             Ok(())
         };
         if let Err(error) = turn() {
             failure = Some(error);
-            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+            stop.store(true, Ordering::Relaxed);
         }
     })?;
     failure.map_or(Ok(()), Err)
-}
-
-/// Lines from standard input, as they are typed.
-#[cfg(unix)]
-fn typed_steps() -> std::sync::mpsc::Receiver<String> {
-    let (lines, typed) = std::sync::mpsc::channel();
-    std::thread::spawn(move || {
-        for line in std::io::stdin().lines().map_while(Result::ok) {
-            if lines.send(line).is_err() {
-                return;
-            }
-        }
-    });
-    typed
-}
-
-/// Adds the steps of a typed line; a line with an error adds none.
-#[cfg(unix)]
-fn take_steps(gripper: &mut EmulatedGripper, line: &str) -> Result<(), Failure> {
-    match parse_script(line) {
-        Ok(steps) => {
-            for mut step in steps {
-                if let Step::Grasp { object, .. } = &mut step {
-                    *object = anchored(object);
-                }
-                gripper.add_step(step)?;
-            }
-        }
-        Err(error) => super::terminal::warn(&error.to_string()),
-    }
-    Ok(())
 }
 
 /// Prints an event.

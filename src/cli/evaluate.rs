@@ -1,16 +1,9 @@
 //! `palpate evaluate`: compares methods on stored trials, or evaluates a saved model on trials it has not seen.
 
-use super::Failure;
 use super::learning::{DataArguments, known_method, parts};
-use super::setup::read_store;
-use super::terminal::{say, say_json, table, warn};
+use super::prelude::*;
 use palpate_lab::study::{ComparisonRow, Controls, in_table_order};
-use palpate_learn::evaluation::StageOneScores;
-use palpate_learn::metrics::Interval;
 use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan};
-use serde::Serialize;
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate evaluate`.
 #[derive(Debug, clap::Args)]
@@ -59,11 +52,14 @@ pub(super) struct EvaluateArguments {
 /// Training trials of each object where no split is asked for.
 const TRAIN_TRIALS: usize = 50;
 
-/// Output of `--json --controls`.
+/// Output of `--json --controls`; without controls it is the rows alone.
 #[derive(Serialize)]
-struct ReportWithControls {
+struct EvaluateReport {
     rows: Vec<ComparisonRow>,
-    controls: Controls,
+    controls: Option<Controls>,
+    /// What was split and tested.
+    #[serde(skip)]
+    heading: Vec<String>,
 }
 
 pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -105,17 +101,17 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         }
         _ => None,
     };
-    match (arguments.json, controls) {
-        (true, Some(controls)) => say_json(&ReportWithControls { rows, controls }),
-        (true, None) => say_json(&rows),
-        (false, controls) => {
-            let plan =
-                if splits.is_empty() { "trials that the models have not learned".to_owned() } else { plan.described() };
-            let plan = if splits.len() > 1 { format!("{plan}, {} fits", splits.len()) } else { plan };
-            print(&rows, arguments, &data, &plan)?;
-            controls.map_or(Ok(()), |controls| print_controls(&controls))
-        }
+    if arguments.json && controls.is_none() {
+        return say_json(&rows);
     }
+    let plan = if splits.is_empty() { "trials that the models have not learned".to_owned() } else { plan.described() };
+    let fits = if splits.len() > 1 { format!(", {} fits", splits.len()) } else { String::new() };
+    let (trials, tested) = (data.examples.len(), rows.first().map_or(0, |row| row.evaluation.trials));
+    let (seed, quick) = (arguments.data.seed, arguments.data.quick);
+    let quick = if quick { "; quick training, do not quote" } else { "" };
+    let mut heading = data.about.lines();
+    heading.push(format!("split: {plan}{fits}; {trials} trials, {tested} of them tested; seed {seed}{quick}\n"));
+    EvaluateReport { rows, controls, heading }.print(arguments.json)
 }
 
 impl EvaluateArguments {
@@ -180,57 +176,59 @@ fn chosen(names: &[String]) -> Result<(Vec<&'static Method>, Vec<String>), Failu
     Ok((methods?, rest.into_iter().cloned().collect()))
 }
 
-fn print(rows: &[ComparisonRow], arguments: &EvaluateArguments, data: &Dataset, plan: &str) -> Result<(), Failure> {
-    let quick = if arguments.data.quick { "; quick training, do not quote" } else { "" };
-    for line in data.about.lines() {
-        say(line)?;
-    }
-    let (trials, seed) = (data.examples.len(), arguments.data.seed);
-    let tested = rows.first().map_or(0, |row| row.evaluation.trials);
-    say(format!("split: {plan}; {trials} trials, {tested} of them tested; seed {seed}{quick}\n"))?;
-    let percent = |x: f64| format!("{:.1}", 100.0 * x);
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| {
-            let e = &row.evaluation;
-            let after = |grasps: usize| e.f1_by_grasps.get(grasps - 1).map_or_else(|| "-".to_owned(), |f| percent(*f));
-            let stage = |pick: fn(&StageOneScores) -> f64| {
-                e.stage_one.as_ref().map_or_else(|| "-".to_owned(), |s| percent(pick(s)))
-            };
-            vec![
-                row.model.clone(),
-                percent(e.f1_macro),
-                format!("{}-{}", percent(e.ci95[0]), percent(e.ci95[1])),
-                percent(e.macro_accuracy),
-                after(3),
-                after(5),
-                stage(|s| s.size_f1),
-                stage(|s| s.shape_f1),
-                format!("{:.3}", e.ece),
-                format!("{:.1}", row.train_cpu_s),
-                format!("{:.1}", e.step_us),
-            ]
-        })
-        .collect();
-    let header =
-        ["model", "F1", "95 %", "accuracy", "F1 (3)", "F1 (5)", "size F1", "shape F1", "ECE", "train s", "us/sample"];
-    table(&header, &cells)?;
-    say(
-        "\nF1 and accuracy: means over the classes, in percent. (3), (5): after three and five grasps of the same object.",
-    )
+/// A share in percent.
+fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
 }
 
-fn print_controls(controls: &Controls) -> Result<(), Failure> {
-    let line = |what: &str, i: Interval| {
-        let percent = [i.estimate, i.low, i.high].map(|x| format!("{:.1}", 100.0 * x));
-        format!("{what:<28}{} ({} to {})", percent[0], percent[1], percent[2])
-    };
-    say(format!(
-        "\nControls of {}: macro accuracy in percent, chance is {:.1}",
-        controls.method,
-        100.0 * controls.chance
-    ))?;
-    say(line("shuffled labels", controls.shuffled_labels))?;
-    say(line("unchanged", controls.plain))?;
-    say(line("true size and shape given", controls.true_size_and_shape))
+impl Report for EvaluateReport {
+    fn text(&self, page: &mut Page) {
+        self.heading.iter().for_each(|line| page.line(line));
+        let or_none = |share: Option<f64>| share.map_or_else(|| "-".to_owned(), percent);
+        let row = |row: &ComparisonRow| {
+            let own = &row.evaluation;
+            let after = |grasps: usize| or_none(own.f1_by_grasps.get(grasps - 1).copied());
+            [
+                row.model.clone(),
+                percent(own.f1_macro),
+                format!("{}-{}", percent(own.ci95[0]), percent(own.ci95[1])),
+                percent(own.macro_accuracy),
+                after(3),
+                after(5),
+                or_none(own.stage_one.as_ref().map(|scores| scores.size_f1)),
+                or_none(own.stage_one.as_ref().map(|scores| scores.shape_f1)),
+                format!("{:.3}", own.ece),
+                format!("{:.1}", row.train_cpu_s),
+                format!("{:.1}", own.step_us),
+            ]
+        };
+        let header = [
+            "model",
+            "F1",
+            "95 %",
+            "accuracy",
+            "F1 (3)",
+            "F1 (5)",
+            "size F1",
+            "shape F1",
+            "ECE",
+            "train s",
+            "us/sample",
+        ];
+        page.table(&header, self.rows.iter().map(row));
+        page.line(
+            "\nF1 and accuracy: means over the classes, in percent. (3), (5): after three and five grasps of the same \
+             object.",
+        );
+        let Some(controls) = &self.controls else { return };
+        let (method, chance) = (&controls.method, percent(controls.chance));
+        page.line(format!("\nControls of {method}: macro accuracy in percent, chance is {chance}"));
+        for (what, own) in [
+            ("shuffled labels", controls.shuffled_labels),
+            ("unchanged", controls.plain),
+            ("true size and shape given", controls.true_size_and_shape),
+        ] {
+            page.line(format!("{what:<28}{} ({} to {})", percent(own.estimate), percent(own.low), percent(own.high)));
+        }
+    }
 }

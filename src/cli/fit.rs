@@ -1,15 +1,9 @@
 //! `palpate fit`: estimates stiffness, damping, torque curve and lag of a real finger from recorded grasps.
 
-use super::Failure;
-use super::output::{check_new, file_of, write_new};
-use super::setup::{SceneArguments, read_store};
-use super::terminal::{say, say_json, table, warn};
+use super::prelude::*;
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{FingerFit, Known, RecordedGrasps, fit_finger};
-use palpate_store::{CalibrationId, FileKind};
-use palpate_tactile::trial::TrialId;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
+use palpate_store::CalibrationId;
 
 /// Arguments of `palpate fit`.
 #[derive(Debug, clap::Args)]
@@ -41,10 +35,12 @@ pub(super) struct FitArguments {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct FitReport {
     #[serde(flatten)]
     fit: FingerFit,
     trials: Vec<TrialId>,
+    #[serde(skip)]
+    out: Option<PathBuf>,
 }
 
 pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -75,51 +71,32 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
         scene.gripper = fit.gripper.clone();
         write_new(path, FileKind::Scene, scene.to_toml().as_bytes())?;
     }
-    if arguments.json {
-        return say_json(&Report { fit, trials: arguments.trials.clone() });
-    }
-    print(&fit)?;
-    match &arguments.out {
-        Some(path) => say(format!(
-            "written: {}, a scene with the fitted gripper; palpate help gripper says how a model learns its grasps",
-            path.display()
-        )),
-        None => Ok(()),
-    }
+    FitReport { fit, trials: arguments.trials.clone(), out: arguments.out.clone() }.print(arguments.json)
 }
 
-fn print(fit: &FingerFit) -> Result<(), Failure> {
-    let known = |known: Known| match known {
-        Known::Well => "well known",
-        Known::Roughly => "roughly known",
-        Known::Hardly => "hardly known",
-    };
-    let rows: Vec<Vec<String>> = fit
-        .estimates
-        .iter()
-        .map(|estimate| {
+impl Report for FitReport {
+    fn text(&self, page: &mut Page) {
+        let estimates = self.fit.estimates.iter().map(|estimate| {
             let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(three_digits);
-            vec![
-                estimate.name.clone(),
-                value,
-                format!("{low} to {high}"),
-                estimate.unit.to_owned(),
-                known(estimate.known).to_owned(),
-            ]
-        })
-        .collect();
-    table(&["parameter", "value", "95 %", "unit", ""], &rows)?;
-    say("")?;
-    let rows: Vec<Vec<String>> = fit
-        .remainders
-        .iter()
-        .map(|left| {
+            let known = match estimate.known {
+                Known::Well => "well known",
+                Known::Roughly => "roughly known",
+                Known::Hardly => "hardly known",
+            };
+            [estimate.name.clone(), value, format!("{low} to {high}"), estimate.unit.to_owned(), known.to_owned()]
+        });
+        page.table(&["parameter", "value", "95 %", "unit", ""], estimates);
+        page.line("");
+        let remainders = self.fit.remainders.iter().map(|left| {
             let force = left.force_share.map_or_else(|| "–".to_owned(), |share| format!("{:.1} %", 100.0 * share));
-            let shift = format!("{:+.0} ms", 1e3 * left.shift_s);
-            vec![left.name.clone(), format!("{} 1/m", three_digits(left.curvature_per_m)), force, shift]
-        })
-        .collect();
-    table(&["residual (RMS)", "curvature", "force", "delay"], &rows)?;
-    fit.remarks.iter().for_each(|remark| warn(remark));
-    Ok(())
+            let curvature = format!("{} 1/m", three_digits(left.curvature_per_m));
+            [left.name.clone(), curvature, force, format!("{:+.0} ms", 1e3 * left.shift_s)]
+        });
+        page.table(&["residual (RMS)", "curvature", "force", "delay"], remainders);
+        self.fit.remarks.iter().for_each(|remark| page.warn(remark));
+        if let Some(path) = &self.out {
+            let (path, what) = (path.display(), "a scene with the fitted gripper");
+            page.line(format!("written: {path}, {what}; palpate help gripper says how a model learns its grasps"));
+        }
+    }
 }

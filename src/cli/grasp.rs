@@ -1,9 +1,7 @@
 //! `palpate grasp`: simulates one grasp, prints a summary, stores the trial, writes it as CSV.
 
-use super::Failure;
-use super::output::{check_replaced, file_of};
-use super::setup::{RecomputeArguments, SceneArguments, SignalArguments, open_store};
-use super::terminal::{say, say_json, warn};
+use super::prelude::*;
+use super::setup::RecomputeArguments;
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp_soundly};
 use palpate_sim::frame::TrustLevel;
@@ -11,11 +9,8 @@ use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::class_name;
-use palpate_store::{FileKind, Stored, contacts_path, write_contacts_csv, write_trial_csv};
-use palpate_tactile::trial::TrialId;
+use palpate_store::{Stored, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::{Sensors, SignalDefinition};
-use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate grasp`.
 #[derive(Debug, clap::Args)]
@@ -62,7 +57,7 @@ pub(super) struct GraspArguments {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct GraspReport {
     #[serde(flatten)]
     summary: GraspSummary,
     seed: u64,
@@ -80,6 +75,11 @@ struct Report {
     trial_id: Option<TrialId>,
     /// False where that trial held the same grasp already.
     newly_stored: bool,
+    #[serde(skip)]
+    scene: Scene,
+    /// Files that were written.
+    #[serde(skip)]
+    written: Option<String>,
 }
 
 pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -118,100 +118,93 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         write_trial_csv(path, &trial, &scene, &sensors)?;
         write_contacts_csv(&contacts_path(path), &trial, &scene)?;
     }
-    let accuracy = scene.solver.accuracy.to_string();
     let summary = GraspSummary::new(&trial, &scene);
     let (trust, trust_reason) = summary.quality.trust();
-    let (trial_id, newly_stored) = (stored.map(Stored::id), stored.is_some_and(Stored::is_new));
-    let report = Report {
+    let report = GraspReport {
         summary,
         seed,
-        accuracy,
+        accuracy: scene.solver.accuracy.to_string(),
         cpu_ms,
         load_cpu_ms,
         trust,
         trust_reason,
         error_band,
-        trial_id,
-        newly_stored,
+        trial_id: stored.map(Stored::id),
+        newly_stored: stored.is_some_and(Stored::is_new),
+        scene,
+        written: arguments.out.as_ref().map(|path| format!("{} and {}", path.display(), contacts_path(path).display())),
     };
-    if arguments.json {
-        say_json(&report)?;
-    } else {
-        print(&report, &scene)?;
-        if let Some(path) = &arguments.out {
-            say(format!("written       {} and {}", path.display(), contacts_path(path).display()))?;
-        }
-    }
+    report.print(arguments.json)?;
     if report.summary.finite { Ok(()) } else { Err("the simulation diverged; see the warnings".into()) }
 }
 
-fn print(report: &Report, scene: &Scene) -> Result<(), Failure> {
-    let summary = &report.summary;
-    for warning in &summary.warnings {
-        warn(warning);
-    }
-    let duration = scene.timing.duration_s;
-    let held = if scene.holds_object() { "fixed" } else { "free" };
-    say(format!("object        {}, {held}", titled(&summary.object)))?;
-    match summary.contact_onset_s {
-        Some(onset) => say(format!("first contact {onset:.3} s"))?,
-        None => say("first contact none")?,
-    }
-    if let Some(hold) = &summary.hold {
-        let pair = |name: &str, values: [f64; 2], unit: &str| {
-            let [left, right] = values.map(three_digits);
-            say(format!("{name:<13} {left} left, {right} right [{unit}]"))
-        };
-        pair("hold force", hold.force_n, "N")?;
-        pair("curvature", hold.curvature_per_m, "1/m")?;
-        pair("pad pressure", hold.pressure_pa.map(|p| p * 1e-3), "kPa")?;
-        pair("at contact", hold.contact_pressure_pa.map(|p| p * 1e-3), "kPa")?;
-        if let Some(shape) = &hold.out_of_plane {
-            pair("tips sideways", shape.tip_m.map(mm), "mm")?;
-            pair("tips twisted", shape.twist_rad.map(f64::to_degrees), "degrees")?;
+impl Report for GraspReport {
+    fn text(&self, page: &mut Page) {
+        let (summary, accuracy) = (&self.summary, &self.accuracy);
+        summary.warnings.iter().for_each(|warning| page.warn(warning));
+        let held = if self.scene.holds_object() { "fixed" } else { "free" };
+        page.fact("object", format!("{}, {held}", titled(&summary.object)));
+        summary_facts(summary, page);
+        let quality = &summary.quality;
+        if self.scene.solver.accuracy.tolerance().is_some() {
+            let (rejected, solves, least) = (quality.rejected_steps, quality.solves, quality.least_step_s * 1e3);
+            let text = format!("{rejected} rejected steps, {solves} solves, shortest step {least:.3} ms");
+            page.fact("error control", text);
         }
-    }
-    if let Some(moved) = summary.object_moved_m {
-        say(format!("object moved  {} mm", three_digits(mm(moved))))?;
-    }
-    if let Some(shaken) = &summary.shaken {
-        let held = if shaken.held { "held" } else { "lost" };
-        let slipped = shaken.slipped_m.map(|way| format!(", {} mm in the hand", three_digits(mm(way))));
-        say(format!("shaken        {held}{}", slipped.unwrap_or_default()))?;
-    }
-    let quality = &summary.quality;
-    say(format!(
-        "solver        {} steps, {:.2} Newton iterations per solve (at most {}), {}",
-        quality.steps,
-        quality.newton_mean,
-        quality.newton_max,
-        if summary.converged { "all converged" } else { "not all converged" },
-    ))?;
-    if scene.solver.accuracy.tolerance().is_some() {
-        let (rejected, solves, least) = (quality.rejected_steps, quality.solves, quality.least_step_s * 1e3);
-        say(format!("error control {rejected} rejected steps, {solves} solves, shortest step {least:.3} ms"))?;
-    }
-    if let Some(error) = &report.error_band {
-        print_error(error)?;
-    }
-    if let Some(recomputed) = quality.recomputed {
-        say(format!("recomputed    at accuracy {}: {recomputed}", report.accuracy))?;
-    }
-    say(format!("trust         {}: {}", report.trust.name(), report.trust_reason))?;
-    say(format!("cost          {:.1} ms CPU for {duration} s at accuracy {}", report.cpu_ms, report.accuracy))?;
-    match report.trial_id {
-        Some(id) if report.newly_stored => say(format!("stored        trial {id}")),
-        Some(id) => say(format!("stored        not again: trial {id} is the same grasp")),
-        None => Ok(()),
+        self.error_band.iter().for_each(|error| error_facts(error, page));
+        page.fact("recomputed", quality.recomputed.map(|recomputed| format!("at accuracy {accuracy}: {recomputed}")));
+        page.fact("trust", format!("{}: {}", self.trust.name(), self.trust_reason));
+        let duration = self.scene.timing.duration_s;
+        page.fact("cost", format!("{:.1} ms CPU for {duration} s at accuracy {accuracy}", self.cpu_ms));
+        page.fact(
+            "stored",
+            self.trial_id.map(|id| match self.newly_stored {
+                true => format!("trial {id}"),
+                false => format!("not again: trial {id} is the same grasp"),
+            }),
+        );
+        page.fact("written", self.written.clone());
     }
 }
 
-fn print_error(error: &ErrorNorms) -> Result<(), Failure> {
-    let part = |name: &str, size: f64, unit: &str, share: f64| {
-        let (size, percent) = (three_digits(size), three_digits(share * 100.0));
-        say(format!("{name:<13} ±{size} {unit}, {percent} % of the range [RMS numerical error]"))
+/// Contact, hold and solver of a grasp.
+pub(super) fn summary_facts(summary: &GraspSummary, page: &mut Page) {
+    let onset = summary.contact_onset_s.map_or_else(|| "none".to_owned(), |onset| format!("{onset:.3} s"));
+    page.fact("first contact", onset);
+    let mut pair = |name: &str, values: Option<[f64; 2]>, unit: &str| {
+        let text = values.map(|both| both.map(three_digits));
+        page.fact(name, text.map(|[left, right]| format!("{left} left, {right} right [{unit}]")));
     };
-    part("curvature", error.curvature_per_m, "1/m", error.curvature_share)?;
-    part("pressure", error.pressure_pa * 1e-3, "kPa", error.pressure_share)?;
-    part("force", error.force_n, "N", error.force_share)
+    let hold = summary.hold.as_ref();
+    pair("hold force", hold.map(|hold| hold.force_n), "N");
+    pair("curvature", hold.map(|hold| hold.curvature_per_m), "1/m");
+    pair("pad pressure", hold.map(|hold| hold.pressure_pa.map(|p| p * 1e-3)), "kPa");
+    pair("at contact", hold.map(|hold| hold.contact_pressure_pa.map(|p| p * 1e-3)), "kPa");
+    let shape = hold.and_then(|hold| hold.out_of_plane.as_ref());
+    pair("tips sideways", shape.map(|shape| shape.tip_m.map(mm)), "mm");
+    pair("tips twisted", shape.map(|shape| shape.twist_rad.map(f64::to_degrees)), "degrees");
+    page.fact("object moved", summary.object_moved_m.map(|moved| format!("{} mm", three_digits(mm(moved)))));
+    page.fact(
+        "shaken",
+        summary.shaken.map(|shaken| {
+            let held = if shaken.held { "held" } else { "lost" };
+            let slipped = shaken.slipped_m.map(|way| format!(", {} mm in the hand", three_digits(mm(way))));
+            format!("{held}{}", slipped.unwrap_or_default())
+        }),
+    );
+    let quality = &summary.quality;
+    let (steps, mean, most) = (quality.steps, quality.newton_mean, quality.newton_max);
+    let converged = if summary.converged { "all converged" } else { "not all converged" };
+    let text = format!("{steps} steps, {mean:.2} Newton iterations per solve (at most {most}), {converged}");
+    page.fact("solver", text);
+}
+
+fn error_facts(error: &ErrorNorms, page: &mut Page) {
+    let mut part = |name: &str, size: f64, unit: &str, share: f64| {
+        let (size, percent) = (three_digits(size), three_digits(share * 100.0));
+        page.fact(name, format!("±{size} {unit}, {percent} % of the range [RMS numerical error]"));
+    };
+    part("curvature", error.curvature_per_m, "1/m", error.curvature_share);
+    part("pressure", error.pressure_pa * 1e-3, "kPa", error.pressure_share);
+    part("force", error.force_n, "N", error.force_share);
 }

@@ -2,8 +2,8 @@
 
 mod page;
 
-use super::terminal::say;
-use super::{Arguments, Failure};
+use super::Arguments;
+use super::prelude::*;
 use crate::manual::TOPICS;
 use clap::builder::PossibleValuesParser;
 use clap::{CommandFactory, Parser};

@@ -1,16 +1,13 @@
 //! Arguments and helpers shared by `train` and `evaluate`.
 
-use super::Failure;
 use super::origin::OriginFilters;
-use super::setup::{SignalArguments, within};
-use super::terminal::{note, warn};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
+use super::prelude::*;
+use super::setup::{self};
+use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView, check_model_path, models_folder};
 use palpate_lab::study::{Compared, Comparison, MethodResult, compare};
 use palpate_learn::{Dataset, METHODS, Method, Split, StopRule, counted, method};
-use palpate_store::{CalibrationId, Store};
+use palpate_store::CalibrationId;
 use palpate_tactile::model::SensorModel;
-use std::sync::atomic::AtomicBool;
 
 /// Selection of trials.
 #[derive(Clone, Debug, clap::Args)]
@@ -105,12 +102,9 @@ impl DataArguments {
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
         let source = self.trials.query(without_empty, most_of_each);
-        let bar = progress_bar("reading trials")?;
-        let data = source.read(store, &self.view(), &mut |done, of| {
-            bar.set_length(of as u64);
-            bar.set_position(done as u64);
-        });
-        bar.finish_and_clear();
+        let bar = Progress::of("reading trials");
+        let data = source.read(store, &self.view(), &mut |done, of| bar.show(done, of));
+        drop(bar);
         let data = data?;
         for mixed in &data.about.mixed {
             warn(&format!("the trials mix {mixed}"));
@@ -130,23 +124,19 @@ impl DataArguments {
         methods: &[&'static Method],
         threads: Option<u16>,
     ) -> Result<Compared, Failure> {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let interrupted = AtomicBool::new(false);
         let parts: Vec<[Dataset; 3]> = splits.iter().map(|split| parts(data, split)).collect();
         let comparisons: Vec<Comparison<'_>> = parts.iter().map(|parts| self.comparison(parts, &interrupted)).collect();
-        let bar = progress_bar("training and testing")?;
-        bar.set_length((methods.len() * splits.len()) as u64);
-        bar.tick();
+        let bar = Progress::of("training and testing");
+        bar.show(0, methods.len() * splits.len());
         let progress = |ended: Option<MethodResult>| {
-            bar.inc(1);
+            bar.0.inc(1);
             if let Some(MethodResult { method, f1_macro, train_cpu_s }) = ended.filter(|_| methods.len() > 1) {
                 let line = format!("{method}: F1 {:.1}, training {train_cpu_s:.1} CPU s", 100.0 * f1_macro);
-                bar.suspend(|| note(&line));
+                bar.0.suspend(|| note(&line));
             }
         };
-        let compared = compare(&comparisons, methods, threads.map_or_else(cores, usize::from), &progress);
-        bar.finish_and_clear();
-        Ok(compared?)
+        Ok(compare(&comparisons, methods, setup::threads(threads), &progress)?)
     }
 
     /// Comparison on one split, of its three parts.
@@ -166,10 +156,12 @@ pub(super) fn parts(data: &Dataset, split: &Split) -> [Dataset; 3] {
     [&split.train, &split.second, &split.test].map(|part| data.part(part))
 }
 
-/// A progress bar on standard error, visible only on a terminal.
-pub(super) fn progress_bar(what: &str) -> Result<ProgressBar, Failure> {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta} left")?;
-    Ok(ProgressBar::new(0).with_style(style).with_message(what.to_owned()))
+/// File for a model that is about to be made: the named one, or one of this name in the models folder.
+pub(super) fn model_file(out: Option<&Path>, name: &str) -> Result<PathBuf, Failure> {
+    let Some(out) = out else { return Ok(models_folder().join(format!("{name}.safetensors"))) };
+    check_folder(out)?;
+    check_model_path(out)?;
+    Ok(out.to_owned())
 }
 
 /// Finds a method by its key; the error lists all keys.

@@ -19,6 +19,7 @@ mod origin;
 mod output;
 mod plan;
 mod plot;
+mod prelude;
 mod recognise;
 mod record;
 mod replay;

@@ -1,23 +1,17 @@
 //! `palpate movie`: a stored trial, or presenter mode, as an animated picture, without a window.
 
-use super::Failure;
-use super::interrupt::stop_flag;
-use super::output::{TemporaryFolder, cannot, check_folder, check_replaced, file_or_folder};
-use super::setup::{read_store, within};
-use super::snapshot::{OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
-use super::terminal::{note, say};
+use super::output::{TemporaryFolder, cannot};
+use super::prelude::*;
+use super::snapshot::{Drawer, OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
 use crate::app::{Mode, OffscreenWindow, film_presentation};
 use glam::Vec2;
 use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::OpenTrial;
 use palpate_lab::picture::PictureView;
-use palpate_render::{DriverChoice, Gpu, MovieFormat, MovieWriter, Picture, Renderer};
+use palpate_render::{MovieFormat, MovieWriter, Picture};
 use palpate_sim::scene::Scene;
-use palpate_store::{FileKind, NewFile, NewFolder};
-use palpate_tactile::trial::TrialId;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use palpate_store::{NewFile, NewFolder};
 
 /// Arguments of `palpate movie`.
 #[derive(Debug, clap::Args)]
@@ -79,10 +73,8 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let store = read_store(store)?;
     let open = open_drawable(&store, id)?;
     let times = times(arguments, &open.trial)?;
-    let gpu = Gpu::headless(DriverChoice::Any)?;
     let full_scale = open.stage.full_scale_of(open.trial.frames.iter().map(AsRef::as_ref));
-    let renderer = Renderer::new(&gpu.device, &gpu.queue);
-    let mut shot = Shot { renderer, gpu, open: &open, full_scale, arguments };
+    let mut shot = Shot { drawer: Drawer::new()?, open: &open, full_scale, arguments };
     let stop = stop_flag()?;
     let mut writer = Writer::begin(&target, out, arguments, times.len())?;
     for (number, t_s) in times.iter().enumerate() {
@@ -160,8 +152,7 @@ fn count(span_s: f64, step_s: f64) -> Result<usize, Failure> {
 
 /// Draws pictures of a trial.
 struct Shot<'a> {
-    gpu: Gpu,
-    renderer: Renderer,
+    drawer: Drawer,
     open: &'a OpenDrawable,
     /// Pressure that has the brightest colour (Pa).
     full_scale: f32,
@@ -170,7 +161,7 @@ struct Shot<'a> {
 
 impl Shot<'_> {
     fn picture(&mut self, t_s: f64) -> Result<Picture, Failure> {
-        let Self { gpu, renderer, open, full_scale, arguments } = self;
+        let Self { drawer, open, full_scale, arguments } = self;
         let OpenDrawable { stage, trial } = open;
         let now = trial.at(t_s).and_then(|now| now.frame).ok_or("the trial has no samples")?;
         let [width, height] = arguments.size.map(|side| side as f32);
@@ -184,7 +175,7 @@ impl Shot<'_> {
             ..PictureView::default()
         };
         let view = PictureView { camera: stage.camera(arguments.view, now, &view), ..view };
-        Ok(Picture::draw(gpu, renderer, &stage.draw(now, &view), arguments.size, 1.0)?)
+        drawer.draw(&stage.draw(now, &view), arguments.size)
     }
 }
 

@@ -1,12 +1,8 @@
 //! `palpate plan`: trials wanted and done per object, and the next one to record.
 
-use super::Failure;
-use super::setup::{existing_store, open_store};
-use super::terminal::{say, say_json, table};
+use super::prelude::*;
 use palpate_sim::objects::{class_of, titled};
-use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, ObjectProgress, Progress};
-use serde::Serialize;
-use std::path::Path;
+use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, ObjectProgress};
 
 /// Arguments of `palpate plan`.
 #[derive(Debug, clap::Args)]
@@ -43,7 +39,7 @@ enum PlanCommand {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct PlanReport {
     done: u32,
     wanted: u32,
     unlabelled: usize,
@@ -52,57 +48,53 @@ struct Report {
 }
 
 pub(super) fn run(arguments: &PlanArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let command = arguments.command.as_ref().unwrap_or(&PlanCommand::Show);
-    if matches!(command, PlanCommand::Show) {
-        return match existing_store(store)? {
-            Some(store) => show(&store.labels().plan()?, &store.labels().trials()?, arguments.json),
-            None => show(&LabelPlan::default(), &[], arguments.json),
-        };
-    }
-    let store = open_store(store)?;
-    let mut plan = store.labels().plan()?;
-    match command {
-        PlanCommand::Show => {}
-        PlanCommand::Set { name, wanted } => plan.set(class_of(name), *wanted)?,
-        PlanCommand::Remove { name } => plan.remove(class_of(name))?,
-    }
-    store.labels().set_plan(&plan)?;
-    show(&plan, &store.labels().trials()?, arguments.json)
-}
-
-fn show(plan: &LabelPlan, rows: &[LabelledTrial], json: bool) -> Result<(), Failure> {
-    let progress = plan.progress(rows);
-    let last = rows.iter().rev().find(|row| row.counts()).and_then(|row| row.object.as_deref());
-    let next = progress.next(last);
-    let unlabelled = rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count();
-    let (done, wanted) = (progress.done(), progress.wanted());
-    if json {
-        return say_json(&Report { done, wanted, unlabelled, objects: progress.objects, next });
-    }
-    table(&["object", "done", "wanted", "flagged"], &cells(&progress))?;
-    say(format!("{done} of {wanted} trials"))?;
-    if unlabelled > 0 {
-        say(format!("{unlabelled} trial(s) without a label: `palpate trials label ID NAME`"))?;
-    }
-    match next {
-        Some(next) => {
-            let [opening, across] = next.cue.shift_mm;
-            say(format!(
-                "next: {} (trial {}), turned by {:.0} degrees, shifted by {opening:.0} mm to the right and {across:.0} mm across",
-                titled(&next.object),
-                next.number,
-                next.cue.turn_deg
-            ))
-        }
-        None => say("the plan is complete"),
-    }
-}
-
-fn cells(progress: &Progress) -> Vec<Vec<String>> {
-    let row = |object: &ObjectProgress| {
-        let ObjectProgress { name, wanted, done, flagged } = object;
-        let wanted = if *wanted == 0 { "not planned".to_owned() } else { wanted.to_string() };
-        vec![titled(name), done.to_string(), wanted, flagged.to_string()]
+    let store = match &arguments.command {
+        None | Some(PlanCommand::Show) => existing_store(store)?,
+        Some(_) => Some(open_store(store)?),
     };
-    progress.objects.iter().map(row).collect()
+    let Some(store) = store else { return PlanReport::new(&LabelPlan::default(), &[]).print(arguments.json) };
+    let mut plan = store.labels().plan()?;
+    match &arguments.command {
+        None | Some(PlanCommand::Show) => {}
+        Some(PlanCommand::Set { name, wanted }) => plan.set(class_of(name), *wanted)?,
+        Some(PlanCommand::Remove { name }) => plan.remove(class_of(name))?,
+    }
+    if !matches!(arguments.command, None | Some(PlanCommand::Show)) {
+        store.labels().set_plan(&plan)?;
+    }
+    PlanReport::new(&plan, &store.labels().trials()?).print(arguments.json)
+}
+
+impl PlanReport {
+    fn new(plan: &LabelPlan, rows: &[LabelledTrial]) -> Self {
+        let progress = plan.progress(rows);
+        let last = rows.iter().rev().find(|row| row.counts()).and_then(|row| row.object.as_deref());
+        Self {
+            done: progress.done(),
+            wanted: progress.wanted(),
+            unlabelled: rows.iter().filter(|row| row.complete && !row.discarded && row.object.is_none()).count(),
+            next: progress.next(last),
+            objects: progress.objects,
+        }
+    }
+}
+
+impl Report for PlanReport {
+    fn text(&self, page: &mut Page) {
+        let row = |ObjectProgress { name, wanted, done, flagged }: &ObjectProgress| {
+            let wanted = if *wanted == 0 { "not planned".to_owned() } else { wanted.to_string() };
+            [titled(name), done.to_string(), wanted, flagged.to_string()]
+        };
+        page.table(&["object", "done", "wanted", "flagged"], self.objects.iter().map(row));
+        page.line(format!("{} of {} trials", self.done, self.wanted));
+        if self.unlabelled > 0 {
+            page.line(format!("{} trial(s) without a label: `palpate trials label ID NAME`", self.unlabelled));
+        }
+        let Some(NextTrial { object, number, cue, .. }) = &self.next else { return page.line("the plan is complete") };
+        let ([opening, across], turn, object) = (cue.shift_mm, cue.turn_deg, titled(object));
+        page.line(format!(
+            "next: {object} (trial {number}), turned by {turn:.0} degrees, shifted by {opening:.0} mm to the right and \
+             {across:.0} mm across"
+        ));
+    }
 }

@@ -1,17 +1,10 @@
 //! `palpate plot`: figures of stored trials, as SVG or PNG.
 
-use super::Failure;
-use super::output::{check_new, file_of};
-use super::setup::{SignalArguments, read_store};
+use super::prelude::*;
 use super::snapshot::{parse_size, parse_theme};
-use super::terminal::say;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
-use palpate_store::FileKind;
-use palpate_tactile::trial::TrialId;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate plot`.
 #[derive(Debug, clap::Args)]

@@ -2,17 +2,13 @@
 
 mod why;
 
-use super::Failure;
-use super::setup::read_store;
-use super::terminal::{say, say_json, table, warn};
+use super::prelude::*;
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Shipped, Verdict};
+use palpate_store::TrialRow;
 use palpate_store::labels::shown_title;
-use palpate_store::{Store, TrialRow};
-use palpate_tactile::trial::{TrialId, TrialSource};
-use serde::Serialize;
+use palpate_tactile::trial::TrialSource;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
 use why::{Explanations, WhyReport};
 
 /// Arguments of `palpate recognise`.
@@ -79,7 +75,7 @@ impl StageOne {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct RecogniseReport {
     trials: Vec<TrialReport>,
     /// All trials as grasps of one object.
     together: Option<Together>,
@@ -190,32 +186,25 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         warn_of_perfect_sensors(&model);
     }
     fixed.into_iter().for_each(|fixed| warn_unless_learned(&model, fixed));
-    if arguments.json {
-        return say_json(&Report { trials, together });
-    }
-    let cells: Vec<Vec<String>> = trials
-        .iter()
-        .map(|trial| {
-            let properties = trial.stage_one.as_ref().map_or_else(String::new, |s| format!("{}, {}", s.size, s.shape));
-            vec![
-                trial.trial.to_string(),
-                shown_title(trial.truth.as_deref().unwrap_or_default()),
-                properties,
-                shown_title(&trial.decided),
-                format!("{:.0} %", 100.0 * trial.probability),
-            ]
-        })
-        .collect();
-    table(&["trial", "label", "stage one", "recognised as", "probability"], &cells)?;
-    if let Some(all) = together {
-        say(format!("together: {} ({:.0} %)", shown_title(&all.decided), 100.0 * all.probability))?;
-    }
-    let explained = || trials.iter().filter_map(|trial| Some((trial.trial, trial.why.as_ref()?)));
-    for (id, why) in explained() {
-        why.say(id, arguments.together)?;
-    }
-    match explained().next_back() {
-        Some((_, why)) => why::say_how(why.calls()),
-        None => Ok(()),
+    RecogniseReport { trials, together }.print(arguments.json)
+}
+
+impl Report for RecogniseReport {
+    fn text(&self, page: &mut Page) {
+        let percent = |p: f64| format!("{:.0} %", 100.0 * p);
+        let row = |trial: &TrialReport| {
+            let properties = trial.stage_one.as_ref().map(|s| format!("{}, {}", s.size, s.shape));
+            let truth = shown_title(trial.truth.as_deref().unwrap_or_default());
+            let decided = shown_title(&trial.decided);
+            [trial.trial.to_string(), truth, properties.unwrap_or_default(), decided, percent(trial.probability)]
+        };
+        let header = ["trial", "label", "stage one", "recognised as", "probability"];
+        page.table(&header, self.trials.iter().map(row));
+        if let Some(all) = &self.together {
+            page.line(format!("together: {} ({})", shown_title(&all.decided), percent(all.probability)));
+        }
+        let explained = || self.trials.iter().filter_map(|trial| Some((trial.trial, trial.why.as_ref()?)));
+        explained().for_each(|(id, why)| why.text(page, id, self.together.is_some()));
+        explained().next_back().into_iter().for_each(|(_, why)| why.method_text(page));
     }
 }

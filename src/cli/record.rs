@@ -1,21 +1,15 @@
 //! `palpate record`: records a trial of the real gripper.
 
-use super::Failure;
-use super::interrupt::stop_flag;
 use super::link;
-use super::setup::{open_store, within};
-use super::terminal::{say, say_json, table, warn};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_device::serial::{Baud, LinkOptions, LinkState, LinkStatus, list_ports};
+use super::prelude::*;
+use palpate_device::serial::{Baud, LinkOptions, LinkState, LinkStatus, PortInfo, list_ports};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{RecordProgress, RecordedTrial, TrialRequest, record};
 use palpate_sim::objects::class_of;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::{FlagRemark, class_name, flaws, shown_title};
-use palpate_tactile::trial::Control;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use palpate_tactile::board::Detected;
+use palpate_tactile::trial::{BoardCourse, Control};
 
 /// Arguments of `palpate record`.
 #[derive(Debug, clap::Args)]
@@ -74,7 +68,7 @@ pub(super) fn parse_baud(text: &str) -> Result<Baud, String> {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct RecordReport {
     trial_id: i64,
     /// Label; none for an unlabelled trial.
     object: Option<String>,
@@ -96,11 +90,13 @@ struct Report {
     channels: Vec<String>,
     flags: Vec<FlagRemark>,
     warnings: Vec<String>,
+    #[serde(skip)]
+    detected: Option<Detected>,
 }
 
 pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(), Failure> {
     if arguments.list {
-        return list(arguments.json);
+        return PortsReport(list_ports()).print(arguments.json);
     }
     let scene = match &arguments.scene {
         Some(path) => Scene::named_or_from_file(path)?,
@@ -123,15 +119,15 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         (false, false) => Control::Free,
     };
     let request = TrialRequest { object: object.clone(), control, length_s: arguments.seconds, adds: false };
-    let bar = ProgressBar::new_spinner().with_style(ProgressStyle::with_template("{elapsed} {msg}")?);
+    let bar = Progress::new("{elapsed} {msg}");
     let mut gripper = SerialGripper::new(Box::new(link));
     let outcome = record(&mut gripper, &scene, request, store, &stop, &mut |progress| {
-        bar.set_message(progress_line(&progress));
-        bar.tick();
+        bar.0.set_message(progress_line(&progress));
+        bar.0.tick();
     });
-    bar.finish_and_clear();
+    drop(bar);
     let recording = outcome?;
-    print(recording.trial, object, &recording.status, arguments.json)?;
+    RecordReport::new(recording.trial, object, &recording.status).print(arguments.json)?;
     match recording.aborted {
         Some(cause) => Err(format!("the trial ended early, and is stored: {cause}").into()),
         None => Ok(()),
@@ -151,62 +147,67 @@ fn progress_line(progress: &RecordProgress<'_>) -> String {
     )
 }
 
-fn print(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus, json: bool) -> Result<(), Failure> {
-    let cadence = recorded.about.course.cadence;
-    let report = Report {
-        trial_id: recorded.id,
-        flags: flaws(recorded.about.flags, object.as_deref()),
-        object,
-        port: recorded.about.port,
-        baud: status.baud,
-        samples: cadence.samples,
-        lost: cadence.lost,
-        bad_lines: cadence.bad_lines,
-        gaps: cadence.gaps,
-        rate_hz: cadence.rate_hz,
-        jitter_p95_ms: cadence.jitter_p95_ms,
-        delay_p95_ms: cadence.delay_p95_ms,
-        drift_ppm: cadence.drift_ppm,
-        reconnects: recorded.about.course.reconnects,
-        dropped: status.dropped,
-        format: recorded.about.course.detected.as_ref().map(|detected| detected.format.label().to_owned()),
-        channels: recorded.about.course.board.channels,
-        warnings: recorded.warnings,
-    };
-    if json {
-        return say_json(&report);
+impl RecordReport {
+    fn new(recorded: RecordedTrial, object: Option<String>, status: &LinkStatus) -> Self {
+        let BoardCourse { cadence, reconnects, detected, board, .. } = recorded.about.course;
+        Self {
+            trial_id: recorded.id,
+            flags: flaws(recorded.about.flags, object.as_deref()),
+            object,
+            port: recorded.about.port,
+            baud: status.baud,
+            samples: cadence.samples,
+            lost: cadence.lost,
+            bad_lines: cadence.bad_lines,
+            gaps: cadence.gaps,
+            rate_hz: cadence.rate_hz,
+            jitter_p95_ms: cadence.jitter_p95_ms,
+            delay_p95_ms: cadence.delay_p95_ms,
+            drift_ppm: cadence.drift_ppm,
+            reconnects,
+            dropped: status.dropped,
+            format: detected.as_ref().map(|detected| detected.format.label().to_owned()),
+            channels: board.channels,
+            warnings: recorded.warnings,
+            detected,
+        }
     }
-    for warning in &report.warnings {
-        warn(warning);
-    }
-    let object = shown_title(report.object.as_deref().unwrap_or_default());
-    say(format!("trial {}      {object} from {}", report.trial_id, report.port))?;
-    for found in &report.flags {
-        say(format!("flagged       {}: {}", found.flag.label(), found.remark))?;
-    }
-    say(format!("samples       {} of {}", report.samples, report.channels.join(", ")))?;
-    if let Some(detected) = &recorded.about.course.detected {
-        let speed = report.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
-        say(format!("format        {}{speed}: {}", detected.format.label(), detected.why))?;
-    }
-    let (rate, jitter, delay) = (report.rate_hz, report.jitter_p95_ms, report.delay_p95_ms);
-    say(format!("cadence       {rate:.2} Hz, jitter {jitter:.2} ms, delay {delay:.2} ms [95th percentiles]"))?;
-    if let Some(drift) = report.drift_ppm {
-        say(format!("clock         drifts by {drift:+.0} ppm against this computer"))?;
-    }
-    let (lost, bad, gaps) = (report.lost, report.bad_lines, report.gaps);
-    say(format!("lost          {lost} readings in {gaps} gaps, {bad} bad lines, {} reconnects", report.reconnects))
 }
 
-fn list(json: bool) -> Result<(), Failure> {
-    let ports = list_ports();
-    if json {
-        return say_json(&ports);
+impl Report for RecordReport {
+    fn text(&self, page: &mut Page) {
+        self.warnings.iter().for_each(|warning| page.warn(warning));
+        let object = shown_title(self.object.as_deref().unwrap_or_default());
+        page.fact(format!("trial {}", self.trial_id), format!("{object} from {}", self.port));
+        for found in &self.flags {
+            page.fact("flagged", format!("{}: {}", found.flag.label(), found.remark));
+        }
+        page.fact("samples", format!("{} of {}", self.samples, self.channels.join(", ")));
+        let speed = self.baud.map(|baud| format!(" at {baud} baud")).unwrap_or_default();
+        let detected = self.detected.as_ref();
+        page.fact("format", detected.map(|detected| format!("{}{speed}: {}", detected.format.label(), detected.why)));
+        let (rate, jitter, delay) = (self.rate_hz, self.jitter_p95_ms, self.delay_p95_ms);
+        let cadence = format!("{rate:.2} Hz, jitter {jitter:.2} ms, delay {delay:.2} ms [95th percentiles]");
+        page.fact("cadence", cadence);
+        page.fact("clock", self.drift_ppm.map(|drift| format!("drifts by {drift:+.0} ppm against this computer")));
+        let Self { lost, bad_lines, gaps, reconnects, .. } = self;
+        let lost = format!("{lost} readings in {gaps} gaps, {bad_lines} bad lines, {reconnects} reconnects");
+        page.fact("lost", lost);
     }
-    if ports.is_empty() {
-        return say("no serial ports: is the board connected?");
+}
+
+/// Output of `--list`.
+#[derive(Serialize)]
+struct PortsReport(Vec<PortInfo>);
+
+impl Report for PortsReport {
+    fn text(&self, page: &mut Page) {
+        if self.0.is_empty() {
+            return page.line("no serial ports: is the board connected?");
+        }
+        page.table(
+            &["port", "device"],
+            self.0.iter().map(|port| [port.path.display().to_string(), port.title.clone()]),
+        );
     }
-    let cells: Vec<Vec<String>> =
-        ports.iter().map(|port| vec![port.path.display().to_string(), port.title.clone()]).collect();
-    table(&["port", "device"], &cells)
 }

@@ -1,18 +1,13 @@
 //! `palpate replay`: plays a stored trial or captured bytes as the live gripper: rows and recognition.
 
-use super::Failure;
+use super::prelude::*;
 use super::recognise::{StageOne, load_model, named, shipped_for, warn_of_perfect_sensors};
-use super::setup::{existing_store, read_store};
-use super::terminal::{note, say, say_json};
 use palpate_device::serial::{LinkOptions, SerialLink};
 use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::Replay;
 use palpate_learn::Shipped;
-use palpate_tactile::trial::TrialId;
-use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

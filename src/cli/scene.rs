@@ -1,15 +1,10 @@
 //! `palpate scene`: scenes with a name; which effects a scene calls for, why, what each costs and changes.
 
-use super::Failure;
-use super::setup::SceneArguments;
-use super::terminal::{say, say_json, warn};
-use indicatif::{ProgressBar, ProgressStyle};
+use super::prelude::*;
+use super::setup::threads;
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, explain_effects};
 use palpate_sim::scene::{SCENES, Scene};
-use serde::Serialize;
-use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate scene`.
 #[derive(Debug, clap::Args)]
@@ -52,17 +47,12 @@ pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
     };
     let scene = scene_of(scene_or_object.as_deref(), scene)?;
     let object = scene.load_object()?;
-    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} effects")?);
-    let progress = |done: usize, of: usize| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-    };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let how = Measuring { threads, cancelled: &AtomicBool::new(false), progress: &progress };
-    let explanation = explain_effects(&scene, object.as_ref(), &how);
-    bar.finish_and_clear();
-    let explanation = explanation.ok_or("the measurement was cancelled")?;
-    if *json { say_json(&explanation) } else { print(&explanation) }
+    let bar = Progress::new("{bar:40} {pos}/{len} effects");
+    let progress = |done: usize, of: usize| bar.show(done, of);
+    let how = Measuring { threads: threads(None), cancelled: &AtomicBool::new(false), progress: &progress };
+    let explanation = explain_effects(&scene, object.as_ref(), &how).ok_or("the measurement was cancelled")?;
+    drop(bar);
+    explanation.print(*json)
 }
 
 /// A named scene, as `--json` prints it.
@@ -99,32 +89,23 @@ fn scene_of(name: Option<&str>, arguments: &SceneArguments) -> Result<Scene, Fai
     }
 }
 
-fn print(explanation: &Explanation) -> Result<(), Failure> {
-    for warning in &explanation.warnings {
-        warn(warning);
+impl Report for Explanation {
+    fn text(&self, page: &mut Page) {
+        self.warnings.iter().for_each(|warning| page.warn(warning));
+        let onset = self.contact_onset_s.map_or("none".to_owned(), |t| format!("at {t:.3} s"));
+        page.line(format!("{}: {:.1} ms of CPU time, first contact {onset}", self.object, self.cpu_ms));
+        self.effects.iter().for_each(|effect| effect_text(effect, self.contact_onset_s, page));
     }
-    let onset = explanation.contact_onset_s.map_or("none".to_owned(), |t| format!("at {t:.3} s"));
-    say(format!("{}: {:.1} ms of CPU time, first contact {onset}", explanation.object, explanation.cpu_ms))?;
-    for effect in &explanation.effects {
-        say("")?;
-        print_effect(effect, explanation)?;
-    }
-    Ok(())
 }
 
-fn print_effect(effect: &ExplainedEffect, explanation: &Explanation) -> Result<(), Failure> {
+fn effect_text(effect: &ExplainedEffect, onset_s: Option<f64>, page: &mut Page) {
     let planned = &effect.planned;
     let state = if planned.on { "on" } else { "off" };
-    let setting = if planned.setting == state { "as set".to_owned() } else { planned.setting.clone() };
-    say(format!("{:<15} {state:<4} ({setting})   {}", planned.name, effect.about))?;
+    let setting = if planned.setting == state { "as set" } else { &planned.setting };
+    page.line(format!("\n{:<15} {state:<4} ({setting})   {}", planned.name, effect.about));
     let compared = if planned.number > planned.threshold { "above" } else { "not above" };
-    say(format!(
-        "  why      {}: {} = {}, {compared} {}",
-        planned.reason,
-        effect.number_is,
-        three_digits(planned.number),
-        planned.threshold
-    ))?;
-    say(format!("  cost     {}", effect.cost_in_words()))?;
-    say(format!("  change   {}", effect.change_in_words(explanation.contact_onset_s)))
+    let (reason, number) = (&planned.reason, three_digits(planned.number));
+    page.line(format!("  why      {reason}: {} = {number}, {compared} {}", effect.number_is, planned.threshold));
+    page.line(format!("  cost     {}", effect.cost_in_words()));
+    page.line(format!("  change   {}", effect.change_in_words(onset_s)));
 }

@@ -75,6 +75,11 @@ impl RecomputeArguments {
     }
 }
 
+/// Number of threads: as asked for, or one per core.
+pub(super) fn threads(asked: Option<u16>) -> usize {
+    asked.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+}
+
 /// Parser of a number within a range.
 pub(super) fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| {

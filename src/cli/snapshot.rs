@@ -1,21 +1,19 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
-use super::Failure;
-use super::output::{TemporaryFolder, check_new, file_of, write_new};
-use super::setup::{SceneArguments, read_store, store_path};
-use super::terminal::{note, say};
+use super::output::TemporaryFolder;
+use super::prelude::*;
+use super::setup::store_path;
 use crate::app::{Mode, OffscreenWindow, window_picture};
 use glam::Vec2;
-use palpate_geometry::drawing::StandardView;
+use palpate_geometry::drawing::{DrawList, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::prepare;
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
-use palpate_store::{FileKind, Store};
-use palpate_tactile::trial::{TrialId, TrialSource};
-use std::path::{Path, PathBuf};
+use palpate_sim::scene::Scene;
+use palpate_tactile::trial::TrialSource;
 use std::sync::Arc;
 
 /// Arguments of `palpate snapshot`.
@@ -218,12 +216,14 @@ const SAMPLE_S: f64 = 0.02;
 
 /// The 3-D view alone.
 fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<Picture, Failure> {
+    let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
     let (stage, frames, badge) = match arguments.trial {
         Some(id) => stored(arguments, store, id)?,
-        None => simulated(arguments, Engine::Own)?,
+        None => simulated(&scene, arguments.at)?,
     };
     let frame = frames.last().ok_or("there is nothing to draw")?;
-    let ghost = if arguments.ghost { simulated(arguments, Engine::Other)?.1.pop() } else { None };
+    scene.solver.engine = scene.solver.engine.other();
+    let ghost = if arguments.ghost { simulated(&scene, arguments.at)?.1.pop() } else { None };
     let size = arguments.size.unwrap_or([1280, 800]);
     let view = PictureView {
         theme: arguments.theme,
@@ -248,28 +248,33 @@ fn scene_picture(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<
     if let Some(ghost) = &ghost {
         list.ghosts = stage.ghosts(ghost, view.theme);
     }
-    let gpu = Gpu::headless(DriverChoice::Any)?;
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-    Ok(Picture::draw(&gpu, &mut renderer, &list, size, 1.0)?)
+    Drawer::new()?.draw(&list, size)
 }
 
-/// Engine to simulate with: that of the scene, or the other one.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Engine {
-    Own,
-    Other,
+/// Draws pictures without a window.
+pub(super) struct Drawer {
+    gpu: Gpu,
+    renderer: Renderer,
+}
+
+impl Drawer {
+    pub(super) fn new() -> Result<Self, Failure> {
+        let gpu = Gpu::headless(DriverChoice::Any)?;
+        Ok(Self { renderer: Renderer::new(&gpu.device, &gpu.queue), gpu })
+    }
+
+    /// Draws a picture of a size (pixels).
+    pub(super) fn draw(&mut self, list: &DrawList, size: [u32; 2]) -> Result<Picture, Failure> {
+        Ok(Picture::draw(&self.gpu, &mut self.renderer, list, size, 1.0)?)
+    }
 }
 
 /// Simulates up to the time to draw; returns all frames until then.
-fn simulated(arguments: &SnapshotArguments, engine: Engine) -> Result<(Stage, Vec<Frame>, String), Failure> {
-    let mut scene = arguments.scene.scene(arguments.object.as_deref())?;
-    if engine == Engine::Other {
-        scene.solver.engine = scene.solver.engine.other();
-    }
-    let at_s = chosen_time(arguments.at, scene.timing.duration_s, "the grasp")?;
+fn simulated(scene: &Scene, at: Option<f64>) -> Result<(Stage, Vec<Frame>, String), Failure> {
+    let at_s = chosen_time(at, scene.timing.duration_s, "the grasp")?;
     let object = scene.load_object()?;
-    let mut run = prepare(&scene, object.as_ref(), 0);
-    let stage = Stage::new(&scene, object.as_ref(), run.begun().data.world_from_gripper);
+    let mut run = prepare(scene, object.as_ref(), 0);
+    let stage = Stage::new(scene, object.as_ref(), run.begun().data.world_from_gripper);
     let mut frames = vec![run.gripper_mut().run_mut().first_look()];
     while frames.last().is_some_and(|last| last.t < at_s) {
         match run.next_frame() {

@@ -1,20 +1,14 @@
 //! `palpate teach`: teaches a model new objects, from their files or from recorded grasps.
 
-use super::Failure;
-use super::interrupt::stop_flag;
-use super::learning::progress_bar;
-use super::output::{check_folder, file_of};
+use super::learning::model_file;
+use super::prelude::*;
 use super::recognise::load_model;
-use super::setup::{classes_of, read_store};
-use super::terminal::{say, say_json};
-use palpate_lab::datasets::{check_model_path, make_models_folder, models_folder, save_model};
+use super::setup::classes_of;
+use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
 use palpate_lab::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 use palpate_learn::{LearnError, Shipped};
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::ObjectSetup;
-use palpate_store::FileKind;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Arguments of `palpate teach`.
@@ -71,7 +65,7 @@ fn within_grasps(text: &str) -> Result<usize, String> {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report<'a> {
+struct TeachReport<'a> {
     model: &'a Path,
     taught: &'a [String],
     classes: Vec<&'a str>,
@@ -85,27 +79,16 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
     let model = load_model(arguments.model.as_deref(), shipped)?;
     let store = if arguments.recorded.is_empty() { None } else { Some(read_store(store)?) };
     // Before the work, which takes seconds.
-    let out = match &arguments.out {
-        Some(out) => {
-            check_folder(out)?;
-            check_model_path(out)?;
-            out.clone()
-        }
-        None => {
-            make_models_folder(&models_folder())?;
-            models_folder().join("taught.safetensors")
-        }
-    };
-    let (simulating, fitting) = (progress_bar("grasping")?, progress_bar("learning")?);
+    let out = model_file(arguments.out.as_deref(), "taught")?;
+    if arguments.out.is_none() {
+        make_models_folder(&models_folder())?;
+    }
+    let (simulating, fitting) = (Progress::of("grasping"), Progress::of("learning"));
     let progress = |stage| match stage {
-        LessonStage::Simulating(done, of) => {
-            simulating.set_length(of as u64);
-            simulating.set_position(done as u64);
-        }
+        LessonStage::Simulating(done, of) => simulating.show(done, of),
         LessonStage::Fitting(share) => {
-            simulating.finish_and_clear();
-            fitting.set_length(1000);
-            fitting.set_position((share * 1000.0) as u64);
+            simulating.0.finish_and_clear();
+            fitting.share(share);
         }
     };
     let stop = stop_flag()?;
@@ -122,26 +105,22 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         stop: &stop,
     };
     let taught = lessons.teach(&model, store.as_ref());
-    simulating.finish_and_clear();
-    fitting.finish_and_clear();
+    drop((simulating, fitting));
     let taught = match taught {
         Err(LessonError::Learn(LearnError::Stopped)) => return Err("stopped; no model was saved".into()),
         taught => taught?,
     };
     save_model(&taught, &out)?;
     let classes: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
-    let report = Report {
-        model: &out,
-        taught: &taught.card.taught,
-        classes,
-        seconds: began.elapsed().as_secs_f64(),
-        cpu_s: cpu.elapsed().as_secs_f64(),
-    };
-    if arguments.json {
-        return say_json(&report);
+    let (seconds, cpu_s) = (began.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+    TeachReport { model: &out, taught: &taught.card.taught, classes, seconds, cpu_s }.print(arguments.json)
+}
+
+impl Report for TeachReport<'_> {
+    fn text(&self, page: &mut Page) {
+        page.fact("taught", self.taught.join(", "));
+        page.fact("classes", format!("{}: {}", self.classes.len(), self.classes.join(", ")));
+        page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));
+        page.fact("saved", self.model.display().to_string());
     }
-    say(format!("taught   {}", report.taught.join(", ")))?;
-    say(format!("classes  {}: {}", report.classes.len(), report.classes.join(", ")))?;
-    say(format!("cost     {:.1} s, {:.1} s CPU", report.seconds, report.cpu_s))?;
-    say(format!("saved    {}", out.display()))
 }

@@ -1,18 +1,11 @@
 //! `palpate train`: trains a recogniser on stored trials and saves it.
 
-use super::Failure;
-use super::learning::{DataArguments, known_method, progress_bar};
-use super::output::{check_folder, file_of};
-use super::setup::read_store;
-use super::terminal::{say, say_json, table};
-use palpate_lab::datasets::{check_model_path, make_models_folder, models_folder, save_model};
+use super::learning::{DataArguments, known_method, model_file};
+use super::prelude::*;
+use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
 use palpate_lab::study::{SearchRow, search};
 use palpate_learn::evaluation::Evaluation;
 use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan};
-use palpate_store::FileKind;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// Arguments of `palpate train`.
 #[derive(Debug, clap::Args)]
@@ -58,7 +51,7 @@ pub(super) struct TrainArguments {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report<'a> {
+struct TrainReport<'a> {
     model: &'a Path,
     method: &'a str,
     trials: usize,
@@ -68,13 +61,22 @@ struct Report<'a> {
     data: String,
     query: &'a str,
     search: Option<Vec<SearchRow>>,
+    #[serde(skip)]
+    title: &'a str,
+    /// Result of the test, and on what.
+    #[serde(skip)]
+    judged: Option<&'a (String, Evaluation)>,
+    /// What the model makes of unknown objects.
+    #[serde(skip)]
+    unknown: Option<&'static str>,
 }
 
 pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<(), Failure> {
     if arguments.list {
-        let rows: Vec<Vec<String>> =
-            METHODS.iter().map(|m| vec![m.key.to_owned(), m.title.to_owned(), m.about.to_owned()]).collect();
-        return table(&["method", "name", "description"], &rows);
+        let mut page = Page::default();
+        let rows = METHODS.iter().map(|method| [method.key, method.title, method.about].map(str::to_owned));
+        page.table(&["method", "name", "description"], rows);
+        return page.print();
     }
     let method = known_method(arguments.method.as_deref().unwrap_or_default())?;
     if arguments.print_settings {
@@ -83,20 +85,12 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
             None => say("this method has no hyperparameters to set"),
         };
     }
-    if let Some(out) = &arguments.out {
-        check_folder(out)?;
-        check_model_path(out)?;
-    }
-    let store = read_store(store)?;
-    let data = arguments.data.read(&store, false, arguments.trials)?;
+    let out = model_file(arguments.out.as_deref(), method.key)?;
+    let data = arguments.data.read(&read_store(store)?, false, arguments.trials)?;
     // Before the training, which may take long.
-    let out = match &arguments.out {
-        Some(out) => out.clone(),
-        None => {
-            make_models_folder(&models_folder())?;
-            models_folder().join(format!("{}.safetensors", method.key))
-        }
-    };
+    if arguments.out.is_none() {
+        make_models_folder(&models_folder())?;
+    }
     let mut settings = parse_settings(&arguments.settings)?;
     let search = if arguments.search { Some(searched(method, &data, arguments, &mut settings)?) } else { None };
     let mut model = fitted(method, &data, arguments, settings)?;
@@ -108,7 +102,13 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         model.card.metrics = evaluation.metrics(test);
     }
     save_model(&model, &out)?;
-    let report = Report {
+    let labels = &model.card.labels;
+    let unknown = match (labels.other(), &model.card.rejection) {
+        (Some(_), _) => Some("class \"other\", learned from random shapes"),
+        (None, None) => Some("not supported: every grasp is assigned to one of these objects"),
+        (None, Some(_)) => None,
+    };
+    let report = TrainReport {
         model: &out,
         method: method.key,
         trials: data.examples.len(),
@@ -118,27 +118,31 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         data: data.about.described(),
         query: &data.about.query,
         search,
+        title: method.title,
+        judged: judged.as_ref(),
+        unknown,
     };
-    if arguments.json {
-        return say_json(&report);
+    report.print(arguments.json)
+}
+
+impl Report for TrainReport<'_> {
+    fn text(&self, page: &mut Page) {
+        page.fact("method", format!("{} ({})", self.title, self.method));
+        page.fact("data", format!("{} trials: {}", self.trials, self.data));
+        page.fact("query", if self.query.is_empty() { "all trials" } else { self.query }.to_owned());
+        page.fact("channels", self.channels.join(", "));
+        page.fact("parameters", self.parameters.to_string());
+        page.fact("cost", format!("{:.1} s CPU", self.train_cpu_s));
+        page.fact(
+            "F1",
+            self.judged.map(|(test, own)| {
+                let [f1, low, high] = [own.f1_macro, own.ci95[0], own.ci95[1]].map(|x| format!("{:.1}", 100.0 * x));
+                format!("{f1} percent ({low} to {high}): {test}")
+            }),
+        );
+        page.fact("unknown", self.unknown.map(str::to_owned));
+        page.fact("saved", self.model.display().to_string());
     }
-    say(format!("method      {} ({})", method.title, method.key))?;
-    say(format!("data        {} trials: {}", report.trials, report.data))?;
-    say(format!("query       {}", if report.query.is_empty() { "all trials" } else { report.query }))?;
-    say(format!("channels    {}", report.channels.join(", ")))?;
-    say(format!("parameters  {}", report.parameters))?;
-    say(format!("cost        {:.1} s CPU", report.train_cpu_s))?;
-    if let Some((test, evaluation)) = &judged {
-        let [f1, low, high] =
-            [evaluation.f1_macro, evaluation.ci95[0], evaluation.ci95[1]].map(|x| format!("{:.1}", 100.0 * x));
-        say(format!("F1          {f1} percent ({low} to {high}): {test}"))?;
-    }
-    if model.card.labels.other().is_some() {
-        say("unknown     class \"other\", learned from random shapes")?;
-    } else if model.card.rejection.is_none() {
-        say("unknown     not supported: every grasp is assigned to one of these objects")?;
-    }
-    say(format!("saved       {}", out.display()))
 }
 
 /// Parses hyperparameters: numbers, true or false.
@@ -158,20 +162,17 @@ fn fitted(
     arguments: &TrainArguments,
     settings: serde_json::Map<String, serde_json::Value>,
 ) -> Result<Model, LearnError> {
-    let bar = progress_bar("training").map_err(|e| LearnError::Failed { cause: e.to_string() })?;
-    bar.set_length(1000);
+    let bar = Progress::of("training");
     let stop = AtomicBool::new(false);
     let fitting = Fitting {
         seed: arguments.data.seed,
         quick: arguments.data.quick,
         settings,
         second: None,
-        progress: &|share| bar.set_position((share * 1000.0) as u64),
+        progress: &|share| bar.share(share),
         stop: &stop,
     };
-    let model = method.train(data, &fitting);
-    bar.finish_and_clear();
-    model
+    method.train(data, &fitting)
 }
 
 /// Judges the method on splits of the data; also says on what.
@@ -194,13 +195,9 @@ fn searched(
     arguments: &TrainArguments,
     settings: &mut serde_json::Map<String, serde_json::Value>,
 ) -> Result<Vec<SearchRow>, Failure> {
-    let bar = progress_bar("searching")?;
-    let rows = search(method, data, arguments.data.seed, arguments.data.quick, settings, &|done, of| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-    });
-    bar.finish_and_clear();
-    let rows = rows?;
+    let bar = Progress::of("searching");
+    let show = |done, of| bar.show(done, of);
+    let rows = search(method, data, arguments.data.seed, arguments.data.quick, settings, &show)?;
     if let Some(best) = rows.first() {
         settings.extend(best.settings.clone());
     }

@@ -5,23 +5,18 @@ mod labels;
 mod selection;
 mod show;
 
-use super::Failure;
 use super::output::trials_target;
-use super::setup::{SignalArguments, existing_store, open_store, read_store};
-use super::terminal::{note, say, say_json, table, warn};
+use super::prelude::*;
 use labels::LabelCommand;
 use palpate_lab::exchange::ExchangeFormat;
 use palpate_store::labels::shown_title;
 use palpate_store::{
-    ExportError, FileKind, Library, Shown, Store, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery,
-    TrialRow, export_trial,
+    ExportError, Library, Shown, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial,
 };
-use palpate_tactile::trial::TrialId;
 use palpate_tactile::{SensorLayout, SignalDefinition};
 use selection::{Filters, Numbers, chosen};
 use std::collections::BTreeSet;
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trials`.
 #[derive(Debug, clap::Args)]
@@ -161,7 +156,7 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
                 _ => Shown::Kept,
             };
             let order = TrialOrder { column: *sort, descending: *reverse };
-            list(&store, &TrialQuery { order, ..filters.query(shown) }, *limit, *json)
+            list(&store, &TrialQuery { order, ..filters.query(shown) }, *limit, *json)?.print(*json)
         }
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
@@ -249,40 +244,42 @@ fn shown_rows<T>(found: &[T], limit: Option<usize>, newest_first: bool, on_termi
     if limit.is_some() || newest_first { &found[..most] } else { &found[found.len() - most..] }
 }
 
-fn list(store: &Store, query: &TrialQuery, limit: Option<usize>, json: bool) -> Result<(), Failure> {
+/// Output of `list --json`.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct ListReport {
+    rows: Vec<TrialRow>,
+    /// What is said where there are none.
+    #[serde(skip)]
+    none: &'static str,
+}
+
+fn list(store: &Store, query: &TrialQuery, limit: Option<usize>, json: bool) -> Result<ListReport, Failure> {
     let library = Library::read(store)?;
     let found = library.find(store, query)?;
     let on_terminal = std::io::stdout().is_terminal() && !json;
     let rows = shown_rows(&found, limit, query.order.descending, on_terminal);
-    let rows: Vec<&TrialRow> = rows.iter().map(|trial| &trial.row).collect();
-    if json {
-        return say_json(&rows);
-    }
-    if rows.is_empty() && query.is_filtered() && library.counts().kept > 0 {
-        return say("no trial matches");
-    }
-    if rows.is_empty() {
-        return say(NONE_YET);
-    }
-    if rows.len() < found.len() {
+    if !json && !rows.is_empty() && rows.len() < found.len() {
         let all = if limit.is_none() { "; `palpate trials list | less` shows all" } else { "" };
         note(&format!("{} of {} trials{all}", rows.len(), found.len()));
     }
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| {
-            vec![
-                row.id.to_string(),
-                shown_title(&row.object),
-                row.created.chars().take(19).collect::<String>().replace('T', " "),
-                row.source.to_string(),
-                row.samples.to_string(),
-                row.seed.to_string(),
-                remark(row),
-            ]
-        })
-        .collect();
-    table(&["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""], &cells)
+    let is_filtered = query.is_filtered() && library.counts().kept > 0;
+    let none = if is_filtered { "no trial matches" } else { NONE_YET };
+    Ok(ListReport { rows: rows.iter().map(|trial| trial.row.clone()).collect(), none })
+}
+
+impl Report for ListReport {
+    fn text(&self, page: &mut Page) {
+        if self.rows.is_empty() {
+            return page.line(self.none);
+        }
+        let row = |row: &TrialRow| {
+            let [id, samples, seed] = [row.id.to_string(), row.samples.to_string(), row.seed.to_string()];
+            [id, shown_title(&row.object), date(&row.created), row.source.to_string(), samples, seed, remark(row)]
+        };
+        let header = ["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""];
+        page.table(&header, self.rows.iter().map(row));
+    }
 }
 
 fn remark(row: &TrialRow) -> String {

@@ -79,7 +79,7 @@ const HOMES: &[(&str, &[&str])] = &[
 
 /// Where random numbers are drawn, always from a seed.
 const RANDOM: &[&str] = &[
-    "src/cli/demo.rs",
+    "src/cli/demo",
     "src/lab/grasping/known_geometry.rs",
     "src/lab/grasping/shuffled_objects.rs",
     "src/lab/study/effect_audit",

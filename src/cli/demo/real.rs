@@ -1,30 +1,24 @@
 //! The demo with the real gripper: it closes on whatever is put between the fingers until that is recognised.
 
-use super::super::Failure;
-use super::super::interrupt::stop_flag;
 use super::super::link;
-use super::super::recognise::{load_model, named, warn_of_perfect_sensors};
-use super::super::setup::open_store;
-use super::super::terminal::{note, say, say_json, typed_lines, warn};
-use super::{DemoArguments, Touched, grasps_in_words, likely};
+use super::super::prelude::*;
+use super::super::recognise::{load_model, warn_of_perfect_sensors};
+use super::{DemoArguments, GraspReport, Hand, grasp_until_recognised};
 use palpate_device::serial::LinkOptions;
 use palpate_lab::datasets::{SensorView, trial_signals};
 use palpate_lab::grasping::{Advisor, Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
-use palpate_learn::{OTHER, Shipped, StopReason, StopRule};
+use palpate_learn::Shipped;
 use palpate_sim::gripper::Phase;
-use palpate_sim::objects::{class_of, titled};
-use palpate_store::Store;
+use palpate_sim::objects::class_of;
+use palpate_sim::scene::Scene;
 use palpate_store::labels::class_name;
 use palpate_tactile::board::Sensor;
-use palpate_tactile::trial::{Control, TrialId, TrialSource};
-use serde::Serialize;
-use std::collections::BTreeMap;
+use palpate_tactile::trial::{Control, TrialSource};
 use std::io::IsTerminal as _;
-use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 /// Answer to Ctrl+C.
@@ -32,26 +26,16 @@ const STOPPED: &str = "stopped; the trials so far are stored";
 /// Time between two looks at the keyboard.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Output of `--json`.
-#[derive(Serialize)]
-struct Report {
-    /// Object in the hand, where it was named.
+/// The real gripper.
+struct RealHand {
+    gripper: SerialGripper,
+    scene: Scene,
     truth: Option<String>,
-    /// Recognised class, or `unknown`.
-    decided: String,
-    /// `sure`, `grasp-limit` or `unknown`.
-    stopped_because: &'static str,
-    threshold: f64,
-    grasps: Vec<GraspReport>,
-}
-
-/// One grasp.
-#[derive(Serialize)]
-struct GraspReport {
-    trial_id: TrialId,
-    touch: Option<Touched>,
-    /// Belief after this grasp and those before it.
-    pmf: BTreeMap<String, f64>,
+    store: Store,
+    stop: Arc<AtomicBool>,
+    /// Lines of the keyboard, on a terminal.
+    keys: Option<Receiver<String>>,
+    advisor: Advisor,
 }
 
 pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) -> Result<(), Failure> {
@@ -64,45 +48,41 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let stop = stop_flag()?;
     let options = LinkOptions { path: Some(port.to_owned()), ..LinkOptions::default() };
     let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
-    let mut gripper = SerialGripper::new(Box::new(link));
-    let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
-    let mut identification = Identification::new(Arc::clone(&model), rule);
     let keys = std::io::stdin().is_terminal().then(typed_lines).transpose()?;
-    let mut grasps: Vec<GraspReport> = Vec::new();
-    let mut advisor = Advisor::default();
-    let stopped = loop {
-        if let Some(keys) = &keys {
-            match identification.last().and_then(|last| advisor.advice(last)) {
-                None if grasps.is_empty() => note("Put an object between the open fingers and press Enter."),
-                Some(by) => note(&format!("To learn most from the next grasp: {}. Then press Enter.", by.of_object())),
-                None => note("Turn the object a little and press Enter."),
+    let gripper = SerialGripper::new(Box::new(link));
+    let mut hand = RealHand { gripper, scene, truth: truth.clone(), store, stop, keys, advisor: Advisor::default() };
+    grasp_until_recognised(&mut hand, &model, arguments, truth, None)
+}
+
+impl Hand for RealHand {
+    fn grasp(&mut self, identification: &mut Identification) -> Result<GraspReport, Failure> {
+        let last = identification.last().cloned();
+        if let Some(keys) = &self.keys {
+            match last.as_ref().map(|last| self.advisor.advice(last)) {
+                None => note("Put an object between the open fingers and press Enter."),
+                Some(None) => note("Turn the object a little and press Enter."),
+                Some(Some(by)) => {
+                    note(&format!("To learn most from the next grasp: {}. Then press Enter.", by.of_object()));
+                }
             }
-            wait_for_enter(keys, &stop)?;
+            wait_for_enter(keys, &self.stop)?;
         }
-        let adds = !grasps.is_empty();
-        let request = TrialRequest { object: truth.clone(), control: Control::Driven, length_s: None, adds };
-        let recording = record(&mut gripper, &scene, request, store.path().to_owned(), &stop, &mut |_progress| ())?;
-        if stop.load(Ordering::Relaxed) {
+        let (object, store) = (self.truth.clone(), self.store.path().to_owned());
+        let request = TrialRequest { object, control: Control::Driven, length_s: None, adds: last.is_some() };
+        let recording = record(&mut self.gripper, &self.scene, request, store, &self.stop, &mut |_progress| ())?;
+        if self.stop.load(Ordering::Relaxed) {
             return Err(STOPPED.into());
         }
         if let Some(cause) = recording.aborted {
             return Err(format!("the hand did not close: {cause}").into());
         }
         let trial_id = recording.trial.id;
-        recognise(&mut identification, &store, trial_id)?;
-        let pmf = identification.belief().now().map(|pmf| named(&model, pmf)).unwrap_or_default();
-        let report = GraspReport { trial_id, touch: Touched::of(&identification), pmf };
-        if !arguments.json {
-            print_grasp(grasps.len() + 1, &report)?;
+        read_trial(identification, &self.store, trial_id)?;
+        if identification.view().measured.is_none() {
+            warn("nothing was touched");
         }
-        grasps.push(report);
-        if let Some(reason) = identification.decision() {
-            break reason;
-        }
-    };
-    let decided = identification.view().decided().unwrap_or("unknown").to_owned();
-    let report = Report { truth, decided, stopped_because: stopped.name(), threshold: rule.threshold, grasps };
-    if arguments.json { say_json(&report) } else { print_conclusion(&report, stopped) }
+        Ok(GraspReport { trial_id: Some(trial_id), ..GraspReport::default() })
+    }
 }
 
 /// Refuses a gripper without calibrations, whose readings mean nothing yet.
@@ -121,8 +101,7 @@ fn refuse_uncalibrated(store: &Store, port: &Path) -> Result<(), Failure> {
         .into())
 }
 
-fn wait_for_enter(keys: &std::sync::mpsc::Receiver<String>, stop: &AtomicBool) -> Result<(), Failure> {
-    use std::sync::mpsc::RecvTimeoutError;
+fn wait_for_enter(keys: &Receiver<String>, stop: &AtomicBool) -> Result<(), Failure> {
     loop {
         match keys.recv_timeout(POLL) {
             Ok(_line) => return Ok(()),
@@ -135,7 +114,7 @@ fn wait_for_enter(keys: &std::sync::mpsc::Receiver<String>, stop: &AtomicBool) -
 }
 
 /// Lets the model read a recorded trial.
-fn recognise(identification: &mut Identification, store: &Store, id: TrialId) -> Result<(), Failure> {
+fn read_trial(identification: &mut Identification, store: &Store, id: TrialId) -> Result<(), Failure> {
     let view = SensorView::of_model(&identification.model().card);
     let read = trial_signals(store, id, TrialSource::Recorded, &view)?;
     identification.begin_grasp(read.signals.channels.iter().cloned().enumerate())?;
@@ -146,30 +125,4 @@ fn recognise(identification: &mut Identification, store: &Store, id: TrialId) ->
     }
     identification.end_grasp();
     Ok(())
-}
-
-fn print_grasp(number: usize, report: &GraspReport) -> Result<(), Failure> {
-    say(format!("Grasp {number} (trial {}).", report.trial_id))?;
-    match &report.touch {
-        Some(touch) => say(format!("  Felt: {touch}."))?,
-        None => warn("nothing was touched"),
-    }
-    say(format!("  Most likely: {}.", likely(&report.pmf)))
-}
-
-fn print_conclusion(report: &Report, stopped: StopReason) -> Result<(), Failure> {
-    let count = report.grasps.len();
-    let grasps = grasps_in_words(count);
-    let decided = titled(&report.decided);
-    let found = match stopped {
-        _ if report.decided == OTHER => format!("None of the known objects, after {grasps}."),
-        StopReason::Sure => format!("Recognised after {grasps}: {decided}."),
-        StopReason::GraspLimit => format!("Grasp limit reached ({count}). Best guess: {decided}."),
-        StopReason::Unknown => format!("Unknown object after {grasps}."),
-    };
-    let verdict = report.truth.as_ref().map(|truth| match (*truth == report.decided, titled(truth)) {
-        (true, _) => " Correct.".to_owned(),
-        (false, truth) => format!(" In the hand: {truth}."),
-    });
-    say(format!("{found}{}", verdict.unwrap_or_default()))
 }

@@ -1,35 +1,35 @@
 //! Markdown of the manual as plain text for a terminal: headings, paragraphs, lists, code blocks, tables.
 
-/// A part of a page.
-#[derive(Debug, PartialEq)]
-enum Block {
-    Heading(String),
-    Paragraph(String),
-    Item(String),
-    Code(Vec<String>),
-    /// Rows of cells, the header first.
-    Table(Vec<Vec<String>>),
+/// Kind of a part of a page.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Heading,
+    Paragraph,
+    Item,
+    Code,
+    Table,
 }
 
 /// A page wrapped to `width` characters, with bold headings where asked for. Code is not wrapped.
 pub(super) fn render(markdown: &str, width: usize, bold: bool) -> String {
     let mut text = String::new();
-    let mut previous: Option<&Block> = None;
-    let blocks = blocks(markdown);
-    for block in &blocks {
-        match (previous, block) {
-            (None, _) => {}
-            (Some(Block::Item(_)), Block::Item(_)) => text.push('\n'),
-            _ => text.push_str("\n\n"),
-        }
-        text.push_str(&match block {
-            Block::Heading(title) => emphasised(&inline(title), bold),
-            Block::Paragraph(words) => wrapped(&inline(words), width).join("\n"),
-            Block::Item(words) => format!("  - {}", wrapped(&inline(words), width - 4).join("\n    ")),
-            Block::Code(lines) => indented(lines),
-            Block::Table(rows) => table(rows, width, bold),
+    let mut previous = None;
+    for (kind, words) in parts(markdown) {
+        text.push_str(match (previous, kind) {
+            (None, _) => "",
+            (Some(Kind::Item), Kind::Item) => "\n",
+            _ => "\n\n",
         });
-        previous = Some(block);
+        text.push_str(&match kind {
+            Kind::Heading => emphasised(&inline(&words), bold),
+            Kind::Paragraph => wrapped(&inline(&words), width).join("\n"),
+            Kind::Item => format!("  - {}", wrapped(&inline(&words), width - 4).join("\n    ")),
+            Kind::Code => {
+                words.lines().map(|line| format!("    {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+            }
+            Kind::Table => table(&words, width, bold),
+        });
+        previous = Some(kind);
     }
     text
 }
@@ -49,47 +49,44 @@ fn emphasised(text: &str, bold: bool) -> String {
     if bold { format!("\x1b[1m{text}\x1b[0m") } else { text.to_owned() }
 }
 
-fn indented(lines: &[String]) -> String {
-    lines.iter().map(|line| format!("    {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
-}
-
-/// Splits a page into blocks.
-fn blocks(markdown: &str) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    let mut lines = markdown.lines().peekable();
-    let mut starts_block = true;
-    while let Some(line) = lines.next() {
-        if line.starts_with("<!--") {
-            // Marks a generated section.
-        } else if line.starts_with("```") {
-            blocks.push(Block::Code(lines.by_ref().take_while(|l| !l.starts_with("```")).map(str::to_owned).collect()));
-        } else if line.starts_with('#') {
-            blocks.push(Block::Heading(line.trim_start_matches('#').trim().to_owned()));
-        } else if line.starts_with('|') {
-            let mut rows = vec![cells(line)];
-            while let Some(row) = lines.next_if(|l| l.starts_with('|')) {
-                rows.push(cells(row));
+/// Splits a page into its parts. Lines of a paragraph or item are joined by blanks, those of code and tables stay.
+fn parts(markdown: &str) -> Vec<(Kind, String)> {
+    let mut parts: Vec<(Kind, String)> = Vec::new();
+    // The part that the next line may continue.
+    let mut open = None;
+    for line in markdown.lines() {
+        let (kind, words) = match line {
+            _ if line.starts_with("```") => {
+                open = (open != Some(Kind::Code)).then_some(Kind::Code);
+                parts.extend(open.map(|kind| (kind, String::new())));
+                continue;
             }
-            rows.retain(|row| !row.iter().all(|cell| cell.starts_with("---")));
-            blocks.push(Block::Table(rows));
-        } else if let Some(item) = line.strip_prefix("- ") {
-            blocks.push(Block::Item(item.to_owned()));
-            starts_block = false;
-            continue;
-        } else if !line.trim().is_empty() {
-            match blocks.last_mut() {
-                Some(Block::Paragraph(text) | Block::Item(text)) if !starts_block => {
-                    text.push(' ');
-                    text.push_str(line.trim());
-                }
-                _ => blocks.push(Block::Paragraph(line.trim().to_owned())),
+            _ if open == Some(Kind::Code) => (Kind::Code, line),
+            _ if line.trim().is_empty() || line.starts_with("<!--") => {
+                open = None;
+                continue;
             }
-            starts_block = false;
-            continue;
+            _ if line.starts_with('#') => (Kind::Heading, line.trim_start_matches('#')),
+            _ if line.starts_with('|') => (Kind::Table, line),
+            _ if line.starts_with("- ") => (Kind::Item, &line[2..]),
+            _ if open == Some(Kind::Item) => (Kind::Item, line.trim()),
+            _ => (Kind::Paragraph, line.trim()),
+        };
+        let continues = open == Some(kind) && kind != Kind::Heading && !line.starts_with("- ");
+        match parts.last_mut().filter(|_| continues) {
+            Some((_, text)) => {
+                text.push_str(match kind {
+                    _ if text.is_empty() => "",
+                    Kind::Code | Kind::Table => "\n",
+                    _ => " ",
+                });
+                text.push_str(words);
+            }
+            None => parts.push((kind, words.to_owned())),
         }
-        starts_block = true;
+        open = Some(kind);
     }
-    blocks
+    parts
 }
 
 /// Text without the marks of emphasis and code; code of several words keeps its backticks.
@@ -98,10 +95,6 @@ fn inline(text: &str) -> String {
         if number % 2 == 1 && part.contains(' ') { format!("`{part}`") } else { part.to_owned() }
     };
     text.trim().replace("**", "").split('`').enumerate().map(code).collect()
-}
-
-fn cells(row: &str) -> Vec<String> {
-    row.trim().trim_matches('|').split('|').map(inline).collect()
 }
 
 /// Lines of at most `width` characters; longer words have lines of their own.
@@ -121,44 +114,42 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// A table with aligned columns; cells of the widest columns wrap where it would not fit.
-fn table(rows: &[Vec<String>], width: usize, bold: bool) -> String {
+fn table(text: &str, width: usize, bold: bool) -> String {
     const GAP: usize = 2;
     /// No column is made narrower than this.
     const NARROWEST: usize = 10;
     /// Lines of a row from which on it is tall.
     const MANY: usize = 3;
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
-    let longest = |column: usize| rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0);
-    let mut widths: Vec<usize> = (0..columns).map(longest).collect();
-    while widths.iter().sum::<usize>() + GAP * columns.saturating_sub(1) > width {
+    let cells = |row: &str| row.trim().trim_matches('|').split('|').map(inline).collect();
+    let is_rule = |row: &Vec<String>| row.iter().all(|cell| cell.starts_with("---"));
+    let rows: Vec<Vec<String>> = text.lines().map(cells).filter(|row| !is_rule(row)).collect();
+    let longest = |column: usize| rows.iter().filter_map(|row| Some(row.get(column)?.chars().count())).max();
+    let mut widths: Vec<usize> = (0..).map_while(longest).collect();
+    while widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1) > width {
         match widths.iter_mut().max() {
             Some(widest) if *widest > NARROWEST => *widest -= 1,
             _ => break,
         }
     }
-    let wrap = |row: &Vec<String>| -> Vec<Vec<String>> {
-        widths.iter().enumerate().map(|(k, w)| wrapped(&cell(row, k), *w)).collect()
-    };
+    let wrap = |row: &Vec<String>| row.iter().zip(&widths).map(|(cell, width)| wrapped(cell, *width)).collect();
     let wrapped_rows: Vec<Vec<Vec<String>>> = rows.iter().map(wrap).collect();
     // Where first cells wrap, or others over many lines, rows need a gap between them.
     let is_tall = |parts: &Vec<Vec<String>>| parts[0].len() > 1 || parts.iter().any(|part| part.len() > MANY);
-    let spread = columns > 0 && wrapped_rows.iter().any(is_tall);
+    let spread = wrapped_rows.iter().any(is_tall);
+    let joined = |cells: Vec<String>| cells.join(&" ".repeat(GAP)).trim_end().to_owned();
     let mut lines = Vec::new();
-    for (number, parts) in wrapped_rows.into_iter().enumerate() {
+    for (number, parts) in wrapped_rows.iter().enumerate() {
         if spread && number > 1 {
             lines.push(String::new());
         }
         for height in 0..parts.iter().map(Vec::len).max().unwrap_or(0) {
-            let padded = parts.iter().zip(&widths).map(|(part, width)| {
-                let text = part.get(height).map_or("", String::as_str);
-                format!("{text:<width$}")
-            });
-            let line = padded.collect::<Vec<_>>().join(&" ".repeat(GAP)).trim_end().to_owned();
+            let text = |part: &Vec<String>| part.get(height).cloned().unwrap_or_default();
+            let line =
+                joined(parts.iter().zip(&widths).map(|(part, width)| format!("{:<width$}", text(part))).collect());
             lines.push(if number == 0 { emphasised(&line, bold) } else { line });
         }
         if number == 0 {
-            lines.push(widths.iter().map(|width| "-".repeat(*width)).collect::<Vec<_>>().join(&" ".repeat(GAP)));
+            lines.push(joined(widths.iter().map(|width| "-".repeat(*width)).collect()));
         }
     }
     lines.join("\n")

@@ -1,7 +1,6 @@
 //! `palpate recognise --why`: what spoke for and against an answer, and the stored trials nearest to the grasp.
 
-use super::super::Failure;
-use super::super::terminal::{say, table};
+use super::super::prelude::*;
 use palpate_lab::datasets::{SensorView, trial_signals};
 use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::why::{
@@ -10,12 +9,8 @@ use palpate_lab::why::{
 };
 use palpate_learn::{Belief, Model, Sequence};
 use palpate_sim::objects::object_title;
-use palpate_store::Store;
 use palpate_store::labels::shown_name;
-use palpate_tactile::trial::TrialId;
-use serde::Serialize;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Explains the answers to successive trials.
 pub(super) struct Explanations {
@@ -108,50 +103,31 @@ impl WhyReport {
         }
     }
 
-    /// Answers of the model that the evidence took.
-    pub(super) fn calls(&self) -> usize {
-        self.calls
-    }
-
-    /// Prints it; `of_several` where the trials are grasps of one object.
-    pub(super) fn say(&self, id: TrialId, of_several: bool) -> Result<(), Failure> {
-        say(format!("\ntrial {id}: {}", self.found.answer()))?;
-        for sentence in self.found.sentences() {
-            say(sentence)?;
-        }
+    /// Writes the explanation; `of_several` where the trials are grasps of one object.
+    pub(super) fn text(&self, page: &mut Page, id: TrialId, of_several: bool) {
+        page.line(format!("\ntrial {id}: {}", self.found.answer()));
+        self.found.sentences().iter().for_each(|sentence| page.line(sentence));
         let title = object_title(&self.first.name);
         if let Some(last) = self.grasps.last().filter(|_| of_several) {
             let [before, alone, after] = [last.before, last.alone, last.after].map(|two| percent(two[0]));
-            say(format!("{title}: {before} before this grasp, {alone} by it alone, {after} after it."))?;
+            page.line(format!("{title}: {before} before this grasp, {alone} by it alone, {after} after it."));
         }
-        self.say_table(&title)?;
-        if let Some(nearest) = &self.nearest {
-            say(in_words(nearest))?;
-        }
-        Ok(())
+        let found = &self.found;
+        let head = format!("points of {title}");
+        let phases = found.phases.iter().map(|span| span.phase.name());
+        let header: Vec<&str> = [head.as_str()].into_iter().chain(phases).chain(["whole grasp"]).collect();
+        let points = |cells: &[Evidence]| cells.iter().map(|cell| points_words(cell.points)).collect::<Vec<_>>();
+        let channels = found.channels.iter().zip(&found.by_both).zip(&found.by_channel);
+        let rows = channels
+            .map(|((name, cells), whole)| [vec![channel_words(name)], points(cells), points(&[*whole])].concat())
+            .chain([[vec!["all channels".to_owned()], points(&found.by_phase), vec![String::new()]].concat()]);
+        page.table(&header, rows);
+        self.nearest.iter().for_each(|nearest| page.line(in_words(nearest)));
     }
 
-    fn say_table(&self, title: &str) -> Result<(), Failure> {
-        let points = |evidence: &Evidence| points_words(evidence.points);
-        let row = |name: String, cells: &[Evidence], whole: String| {
-            [name].into_iter().chain(cells.iter().map(points)).chain([whole]).collect::<Vec<String>>()
-        };
-        let found = &self.found;
-        let mut rows: Vec<Vec<String>> = found
-            .by_both
-            .iter()
-            .zip(&found.by_channel)
-            .enumerate()
-            .map(|(c, (cells, whole))| row(channel_words(&found.channels[c]), cells, points(whole)))
-            .collect();
-        rows.push(row("all channels".to_owned(), &found.by_phase, String::new()));
-        let head = format!("points of {title}");
-        let mut header = vec![head.as_str()];
-        for span in &found.phases {
-            header.push(span.phase.name());
-        }
-        header.push("whole grasp");
-        table(&header, &rows)
+    /// Says how evidence is measured.
+    pub(super) fn method_text(&self, page: &mut Page) {
+        page.line(format!("\nHow measured: {MEASURED_HOW} {} answers per grasp.", self.calls));
     }
 }
 
@@ -165,14 +141,6 @@ fn in_words(nearest: &NearestReport) -> String {
         return "Nearest stored trials: none with these channels.".to_owned();
     }
     let older = if nearest.older > 0 { format!(", {} older ones not", nearest.older) } else { String::new() };
-    format!(
-        "Nearest of {} stored trials{older}: {}. Distance in spreads within a class.",
-        nearest.compared,
-        found.join(", ")
-    )
-}
-
-/// Prints how evidence is measured.
-pub(super) fn say_how(calls: usize) -> Result<(), Failure> {
-    say(format!("\nHow measured: {MEASURED_HOW} {calls} answers per grasp."))
+    let (compared, found) = (nearest.compared, found.join(", "));
+    format!("Nearest of {compared} stored trials{older}: {found}. Distance in spreads within a class.")
 }

@@ -1,18 +1,12 @@
 //! Trials in and out as files of other programs: MCAP, NPZ, Parquet.
 
-use super::super::Failure;
-use super::super::interrupt::stop_flag;
-use super::super::output::check_new;
-use super::super::terminal::say;
+use super::super::prelude::*;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::exchange::{ExchangeFormat, read_mcap};
 use palpate_lab::inspection::OpenOptions;
 use palpate_learn::{Model, Models};
-use palpate_store::{Import, Store, read_trials_csv};
-use palpate_tactile::trial::TrialId;
-use std::path::Path;
+use palpate_store::{Import, read_trials_csv};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// Writes trials into one file.
 pub(super) fn export(

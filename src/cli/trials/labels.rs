@@ -1,15 +1,12 @@
 //! `palpate trials label`, `note`, `tag`, `undo`, `redo`, `journal` and `export --labelled`.
 
-use super::super::Failure;
 use super::super::output::names_folder;
-use super::super::terminal::{say, say_json, table, warn};
+use super::super::prelude::*;
 use super::selection::{Filters, Numbers, chosen};
 use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::{TrialEdit, class_name, compared};
-use palpate_store::{JournalEntry, Shown, Store, export_labelled};
-use palpate_tactile::trial::TrialId;
+use palpate_store::{JournalEntry, Shown, export_labelled};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Subcommands that change or show labels.
 #[derive(Debug, clap::Subcommand)]
@@ -112,7 +109,7 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
             Some(entry) => say(format!("redone: {}", entry.restored())),
             None => say("nothing to redo"),
         },
-        LabelCommand::Journal { last, json } => journal(&store.journal().entries(*last)?, *json),
+        LabelCommand::Journal { last, json } => JournalReport(store.journal().entries(*last)?).print(*json),
     }
 }
 
@@ -150,22 +147,21 @@ fn label(store: &Store, ids: &[TrialId], name: &str, unsure: bool) -> Result<(),
     Ok(())
 }
 
-fn journal(entries: &[JournalEntry], json: bool) -> Result<(), Failure> {
-    if json {
-        return say_json(&entries);
-    }
-    if entries.is_empty() {
-        return say("no changes yet");
-    }
-    let cells: Vec<Vec<String>> = entries
-        .iter()
-        .map(|entry| {
-            let when = entry.at.chars().take(19).collect::<String>().replace('T', " ");
+/// Output of `journal --json`.
+#[derive(Serialize)]
+struct JournalReport(Vec<JournalEntry>);
+
+impl Report for JournalReport {
+    fn text(&self, page: &mut Page) {
+        if self.0.is_empty() {
+            return page.line("no changes yet");
+        }
+        let row = |entry: &JournalEntry| {
             let from = if entry.merged { "merged" } else { "" };
-            vec![entry.number.to_string(), entry.sentence(), when, from.to_owned()]
-        })
-        .collect();
-    table(&["no", "change", "at (UTC)", ""], &cells)
+            [entry.number.to_string(), entry.sentence(), date(&entry.at), from.to_owned()]
+        };
+        page.table(&["no", "change", "at (UTC)", ""], self.0.iter().map(row));
+    }
 }
 
 /// Exports all labelled trials.

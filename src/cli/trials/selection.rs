@@ -1,11 +1,9 @@
 //! Which trials a command is about: numbers, and the filters of the library.
 
-use super::super::Failure;
 use super::super::origin::OriginFilters;
-use super::super::terminal::note;
+use super::super::prelude::*;
 use palpate_store::labels::Flag;
-use palpate_store::{Library, Shown, Store, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
-use palpate_tactile::trial::TrialId;
+use palpate_store::{Library, Shown, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
