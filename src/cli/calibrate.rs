@@ -4,14 +4,10 @@ mod guided;
 mod manage;
 mod zero;
 
-use super::Failure;
-use super::setup::{existing_store, open_store};
-use super::terminal::{say, say_json, table, warn};
-use palpate_store::{CalibrationId, Store, StoredCalibration, read_points_csv};
+use super::prelude::*;
+use palpate_store::{CalibrationId, StoredCalibration, read_points_csv};
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::calibration::{Calibration, Input, Record, SensorKind};
-use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 pub(super) use guided::weigh;
 
@@ -83,15 +79,10 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
     if arguments.points.is_some() && arguments.live.empty_close.is_none() {
         arguments.live.refuse_beside_points()?;
     }
-    let record = match &arguments.points {
-        Some(file) => {
-            let record = record_of_file(arguments, sensor, &part, file)?;
-            match arguments.live.empty_close {
-                Some(seconds) => guided::watch_empty_close(&arguments.live, seconds, sensor, record, known.as_ref())?,
-                None => record,
-            }
-        }
-        None => guided::record(arguments, sensor, &part, known.as_ref())?,
+    let points = arguments.points.as_ref().map(|file| record_of_file(arguments, sensor, &part, file)).transpose()?;
+    let record = match points {
+        Some(record) if arguments.live.empty_close.is_none() => record,
+        points => guided::record(arguments, sensor, &part, points, known.as_ref())?,
     };
     let calibration = Calibration::fit(Record { note: arguments.note.clone(), ..record })?;
     let stored = if arguments.dry_run {
@@ -100,33 +91,37 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
         let mut store = known.map_or_else(|| open_store(store), Ok)?;
         Some(keep(&mut store, sensor, &calibration)?)
     };
-    if arguments.json {
-        return say_json(&Report {
-            id: stored.as_ref().map(|s| s.id),
-            version: stored.map(|s| s.version),
-            calibration,
-        });
+    CalibrateReport {
+        id: stored.as_ref().map(|stored| stored.id),
+        version: stored.as_ref().map(|stored| stored.version),
+        calibration,
+        sensor,
     }
-    print(&calibration)?;
-    match stored {
-        Some(stored) => say(format!(
-            "stored as calibration {}, version {} of \"{}\", mounted as the {}",
-            stored.id,
-            stored.version,
-            stored.record.part,
-            sensor.label()
-        )),
-        None => say("not stored"),
-    }
+    .print(arguments.json)
 }
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report {
+struct CalibrateReport {
     id: Option<CalibrationId>,
     version: Option<i64>,
     #[serde(flatten)]
     calibration: Calibration,
+    #[serde(skip)]
+    sensor: Sensor,
+}
+
+impl Report for CalibrateReport {
+    fn text(&self, page: &mut Page) {
+        points_text(&self.calibration, page);
+        let (part, place) = (&self.calibration.record.part, self.sensor.label());
+        page.line(match self.id.zip(self.version) {
+            Some((id, version)) => {
+                format!("stored as calibration {id}, version {version} of \"{part}\", mounted as the {place}")
+            }
+            None => "not stored".to_owned(),
+        });
+    }
 }
 
 fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: Option<&Store>) -> Result<String, Failure> {
@@ -162,34 +157,24 @@ fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<
     Ok(stored)
 }
 
-/// Prints the points with their residuals, and the summary.
-fn print(calibration: &Calibration) -> Result<(), Failure> {
-    let kind = calibration.record.kind;
-    let residual = |residual: Option<f64>| match (kind, residual) {
-        (_, None) => String::new(),
-        (SensorKind::Flex, Some(off)) => format!("{:+.2}", off.to_degrees()),
-        (SensorKind::Pad, Some(off)) => format!("{:+.1}", 100.0 * off),
-    };
-    let rows: Vec<Vec<String>> = calibration
-        .record
-        .points
-        .iter()
-        .zip(calibration.residuals())
-        .map(|(point, off)| {
-            let ohm = calibration.record.input.ohm(point.counts);
-            let kilo = if ohm < 1e6 { format!("{:.2}", ohm * 1e-3) } else { "open".to_owned() };
-            let shown = format!("{:.3}", kind.shown(point.stimulus));
-            vec![shown, format!("{:.1}", point.counts), kilo, residual(off)]
-        })
-        .collect();
+/// The points with their residuals, and the summary.
+fn points_text(calibration: &Calibration, page: &mut Page) {
+    let Record { kind, input, points, .. } = &calibration.record;
     let (stimulus, off) = match kind {
         SensorKind::Flex => ("angle [deg]", "residual [deg]"),
         SensorKind::Pad => ("load [kg]", "residual [%]"),
     };
-    table(&[stimulus, "counts", "kOhm", off], &rows)?;
-    say(calibration.summary())?;
-    for warning in &calibration.warnings {
-        warn(warning);
-    }
-    Ok(())
+    let residual = |off: f64| match kind {
+        SensorKind::Flex => format!("{:+.2}", off.to_degrees()),
+        SensorKind::Pad => format!("{:+.1}", 100.0 * off),
+    };
+    let rows = points.iter().zip(calibration.residuals()).map(|(point, off)| {
+        let ohm = input.ohm(point.counts);
+        let kilo = if ohm < 1e6 { format!("{:.2}", ohm * 1e-3) } else { "open".to_owned() };
+        let (shown, counts) = (format!("{:.3}", kind.shown(point.stimulus)), format!("{:.1}", point.counts));
+        [shown, counts, kilo, off.map(residual).unwrap_or_default()]
+    });
+    page.table(&[stimulus, "counts", "kOhm", off], rows);
+    page.line(calibration.summary());
+    calibration.warnings.iter().for_each(|warning| page.warn(warning));
 }

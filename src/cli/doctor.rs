@@ -1,22 +1,14 @@
 //! `palpate doctor`: diagnoses the connection between the gripper's board and this computer.
 
-use super::Failure;
 use super::link;
-use super::setup::within;
-use super::terminal::{note, say, say_json, table, typed_lines};
+use super::prelude::*;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use indicatif::{ProgressBar, ProgressStyle};
 use palpate_device::doctor::{
-    Bleed, CheckFinding, CheckStatus, CrosstalkTest, Observations, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine,
-    findings, is_sound, not_checked, summary, write_sketch,
+    Bleed, CheckFinding, CheckStatus, CrosstalkSession, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
+    is_sound, not_checked, summary, write_sketch,
 };
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{Baud, LinkEvent, LinkOptions};
-use palpate_tactile::board::KNOWN_AFTER;
-use serde::Serialize;
-use std::path::PathBuf;
+use palpate_device::serial::{Baud, LinkOptions};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Arguments of `palpate doctor`.
@@ -64,7 +56,7 @@ fn sketch_folder() -> impl TypedValueParser<Value = PathBuf> {
 
 /// Output of `--json`.
 #[derive(Serialize)]
-struct Report<'a> {
+struct DoctorReport<'a> {
     port: Option<&'a std::path::Path>,
     listened_s: f64,
     /// No check failed.
@@ -72,6 +64,9 @@ struct Report<'a> {
     /// Names of the checks that did not see what they need.
     not_checked: Vec<&'static str>,
     findings: Vec<CheckFinding>,
+    /// Port and readings, in words.
+    #[serde(skip)]
+    heard: Option<String>,
 }
 
 pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
@@ -87,40 +82,64 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let replay_speed = f64::INFINITY;
     let path = arguments.port.clone();
     let options = LinkOptions { path, baud: arguments.baud, replay_speed, ..LinkOptions::default() };
-    let stop = super::interrupt::stop_flag()?;
+    let stop = stop_flag()?;
     if arguments.crosstalk {
         return crosstalk(&options, &stop, arguments.json);
     }
-    let bar = ProgressBar::new((arguments.seconds * 10.0) as u64);
-    bar.set_style(ProgressStyle::with_template("listening {bar:40} bend each finger, press each pad")?);
+    let bar = Progress::new("listening {bar:40} bend each finger, press each pad");
     let seen = examine(&options, Duration::from_secs_f64(arguments.seconds), &mut |listened_s| {
-        bar.set_position((listened_s * 10.0) as u64);
+        bar.share(listened_s / arguments.seconds);
         !stop.load(Ordering::Relaxed)
     });
-    bar.finish_and_clear();
+    drop(bar);
     let found = findings(&seen);
-    let sound = is_sound(&found);
-    if arguments.json {
-        let port = seen.link.as_ref().map(|link| link.port.path.as_path()).or(arguments.port.as_deref());
-        say_json(&Report {
-            port,
-            listened_s: seen.listened_s,
-            sound,
-            not_checked: not_checked(&found),
-            findings: found,
-        })?;
-    } else {
-        print(&seen, &found)?;
-    }
+    let (sound, link) = (is_sound(&found), seen.link.as_ref());
+    let report = DoctorReport {
+        port: link.map(|link| link.port.path.as_path()).or(arguments.port.as_deref()),
+        listened_s: seen.listened_s,
+        sound,
+        not_checked: not_checked(&found),
+        findings: found,
+        heard: link.map(|link| {
+            let (path, title, samples) = (link.port.path.display(), &link.port.title, link.cadence.samples);
+            format!("{path} ({title}): {samples} readings over {:.1} s\n", seen.traces.seconds())
+        }),
+    };
+    report.print(arguments.json)?;
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+impl Report for DoctorReport<'_> {
+    fn text(&self, page: &mut Page) {
+        self.heard.iter().for_each(|heard| page.line(heard));
+        for finding in &self.findings {
+            page.line(format!("{:<11} {:<14} {}", finding.verdict.name(), finding.check, finding.seen));
+            for (word, text) in [("why:", &finding.cause), ("do:", &finding.fix), ("copy:", &finding.command)] {
+                text.iter().for_each(|text| page.line(format!("{word:>26} {text}")));
+            }
+        }
+        page.line(format!("\n{}", summary(&self.findings)));
+    }
 }
 
 /// Output of `--crosstalk --json`.
 #[derive(Serialize)]
-struct CrosstalkReport<'a> {
+struct CrosstalkReport {
     sound: bool,
-    found: &'a [Bleed],
+    found: Vec<Bleed>,
     result: Vec<String>,
+}
+
+impl Report for CrosstalkReport {
+    fn text(&self, page: &mut Page) {
+        let row = |bleed: &Bleed| {
+            let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
+            let verdict = if bleed.bleeds { CheckStatus::Failed } else { CheckStatus::Passed };
+            [bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
+        };
+        page.table(&["moved", "watched", "crosstalk [%]", "counts", ""], self.found.iter().map(row));
+        self.result.iter().for_each(|sentence| page.line(sentence));
+    }
 }
 
 /// Silence of the board that ends the test.
@@ -129,75 +148,33 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// Runs the crosstalk test: the user moves one sensor after the other.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
     let link = link::open(options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
-    let (mut test, mut shown) = (None, String::new());
-    let (mut readings, mut newest) = (0, Instant::now());
+    let (mut session, mut shown, mut newest) = (CrosstalkSession::default(), String::new(), Instant::now());
     let keys = typed_lines()?;
-    while !stop.load(Ordering::Relaxed) && !link.is_over() {
-        let events = link.take(Duration::from_millis(50));
+    while !stop.load(Ordering::Relaxed) && !link.is_over() && !session.is_over() {
+        let readings = link::readings(&link, Duration::from_millis(50));
         let board = link.status().board;
-        for event in events {
-            let LinkEvent::Decoded(DecodedEvent::Reading(reading)) = event else { continue };
+        for reading in readings {
             newest = Instant::now();
-            readings += 1;
-            if readings < KNOWN_AFTER {
-                continue;
-            }
-            let test = match &mut test {
-                Some(test) => test,
-                empty @ None => empty.insert(CrosstalkTest::new(&board)?),
-            };
-            test.see(&board);
-            test.feed(&reading);
-            let instruction = test.instruction();
-            if test.source().is_some() && shown != instruction {
-                let [step, of] = test.step();
-                note(&format!("{step} of {of}: {instruction}"));
-                shown = instruction;
+            session.feed(&reading, &board)?;
+            let Some(test) = session.test().filter(|test| test.source().is_some()) else { continue };
+            let [step, of] = test.step();
+            let told = format!("{step} of {of}: {}", test.instruction());
+            if told != shown {
+                note(&told);
+                shown = told;
             }
         }
-        if let (Ok(_enter), Some(test)) = (keys.try_recv(), &mut test) {
-            test.skip();
-        }
-        if test.as_ref().is_some_and(|test: &CrosstalkTest| test.source().is_none()) {
-            break;
+        if keys.try_recv().is_ok() {
+            session.skip();
         }
         if newest.elapsed() > SILENCE {
-            return Err(
-                format!("no readings for {:.0} s. {}", SILENCE.as_secs_f64(), link.status().state.sentence()).into()
-            );
+            let state = link.status().state.sentence();
+            return Err(format!("no readings for {:.0} s. {state}", SILENCE.as_secs_f64()).into());
         }
     }
-    let Some(test) = test else {
-        return Err(format!("no readings from the board. {}", link.status().state.sentence()).into());
-    };
+    let state = || format!("no readings from the board. {}", link.status().state.sentence());
+    let test = session.test().ok_or_else(state)?;
     let sound = test.is_sound();
-    if json {
-        say_json(&CrosstalkReport { sound, found: test.found(), result: test.summary() })?;
-    } else {
-        let row = |bleed: &Bleed| {
-            let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
-            let verdict = if bleed.bleeds { CheckStatus::Failed } else { CheckStatus::Passed };
-            vec![bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
-        };
-        table(&["moved", "watched", "crosstalk [%]", "counts", ""], &test.found().iter().map(row).collect::<Vec<_>>())?;
-        test.summary().iter().try_for_each(say)?;
-    }
+    CrosstalkReport { sound, found: test.found().to_vec(), result: test.summary() }.print(json)?;
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-fn print(seen: &Observations, found: &[CheckFinding]) -> Result<(), Failure> {
-    if let Some(link) = &seen.link {
-        let (path, title) = (link.port.path.display(), &link.port.title);
-        let (samples, lasted) = (link.cadence.samples, seen.traces.seconds());
-        say(format!("{path} ({title}): {samples} readings over {lasted:.1} s\n"))?;
-    }
-    for finding in found {
-        say(format!("{:<11} {:<14} {}", finding.verdict.name(), finding.check, finding.seen))?;
-        for (word, text) in [("why", &finding.cause), ("do", &finding.fix), ("copy", &finding.command)] {
-            if let Some(text) = text {
-                say(format!("{:>26} {text}", format!("{word}:")))?;
-            }
-        }
-    }
-    say(format!("\n{}", summary(found)))
 }

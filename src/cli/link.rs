@@ -2,7 +2,9 @@
 
 use super::Failure;
 use super::terminal::note;
-use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
+use palpate_device::protocol::DecodedEvent;
+use palpate_device::serial::{LinkEvent, LinkOptions, PortTrouble, SerialLink};
+use palpate_tactile::board::Reading;
 use std::time::{Duration, Instant};
 
 /// Default wait for a busy port (s): ModemManager probes a newly connected board for about this long.
@@ -40,4 +42,13 @@ pub(super) fn open(
             std::thread::sleep(POLL);
         }
     }
+}
+
+/// Readings of the board, waited for as long as `patience`.
+pub(super) fn readings(link: &SerialLink, patience: Duration) -> impl Iterator<Item = Reading> {
+    link.take(patience).into_iter().filter_map(|event| match event {
+        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading),
+        LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_))
+        | LinkEvent::Captured(_) => None,
+    })
 }

@@ -345,7 +345,7 @@ fn a_calibration_shares_the_port_or_brings_its_own() {
     // Twice at once: the second reading has not settled, and that is said.
     desk.until(|view| {
         let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
-        calibration.is_some_and(|c| matches!(c.settled, Some(Ok(_))))
+        calibration.and_then(|c| c.procedure.as_ref()).is_some_and(|procedure| procedure.settled().is_ok())
     });
     for _ in 0..2 {
         desk.command(GripperCommand::Calibrate(CalibrationCommand::Take(0.0)));

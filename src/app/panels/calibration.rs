@@ -13,7 +13,7 @@ use palpate_lab::workers::{
     CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, RunningCalibration, SensorJobError,
 };
 use palpate_tactile::board::Sensor;
-use palpate_tactile::calibration::{Calibration, Curve, Point, SensorKind};
+use palpate_tactile::calibration::{Calibration, Curve, Procedure, Record, SensorKind};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
@@ -96,23 +96,24 @@ fn begin_ui(
 }
 
 fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibration, actions: &mut Actions) {
-    wrapped(ui, RichText::new(format!("\"{}\", {}", running.plan.part, running.plan.sensor.label())).weak());
+    let RunningCalibration { plan, procedure, fit, closing, .. } = running;
+    let procedure = procedure.as_ref();
+    wrapped(ui, RichText::new(format!("\"{}\", {}", plan.part, plan.sensor.label())).weak());
     wrapped(ui, RichText::new(&running.instruction).strong());
-    let counts = running.latest.map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
-    let state = match &running.settled {
+    let counts = procedure.and_then(Procedure::latest).map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
+    let state = match procedure.map(Procedure::settled) {
+        _ if *closing => "watching the empty close".to_owned(),
         Some(Ok(_)) => "settled".to_owned(),
         Some(Err(why)) => why.to_string(),
-        None if running.closing => "watching the empty close".to_owned(),
         None => "no readings yet".to_owned(),
     };
     wrapped(ui, RichText::new(format!("{counts} counts, {state}")));
-    ui.horizontal_wrapped(|ui| buttons_ui(ui, running, actions));
+    let calibration = fit.as_ref().and_then(|fit| fit.as_deref().ok());
+    ui.horizontal_wrapped(|ui| buttons_ui(ui, running, calibration.is_some(), actions));
     if let Some(why) = &running.not_taken {
         wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
     }
-    let kind = SensorKind::of(running.plan.sensor);
-    let fit = running.fit.as_ref().and_then(|fit| fit.as_deref().ok());
-    match &running.fit {
+    match fit {
         Some(Ok(calibration)) => {
             wrapped(ui, RichText::new(calibration.summary()));
             for warning in &calibration.warnings {
@@ -122,42 +123,35 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
         Some(Err(why)) => wrapped(ui, RichText::new(why.to_string()).weak()),
         None => wrapped(ui, RichText::new("no points yet").weak()),
     }
-    let theme = context.view.theme;
-    curve_plot(ui, kind, &running.points, fit, theme);
-    if let Some(calibration) = fit {
+    if let Some(calibration) = calibration {
+        let (kind, theme) = (SensorKind::of(plan.sensor), context.view.theme);
+        curve_plot(ui, kind, calibration, theme);
         residual_plot(ui, kind, calibration, theme);
         bending_plot(ui, calibration, theme);
     }
 }
 
-fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
-    let mut button = |ready: bool, text: &str, about: &str, command: Option<CalibrationCommand>| {
-        let clicked = ui.add_enabled(ready && command.is_some(), Button::new(text)).on_hover_text(about).clicked();
-        if let Some(command) = command.filter(|_| clicked) {
+fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, fits: bool, actions: &mut Actions) {
+    let mut button = |ready: bool, text: &str, about: &str, command: CalibrationCommand| {
+        if ui.add_enabled(ready, Button::new(text)).on_hover_text(about).clicked() {
             actions.push(GripperCommand::Calibrate(command));
         }
     };
-    let take = running.next.map(CalibrationCommand::Take);
-    button(matches!(running.settled, Some(Ok(_))), "Take point", "Take the settled reading", take);
-    let free = !running.closing;
-    button(free && running.next.is_some(), "Skip", "Leave this point out", Some(CalibrationCommand::Skip));
-    button(
-        running.closing || !running.points.is_empty(),
-        "Undo",
-        "Measure the last point again",
-        Some(CalibrationCommand::Undo),
-    );
+    let (free, procedure) = (!running.closing, running.procedure.as_ref());
+    let next = procedure.and_then(Procedure::next);
+    let ready = free && next.is_some() && procedure.is_some_and(|procedure| procedure.settled().is_ok());
+    let take = CalibrationCommand::Take(next.unwrap_or_default());
+    button(ready, "Take point", "Take the settled reading", take);
+    button(free && next.is_some(), "Skip", "Leave this point out", CalibrationCommand::Skip);
+    let has_points = procedure.is_some_and(|procedure| !procedure.record().points.is_empty());
+    button(running.closing || has_points, "Undo", "Measure the last point again", CalibrationCommand::Undo);
     if SensorKind::of(running.plan.sensor) == SensorKind::Pad {
         let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
-        button(running.can_close, "Empty close", about, Some(CalibrationCommand::EmptyClose));
+        button(free && fits, "Empty close", about, CalibrationCommand::EmptyClose);
     }
-    button(
-        free && matches!(running.fit, Some(Ok(_))),
-        "Save",
-        "Store the calibration; it applies to earlier trials too",
-        Some(CalibrationCommand::Keep),
-    );
-    button(true, "Cancel", "Discard the calibration", Some(CalibrationCommand::Stop));
+    let about = "Store the calibration; it applies to earlier trials too";
+    button(free && fits, "Save", about, CalibrationCommand::Keep);
+    button(true, "Cancel", "Discard the calibration", CalibrationCommand::Stop);
 }
 
 /// Reading of a part in the unit of the plot: kilohms of a strip, microsiemens of a pad.
@@ -169,10 +163,9 @@ fn shown(kind: SensorKind, ohm: f64) -> f64 {
 }
 
 /// Points and fitted curve.
-fn curve_plot(ui: &mut Ui, kind: SensorKind, points: &[Point], fit: Option<&Calibration>, theme: Theme) {
-    let Some(calibration) = fit else { return };
+fn curve_plot(ui: &mut Ui, kind: SensorKind, calibration: &Calibration, theme: Theme) {
     let accent = colour(theme.colours().accent);
-    let input = &calibration.record.input;
+    let Record { input, points, .. } = &calibration.record;
     let measured: PlotPoints<'_> =
         points.iter().map(|p| [kind.shown(p.stimulus), shown(kind, input.ohm(p.counts))]).collect();
     let most = points.iter().map(|point| point.stimulus).fold(0.0, f64::max);

@@ -1,21 +1,14 @@
 //! Guided calibration with the board connected: asks for the next angle or weight, waits until the reading has settled, and
 //! records the point on Enter or automatically.
 
-use super::super::Failure;
 use super::super::link;
-use super::super::setup::within;
-use super::super::terminal::{note, typed_lines, warn};
+use super::super::prelude::*;
 use super::CalibrateArguments;
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkOptions, LinkState, SerialLink};
-use palpate_store::Store;
-use palpate_tactile::board::{Board, KNOWN_AFTER, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{
-    BendingZero, Calibration, EmptyClose, Point, Procedure, Record, SensorKind, Unsettled,
-};
-use std::collections::VecDeque;
+use palpate_device::serial::{LinkOptions, LinkState, SerialLink};
+use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
+use palpate_tactile::board::{Board, KNOWN_AFTER_S, Reading, Sensor};
+use palpate_tactile::calibration::{Point, Procedure, Record, SensorKind};
 use std::io::{IsTerminal as _, Write as _};
-use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
@@ -53,157 +46,149 @@ const PATIENCE_S: f64 = 8.0;
 /// How long an automatic procedure waits for a change (s).
 const AUTO_PATIENCE_S: f64 = 60.0;
 
-/// The board and the keyboard.
-struct Bench {
+/// The board: its link, and the last state that was told.
+struct BoardInput {
     link: SerialLink,
-    keys: Receiver<String>,
-    shows_progress: bool,
     state: LinkState,
-    /// Readings received and not yet processed.
-    pending: VecDeque<Reading>,
 }
 
-/// A typed command.
-enum Input {
-    Take(Option<f64>),
-    Skip,
-    Undo,
-    Quit,
-}
-
+/// Calibrates a part; `points` were measured before, and only the empty close is missing.
 pub(super) fn record(
     arguments: &CalibrateArguments,
     sensor: Sensor,
     part: &str,
+    points: Option<Record>,
     store: Option<&Store>,
 ) -> Result<Record, Failure> {
     let live = &arguments.live;
-    let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
-    let board = bench.board()?;
-    let mut procedure = Procedure::new(&board, sensor, part, arguments.resistor).ok_or_else(|| {
-        let (wanted, has) = (sensor.channel(), board.channels.join(", "));
-        format!(
-            "the board has no channel \"{wanted}\"; it has {has}. Name its channels in the sketch, or in a header line"
-        )
-    })?;
-    if !live.plan.is_empty() {
-        let plan: Vec<f64> = live.plan.iter().map(|shown| SensorKind::of(sensor).stimulus(*shown)).collect();
-        procedure = procedure.with_plan(&plan);
+    let close_s = live.empty_close;
+    let serving = store.filter(|_| close_s.is_some()).map(|store| store.calibrations().serving(None, &[]));
+    let setup = CalibrationSetup {
+        resistor_ohm: arguments.resistor,
+        stimuli: live.plan.iter().map(|shown| SensorKind::of(sensor).stimulus(*shown)).collect(),
+        record: points,
+        automatic: live.auto,
+        close_s,
+        serving: serving.transpose()?.map(|serving| serving.calibrations).unwrap_or_default(),
+    };
+    let input = BoardInput::open(live.port.as_deref(), live.auto)?;
+    if setup.record.is_none() {
+        let place = sensor.label();
+        note(&format!(
+            "Calibrating \"{part}\", the {place}. Enter records a point; a number records it as that angle or weight;"
+        ));
+        note("s skips it, u undoes the last one, q quits.");
     }
-    note(&format!(
-        "Calibrating \"{part}\", the {}. Enter records a point; a number records it as that angle or weight;",
-        sensor.label()
-    ));
-    note("s skips it, u undoes the last one, q quits.");
-    while procedure.next().is_some() {
-        bench.one_point(&mut procedure, live.auto)?;
-    }
-    let record = procedure.record().clone();
-    match live.empty_close {
-        Some(seconds) => with_empty_close(&mut bench, record, sensor, store, live.auto, seconds),
-        None => Ok(record),
-    }
+    guide(input, sensor, part, setup)
 }
 
 /// Reads a pad under a known weight (kg): on Enter, or as soon as it has settled.
 pub(in crate::cli) fn weigh(port: Option<&Path>, sensor: Sensor, kg: f64, auto: bool) -> Result<Point, Failure> {
-    let mut bench = Bench::open(port, auto)?;
-    let board = bench.board()?;
-    let force = SensorKind::Pad.stimulus(kg);
-    let procedure = Procedure::new(&board, sensor, "weighed", None);
-    let mut procedure =
-        procedure.ok_or_else(|| format!("the board has no channel \"{}\"", sensor.channel()))?.with_plan(&[force]);
+    let input = BoardInput::open(port, auto)?;
     if !auto {
         note(&format!("Press Enter once the weight lies on the {}.", sensor.label()));
     }
-    while procedure.next().is_some() {
-        bench.one_point(&mut procedure, auto)?;
+    let stimuli = vec![SensorKind::Pad.stimulus(kg)];
+    let setup = CalibrationSetup { stimuli, automatic: auto, ..CalibrationSetup::default() };
+    let record = guide(input, sensor, "weighed", setup)?;
+    Ok(*record.points.last().ok_or("no weight was measured")?)
+}
+
+/// Runs a calibration to its end.
+fn guide(mut input: BoardInput, sensor: Sensor, part: &str, setup: CalibrationSetup) -> Result<Record, Failure> {
+    let auto = setup.automatic;
+    let points = setup.record.as_ref().map_or(0, |record| record.points.len());
+    let keys = if auto { channel().1 } else { typed_lines()? };
+    let plan = CalibrationPlan { sensor, part: part.to_owned(), port: None };
+    let mut session = CalibrationSession::new(plan, setup);
+    let mut screen = Screen::new(SensorKind::of(sensor), points, auto);
+    while !session.is_complete() {
+        let mut readings = input.listen()?.into_iter();
+        let board = input.link.status().board;
+        while let Some(reading) = readings.next().filter(|_| !session.is_complete()) {
+            session.feed(&reading, &board)?;
+            screen.tell(&session);
+            if let Some(why) = session.take_refusal() {
+                if auto {
+                    return Err(why.into());
+                }
+                screen.warn(&why);
+            }
+        }
+        screen.show_reading(&session);
+        screen.check_patience(&session, &input.state)?;
+        if !auto
+            && session.procedure().is_some()
+            && let Some(command) = typed(&keys, &session, screen.kind)?
+        {
+            let before = session.procedure().map_or(0, |procedure| procedure.record().points.len());
+            session.handle(&command);
+            if command == CalibrationCommand::Undo && before == 0 {
+                note("no point to undo");
+            }
+            session.take_refusal().iter().for_each(|why| screen.warn(why));
+            screen.tell(&session);
+        }
     }
-    Ok(*procedure.record().points.last().ok_or("no weight was measured")?)
+    Ok(session.procedure().ok_or("nothing was measured")?.record().clone())
 }
 
-/// Adds an empty close to a pad whose points come from a file.
-pub(super) fn watch_empty_close(
-    live: &LiveArguments,
-    seconds: f64,
-    sensor: Sensor,
-    record: Record,
-    store: Option<&Store>,
-) -> Result<Record, Failure> {
-    let mut bench = Bench::open(live.port.as_deref(), live.auto)?;
-    bench.board()?;
-    with_empty_close(&mut bench, record, sensor, store, live.auto, seconds)
-}
-
-fn with_empty_close(
-    bench: &mut Bench,
-    record: Record,
-    sensor: Sensor,
-    store: Option<&Store>,
-    auto: bool,
-    seconds: f64,
-) -> Result<Record, Failure> {
-    let pad = Calibration::fit(record.clone())?;
-    let serving = store.map(|store| store.calibrations().serving(None, &[])).transpose()?;
-    let serving = serving.map(|serving| serving.calibrations).unwrap_or_default();
-    let close = EmptyClose::begin(&bench.link.status().board, (sensor, pad), &serving, seconds)?;
-    Ok(Record { bending: Some(bench.empty_close(close, auto)?), ..record })
+/// The command that was typed, if any.
+fn typed(
+    keys: &Receiver<String>,
+    session: &CalibrationSession,
+    kind: SensorKind,
+) -> Result<Option<CalibrationCommand>, Failure> {
+    let line = match keys.try_recv() {
+        Ok(line) => line,
+        Err(TryRecvError::Empty) => return Ok(None),
+        Err(TryRecvError::Disconnected) => {
+            return Err("standard input has ended; use --auto to record without a keyboard".into());
+        }
+    };
+    Ok(match line.trim() {
+        "" if session.awaits_close() => Some(CalibrationCommand::EmptyClose),
+        "" => session.procedure().and_then(Procedure::next).map(CalibrationCommand::Take),
+        "s" => Some(CalibrationCommand::Skip),
+        "u" => Some(CalibrationCommand::Undo),
+        "q" => return Err("cancelled; nothing was stored".into()),
+        text => {
+            let number = text.parse::<f64>().ok();
+            if number.is_none() {
+                warn(&format!("unknown input \"{text}\": press Enter, or type a number, s, u or q"));
+            }
+            number.map(|number| CalibrationCommand::Take(kind.stimulus(number)))
+        }
+    })
 }
 
 /// Listens for some seconds; returns the board and its readings.
 pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Reading>), Failure> {
-    let mut bench = Bench::open(port, true)?;
-    bench.board()?;
-    let mut readings: Vec<Reading> = Vec::new();
-    let start = Instant::now();
-    while readings.last().zip(readings.first()).is_none_or(|(last, first)| last.t_s - first.t_s < seconds) {
+    let mut input = BoardInput::open(port, true)?;
+    let (mut readings, start): (Vec<Reading>, _) = (Vec::new(), Instant::now());
+    let mut span_s = -1.0;
+    // Within the first, a board tells what it is.
+    while span_s < seconds || (span_s < KNOWN_AFTER_S && !input.link.is_over()) {
         if start.elapsed().as_secs_f64() > seconds + PATIENCE_S {
-            return Err(format!("the board stopped sending. {}", bench.state.sentence()).into());
+            return Err(format!("no readings from the board for {seconds} s. {}", input.state.sentence()).into());
         }
-        bench.listen()?;
-        readings.extend(bench.pending.drain(..));
+        readings.extend(input.listen()?);
+        span_s = readings.last().zip(readings.first()).map_or(-1.0, |(last, first)| last.t_s - first.t_s);
     }
-    Ok((bench.link.status().board, readings))
+    Ok((input.link.status().board, readings))
 }
 
-impl Bench {
+impl BoardInput {
     fn open(port: Option<&Path>, hands_free: bool) -> Result<Self, Failure> {
         let captured = port.is_some_and(Path::is_file);
         let replay_speed = if captured && hands_free { f64::INFINITY } else { 1.0 };
-        let path = port.map(Path::to_owned);
-        let link =
-            link::open(&LinkOptions { path, replay_speed, ..LinkOptions::default() }, link::USUAL_WAIT_S, || false)?;
-        let keys = if hands_free { channel().1 } else { typed_lines()? };
-        Ok(Self {
-            link,
-            keys,
-            shows_progress: std::io::stderr().is_terminal(),
-            state: LinkState::Waiting,
-            pending: VecDeque::new(),
-        })
+        let options = LinkOptions { path: port.map(Path::to_owned), replay_speed, ..LinkOptions::default() };
+        Ok(Self { link: link::open(&options, link::USUAL_WAIT_S, || false)?, state: LinkState::Waiting })
     }
 
-    /// Waits until the channels of the board are known.
-    fn board(&mut self) -> Result<Board, Failure> {
-        let start = Instant::now();
-        loop {
-            self.listen()?;
-            let over = self.link.is_over() && !self.pending.is_empty();
-            let span_s =
-                self.pending.back().zip(self.pending.front()).map_or(0.0, |(last, first)| last.t_s - first.t_s);
-            if over || (self.pending.len() >= KNOWN_AFTER as usize && span_s >= KNOWN_AFTER_S) {
-                return Ok(self.link.status().board);
-            }
-            if start.elapsed().as_secs_f64() > PATIENCE_S {
-                let state = self.link.status().state.sentence();
-                return Err(format!("no readings from the board within {PATIENCE_S:.0} s. {state}").into());
-            }
-        }
-    }
-
-    /// Receives readings; reports changes of the link.
-    fn listen(&mut self) -> Result<(), Failure> {
-        let events = self.link.take(Duration::from_millis(100));
+    /// Receives readings; tells changes of the link.
+    fn listen(&mut self) -> Result<Vec<Reading>, Failure> {
+        let readings: Vec<Reading> = link::readings(&self.link, Duration::from_millis(100)).collect();
         let state = self.link.status().state;
         if state != self.state {
             if !matches!(state, LinkState::Listening | LinkState::Ended { .. }) {
@@ -211,112 +196,81 @@ impl Bench {
             }
             self.state = state;
         }
-        if events.is_empty() && self.pending.is_empty() && self.link.is_over() {
+        if readings.is_empty() && self.link.is_over() {
             return Err(format!("the stream ended before all points were recorded. {}", self.state.sentence()).into());
         }
-        let reading = |event| match event {
-            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading),
-            LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_))
-            | LinkEvent::Captured(_) => None,
-        };
-        self.pending.extend(events.into_iter().filter_map(reading));
-        Ok(())
+        Ok(readings)
+    }
+}
+
+/// What the terminal has told of a calibration.
+struct Screen {
+    kind: SensorKind,
+    auto: bool,
+    /// A line that is overwritten shows the present reading, on a terminal only.
+    shows_reading: bool,
+    instruction: String,
+    points: usize,
+    /// When the last point was taken.
+    since: Instant,
+}
+
+impl Screen {
+    fn new(kind: SensorKind, points: usize, auto: bool) -> Self {
+        let shows_reading = std::io::stderr().is_terminal();
+        Self { kind, auto, shows_reading, instruction: String::new(), points, since: Instant::now() }
     }
 
-    fn input(&self) -> Result<Option<Input>, Failure> {
-        let line = match self.keys.try_recv() {
-            Ok(line) => line,
-            Err(TryRecvError::Empty) => return Ok(None),
-            Err(TryRecvError::Disconnected) => {
-                return Err("standard input has ended; use --auto to record without a keyboard".into());
+    /// Tells what has changed: the last point, and what to do next.
+    fn tell(&mut self, session: &CalibrationSession) {
+        let Some(procedure) = session.procedure() else { return };
+        let points = &procedure.record().points;
+        if points.len() != self.points {
+            self.clear_line();
+            match points.last().filter(|_| points.len() > self.points) {
+                Some(Point { stimulus, counts, spread, readings }) => {
+                    let at = self.kind.with_unit(*stimulus);
+                    note(&format!("  {at}: {counts:.1} counts, noise {spread:.1}, {readings} readings"));
+                }
+                None => note("last point removed: record it again"),
             }
+            (self.points, self.since) = (points.len(), Instant::now());
+        }
+        let instruction = match session.closing() {
+            // Counts down.
+            Some(_) if self.instruction.starts_with("take everything") => return,
+            Some(closing) => closing.instruction(),
+            None if procedure.next().is_some() => format!("{} ({} left)", procedure.instruction(), procedure.left()),
+            None if session.awaits_close() && !self.auto => "Press Enter, then close the empty hand".to_owned(),
+            None => return,
         };
-        Ok(match line.trim() {
-            "" => Some(Input::Take(None)),
-            "s" => Some(Input::Skip),
-            "u" => Some(Input::Undo),
-            "q" => Some(Input::Quit),
-            text => match text.parse::<f64>() {
-                Ok(number) => Some(Input::Take(Some(number))),
-                Err(_) => {
-                    warn(&format!("unknown input \"{text}\": press Enter, or type a number, s, u or q"));
-                    None
-                }
-            },
-        })
-    }
-
-    /// Runs one step of the procedure: records, skips or undoes a point.
-    fn one_point(&mut self, procedure: &mut Procedure, auto: bool) -> Result<(), Failure> {
-        let Some(planned) = procedure.next() else { return Ok(()) };
-        let kind = procedure.record().kind;
-        note(&format!("{} ({} left)", procedure.instruction(), procedure.left()));
-        let start = Instant::now();
-        loop {
-            // One by one, so that an automatic procedure sees each plateau however fast the stream is.
-            self.listen()?;
-            procedure.see(&self.link.status().board);
-            while let Some(reading) = self.pending.pop_front() {
-                procedure.feed(&reading);
-                if auto && procedure.has_changed() && procedure.settled().is_ok() {
-                    return Ok(self.take(procedure, planned)?);
-                }
-            }
-            self.show(procedure);
-            if auto {
-                if start.elapsed().as_secs_f64() > AUTO_PATIENCE_S {
-                    let why = procedure
-                        .settled()
-                        .err()
-                        .map_or_else(|| "the reading did not change".to_owned(), |e| e.to_string());
-                    return Err(format!("no point at {}: {why}", kind.with_unit(planned)).into());
-                }
-                continue;
-            }
-            match self.input()? {
-                None => {}
-                Some(Input::Take(number)) => {
-                    let stimulus = number.map_or(planned, |number| kind.stimulus(number));
-                    match self.take(procedure, stimulus) {
-                        Ok(()) => return Ok(()),
-                        Err(why) => {
-                            self.clear_line();
-                            warn(&format!("{} not recorded: {why}", kind.with_unit(stimulus)));
-                        }
-                    }
-                }
-                Some(Input::Skip) => {
-                    procedure.skip();
-                    return Ok(());
-                }
-                Some(Input::Undo) => {
-                    let undone = procedure.undo().map(|point| kind.with_unit(point.stimulus));
-                    note(
-                        &undone.map_or_else(
-                            || "no point to undo".to_owned(),
-                            |at| format!("{at} removed: record it again"),
-                        ),
-                    );
-                    return Ok(());
-                }
-                Some(Input::Quit) => return Err("cancelled; nothing was stored".into()),
-            }
+        if instruction != self.instruction {
+            note(&instruction);
+            self.instruction = instruction;
         }
     }
 
-    fn take(&self, procedure: &mut Procedure, stimulus: f64) -> Result<(), Unsettled> {
-        let point = procedure.take(stimulus)?;
-        self.clear_line();
-        let at = procedure.record().kind.with_unit(stimulus);
-        note(&format!("  {at}: {:.1} counts, noise {:.1}, {} readings", point.counts, point.spread, point.readings));
-        Ok(())
+    /// Ends a calibration without readings, or an automatic one that waits for a change.
+    fn check_patience(&self, session: &CalibrationSession, state: &LinkState) -> Result<(), Failure> {
+        let waited_s = self.since.elapsed().as_secs_f64();
+        match session.procedure() {
+            None if waited_s > PATIENCE_S => {
+                Err(format!("no readings from the board within {PATIENCE_S:.0} s. {}", state.sentence()).into())
+            }
+            Some(procedure) if self.auto && waited_s > AUTO_PATIENCE_S && session.closing().is_none() => {
+                let why =
+                    procedure.settled().map_or_else(|why| why.to_string(), |_| "the reading did not change".into());
+                let at = procedure.next().map(|next| self.kind.with_unit(next)).unwrap_or_default();
+                Err(format!("no point at {at}: {why}").into())
+            }
+            _ => Ok(()),
+        }
     }
 
-    /// Shows the present reading on a line that is overwritten, on a terminal only.
-    fn show(&self, procedure: &Procedure) {
-        if !self.shows_progress {
+    fn show_reading(&self, session: &CalibrationSession) {
+        let Some(procedure) = session.procedure().filter(|_| self.shows_reading && session.closing().is_none()) else {
             return;
-        }
+        };
         let counts = procedure.latest().map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
         let state = match procedure.settled() {
             Ok(point) => format!("settled at {:.1}: press Enter", point.counts),
@@ -326,28 +280,13 @@ impl Bench {
     }
 
     fn clear_line(&self) {
-        if self.shows_progress {
+        if self.shows_reading {
             let _unseen = write!(std::io::stderr(), "\r\x1b[K");
         }
     }
 
-    /// Measures how bending shifts the zero of a pad.
-    fn empty_close(&mut self, mut close: EmptyClose, auto: bool) -> Result<BendingZero, Failure> {
-        note(&close.instruction());
-        if !auto {
-            note("Press Enter, then close the hand");
-            while self.input()?.is_none() {
-                self.listen()?;
-            }
-            self.pending.clear();
-        }
-        loop {
-            self.listen()?;
-            while let Some(reading) = self.pending.pop_front() {
-                if close.feed(&reading) {
-                    return Ok(close.bending()?);
-                }
-            }
-        }
+    fn warn(&self, text: &str) {
+        self.clear_line();
+        warn(text);
     }
 }

@@ -1,14 +1,10 @@
 //! Manages calibrations: list, show, export, import, mount, withdraw.
 
-use super::super::Failure;
-use super::super::output::{file_of, write_new};
-use super::super::terminal::{say, say_json, table, warn};
-use super::{parse_sensor, print, zero};
-use palpate_store::{CalibrationId, FileKind, Store, StoredCalibration};
+use super::super::prelude::*;
+use super::{parse_sensor, points_text, zero};
+use palpate_store::{CalibrationId, StoredCalibration};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::Calibration;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum CalibrateCommand {
@@ -76,22 +72,20 @@ impl CalibrateCommand {
 
 /// Result of a command that adds nothing, where there is no store.
 pub(super) fn without_store(command: &CalibrateCommand) -> Result<(), Failure> {
-    let none = "no calibrations yet: `palpate help gripper` says how to calibrate";
     match command {
-        CalibrateCommand::List { json: true, .. } => say_json(&ListReport::default()),
-        CalibrateCommand::Drift(arguments) if arguments.json => say_json(&[(); 0]),
-        CalibrateCommand::List { .. } | CalibrateCommand::Drift(_) => say(none),
+        CalibrateCommand::List { json, .. } => ListReport::default().print(*json),
+        CalibrateCommand::Drift(arguments) => zero::DriftReport::default().print(arguments.json),
         CalibrateCommand::Tare(_) => {
             Err("no calibrations yet, so there is no zero; `palpate help gripper` says how to calibrate".into())
         }
-        _ => Err(none.into()),
+        _ => Err("no calibrations yet: `palpate help gripper` says how to calibrate".into()),
     }
 }
 
 pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), Failure> {
     match command {
-        CalibrateCommand::List { part, json } => list(store, part.as_deref(), *json),
-        CalibrateCommand::Show { id, json } => show(store, *id, *json),
+        CalibrateCommand::List { part, json } => ListReport::new(store, part.as_deref())?.print(*json),
+        CalibrateCommand::Show { id, json } => show(store, *id)?.print(*json),
         CalibrateCommand::Export { ids, out } => export(store, ids, out),
         CalibrateCommand::Import { files } => files.iter().try_for_each(|file| import(store, file)),
         CalibrateCommand::Mount { sensor, part } => mount(store, *sensor, part.trim()),
@@ -126,77 +120,74 @@ struct Row {
     fault: Option<String>,
 }
 
-fn list(store: &Store, part: Option<&str>, json: bool) -> Result<(), Failure> {
-    let parts = store.calibrations().mounted()?;
-    let mounted = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor.channel(), part?)));
-    let rows = store.calibrations().list(part)?.into_iter().map(|stored| {
-        let fitted = Calibration::fit(stored.record.clone());
-        let summary = fitted.as_ref().ok().map(Calibration::summary);
-        Row { stored, summary, fault: fitted.err().map(|fault| fault.to_string()) }
-    });
-    let listed = ListReport { mounted: mounted.collect(), calibrations: rows.collect() };
-    if json {
-        return say_json(&listed);
+impl ListReport {
+    fn new(store: &Store, part: Option<&str>) -> Result<Self, Failure> {
+        let parts = store.calibrations().mounted()?;
+        let mounted = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor.channel(), part?)));
+        let rows = store.calibrations().list(part)?.into_iter().map(|stored| {
+            let fitted = Calibration::fit(stored.record.clone());
+            let summary = fitted.as_ref().ok().map(Calibration::summary);
+            Row { stored, summary, fault: fitted.err().map(|fault| fault.to_string()) }
+        });
+        Ok(Self { mounted: mounted.collect(), calibrations: rows.collect() })
     }
-    for (channel, part) in &listed.mounted {
-        say(format!("{channel:<6}\"{part}\""))?;
-    }
-    if listed.calibrations.is_empty() {
-        return say("no calibrations yet: `palpate calibrate flexL --part A7` makes one");
-    }
-    let cells: Vec<Vec<String>> = listed
-        .calibrations
-        .iter()
-        .map(|Row { stored, summary, fault }| {
-            let remark = match (&stored.withdrawn, fault) {
-                (Some(_), _) => "withdrawn: ".to_owned(),
-                (None, Some(_)) => "unusable: ".to_owned(),
-                (None, None) => String::new(),
-            };
-            let result = summary.as_ref().or(fault.as_ref()).cloned().unwrap_or_default();
-            vec![
-                stored.id.to_string(),
-                stored.record.part.clone(),
-                stored.version.to_string(),
-                stored.created.chars().take(19).collect::<String>().replace('T', " "),
-                stored.record.kind.label().to_owned(),
-                format!("{remark}{result}"),
-            ]
-        })
-        .collect();
-    table(&["id", "part", "version", "made (UTC)", "kind", "result"], &cells)
 }
 
-fn show(store: &Store, id: CalibrationId, json: bool) -> Result<(), Failure> {
-    let stored = store.calibrations().get(id)?;
-    let calibration = Calibration::fit(stored.record.clone())?;
-    if json {
-        #[derive(Serialize)]
-        struct Report<'a> {
-            id: CalibrationId,
-            version: i64,
-            created: &'a str,
-            withdrawn: Option<&'a str>,
-            #[serde(flatten)]
-            calibration: &'a Calibration,
+impl Report for ListReport {
+    fn text(&self, page: &mut Page) {
+        for (channel, part) in &self.mounted {
+            page.line(format!("{channel:<6}\"{part}\""));
         }
-        let StoredCalibration { version, created, withdrawn, .. } = &stored;
-        let withdrawn = withdrawn.as_deref();
-        return say_json(&Report { id, version: *version, created, withdrawn, calibration: &calibration });
+        if self.calibrations.is_empty() {
+            return page.line("no calibrations yet: `palpate calibrate flexL --part A7` makes one");
+        }
+        let row = |Row { stored, summary, fault }: &Row| {
+            let remark = match (&stored.withdrawn, fault) {
+                (Some(_), _) => "withdrawn: ",
+                (None, Some(_)) => "unusable: ",
+                (None, None) => "",
+            };
+            let result = format!("{remark}{}", summary.as_ref().or(fault.as_ref()).map_or("", String::as_str));
+            let (part, kind) = (stored.record.part.clone(), stored.record.kind.label().to_owned());
+            [stored.id.to_string(), part, stored.version.to_string(), date(&stored.created), kind, result]
+        };
+        page.table(&["id", "part", "version", "made (UTC)", "kind", "result"], self.calibrations.iter().map(row));
     }
-    let StoredCalibration { version, created, record, withdrawn, .. } = &stored;
-    say(format!("calibration {id}: {} \"{}\", version {version}, made {created}", record.kind.label(), record.part))?;
-    print(&calibration)?;
-    if let Some(bending) = &record.bending {
-        say(format!("zero known up to a curvature of {:.1} 1/m", bending.reaches()))?;
+}
+
+/// Output of `show --json`.
+#[derive(Serialize)]
+struct ShowReport {
+    id: CalibrationId,
+    version: i64,
+    created: String,
+    withdrawn: Option<String>,
+    #[serde(flatten)]
+    calibration: Calibration,
+}
+
+fn show(store: &Store, id: CalibrationId) -> Result<ShowReport, Failure> {
+    let StoredCalibration { version, created, withdrawn, record, .. } = store.calibrations().get(id)?;
+    Ok(ShowReport { id, version, created, withdrawn, calibration: Calibration::fit(record)? })
+}
+
+impl Report for ShowReport {
+    fn text(&self, page: &mut Page) {
+        let Self { id, version, created, withdrawn, calibration } = self;
+        let record = &calibration.record;
+        let (kind, part) = (record.kind.label(), &record.part);
+        page.line(format!("calibration {id}: {kind} \"{part}\", version {version}, made {created}"));
+        points_text(calibration, page);
+        if let Some(bending) = &record.bending {
+            page.line(format!("zero known up to a curvature of {:.1} 1/m", bending.reaches()));
+        }
+        if !record.note.is_empty() {
+            page.line(&record.note);
+        }
+        if withdrawn.is_some() {
+            page.warn("this calibration is withdrawn");
+        }
     }
-    if !record.note.is_empty() {
-        say(&record.note)?;
-    }
-    if withdrawn.is_some() {
-        warn("this calibration is withdrawn");
-    }
-    Ok(())
 }
 
 fn export(store: &Store, ids: &[CalibrationId], out: &Path) -> Result<(), Failure> {

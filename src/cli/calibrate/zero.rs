@@ -1,16 +1,12 @@
 //! Zeros: `palpate calibrate tare` stores the present ones, `palpate calibrate drift` shows those of stored trials.
 
-use super::super::Failure;
-use super::super::setup::within;
-use super::super::terminal::{say, say_json, table, warn};
+use super::super::prelude::*;
 use super::guided;
 use palpate_store::labels::shown_title;
-use palpate_store::{Store, StoredTare};
+use palpate_store::{PartTare, StoredTare};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout};
-use palpate_tactile::trial::{TrialId, TrialSource};
-use serde::Serialize;
-use std::path::PathBuf;
+use palpate_tactile::trial::TrialSource;
 
 /// Arguments of `palpate calibrate tare`.
 #[derive(Debug, clap::Args)]
@@ -60,37 +56,43 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
     let zero = readout.tare(&readings)?;
     let stored = if arguments.dry_run { None } else { Some(store.calibrations().add_tare(&zero)?) };
     let warnings = [readout.warnings(), &serving.warnings].concat();
-    if arguments.json {
-        return say_json(&TareReport { drift, stored, warnings });
-    }
-    let rows: Vec<Vec<String>> = drift
-        .iter()
-        .map(|drift| vec![drift.sensor.label().to_owned(), drift.with_unit(), drift.badge().to_owned(), to_do(drift)])
-        .collect();
-    table(&["sensor", "drift", "", ""], &rows)?;
-    warnings.iter().for_each(|warning| warn(warning));
-    match stored {
-        None => say("not stored"),
-        Some(stored) => {
-            let versions = stored.parts.iter().map(|part| format!("\"{}\" version {}", part.part, part.version));
-            let versions: Vec<String> = versions.collect();
-            say(format!("stored as the zero of {}, until their next calibration", versions.join(", ")))
-        }
+    TareReport { drift, stored, warnings }.print(arguments.json)
+}
+
+impl Report for TareReport {
+    fn text(&self, page: &mut Page) {
+        let row =
+            |drift: &Drift| [drift.sensor.label(), &drift.with_unit(), drift.badge(), to_do(drift)].map(str::to_owned);
+        page.table(&["sensor", "drift", "", ""], self.drift.iter().map(row));
+        self.warnings.iter().for_each(|warning| page.warn(warning));
+        let Some(stored) = &self.stored else { return page.line("not stored") };
+        let versions = stored.parts.iter().map(|part| format!("\"{}\" version {}", part.part, part.version));
+        let versions: Vec<String> = versions.collect();
+        page.line(format!("stored as the zero of {}, until their next calibration", versions.join(", ")));
     }
 }
 
 /// Advice for a drifted zero.
-fn to_do(drift: &Drift) -> String {
-    let what = match (drift.level, drift.sensor.is_flex()) {
+fn to_do(drift: &Drift) -> &'static str {
+    match (drift.level, drift.sensor.is_flex()) {
         (DriftLevel::Steady, _) => "nothing to do",
         (DriftLevel::Moved, _) => "corrected from now on; calibrate again if it drifts further",
         (DriftLevel::TooFar, true) => "not corrected: straighten the finger, or check whether the strip has slipped",
         (DriftLevel::TooFar, false) => "not corrected: free the pad, or check whether it is pinched",
-    };
-    what.to_owned()
+    }
 }
 
-/// One trial in the output of `drift --json`.
+/// Output of `drift --json`.
+#[derive(Default, Serialize)]
+#[serde(transparent)]
+pub(super) struct DriftReport {
+    rows: Vec<DriftRow>,
+    /// Tares that apply.
+    #[serde(skip)]
+    tares: Vec<PartTare>,
+}
+
+/// One trial in it.
 #[derive(Serialize)]
 struct DriftRow {
     trial: TrialId,
@@ -115,30 +117,27 @@ pub(super) fn drift(arguments: &DriftArguments, store: &Store) -> Result<(), Fai
     if let Some(id) = arguments.trials.iter().find(|id| rows.iter().all(|row| row.trial != **id)) {
         return Err(format!("no trial {id} of the real gripper: see `palpate trials list`").into());
     }
-    if arguments.json {
-        return say_json(&rows);
-    }
-    if rows.is_empty() {
-        return say("no trials of the real gripper yet: `palpate record` records one");
-    }
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| {
-            let of = |sensor: Sensor| row.drift.iter().find(|drift| drift.sensor == sensor);
-            let cell =
-                |sensor| of(sensor).map_or_else(|| "–".to_owned(), |d| format!("{} {}", d.with_unit(), d.badge()));
-            let date = row.created.chars().take(19).collect::<String>().replace('T', " ");
-            let start = [row.trial.to_string(), date, shown_title(&row.object)];
-            start.into_iter().chain(Sensor::ALL.map(cell)).collect()
-        })
-        .collect();
-    let names = Sensor::ALL.map(Sensor::channel);
-    table(&["trial", "recorded (UTC)", "object", names[0], names[1], names[2], names[3]], &cells)?;
-    if let Some(tare) = store.calibrations().tare()? {
-        for part in &tare.parts {
-            let date = part.taken.chars().take(19).collect::<String>().replace('T', " ");
-            say(format!("\"{}\", the {}: tare {} of {date} applies", part.part, part.sensor.label(), part.version))?;
+    let tares = store.calibrations().tare()?.map(|tare| tare.parts).unwrap_or_default();
+    DriftReport { rows, tares }.print(arguments.json)
+}
+
+impl Report for DriftReport {
+    fn text(&self, page: &mut Page) {
+        if self.rows.is_empty() {
+            return page.line("no trials of the real gripper yet: `palpate record` records one");
+        }
+        let row = |row: &DriftRow| {
+            let [a, b, c, d] = Sensor::ALL.map(|sensor| {
+                let drift = row.drift.iter().find(|drift| drift.sensor == sensor);
+                drift.map_or_else(|| "–".to_owned(), |drift| format!("{} {}", drift.with_unit(), drift.badge()))
+            });
+            [row.trial.to_string(), date(&row.created), shown_title(&row.object), a, b, c, d]
+        };
+        let [a, b, c, d] = Sensor::ALL.map(Sensor::channel);
+        page.table(&["trial", "recorded (UTC)", "object", a, b, c, d], self.rows.iter().map(row));
+        for part in &self.tares {
+            let (place, version, date) = (part.sensor.label(), part.version, date(&part.taken));
+            page.line(format!("\"{}\", the {place}: tare {version} of {date} applies", part.part));
         }
     }
-    Ok(())
 }

@@ -10,7 +10,7 @@
 //! Crosstalk of a converter's multiplexer follows the other sensor at once and in proportion. A sensor that moves out of step
 //! was touched.
 
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -341,6 +341,45 @@ impl Bleed {
 /// The finger of a sensor: 0 for the left one.
 fn side_of(sensor: Sensor) -> usize {
     sensor as usize % 2
+}
+
+/// Crosstalk test of a board whose channels are known only after its first readings. Terminal and window show it.
+#[derive(Clone, Debug, Default)]
+pub struct CrosstalkSession {
+    test: Option<CrosstalkTest>,
+    readings: u32,
+}
+
+impl CrosstalkSession {
+    /// Takes in a reading. Fails where the board has too few sensors.
+    pub fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), CrosstalkError> {
+        self.readings = self.readings.saturating_add(1);
+        if self.readings < KNOWN_AFTER {
+            return Ok(());
+        }
+        let test = match &mut self.test {
+            Some(test) => test,
+            empty @ None => empty.insert(CrosstalkTest::new(board)?),
+        };
+        test.see(board);
+        test.feed(reading);
+        Ok(())
+    }
+
+    /// The test; none before the board is known.
+    pub fn test(&self) -> Option<&CrosstalkTest> {
+        self.test.as_ref()
+    }
+
+    /// Skips the sensor to move.
+    pub fn skip(&mut self) {
+        self.test.iter_mut().for_each(CrosstalkTest::skip);
+    }
+
+    /// True when every sensor was moved or skipped.
+    pub fn is_over(&self) -> bool {
+        self.test.as_ref().is_some_and(|test| test.source().is_none())
+    }
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ mod traces;
 mod wiring;
 
 pub use checks::{CHECKS, Check};
-pub use crosstalk::{Bleed, CrosstalkError, CrosstalkTest};
+pub use crosstalk::{Bleed, CrosstalkError, CrosstalkSession, CrosstalkTest};
 pub use examine::{examine, example_of, is_enough};
 pub use traces::{ChannelTrace, ChannelTraces};
 pub use wiring::{SKETCH, SketchError, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};

@@ -71,9 +71,9 @@ pub use explainer::{ExplainRequest, ExplainedGrasp, Explainer, NearestState};
 pub use fitter::{FitCommand, FitTrials, FitTrialsError, FittedFinger, Fitter, FitterView, fit_trials};
 pub use ghost::GhostGrasp;
 pub use gripper::{
-    CalibrationCommand, CalibrationPlan, CalibrationView, CrosstalkCommand, CrosstalkView, EndedTrial, GripperCommand,
-    GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest, RunningCalibration, RunningCrosstalk,
-    SensorJobError, TrialView,
+    CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
+    CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
+    RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
 };
 pub use inspector::{Inspector, OpenRequest, Opened};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};

@@ -77,6 +77,8 @@ pub struct Procedure {
     silent: usize,
     /// The user has entered the resistor beside the sensor.
     resistor_is_given: bool,
+    /// The points were measured elsewhere, and their input stays as it was there.
+    is_measured: bool,
 }
 
 impl Procedure {
@@ -105,16 +107,26 @@ impl Procedure {
             window: VecDeque::new(),
             silent: 0,
             resistor_is_given: resistor_ohm.is_some(),
+            is_measured: false,
         })
+    }
+
+    /// Continues after points that were measured elsewhere. Refuses a board that has no such channel.
+    pub fn after(board: &Board, sensor: Sensor, record: Record) -> Option<Self> {
+        let begun = Self::new(board, sensor, &record.part, None)?;
+        Some(Self { record, left: VecDeque::new(), is_measured: true, ..begun })
     }
 
     /// Updates the board's properties, which apply to all points, as points are stored as counts.
     pub fn see(&mut self, board: &Board) {
+        self.column = board.channel_of(self.sensor).unwrap_or(self.column);
+        if self.is_measured {
+            return;
+        }
         let input = &mut self.record.input;
         let seen = input.seen_by(board, self.sensor);
         let fixed_ohm = if self.resistor_is_given { input.divider.fixed_ohm } else { seen.divider.fixed_ohm };
         *input = Input { divider: Divider { fixed_ohm, ..seen.divider }, ..seen };
-        self.column = board.channel_of(self.sensor).unwrap_or(self.column);
     }
 
     /// With other angles (rad) or forces (N) to be set.

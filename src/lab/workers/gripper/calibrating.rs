@@ -1,9 +1,10 @@
-//! Calibration on the shared link: readings and applied values in, a curve out.
+//! Calibration session: readings and applied values in, a curve out. The terminal feeds it from its own link, the gripper
+//! thread from the shared one.
 
 use super::sensor_job_error::SensorJobError;
 use palpate_store::Store;
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
-use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyClose, Point, Procedure, Unsettled};
+use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyClose, Procedure, Record};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,64 +49,120 @@ pub struct CalibrationView {
 }
 
 /// Running calibration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct RunningCalibration {
     /// The plan.
     pub plan: CalibrationPlan,
-    /// State of the link, in a sentence.
-    pub link: String,
-    /// What to do next.
+    /// What to do next; before the first readings the state of the link.
     pub instruction: String,
-    /// The angle (rad) or force (N) to set next; none when all are done.
-    pub next: Option<f64>,
-    /// The newest reading (counts).
-    pub latest: Option<f64>,
-    /// The settled reading (counts); `None` before the first reading and during an empty close.
-    pub settled: Option<Result<f64, Unsettled>>,
-    /// Reason why the last point was not taken.
-    pub not_taken: Option<String>,
-    /// The points so far.
-    pub points: Vec<Point>,
+    /// Points and readings so far; none before the first readings.
+    pub procedure: Option<Procedure>,
+    /// Fit of the points.
+    pub fit: Option<Result<Arc<Calibration>, CalibrationFault>>,
     /// An empty close is being watched; until it is over, only stopping is possible.
     pub closing: bool,
-    /// An empty close can be watched: a pad is calibrated, and none is being watched.
-    pub can_close: bool,
-    /// Fit of the points; `None` before the first reading.
-    pub fit: Option<Result<Arc<Calibration>, CalibrationFault>>,
+    /// Reason why the last point was not taken.
+    pub not_taken: Option<String>,
 }
 
-/// Running calibration in the gripper thread.
-pub(super) struct Calibrating {
+/// What a calibration does by itself, and what it begins with.
+#[derive(Clone, Debug, Default)]
+pub struct CalibrationSetup {
+    /// Resistor beside the sensor (ohm), where it is not as the board reports.
+    pub resistor_ohm: Option<f64>,
+    /// Angles (rad) or forces (N) to set; empty for the usual ones.
+    pub stimuli: Vec<f64>,
+    /// Points that were measured elsewhere.
+    pub record: Option<Record>,
+    /// Take each point, and begin the empty close, without a command.
+    pub automatic: bool,
+    /// Duration of the empty close (s) that is part of it, if any.
+    pub close_s: Option<f64>,
+    /// Calibrations of the other parts, for the empty close.
+    pub serving: Vec<(Sensor, Calibration)>,
+}
+
+/// Calibration of a part, fed with readings. Terminal and window show it.
+#[derive(Clone, Debug)]
+pub struct CalibrationSession {
     plan: CalibrationPlan,
+    setup: CalibrationSetup,
     /// Set once the board is known.
     procedure: Option<Procedure>,
-    readings: u32,
+    /// Readings before that.
+    early: Vec<Reading>,
     /// The newest description of the board.
     board: Option<Board>,
     closing: Option<EmptyClose>,
     not_taken: Option<String>,
 }
 
-impl Calibrating {
-    pub(super) fn new(plan: CalibrationPlan) -> Self {
-        Self { plan, procedure: None, readings: 0, closing: None, not_taken: None, board: None }
+impl CalibrationSession {
+    /// Begins; the first readings tell which channels the board has.
+    pub fn new(plan: CalibrationPlan, setup: CalibrationSetup) -> Self {
+        Self { plan, setup, procedure: None, early: Vec::new(), board: None, closing: None, not_taken: None }
     }
 
-    /// Adds a reading; fails where the board has no such channel.
-    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), SensorJobError> {
-        self.readings = self.readings.saturating_add(1);
-        if self.readings < KNOWN_AFTER {
+    /// Points and readings so far; none before the board is known.
+    pub fn procedure(&self) -> Option<&Procedure> {
+        self.procedure.as_ref()
+    }
+
+    /// The empty close that is being watched.
+    pub fn closing(&self) -> Option<&EmptyClose> {
+        self.closing.as_ref()
+    }
+
+    /// Reason why the last point or empty close was not taken; forgotten with this call.
+    pub fn take_refusal(&mut self) -> Option<String> {
+        self.not_taken.take()
+    }
+
+    /// True where all points are taken, and the empty close is still missing.
+    pub fn awaits_close(&self) -> bool {
+        self.setup.close_s.is_some() && self.closing.is_none() && self.has_all_points() && !self.has_bending()
+    }
+
+    /// True where nothing of the setup is missing.
+    pub fn is_complete(&self) -> bool {
+        self.has_all_points() && self.closing.is_none() && (self.setup.close_s.is_none() || self.has_bending())
+    }
+
+    fn has_all_points(&self) -> bool {
+        self.procedure.as_ref().is_some_and(|procedure| procedure.next().is_none())
+    }
+
+    fn has_bending(&self) -> bool {
+        self.procedure.as_ref().is_some_and(|procedure| procedure.record().bending.is_some())
+    }
+
+    /// Takes in a reading; fails where the board has no such channel.
+    pub fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), SensorJobError> {
+        if self.procedure.is_none() {
+            self.early.push(reading.clone());
+            if self.early.len() < KNOWN_AFTER as usize {
+                return Ok(());
+            }
+            self.procedure = Some(self.begin(board)?);
+            let early = std::mem::take(&mut self.early);
+            early.iter().for_each(|reading| self.take_reading(reading, board));
             return Ok(());
         }
-        let procedure = match &mut self.procedure {
-            Some(procedure) => procedure,
-            empty @ None => empty.insert(begin(&self.plan, board)?),
-        };
+        self.take_reading(reading, board);
+        Ok(())
+    }
+
+    fn take_reading(&mut self, reading: &Reading, board: &Board) {
+        let Some(procedure) = &mut self.procedure else { return };
         // The description of the board may change after its first readings.
         if self.board.as_ref() != Some(board) {
             procedure.see(board);
             self.board = Some(board.clone());
         }
+        if self.setup.automatic && self.awaits_close() {
+            self.handle(&CalibrationCommand::EmptyClose);
+        }
+        let Some(procedure) = &mut self.procedure else { return };
         if let Some(closing) = &mut self.closing {
             if closing.feed(reading) {
                 match closing.bending() {
@@ -114,28 +171,33 @@ impl Calibrating {
                 }
                 self.closing = None;
             }
-            return Ok(());
+            return;
         }
         procedure.feed(reading);
-        Ok(())
+        let next = procedure.next().filter(|_| self.setup.automatic);
+        if let Some(next) = next.filter(|_| procedure.has_changed() && procedure.settled().is_ok()) {
+            self.handle(&CalibrationCommand::Take(next));
+        }
     }
 
-    /// Begins to watch an empty close, with the present calibrations.
-    pub(super) fn close_empty(&mut self, board: &Board, store: &Store) {
-        let Some(procedure) = &self.procedure else { return };
-        let begin = || -> Result<EmptyClose, SensorJobError> {
-            let pad = (procedure.sensor(), procedure.fit()?);
-            let serving = store.calibrations().serving(None, &[]).map_err(Arc::new)?;
-            Ok(EmptyClose::begin(board, pad, &serving.calibrations, EmptyClose::SECONDS)?)
-        };
-        match begin() {
-            Ok(closing) => (self.closing, self.not_taken) = (Some(closing), None),
+    /// Begins to watch an empty close, with the calibrations of the other parts.
+    fn close_empty(&mut self) {
+        let (Some(procedure), Some(board)) = (&self.procedure, &self.board) else { return };
+        let seconds = self.setup.close_s.unwrap_or(EmptyClose::SECONDS);
+        let begin = |pad| EmptyClose::begin(board, (procedure.sensor(), pad), &self.setup.serving, seconds);
+        match procedure.fit().and_then(begin) {
+            Ok(closing) => self.closing = Some(closing),
             Err(cause) => self.not_taken = Some(cause.to_string()),
         }
     }
 
-    /// Takes, skips or removes a point.
-    pub(super) fn handle(&mut self, command: &CalibrationCommand) {
+    /// Sets the calibrations of the other parts, for the empty close.
+    pub fn set_serving(&mut self, serving: Vec<(Sensor, Calibration)>) {
+        self.setup.serving = serving;
+    }
+
+    /// Takes, skips or removes a point, or begins the empty close.
+    pub fn handle(&mut self, command: &CalibrationCommand) {
         let Some(procedure) = &mut self.procedure else { return };
         if self.closing.is_some() && *command == CalibrationCommand::Undo {
             // The board may have fallen silent: what was measured before is kept.
@@ -155,10 +217,8 @@ impl Calibrating {
             CalibrationCommand::Undo => {
                 procedure.undo();
             }
-            CalibrationCommand::Begin(_)
-            | CalibrationCommand::EmptyClose
-            | CalibrationCommand::Keep
-            | CalibrationCommand::Stop => {}
+            CalibrationCommand::EmptyClose => self.close_empty(),
+            CalibrationCommand::Begin(_) | CalibrationCommand::Keep | CalibrationCommand::Stop => {}
         }
     }
 
@@ -169,34 +229,28 @@ impl Calibrating {
     }
 
     pub(super) fn view(&self, link: String) -> RunningCalibration {
-        let procedure = self.procedure.as_ref();
-        let fit = procedure.map(|procedure| procedure.fit().map(Arc::new));
-        let instruction = match (&self.closing, procedure) {
-            (Some(closing), _) => closing.instruction(),
-            (None, Some(procedure)) => procedure.instruction(),
-            (None, None) => link.clone(),
-        };
+        let instruction = self.procedure.as_ref().map_or(link, Procedure::instruction);
         RunningCalibration {
             plan: self.plan.clone(),
-            instruction,
-            link,
-            next: procedure.and_then(Procedure::next),
-            latest: procedure.and_then(Procedure::latest),
-            settled: procedure
-                .filter(|_| self.closing.is_none())
-                .map(|procedure| procedure.settled().map(|point| point.counts)),
+            instruction: self.closing.as_ref().map_or(instruction, EmptyClose::instruction),
+            fit: self.procedure.as_ref().map(|procedure| procedure.fit().map(Arc::new)),
+            procedure: self.procedure.clone(),
             closing: self.closing.is_some(),
             not_taken: self.not_taken.clone(),
-            points: procedure.map(|procedure| procedure.record().points.clone()).unwrap_or_default(),
-            can_close: !self.plan.sensor.is_flex() && self.closing.is_none() && matches!(fit, Some(Ok(_))),
-            fit,
         }
     }
-}
 
-fn begin(plan: &CalibrationPlan, board: &Board) -> Result<Procedure, SensorJobError> {
-    let missing = || SensorJobError::NoChannel { wanted: plan.sensor.channel(), has: board.channels.join(", ") };
-    Procedure::new(board, plan.sensor, &plan.part, None).ok_or_else(missing)
+    fn begin(&self, board: &Board) -> Result<Procedure, SensorJobError> {
+        let CalibrationPlan { sensor, part, .. } = &self.plan;
+        let CalibrationSetup { record, resistor_ohm, stimuli, .. } = &self.setup;
+        let procedure = match record {
+            Some(record) => Procedure::after(board, *sensor, record.clone()),
+            None => Procedure::new(board, *sensor, part, *resistor_ohm),
+        };
+        let missing = || SensorJobError::NoChannel { wanted: sensor.channel(), has: board.channels.join(", ") };
+        let procedure = procedure.ok_or_else(missing)?;
+        Ok(if stimuli.is_empty() { procedure } else { procedure.with_plan(stimuli) })
+    }
 }
 
 fn keep(procedure: &Procedure, store: &mut Store) -> Result<String, SensorJobError> {

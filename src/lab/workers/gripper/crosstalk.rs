@@ -1,8 +1,7 @@
 //! Crosstalk test on the shared link.
 
 use super::sensor_job_error::SensorJobError;
-use palpate_device::doctor::{Bleed, CrosstalkError, CrosstalkTest};
-use palpate_tactile::board::{Board, KNOWN_AFTER, Reading};
+use palpate_device::doctor::{Bleed, CrosstalkSession, CrosstalkTest};
 use std::path::PathBuf;
 
 /// Command to the crosstalk test.
@@ -36,54 +35,19 @@ pub struct RunningCrosstalk {
     pub step: Option<[usize; 2]>,
 }
 
-/// Crosstalk test in the gripper thread.
-#[derive(Default)]
-pub(super) struct Crossing {
-    /// Set once the board is known.
-    test: Option<CrosstalkTest>,
-    readings: u32,
-}
-
-impl Crossing {
-    /// Adds a reading; true when the test is over. Fails where the board has too few sensors.
-    pub(super) fn feed(&mut self, reading: &Reading, board: &Board) -> Result<bool, CrosstalkError> {
-        self.readings = self.readings.saturating_add(1);
-        if self.readings < KNOWN_AFTER {
-            return Ok(false);
-        }
-        let test = match &mut self.test {
-            Some(test) => test,
-            empty @ None => empty.insert(CrosstalkTest::new(board)?),
-        };
-        test.see(board);
-        test.feed(reading);
-        Ok(test.source().is_none())
+impl CrosstalkView {
+    /// View of a running test; `link` is the state of the link, in a sentence.
+    pub(super) fn running(session: &CrosstalkSession, link: String) -> Self {
+        let test = session.test();
+        let instruction = test.map_or(link, CrosstalkTest::instruction);
+        let running = Some(RunningCrosstalk { instruction, step: test.map(CrosstalkTest::step) });
+        Self { running, ended: None, ..Self::ended(session) }
     }
 
-    pub(super) fn skip(&mut self) {
-        if let Some(test) = &mut self.test {
-            test.skip();
-        }
-    }
-
-    /// True when every sensor was moved or skipped.
-    pub(super) fn is_over(&self) -> bool {
-        self.test.as_ref().is_some_and(|test| test.source().is_none())
-    }
-
-    pub(super) fn found(&self) -> Vec<Bleed> {
-        self.test.as_ref().map(|test| test.found().to_vec()).unwrap_or_default()
-    }
-
-    /// Result, in sentences.
-    pub(super) fn summary(&self) -> Result<Vec<String>, SensorJobError> {
-        self.test.as_ref().map(CrosstalkTest::summary).ok_or(SensorJobError::NoReadings)
-    }
-
-    pub(super) fn view(&self, link: String) -> RunningCrosstalk {
-        RunningCrosstalk {
-            instruction: self.test.as_ref().map_or(link, CrosstalkTest::instruction),
-            step: self.test.as_ref().map(CrosstalkTest::step),
-        }
+    /// View of a test that has ended.
+    pub(super) fn ended(session: &CrosstalkSession) -> Self {
+        let found = session.test().map(|test| test.found().to_vec()).unwrap_or_default();
+        let ended = session.test().map(CrosstalkTest::summary).ok_or(SensorJobError::NoReadings);
+        Self { running: None, found, ended: Some(ended) }
     }
 }

@@ -18,7 +18,9 @@ mod sensor_job_error;
 mod session;
 mod worker;
 
-pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationView, RunningCalibration};
+pub use calibrating::{
+    CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, RunningCalibration,
+};
 pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
 pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;

@@ -25,7 +25,9 @@ pub enum SensorJobError {
     #[error(transparent)]
     Crosstalk(#[from] CrosstalkError),
     /// The board has no channel for the sensor.
-    #[error("the board has no channel \"{wanted}\"; it has {has}")]
+    #[error(
+        "the board has no channel \"{wanted}\"; it has {has}. Name its channels in the sketch, or in a header line"
+    )]
     NoChannel {
         /// Name of the channel.
         wanted: &'static str,

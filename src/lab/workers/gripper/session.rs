@@ -5,8 +5,8 @@ mod recognising;
 mod sensors;
 mod trials;
 
-use super::calibrating::{Calibrating, CalibrationView};
-use super::crosstalk::{Crossing, CrosstalkView};
+use super::calibrating::{CalibrationSession, CalibrationView};
+use super::crosstalk::CrosstalkView;
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
@@ -17,6 +17,7 @@ use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
 use crate::workers::listener::Listener;
 use crate::workers::{Latest, Notice, TraceRow, Wake};
+use palpate_device::doctor::CrosstalkSession;
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
 use palpate_sim::scene::Scene;
@@ -103,10 +104,10 @@ pub(super) struct GripperSession {
     begun: u64,
     watching: Option<TrialRequest>,
     ended: Option<Arc<EndedTrial>>,
-    calibrating: Option<Calibrating>,
+    calibrating: Option<CalibrationSession>,
     observing: Vec<Observing>,
     calibrated: Option<Result<String, SensorJobError>>,
-    crossing: Option<Crossing>,
+    crossing: Option<CrosstalkSession>,
     crossed: CrosstalkView,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
@@ -301,7 +302,7 @@ impl GripperSession {
             self.calibrated = Some(Err(SensorJobError::Disconnected(why.to_owned())));
         }
         if let Some(crossing) = self.crossing.take() {
-            self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(crossing.summary()) };
+            self.crossed = CrosstalkView::ended(&crossing);
         }
         self.observing.clear();
         self.connection = None;
@@ -424,16 +425,11 @@ impl GripperSession {
         self.revision += 1;
         let connection = self.connection.as_ref();
         let link = connection.map(|connection| connection.gripper.stream().status());
-        let calibration = self
-            .calibrating
-            .as_ref()
-            .map(|calibrating| calibrating.view(link.as_ref().map(|link| link.state.sentence()).unwrap_or_default()));
+        let state = || link.as_ref().map(|link| link.state.sentence()).unwrap_or_default();
+        let calibration = self.calibrating.as_ref().map(|calibrating| calibrating.view(state()));
         let calibration = CalibrationView { running: calibration, ended: self.calibrated.clone() };
         let crosstalk = match &self.crossing {
-            Some(crossing) => {
-                let state = link.as_ref().map(|link| link.state.sentence()).unwrap_or_default();
-                CrosstalkView { running: Some(crossing.view(state)), found: crossing.found(), ended: None }
-            }
+            Some(crossing) => CrosstalkView::running(crossing, state()),
             None => self.crossed.clone(),
         };
         let trial =

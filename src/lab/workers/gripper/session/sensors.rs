@@ -4,10 +4,11 @@ use super::{Connection, GripperSession, open};
 use crate::gripper::Gripper;
 use crate::recording::REST_S;
 use crate::workers::Notice;
-use crate::workers::gripper::calibrating::{Calibrating, CalibrationCommand, CalibrationPlan};
-use crate::workers::gripper::crosstalk::{Crossing, CrosstalkCommand, CrosstalkView};
+use crate::workers::gripper::calibrating::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
+use crate::workers::gripper::crosstalk::{CrosstalkCommand, CrosstalkView};
 use crate::workers::gripper::plotted::Plotted;
 use crate::workers::gripper::sensor_job_error::SensorJobError;
+use palpate_device::doctor::CrosstalkSession;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
@@ -121,9 +122,12 @@ impl GripperSession {
                 }
             }
             CalibrationCommand::EmptyClose => {
-                let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection) else { return };
-                match open(&mut self.store, &self.path) {
-                    Ok(store) => calibrating.close_empty(&connection.board, store),
+                let Some(calibrating) = &mut self.calibrating else { return };
+                match open(&mut self.store, &self.path).and_then(|store| store.calibrations().serving(None, &[])) {
+                    Ok(serving) => {
+                        calibrating.set_serving(serving.calibrations);
+                        calibrating.handle(command);
+                    }
                     Err(cause) => self.outlets.notify(Notice::Warning(cause.to_string())),
                 }
             }
@@ -138,7 +142,7 @@ impl GripperSession {
     fn begin_calibration(&mut self, plan: &CalibrationPlan) {
         match self.borrow_port(plan.port.as_deref()) {
             Err(cause) => self.calibrated = Some(Err(cause)),
-            Ok(()) => self.calibrating = Some(Calibrating::new(plan.clone())),
+            Ok(()) => self.calibrating = Some(CalibrationSession::new(plan.clone(), CalibrationSetup::default())),
         }
     }
 
@@ -192,13 +196,11 @@ impl GripperSession {
         match command {
             CrosstalkCommand::Begin(port) => match self.borrow_port(port.as_deref()) {
                 Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
-                Ok(()) => self.crossing = Some(Crossing::default()),
+                Ok(()) => self.crossing = Some(CrosstalkSession::default()),
             },
             CrosstalkCommand::Skip => {
-                self.crossing.iter_mut().for_each(Crossing::skip);
-                if self.crossing.as_ref().is_some_and(Crossing::is_over) {
-                    self.end_crosstalk(None);
-                }
+                self.crossing.iter_mut().for_each(CrosstalkSession::skip);
+                self.end_complete_crosstalk();
             }
             CrosstalkCommand::Stop => self.end_crosstalk(None),
         }
@@ -208,16 +210,23 @@ impl GripperSession {
     pub(super) fn cross(&mut self, reading: &Reading) {
         let (Some(crossing), Some(connection)) = (&mut self.crossing, &self.connection) else { return };
         match crossing.feed(reading, &connection.board) {
-            Ok(false) => {}
-            Ok(true) => self.end_crosstalk(None),
+            Ok(()) => self.end_complete_crosstalk(),
             Err(cause) => self.end_crosstalk(Some(cause.into())),
+        }
+    }
+
+    fn end_complete_crosstalk(&mut self) {
+        if self.crossing.as_ref().is_some_and(CrosstalkSession::is_over) {
+            self.end_crosstalk(None);
         }
     }
 
     fn end_crosstalk(&mut self, cause: Option<SensorJobError>) {
         let Some(crossing) = self.crossing.take() else { return };
-        let ended = cause.map_or_else(|| crossing.summary(), Err);
-        self.crossed = CrosstalkView { running: None, found: crossing.found(), ended: Some(ended) };
+        self.crossed = CrosstalkView::ended(&crossing);
+        if let Some(cause) = cause {
+            self.crossed.ended = Some(Err(cause));
+        }
         self.return_port("the crosstalk test has ended");
     }
 }
