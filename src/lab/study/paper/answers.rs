@@ -94,25 +94,31 @@ impl TestPart {
     }
 
     /// Training and test set.
-    pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<(Dataset, Dataset), StudyError> {
+    pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<[Dataset; 2], StudyError> {
         let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1)?;
         let split = splits.get(self.part).ok_or(StudyError::Split(SplitError::Folds))?.limited(data, self.train);
-        Ok((data.part(&split.train), data.part(&split.test)))
+        Ok([data.part(&split.train), data.part(&split.test)])
     }
 }
 
-/// Fits a method and judges it; none where it was cancelled.
-pub(super) fn fit_and_judge(
-    bench: &StudyBench<'_>,
-    method: &Method,
-    train: &Dataset,
-    test: &Dataset,
-) -> Result<Option<Judged>, StudyError> {
-    match bench.fit(method, train) {
-        Ok(Some(model)) => Ok(Some(Judged::Answers(judge(&model, test)))),
-        Ok(None) => Ok(None),
-        Err(StudyError::Fit { cause, .. }) => Ok(Some(Judged::NotFitted(cause.to_string()))),
-        Err(other) => Err(other),
+impl StudyBench<'_> {
+    /// Training and test grasps of a method.
+    pub(super) fn split(
+        &self,
+        wanted: DataWanted,
+        method: &Method,
+        part: TestPart,
+    ) -> Result<[Dataset; 2], StudyError> {
+        part.split(&*self.data(&wanted.read_by(method))?, self.plan().seed)
+    }
+
+    /// Fits a method to training grasps and judges it on test grasps.
+    pub(super) fn judge(&self, method: &Method, [train, test]: &[Dataset; 2]) -> Result<Judged, StudyError> {
+        match self.fit(method, train) {
+            Ok(model) => Ok(Judged::Answers(judge(&model, test))),
+            Err(StudyError::Fit { cause, .. }) => Ok(Judged::NotFitted(cause.to_string())),
+            Err(other) => Err(other),
+        }
     }
 }
 

@@ -41,9 +41,9 @@ pub enum StudyError {
     /// The trials lack something that the study needs.
     #[error("the study needs {0}")]
     Missing(String),
-    /// The result of a unit is not of this study.
-    #[error("the result of a unit cannot be read: {0}")]
-    Unit(#[from] serde_json::Error),
+    /// It was stopped; the same plan continues.
+    #[error("stopped")]
+    Stopped,
 }
 
 /// Step of a study.
@@ -110,23 +110,27 @@ impl<'a> StudyBench<'a> {
         self.work.cancelled.load(Ordering::Relaxed)
     }
 
+    /// An error once the study is to stop.
+    pub(super) fn go_on(&self) -> Result<(), StudyError> {
+        if self.is_cancelled() { Err(StudyError::Stopped) } else { Ok(()) }
+    }
+
     /// Reads grasps: those of the plan's query, or simulated ones, which are collected where the store lacks them. The
-    /// empty hand is left out. None where it was cancelled.
-    pub fn data(&self, wanted: &DataWanted) -> Result<Option<Arc<Dataset>>, StudyError> {
+    /// empty hand is left out.
+    pub fn data(&self, wanted: &DataWanted) -> Result<Arc<Dataset>, StudyError> {
         // One thread collects and reads, others wait for it and find the data set here.
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = read.iter().position(|(own, _)| own == wanted) {
             let found = read.remove(at);
             let data = Arc::clone(&found.1);
             read.push(found);
-            return Ok(Some(data));
+            return Ok(data);
         }
         let mut store = self.store.lock().unwrap_or_else(PoisonError::into_inner);
         let query = match &self.plan.query {
-            Some(query) => Some(query.clone()),
+            Some(query) => query.clone(),
             None => self.collected(&mut store, wanted)?,
         };
-        let Some(query) = query else { return Ok(None) };
         let most_of_each = Some(query.most_of_each.map_or(wanted.grasps, |most| most.min(wanted.grasps)));
         let query = DatasetQuery { without_empty: true, most_of_each, ..query };
         let data = Arc::new(query.read(&store, &wanted.view, &mut |_, _| ())?);
@@ -134,7 +138,7 @@ impl<'a> StudyBench<'a> {
             read.remove(0);
         }
         read.push((wanted.clone(), Arc::clone(&data)));
-        Ok(Some(data))
+        Ok(data)
     }
 
     /// A simulated trial of the store; none for others.
@@ -147,8 +151,8 @@ impl<'a> StudyBench<'a> {
         })
     }
 
-    /// Collects what is missing; returns the query for it, none where it was cancelled.
-    fn collected(&self, store: &mut Store, wanted: &DataWanted) -> Result<Option<DatasetQuery>, StudyError> {
+    /// Collects what is missing; returns the query for it.
+    fn collected(&self, store: &mut Store, wanted: &DataWanted) -> Result<DatasetQuery, StudyError> {
         let preset = PosePreset::named(&wanted.preset);
         let preset = preset.ok_or_else(|| StudyError::Unknown(format!("preset {}", wanted.preset)))?;
         let mut scene = Scene { pose: preset.poses(), ..wanted.scene.clone() };
@@ -164,17 +168,19 @@ impl<'a> StudyBench<'a> {
             (self.work.progress)(StudyProgress { step: StudyStep::Collecting, done, of });
             if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let query = DatasetQuery { collection: Some(report.collection), objects, ..DatasetQuery::default() };
-        Ok((!report.interrupted).then_some(query))
+        if report.interrupted {
+            return Err(StudyError::Stopped);
+        }
+        Ok(DatasetQuery { collection: Some(report.collection), objects, ..DatasetQuery::default() })
     }
 
-    /// Fits a method; none where it was cancelled.
-    pub fn fit(&self, method: &Method, data: &Dataset) -> Result<Option<Model>, StudyError> {
+    /// Fits a method.
+    pub fn fit(&self, method: &Method, data: &Dataset) -> Result<Model, StudyError> {
         self.fitted(method.key, |fitting| method.train(data, fitting))
     }
 
-    /// Teaches a model further grasps; `None` where it was cancelled.
-    pub fn teach(&self, model: &Model, grasps: &Dataset) -> Result<Option<Model>, StudyError> {
+    /// Teaches a model further grasps.
+    pub fn teach(&self, model: &Model, grasps: &Dataset) -> Result<Model, StudyError> {
         self.fitted(&model.card.method, |fitting| model.taught(grasps, fitting))
     }
 
@@ -182,7 +188,7 @@ impl<'a> StudyBench<'a> {
         &self,
         method: &str,
         fit: impl FnOnce(&Fitting<'_>) -> Result<Model, LearnError>,
-    ) -> Result<Option<Model>, StudyError> {
+    ) -> Result<Model, StudyError> {
         let fitting = Fitting {
             seed: self.plan.seed,
             quick: self.plan.has_quick_fits(),
@@ -191,10 +197,9 @@ impl<'a> StudyBench<'a> {
             stop: self.work.cancelled,
             second: None,
         };
-        match fit(&fitting) {
-            Ok(model) => Ok(Some(model)),
-            Err(LearnError::Stopped) => Ok(None),
-            Err(cause) => Err(StudyError::Fit { method: method.to_owned(), cause }),
-        }
+        fit(&fitting).map_err(|cause| match cause {
+            LearnError::Stopped => StudyError::Stopped,
+            cause => StudyError::Fit { method: method.to_owned(), cause },
+        })
     }
 }

@@ -1,35 +1,210 @@
-//! Plots that several studies draw from their tables.
+//! Figures that studies draw from their tables: plots by a facet, series, and points that lead to rows and their trials.
 
 use super::answers::Pool;
-use super::report::{Cell, FigureLink, FigureMark, PERCENT, StudyTable};
-use palpate_geometry::drawing::{CellAxis, ColourScale, DataPoint, HeatMap, Plot, PlotAxis};
+use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
+use super::rows::{grouped, unique};
+use palpate_geometry::drawing::{
+    CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis,
+};
 
 /// Heading of columns of shares in plots.
 pub(super) const F1_PERCENT: &str = "macro F1 (%)";
+/// Column of shares that facets show.
+const F1: &str = "F1";
 
-/// A point of a row: x, and the cell of a column in percent with its interval.
-pub(super) fn percent_point(table: &StudyTable, row: usize, column: &str, x: f64) -> DataPoint {
-    let cell = table.cell(row, column);
-    let spread = cell.spread().map(|ends| ends.map(|end| 100.0 * end));
-    DataPoint { spread, ..DataPoint::new(x, 100.0 * cell.value().unwrap_or(f64::NAN)) }
+/// Row of a table.
+#[derive(Clone, Copy)]
+pub(super) struct Line<'a> {
+    pub(super) table: &'a StudyTable,
+    pub(super) row: usize,
 }
 
-/// The same on its side: the cell is x, the row stands at y.
-pub(super) fn percent_row(table: &StudyTable, row: usize, column: &str, y: f64) -> DataPoint {
-    let DataPoint { at: [_, x], spread, .. } = percent_point(table, row, column, y);
-    DataPoint { spread, ..DataPoint::new(x, y) }
+impl<'a> Line<'a> {
+    /// Text in a column.
+    pub(super) fn text(self, column: &str) -> &'a str {
+        self.table.text(self.row, column)
+    }
+
+    /// Number in a column; not a number where there is none.
+    pub(super) fn value(self, column: &str) -> f64 {
+        self.table.cell(self.row, column).value().unwrap_or(f64::NAN)
+    }
+
+    /// Its point at x: a column in percent with its interval.
+    pub(super) fn percent(self, column: &str, x: f64) -> DataPoint {
+        let spread = self.table.cell(self.row, column).spread().map(|ends| ends.map(|end| 100.0 * end));
+        DataPoint { spread, ..DataPoint::new(x, 100.0 * self.value(column)) }
+    }
+
+    /// The same on its side: the column is x, the row stands at y.
+    pub(super) fn percent_row(self, column: &str, y: f64) -> DataPoint {
+        let DataPoint { at: [_, x], spread, .. } = self.percent(column, y);
+        DataPoint { spread, ..DataPoint::new(x, y) }
+    }
 }
 
 /// Axis of named rows, the first at the top: places 0, -1, -2 and so on.
-pub(super) fn named_rows(names: &[&str]) -> PlotAxis {
-    let ticks = names.iter().enumerate().map(|(k, name)| (-(k as f64), (*name).to_owned())).collect();
+pub(super) fn named_rows(names: &[String]) -> PlotAxis {
+    let ticks = names.iter().enumerate().map(|(k, name)| (-(k as f64), name.clone())).collect();
     PlotAxis { ticks, range: Some([0.6 - names.len() as f64, 0.6]), ..PlotAxis::default() }
 }
 
 /// Axis of named columns at 0, 1, 2 and so on.
-pub(super) fn named_columns(title: &str, names: &[&str]) -> PlotAxis {
-    let ticks = names.iter().enumerate().map(|(k, name)| (k as f64, (*name).to_owned())).collect();
+fn named_columns(title: &str, names: &[String]) -> PlotAxis {
+    let ticks = names.iter().enumerate().map(|(k, name)| (k as f64, name.clone())).collect();
     PlotAxis { ticks, range: Some([-0.5, names.len() as f64 - 0.5]), ..PlotAxis::linear(title) }
+}
+
+/// Series of a colour with a dot at each point.
+pub(super) fn dots(colour: usize) -> DataSeries {
+    DataSeries { colour, marker: Marker::Dot, ..DataSeries::default() }
+}
+
+/// Series of a colour with a line, bold or thin.
+pub(super) fn lines(colour: usize, bold: bool) -> DataSeries {
+    let line = if bold { LineStyle::Bold } else { LineStyle::Thin };
+    DataSeries { colour, line, marker: Marker::of_series(colour), ..DataSeries::default() }
+}
+
+/// Places of rows along an axis.
+pub(super) enum Along<'a> {
+    /// Named rows from top to bottom.
+    Rows(&'a dyn Fn(Line<'_>) -> String),
+    /// Named columns below a title.
+    Columns(&'a str, &'a dyn Fn(Line<'_>) -> String),
+    /// Numbers.
+    Axis(&'a dyn Fn(&[Line<'_>]) -> PlotAxis, &'a dyn Fn(Line<'_>) -> f64),
+}
+
+/// Figure of the macro F1 of the rows of a table, by facets.
+pub(super) struct Facets<'a> {
+    /// Title of the plot of a row.
+    pub(super) plot: &'a dyn Fn(Line<'_>) -> String,
+    /// Name of the series of a row.
+    pub(super) series: &'a dyn Fn(Line<'_>) -> String,
+    /// Its place.
+    pub(super) along: Along<'a>,
+    /// Shift of the first series, and from one to the next.
+    pub(super) shift: [f64; 2],
+    /// Look of a series by its name and number.
+    pub(super) look: &'a dyn Fn(&str, usize) -> DataSeries,
+    /// True where a series is named in its first plot alone.
+    pub(super) named_once: bool,
+    /// Plots in a row.
+    pub(super) columns: usize,
+    /// Width and height of files (points).
+    pub(super) size: [u32; 2],
+    pub(super) note: &'a str,
+}
+
+impl Facets<'_> {
+    /// A plot for each sensor model, a row for each method, a colour for each model.
+    pub(super) const USUAL: Facets<'static> = Facets {
+        plot: &|line| format!("{} sensors", line.text("sensors")),
+        series: &|line| line.text("model").to_owned(),
+        along: Along::Rows(&|line| line.text("model").to_owned()),
+        shift: [0.0; 2],
+        look: &|_, colour| dots(colour),
+        named_once: false,
+        columns: 2,
+        size: [1080, 720],
+        note: "Macro F1 after one grasp with 95 % intervals, by bootstrap over test grasps.",
+    };
+
+    /// The figure of a table, by the same name; none where the report lacks it.
+    pub(super) fn figure(&self, report: &StudyReport, name: &str) -> Option<LinkedFigure> {
+        Some(self.plots(report, name)?.figure(name, self.columns, self.size, self.note))
+    }
+
+    /// Its plots, to add to.
+    pub(super) fn plots<'a>(&self, report: &'a StudyReport, name: &str) -> Option<LinkedPlots<'a>> {
+        let mut figure = LinkedPlots::of(report, name)?;
+        figure.named_once = self.named_once;
+        figure.add_facets(self);
+        Some(figure)
+    }
+}
+
+/// A figure in the making, whose points lead to the rows of a table.
+pub(super) struct LinkedPlots<'a> {
+    pub(super) plots: Vec<Plot>,
+    /// Title, at first that of the table.
+    pub(super) title: String,
+    /// True where a series is named in its first plot alone.
+    pub(super) named_once: bool,
+    at: usize,
+    table: &'a StudyTable,
+    links: Vec<FigureLink>,
+}
+
+impl<'a> LinkedPlots<'a> {
+    /// A figure of a table; none where the report lacks it.
+    pub(super) fn of(report: &'a StudyReport, table: &str) -> Option<Self> {
+        let (at, table) = report.table(table)?;
+        Some(Self { plots: Vec::new(), title: table.title.clone(), named_once: false, at, table, links: Vec::new() })
+    }
+
+    /// All rows.
+    pub(super) fn lines(&self) -> impl Iterator<Item = Line<'a>> + use<'a> {
+        let table = self.table;
+        (0..table.rows.len()).map(move |row| Line { table, row })
+    }
+
+    /// Rows with certain texts in some columns.
+    pub(super) fn lines_with(&self, wanted: &[(&str, &str)]) -> Vec<Line<'a>> {
+        self.lines().filter(|line| wanted.iter().all(|(column, text)| line.text(column) == *text)).collect()
+    }
+
+    /// Adds a series to the last plot, unless it has no point.
+    pub(super) fn series(&mut self, mut series: DataSeries, points: impl IntoIterator<Item = (Line<'a>, DataPoint)>) {
+        let Some((plot, before)) = self.plots.split_last_mut() else { return };
+        if self.named_once && before.iter().flat_map(|plot| &plot.series).any(|own| own.name == series.name) {
+            series.name.clear();
+        }
+        for (line, point) in points {
+            let mark = FigureMark::Point(plot.series.len(), series.points.len());
+            self.links.push(FigureLink { plot: before.len(), mark, table: self.at, row: line.row });
+            series.points.push(point);
+        }
+        if !series.points.is_empty() {
+            plot.series.push(series);
+        }
+    }
+
+    /// Adds a plot for each facet.
+    fn add_facets(&mut self, facets: &Facets<'_>) {
+        let all = unique(self.lines().map(facets.series));
+        for (title, lines) in grouped(self.lines().map(|line| ((facets.plot)(line), line))) {
+            let names = match facets.along {
+                Along::Rows(name) | Along::Columns(_, name) => unique(lines.iter().map(|line| name(*line))),
+                Along::Axis(..) => Vec::new(),
+            };
+            let share = PlotAxis::linear(F1_PERCENT);
+            let (x, y, sideways) = match facets.along {
+                Along::Rows(_) => (share, named_rows(&names), true),
+                Along::Columns(title, _) => (named_columns(title, &names), share, false),
+                Along::Axis(axis, _) => (axis(&lines), share, false),
+            };
+            self.plots.push(Plot { title, x, y, sideways, ..Plot::default() });
+            let place = |name: String| names.iter().position(|own| *own == name).unwrap_or(0) as f64;
+            for (number, name) in all.iter().enumerate() {
+                let shift = facets.shift[0] + facets.shift[1] * number as f64;
+                let own = lines.iter().filter(|line| (facets.series)(**line) == *name);
+                let points = own.map(|line| match facets.along {
+                    Along::Rows(name) => (*line, line.percent_row(F1, shift - place(name(*line)))),
+                    Along::Columns(_, name) => (*line, line.percent(F1, shift + place(name(*line)))),
+                    Along::Axis(_, value) => (*line, line.percent(F1, shift + value(*line))),
+                });
+                self.series(DataSeries { name: name.clone(), ..(facets.look)(name, number) }, points);
+            }
+        }
+    }
+
+    /// The figure.
+    pub(super) fn figure(self, name: &str, columns: usize, size: [u32; 2], note: impl Into<String>) -> LinkedFigure {
+        let figure = Figure { title: self.title, plots: self.plots, columns, note: note.into() };
+        LinkedFigure { name: name.to_owned(), figure, size, links: self.links }
+    }
 }
 
 /// Table of confusions, one row for each kind of grasps and pair of classes that occurs.
@@ -49,9 +224,28 @@ pub(super) fn confusion_table(name: &str, title: &str, kinds: &[(&str, &Pool)]) 
     table
 }
 
+/// Figure of the confusion matrices of a table, those of kinds of grasps that `title` names.
+pub(super) fn confusion_figure(
+    report: &StudyReport,
+    name: &str,
+    title: impl Fn(&str) -> Option<String>,
+    size: [u32; 2],
+    note: &str,
+) -> Option<LinkedFigure> {
+    let mut figure = LinkedPlots::of(report, name)?;
+    let (table, at) = (figure.table, figure.at);
+    for (kind, title) in table.texts("grasps").into_iter().filter_map(|kind| Some((kind, title(kind)?))) {
+        let rows = table.rows_with(&[("grasps", kind)]);
+        let (plot, links) = confusion_plot((table, at), &rows, &title, figure.plots.len());
+        figure.plots.push(plot);
+        figure.links.extend(links);
+    }
+    Some(figure.figure(name, 2, size, note))
+}
+
 /// Confusion matrix of some rows of a table with the columns "true", "predicted" and "share": a share of each true class
 /// for every cell. Rows are numbered, so that columns need no names. `plot` is its number in the figure.
-pub(super) fn confusion_plot(
+fn confusion_plot(
     (table, at): (&StudyTable, usize),
     rows: &[usize],
     title: &str,

@@ -1,46 +1,38 @@
-//! Sensors that drift (section VI): gains and zeros that are others in the test than in the training, with and without a
-//! zero taken before contact, and hysteresis that the training has not seen.
+//! Sensors that drift (section VI): gains and zeros that differ between training and test, with and without a zero taken before
+//! contact, and hysteresis that the training has not seen.
 
-use super::answers::{ModelAnswers, PARTS, Pool, TestPart, judge, usual_grasps};
+use super::answers::{Judged, ModelAnswers, PARTS, TestPart, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
-use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{F1_PERCENT, percent_point};
-use super::plan::StudyPlan;
-use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{StudyCard, UnitResult};
+use super::drawing::{F1_PERCENT, LinkedPlots};
+use super::judging::{Claim, Rule, points};
+use super::report::{Agreement, Cell, Column, Finding, LinkedFigure, PERCENT, StudyReport};
+use super::rows::{Kind, Row, compare, described, find, pooled, unique};
+use super::study::{Study, StudyCell};
+use super::{StudyCard, StudyPlan};
 use crate::datasets::{SensorView, noise_seed, sequence_of};
-use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
+use palpate_geometry::drawing::{DataSeries, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Dataset, Example, Method, Sequence, method};
 use palpate_sim::gripper::Phase;
 use palpate_tactile::model::{PhysicalLike, SensorModel};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(super) struct Drift;
-
-const CARD: StudyCard = StudyCard {
-    key: "drift",
-    title: "Drift of sensors",
-    about: "recognition with gains and zeros that have drifted since the training, re-zeroed or not, and with hysteresis",
-    paper: "section VI, future work",
-    budget: "about 30 CPU minutes",
-};
 
 /// Methods: trees on features of the whole grasp, and the paper's network.
 const METHODS: [&str; 2] = ["extra-trees", "macro-layer"];
 
 /// What drifts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum DriftOf {
     Gain,
     Zero,
     Both,
 }
 
-impl Kind {
+impl DriftOf {
     const ALL: [Self; 3] = [Self::Gain, Self::Zero, Self::Both];
 
     fn name(self) -> &'static str {
@@ -66,26 +58,7 @@ pub(super) enum Case {
     Hysteresis { method: &'static Method, part: usize },
 }
 
-impl StudyCase for Case {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        let methods = || METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
-        let parts = plan.pick(PARTS, 1, 1);
-        let mut cases = Vec::new();
-        for &sensors in &plan.sensors {
-            for method in methods() {
-                for reading in READINGS {
-                    cases.extend((0..parts).map(|part| Self::Drifted { sensors, reading, method, part }));
-                }
-            }
-        }
-        if plan.query.is_none() && plan.sensors.contains(&SensorModel::PhysicalLike) {
-            for method in methods() {
-                cases.extend((0..parts).map(|part| Self::Hysteresis { method, part }));
-            }
-        }
-        cases
-    }
-
+impl StudyCell for Case {
     fn name(&self) -> String {
         match self {
             Self::Drifted { sensors, reading, method, part } => {
@@ -95,9 +68,9 @@ impl StudyCase for Case {
         }
     }
 
-    fn method(&self) -> &'static Method {
+    fn method(&self) -> Option<&'static Method> {
         match self {
-            Self::Drifted { method, .. } | Self::Hysteresis { method, .. } => method,
+            Self::Drifted { method, .. } | Self::Hysteresis { method, .. } => Some(method),
         }
     }
 }
@@ -124,7 +97,7 @@ fn ranges(data: &Dataset) -> Vec<f32> {
 }
 
 /// Grasps whose channels each have a gain and a zero of their own, drawn evenly up to a level.
-fn drifted(data: &Dataset, ranges: &[f32], kind: Kind, level: f64, seed: u64) -> Dataset {
+fn drifted(data: &Dataset, ranges: &[f32], kind: DriftOf, level: f64, seed: u64) -> Dataset {
     with_readings(data, |k, example| {
         let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ k as u64);
         let mut within = || (level * (2.0 * random.random::<f64>() - 1.0)) as f32;
@@ -133,9 +106,9 @@ fn drifted(data: &Dataset, ranges: &[f32], kind: Kind, level: f64, seed: u64) ->
         for row in grasp.values.chunks_exact_mut(ranges.len().max(1)) {
             for (value, [gain, zero]) in row.iter_mut().zip(&drawn) {
                 *value = match kind {
-                    Kind::Gain => *value * (1.0 + gain),
-                    Kind::Zero => *value + zero,
-                    Kind::Both => *value * (1.0 + gain) + zero,
+                    DriftOf::Gain => *value * (1.0 + gain),
+                    DriftOf::Zero => *value + zero,
+                    DriftOf::Both => *value * (1.0 + gain) + zero,
                 };
             }
         }
@@ -160,17 +133,18 @@ fn zeroed(data: &Dataset) -> Dataset {
     })
 }
 
-/// Readings of the same simulated grasps by real sensors with these faults; none where one is not simulated.
-fn read_again(bench: &StudyBench<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Option<Dataset>, StudyError> {
+/// Readings of the same simulated grasps by real sensors with these faults.
+fn read_again(bench: &StudyBench<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Dataset, StudyError> {
     let mut read = Vec::new();
     for example in &data.examples {
-        let Some(trial) = bench.simulated(example.id)? else { return Ok(None) };
+        let missing = || StudyError::Missing("simulated grasps".to_owned());
+        let trial = bench.simulated(example.id)?.ok_or_else(missing)?;
         let clean = SensorView::default().signals(&trial);
         let clean = clean.map_err(|cause| crate::datasets::DatasetError::Layout { cause })?;
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         read.push(sequence_of(&settings.apply(&clean, noise_seed(&trial.header)).until(end)));
     }
-    Ok(Some(with_readings(data, |k, _| read[k].clone())))
+    Ok(with_readings(data, |k, _| read[k].clone()))
 }
 
 /// The grasps that another data set has, with the readings of this one.
@@ -183,14 +157,17 @@ fn same_grasps(data: &Dataset, as_in: &Dataset) -> Dataset {
 /// Answers under each condition, in its words.
 type Answers = Vec<(String, ModelAnswers)>;
 
-fn condition(kind: Kind, level: f64) -> String {
-    if level > 0.0 { format!("{} {:.0} %", kind.name(), 100.0 * level) } else { "none".to_owned() }
+/// Condition without drift.
+const NONE: &str = "none";
+
+fn condition(kind: DriftOf, level: f64) -> String {
+    if level > 0.0 { format!("{} {:.0} %", kind.name(), 100.0 * level) } else { NONE.to_owned() }
 }
 
 /// All conditions: none, then each kind at each level.
-fn conditions() -> impl Iterator<Item = (Kind, f64)> {
-    let drifts = Kind::ALL.into_iter().flat_map(|kind| LEVELS[1..].iter().map(move |level| (kind, *level)));
-    std::iter::once((Kind::Gain, 0.0)).chain(drifts)
+fn conditions() -> impl Iterator<Item = (DriftOf, f64)> {
+    let drifts = DriftOf::ALL.into_iter().flat_map(|kind| LEVELS[1..].iter().map(move |level| (kind, *level)));
+    std::iter::once((DriftOf::Gain, 0.0)).chain(drifts)
 }
 
 const HYSTERESIS: [(&str, bool, bool); 4] = [
@@ -200,233 +177,182 @@ const HYSTERESIS: [(&str, bool, bool); 4] = [
     ("hysteresis in the training alone", true, false),
 ];
 
-impl CaseStudy for Drift {
-    type Case = Case;
+/// Reading and condition.
+type Reading = (&'static str, String);
 
-    const CARD: StudyCard = CARD;
+impl Study for Drift {
+    type Cell = Case;
+    type Found = Answers;
 
-    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    const CARD: StudyCard = StudyCard {
+        key: "drift",
+        title: "Drift of sensors",
+        about: "recognition with gains and zeros that have drifted since the training, re-zeroed or not, and with hysteresis",
+        paper: "section VI, future work",
+        budget: "about 30 CPU minutes",
+    };
+
+    fn grid(plan: &StudyPlan) -> Vec<Case> {
+        let methods = || METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
+        let parts = plan.pick(PARTS, 1, 1);
+        let mut cases = Vec::new();
+        for &sensors in &plan.sensors {
+            for method in methods() {
+                for reading in READINGS {
+                    cases.extend((0..parts).map(|part| Case::Drifted { sensors, reading, method, part }));
+                }
+            }
+        }
+        if plan.query.is_none() && plan.sensors.contains(&SensorModel::PhysicalLike) {
+            cases.extend(methods().flat_map(|method| (0..parts).map(move |part| Case::Hysteresis { method, part })));
+        }
+        cases
+    }
+
+    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Answers, StudyError> {
         let plan = bench.plan();
-        let answers = match case {
+        let mut answers = Answers::new();
+        match *case {
             Case::Drifted { sensors, reading, method, part } => {
-                let Some(data) = bench.data(&usual_grasps(plan, sensors))? else { return Ok(None) };
-                let (train, test) = TestPart::usual(plan, part).split(&data, plan.seed)?;
+                let data = bench.data(&usual_grasps(plan, sensors))?;
+                let [train, test] = TestPart::usual(plan, part).split(&data, plan.seed)?;
                 let ranges = ranges(&train);
                 let read = |data: Dataset| if reading == ZEROED { zeroed(&data) } else { data };
-                let Some(model) = bench.fit(method, &read(train))? else { return Ok(None) };
-                let judged = conditions().map(|(kind, level)| {
+                let model = bench.fit(method, &read(train))?;
+                for (kind, level) in conditions() {
+                    bench.go_on()?;
                     let test = drifted(&test, &ranges, kind, level, plan.seed);
-                    (condition(kind, level), judge(&model, &read(test)))
-                });
-                judged.take_while(|_| !bench.is_cancelled()).collect::<Answers>()
+                    answers.push((condition(kind, level), judge(&model, &read(test))));
+                }
             }
             Case::Hysteresis { method, part } => {
-                let Some(data) = bench.data(&usual_grasps(plan, SensorModel::PhysicalLike))? else { return Ok(None) };
+                let data = bench.data(&usual_grasps(plan, SensorModel::PhysicalLike))?;
                 let read =
                     |hysteresis| read_again(bench, &data, &PhysicalLike { hysteresis, ..PhysicalLike::default() });
-                let read = [read(false)?, read(true)?];
-                let [Some(without), Some(with)] = read else {
-                    return Err(StudyError::Missing("simulated grasps".to_owned()));
-                };
-                let mut answers = Answers::new();
-                let (train, test) = TestPart::usual(plan, part).split(&data, plan.seed)?;
+                let (without, with) = (read(false)?, read(true)?);
+                let [train, test] = TestPart::usual(plan, part).split(&data, plan.seed)?;
                 for (name, in_training, in_test) in HYSTERESIS {
                     let of = |on: bool, grasps: &Dataset| same_grasps(if on { &with } else { &without }, grasps);
                     let (train, test) = (of(in_training, &train), of(in_test, &test));
-                    let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
-                    answers.push((name.to_owned(), judge(&model, &test)));
-                }
-                answers
-            }
-        };
-        if bench.is_cancelled() {
-            return Ok(None);
-        }
-        UnitResult::new(&answers).map(Some)
-    }
-
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut groups: Vec<Group> = Vec::new();
-        let mut report = StudyReport::default();
-        for case in Case::all(plan) {
-            let Some(unit) = units.get(&case.name()) else { continue };
-            let key = match &case {
-                Case::Drifted { sensors, reading, method, .. } => [sensors.name(), *reading, method.key],
-                Case::Hysteresis { method, .. } => [SensorModel::PhysicalLike.name(), AS_READ, method.key],
-            };
-            for (condition, answers) in unit.read::<Answers>()? {
-                if !report.data.contains(&answers.data) {
-                    report.data.push(answers.data.clone());
-                }
-                let fits = |group: &&mut Group| group.key == key && group.condition == condition;
-                match groups.iter_mut().find(fits) {
-                    Some(group) => group.answers.push(answers),
-                    None => groups.push(Group { key, condition, answers: vec![answers] }),
+                    answers.push((name.to_owned(), judge(&bench.fit(method, &train)?, &test)));
                 }
             }
         }
-        let mut table = StudyTable::new(
-            CARD.key,
-            format!("Drift of the sensors in the test, preset {}; differences to none", plan.preset),
-            &[
-                ("sensors", ""),
-                ("reading", ""),
-                ("model", ""),
-                ("drift up to", ""),
-                ("F1", PERCENT),
-                ("accuracy", PERCENT),
-                ("F1 against none", PERCENT),
-                ("F1 against as read", PERCENT),
-                ("tested", "grasps"),
-            ],
-        );
-        let mut measured = Vec::new();
-        for group in &groups {
-            let pool = group.pool();
-            let other = |key: [&str; 3], condition: &str| {
-                let found = groups.iter().find(|other| other.key == key && other.condition == condition)?;
-                let differs = found.key != group.key || found.condition != group.condition;
-                differs.then(|| pool.against(&found.pool())).flatten().map(|difference| difference.f1)
+        bench.go_on()?;
+        Ok(answers)
+    }
+
+    fn report(plan: &StudyPlan, found: Vec<(Case, Answers)>) -> StudyReport {
+        let answers = found.into_iter().flat_map(|(case, answers)| {
+            let (sensors, reading, method) = match case {
+                Case::Drifted { sensors, reading, method, .. } => (sensors, reading, method),
+                Case::Hysteresis { method, .. } => (SensorModel::PhysicalLike, AS_READ, method),
             };
-            let is_hysteresis = group.condition.starts_with("hysteresis");
-            let reference = if is_hysteresis { HYSTERESIS[0].0 } else { "none" };
-            let against_none = other(group.key, reference);
-            let [sensors, reading, model] = group.key;
-            let against_read =
-                (reading == ZEROED).then(|| other([sensors, AS_READ, model], &group.condition)).flatten();
-            table.push(
-                vec![
-                    Cell::text(sensors),
-                    Cell::text(reading),
-                    Cell::text(model),
-                    Cell::text(&group.condition),
-                    Cell::interval(pool.f1()),
-                    Cell::interval(pool.accuracy()),
-                    Cell::interval(against_none),
-                    Cell::interval(against_read),
-                    Cell::Number(pool.len() as f64),
-                ],
-                pool.misjudged(),
-            );
-            measured.push((group.key, group.condition.clone(), against_none, against_read));
-        }
-        report.findings = findings(&measured);
-        report.tables.push(table);
-        Ok(report)
+            let kind = move |condition| Kind { sensors, method, factor: (reading, condition) };
+            answers.into_iter().map(move |(condition, own)| (kind(condition), Judged::Answers(own)))
+        });
+        let mut rows: Vec<Row<Reading>> = pooled(answers);
+        compare(&mut rows, |kind| {
+            let (reading, condition) = &kind.factor;
+            let reference = if condition.starts_with("hysteresis") { HYSTERESIS[0].0 } else { NONE };
+            Some(kind.with((*reading, reference.to_owned())))
+        });
+        let title = format!("Drift of the sensors in the test, preset {}; differences to none", plan.preset);
+        StudyReport::new(
+            described(&rows),
+            vec![Row::table("drift", title, &rows).columns(&[
+                Row::SENSORS,
+                Column("reading", "", &|row| row.kind.factor.0.into()),
+                Row::MODEL,
+                Column("drift up to", "", &|row| row.kind.factor.1.as_str().into()),
+                Row::F1,
+                Row::ACCURACY,
+                Row::gain("F1 against none"),
+                Column("F1 against as read", PERCENT, &|row| Cell::interval(against_as_read(&rows, row))),
+                Row::TESTED,
+            ])],
+            findings(&rows),
+        )
     }
 
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        report.table(CARD.key).map(|(at, table)| figure(at, table)).into_iter().collect()
-    }
-}
-
-/// Answers of one kind of model and reading under one condition.
-struct Group {
-    /// Sensors, reading, model.
-    key: [&'static str; 3],
-    condition: String,
-    answers: Vec<ModelAnswers>,
-}
-
-impl Group {
-    fn pool(&self) -> Pool {
-        Pool::of(&self.answers)
-    }
-}
-
-/// Sensors, reading and model; the condition; difference to no drift, and to the same without re-zeroing.
-type MeasuredDrift = ([&'static str; 3], String, Option<Interval>, Option<Interval>);
-
-fn findings(measured: &[MeasuredDrift]) -> Vec<Finding> {
-    let points = |gain: Interval| {
-        format!("{:+.1} ({:+.1} to {:+.1})", 100.0 * gain.estimate, 100.0 * gain.low, 100.0 * gain.high)
-    };
-    let of = |wanted: &dyn Fn(&MeasuredDrift) -> bool, pick: &dyn Fn(&MeasuredDrift) -> Option<Interval>, sign: f64| {
-        let own: Vec<(String, Interval)> = measured
-            .iter()
-            .filter(|one| wanted(one))
-            .filter_map(|one| {
-                let ([sensors, _, model], condition, ..) = one;
-                Some((format!("{sensors}, {model}, {condition}"), pick(one)?))
-            })
-            .collect();
-        let verdict = Agreement::of_all(own.iter().map(|(_, gain)| {
-            let (low, high) = if sign < 0.0 { (-gain.high, -gain.low) } else { (gain.low, gain.high) };
-            Agreement::of_gain(Some(Interval { estimate: sign * gain.estimate, low, high }))
-        }));
-        let listed: Vec<String> = own.iter().map(|(name, gain)| format!("{name}: {}", points(*gain))).collect();
-        (format!("points of macro F1: {}", listed.join("; ")), verdict)
-    };
-    let mut findings = Vec::new();
-    let mut add = |claim: &str, (found, verdict): (String, Agreement), why: &str| {
-        if verdict != Agreement::NotMeasured {
-            let (section, claim, why) = ("VI".to_owned(), claim.to_owned(), why.to_owned());
-            findings.push(Finding { section, claim, found, verdict, why });
-        }
-    };
-    let most = format!("{:.0} %", 100.0 * LEVELS[LEVELS.len() - 1]);
-    let worst = |condition: &str| condition.ends_with(&most);
-    add(
-        "Drifts of the sensors lower recognition",
-        of(&|one| one.0[1] == AS_READ && worst(&one.1), &|one| one.2, -1.0),
-        "Agrees where the paired 95 % interval of the loss to gains and zeros drawn within 20 % is above zero in each case",
-    );
-    add(
-        "A zero taken before contact takes back what a drift of zeros costs",
-        of(&|one| worst(&one.1) && one.1.starts_with(Kind::Zero.name()), &|one| one.3, 1.0),
-        "Agrees where models on re-zeroed readings are better under a zero that has drifted within 20 % of the range, each paired 95 % \
-         interval above zero",
-    );
-    add(
-        "Hysteresis that the training has not seen lowers recognition",
-        of(&|one| one.1 == HYSTERESIS[2].0, &|one| one.2, -1.0),
-        "Agrees where the paired 95 % interval of the loss against hysteresis in training and test is above zero",
-    );
-    findings
-}
-
-/// A plot for each kind of drift and sensors: F1 over its level, one line for each model and reading.
-fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    for sensors in table.texts("sensors") {
-        for kind in Kind::ALL {
-            let mut plot = Plot {
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        let Some(mut figure) = LinkedPlots::of(report, "drift") else { return Vec::new() };
+        figure.named_once = true;
+        let texts = |column: &'static str| unique(figure.lines().map(move |line| line.text(column)));
+        let (all_sensors, models) = (texts("sensors"), texts("model"));
+        for (sensors, kind) in all_sensors.into_iter().flat_map(|own| DriftOf::ALL.map(|kind| (own, kind))) {
+            figure.plots.push(Plot {
                 title: format!("{sensors}: {}", kind.name()),
                 x: PlotAxis::linear("drift up to (%)"),
                 y: PlotAxis { range: Some([0.0, 100.0]), ..PlotAxis::linear(F1_PERCENT) },
                 ..Plot::default()
-            };
-            for (colour, model) in table.texts("model").into_iter().enumerate() {
+            });
+            for (colour, model) in models.iter().enumerate() {
                 for reading in READINGS {
-                    let mut points = Vec::new();
-                    for level in LEVELS {
-                        let texts = [("sensors", sensors), ("reading", reading), ("model", model)];
+                    let lines = figure.lines_with(&[("sensors", sensors), ("reading", reading), ("model", model)]);
+                    let points = LEVELS.into_iter().filter_map(|level| {
                         let condition = condition(kind, level);
-                        let rows = table.rows_with(&texts);
-                        let row = rows.into_iter().find(|row| table.text(*row, "drift up to") == condition);
-                        let Some(row) = row else { continue };
-                        let mark = FigureMark::Point(plot.series.len(), points.len());
-                        links.push(FigureLink { plot: plots.len(), mark, table: at, row });
-                        points.push(percent_point(table, row, "F1", 100.0 * level));
-                    }
-                    let zeroed = reading == ZEROED;
-                    plot.series.push(DataSeries {
-                        name: if plots.is_empty() { format!("{model}, {reading}") } else { String::new() },
-                        colour,
-                        line: if zeroed { LineStyle::Bold } else { LineStyle::Dashed },
-                        marker: if zeroed { Marker::Dot } else { Marker::Ring },
-                        points,
+                        let line = lines.iter().find(|line| line.text("drift up to") == condition)?;
+                        Some((*line, line.percent("F1", 100.0 * level)))
                     });
+                    let (line, marker) = match reading {
+                        ZEROED => (LineStyle::Bold, Marker::Dot),
+                        _ => (LineStyle::Dashed, Marker::Ring),
+                    };
+                    let name = format!("{model}, {reading}");
+                    figure.series(DataSeries { name, colour, line, marker, points: Vec::new() }, points);
                 }
             }
-            plots.push(plot);
         }
+        let note = "Each channel of each test grasp has a gain and a zero of its own, drawn evenly; zeros as shares of the channel's range. \
+                    95 % intervals by bootstrap over test grasps.";
+        vec![Some(figure.figure("drift", 3, [1180, 760], note))]
     }
-    let note = "Each channel of each test grasp has a gain and a zero of its own, drawn evenly; zeros as shares of the channel's range. \
-                95 % intervals by bootstrap over test grasps."
-        .to_owned();
-    let figure = Figure { title: table.title.clone(), plots, columns: 3, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1180, 760], links }
+}
+
+/// Difference of a re-zeroed row to the same as read.
+fn against_as_read(rows: &[Row<Reading>], row: &Row<Reading>) -> Option<Interval> {
+    let (reading, condition) = &row.kind.factor;
+    let as_read = find(rows, &row.kind.with((AS_READ, condition.clone())));
+    Some(row.pool.against(&as_read.filter(|_| *reading == ZEROED)?.pool)?.f1)
+}
+
+fn findings(rows: &[Row<Reading>]) -> Vec<Finding> {
+    let most = format!("{:.0} %", 100.0 * LEVELS[LEVELS.len() - 1]);
+    let claim = |claim: &str, why: &str, rule: Rule, pick: &dyn Fn(&Row<Reading>) -> Option<Interval>| {
+        let found = rows.iter().filter_map(|row| {
+            let gain = pick(row)?;
+            let text = format!("{}, {}: {}", row.kind.model(), row.kind.factor.1, points(gain));
+            Some((text, rule.judge_one(gain)))
+        });
+        Claim("VI", claim, why).of_each("points of macro F1: ", found)
+    };
+    let findings = [
+        claim(
+            "Drifts of the sensors lower recognition",
+            "Agrees where the paired 95 % interval of the loss to gains and zeros drawn within 20 % is above zero in each case",
+            Rule::AllBelow(0.0),
+            &|row| row.gain.filter(|_| row.kind.factor.0 == AS_READ && row.kind.factor.1.ends_with(&most)),
+        ),
+        claim(
+            "A zero taken before contact takes back what a drift of zeros costs",
+            "Agrees where models on re-zeroed readings are better under a zero that has drifted within 20 % of the range, each paired \
+             95 % interval above zero",
+            Rule::AllAbove(0.0),
+            &|row| {
+                let condition = &row.kind.factor.1;
+                let is_worst = condition.ends_with(&most) && condition.starts_with(DriftOf::Zero.name());
+                is_worst.then(|| against_as_read(rows, row)).flatten()
+            },
+        ),
+        claim(
+            "Hysteresis that the training has not seen lowers recognition",
+            "Agrees where the paired 95 % interval of the loss against hysteresis in training and test is above zero",
+            Rule::AllBelow(0.0),
+            &|row| row.gain.filter(|_| row.kind.factor.1 == HYSTERESIS[2].0),
+        ),
+    ];
+    findings.into_iter().filter(|finding| finding.verdict != Agreement::NotMeasured).collect()
 }
 
 #[cfg(test)]
@@ -451,8 +377,11 @@ mod tests {
     fn drifts_stay_within_their_level_and_a_zero_takes_back_a_drift_of_zeros() {
         let (data, ranges) = (data(), ranges(&data()));
         assert!((ranges[1] / ranges[0] - 100.0).abs() < 1e-3 && ranges[0] > 5.0, "{ranges:?}");
-        assert_eq!(drifted(&data, &ranges, Kind::Both, 0.0, 1).examples[2].grasp.values, data.examples[2].grasp.values);
-        let moved = drifted(&data, &ranges, Kind::Zero, 0.2, 1);
+        assert_eq!(
+            drifted(&data, &ranges, DriftOf::Both, 0.0, 1).examples[2].grasp.values,
+            data.examples[2].grasp.values
+        );
+        let moved = drifted(&data, &ranges, DriftOf::Zero, 0.2, 1);
         let shifts: Vec<f32> =
             moved.examples.iter().zip(&data.examples).map(|(a, b)| a.grasp.values[0] - b.grasp.values[0]).collect();
         assert!(shifts.iter().all(|shift| shift.abs() <= 0.2 * ranges[0]) && shifts[0] != shifts[1], "{shifts:?}");
@@ -460,7 +389,7 @@ mod tests {
         for (a, b) in back.examples.iter().zip(&straight.examples) {
             assert!(a.grasp.values.iter().zip(&b.grasp.values).all(|(a, b)| (a - b).abs() < 1e-3));
         }
-        let scaled = drifted(&data, &ranges, Kind::Gain, 0.2, 1);
+        let scaled = drifted(&data, &ranges, DriftOf::Gain, 0.2, 1);
         let gain = scaled.examples[0].grasp.values[78] / data.examples[0].grasp.values[78];
         assert!((0.8..1.2).contains(&gain) && gain != 1.0, "{gain}");
     }

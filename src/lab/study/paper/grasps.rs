@@ -3,34 +3,25 @@
 //! Grasps are combined in two ways: the iterated network is fed with the probabilities of those before, and the product of
 //! experts multiplies the probabilities of each grasp alone.
 
-use super::answers::{PARTS, Pool, SHOWN, TestPart, usual_grasps};
+use super::answers::{Pool, SHOWN, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
-use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{F1_PERCENT, percent_point};
-use super::plan::{DataWanted, StudyPlan};
-use super::pools::{Gains, add_new, better_than_each, finding, finding_on_gains, points};
-use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{StudyCard, UnitResult};
+use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
+use super::judging::{ALL_GAIN, Claim, Rule, percent, points};
+use super::plan::DataWanted;
+use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
+use super::rows::{Fit, Kind, Row, crossed, gains_over, grouped, unique};
+use super::study::Study;
+use super::{StudyCard, StudyPlan};
 use crate::grasping::SUCCESSION;
-use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
+use palpate_geometry::drawing::PlotAxis;
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Method, Model, Pmf, StopReason, StopRule, method};
+use palpate_learn::{Belief, Dataset, Model, Pmf, StopReason, StopRule};
 use palpate_sim::scene::Between;
-use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Grasps;
-
-const CARD: StudyCard = StudyCard {
-    key: "grasps",
-    title: "Successive grasps",
-    about: "accuracy and F1 after one to eight grasps, put down anew or left as released, by feedback and by product of \
-            experts, and confident stops that are wrong",
-    paper: "Fig. 8",
-    budget: "about 30 CPU minutes",
-};
 
 /// The paper's iterated network, strict and tuned, one of a single grasp, and a method of seconds.
 const MODELS: [&str; 4] = ["paper-ids-lstm", "ids-lstm", "macro-layer", "extra-trees"];
@@ -48,43 +39,16 @@ const LEFT: &str = "left as released";
 const FEEDBACK: &str = "feedback";
 pub(super) const PRODUCT: &str = "product of experts";
 
-pub(super) struct Case {
-    sensors: SensorModel,
-    method: &'static Method,
-    part: usize,
-}
-
-impl StudyCase for Case {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        let mut cases = Vec::new();
-        for (number, &sensors) in plan.sensors.iter().enumerate() {
-            for method in MODELS.into_iter().filter_map(method) {
-                let parts = plan.pick(if number > 0 && method.recipe.is_some() { 1 } else { PARTS }, 1, 1);
-                cases.extend((0..parts).map(|part| Self { sensors, method, part }));
-            }
-        }
-        cases
-    }
-
-    fn name(&self) -> String {
-        format!("{}, {}, part {}", self.sensors.name(), self.method.key, self.part + 1)
-    }
-
-    fn method(&self) -> &'static Method {
-        self.method
-    }
-}
-
 /// Result of a unit.
-#[derive(Serialize, Deserialize)]
-struct GraspsResult {
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct GraspsResult {
     data: Vec<String>,
     classes: Vec<String>,
     courses: Vec<Course>,
 }
 
 /// Rounds of successive grasps, combined in one way.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 struct Course {
     placed: String,
     combined: String,
@@ -162,21 +126,32 @@ fn course(model: &Model, data: &Dataset, alone: &[Pmf], rounds: &[Vec<usize>], f
     rounds.iter().filter(|grasps| !grasps.is_empty()).map(run).collect()
 }
 
-impl CaseStudy for Grasps {
-    type Case = Case;
+impl Study for Grasps {
+    type Cell = Fit<()>;
+    type Found = GraspsResult;
 
-    const CARD: StudyCard = CARD;
+    const CARD: StudyCard = StudyCard {
+        key: "grasps",
+        title: "Successive grasps",
+        about: "accuracy and F1 after one to eight grasps, put down anew or left as released, by feedback and by product of \
+                experts, and confident stops that are wrong",
+        paper: "Fig. 8",
+        budget: "about 30 CPU minutes",
+    };
 
-    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
+        crossed(plan, &[()], &MODELS, |kind| kind.usual_parts(plan))
+    }
+
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<GraspsResult, StudyError> {
         let plan = bench.plan();
-        let wanted = usual_grasps(plan, case.sensors).read_by(case.method);
-        let Some(data) = bench.data(&wanted)? else { return Ok(None) };
-        let (train, test) = TestPart::usual(plan, case.part).split(&data, plan.seed)?;
+        let wanted = usual_grasps(plan, kind.sensors).read_by(kind.method);
+        let [train, test] = bench.split(wanted.clone(), kind.method, TestPart::usual(plan, *part))?;
         // Stored trials hold both, told apart by the trial before them.
-        let released = DataWanted { between: Between::AsReleased, grasps: plan.grasps(RELEASED, 2 * MOST), ..wanted };
-        let released = if plan.query.is_some() { Some(data.clone()) } else { bench.data(&released)? };
-        let Some(released) = released else { return Ok(None) };
-        let Some(model) = bench.fit(case.method, &train)? else { return Ok(None) };
+        let released =
+            DataWanted { between: Between::AsReleased, grasps: plan.grasps(RELEASED, 2 * MOST), ..wanted.clone() };
+        let released = bench.data(if plan.query.is_some() { &wanted } else { &released })?;
+        let model = bench.fit(kind.method, &train)?;
         // Grasps that the model has learned from belong to no round.
         let learned: Vec<u64> = train.examples.iter().map(|example| example.content).collect();
         let mut released_rounds = left_as_released(&released);
@@ -189,7 +164,7 @@ impl CaseStudy for Grasps {
         for (placed, data, rounds) in [(ANEW, &test, &anew_rounds), (LEFT, &in_order, &released_rounds)] {
             let alone: Vec<Pmf> =
                 data.examples.iter().map(|example| model.recogniser.recognise(&example.grasp, None).pmf).collect();
-            let is_iterated = case.method.recipe.is_some_and(|recipe| recipe().iterated);
+            let is_iterated = kind.method.recipe.is_some_and(|recipe| recipe().iterated);
             for (combined, feedback) in [(PRODUCT, false), (FEEDBACK, true)] {
                 if !feedback || is_iterated {
                     let rounds = course(&model, data, &alone, rounds, feedback);
@@ -198,89 +173,75 @@ impl CaseStudy for Grasps {
             }
         }
         let described = |data: &Dataset, placed: &str| format!("{}, {placed}", data.about.described());
-        let result = GraspsResult {
+        Ok(GraspsResult {
             data: vec![described(&test, ANEW), described(&in_order, LEFT)],
             classes: test.labels.classes.iter().map(|class| class.name.clone()).collect(),
             courses,
+        })
+    }
+
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, GraspsResult)>) -> StudyReport {
+        let data = unique(found.iter().flat_map(|(_, result)| result.data.clone()));
+        let classes = found.last().map_or_else(Vec::new, |(_, result)| result.classes.clone());
+        let courses = found.into_iter().flat_map(|(fit, result)| {
+            let kind = move |course: Course| (fit.kind.with(Way::of(&course)), course.rounds);
+            result.courses.into_iter().map(kind)
+        });
+        let merged = grouped(courses).into_iter().map(|(kind, rounds)| Merged { kind, rounds: rounds.concat() });
+        let merged: Vec<Merged> = merged.filter(|merged| !merged.rounds.is_empty()).collect();
+        let rows: Vec<Row<(Way, usize)>> =
+            merged.iter().flat_map(|own| (1..=own.most()).map(|grasps| own.after(&classes, grasps))).collect();
+        let table = Row::table("grasps", format!("Successive grasps, {}", plan.described()), &rows).columns(&[
+            Row::SENSORS,
+            Row::MODEL,
+            Column("object", "", &|row| row.kind.factor.0.placed.into()),
+            Column("combined by", "", &|row| row.kind.factor.0.combined.into()),
+            Column("grasps", "", &|row| row.kind.factor.1.into()),
+            Row::F1,
+            Row::ACCURACY,
+            Column("rounds", "", &|row| row.pool.len().into()),
+        ]);
+        StudyReport::new(data, vec![table, stops_table(&merged)], findings(&rows, &merged))
+    }
+
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        let named = |line: Line<'_>| format!("{}, {}", line.text("model"), line.text("combined by"));
+        let series = LinkedPlots::of(report, "grasps").map_or(0, |figure| unique(figure.lines().map(named)).len());
+        let axis = |lines: &[Line<'_>]| {
+            let most = lines.iter().map(|line| line.value("grasps")).fold(0.0, f64::max);
+            PlotAxis::count("grasps of the object", most as usize)
         };
-        UnitResult::new(&result).map(Some)
-    }
-
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let (mut data, mut classes, mut courses): (Vec<String>, Vec<String>, Vec<Merged>) = Default::default();
-        for case in Case::all(plan) {
-            let Some(unit) = units.get(&case.name()) else { continue };
-            let result: GraspsResult = unit.read()?;
-            result.data.iter().for_each(|line| add_new(&mut data, line));
-            classes = result.classes;
-            for course in result.courses {
-                let kind = [case.sensors.name().to_owned(), case.method.key.to_owned(), course.placed, course.combined];
-                match courses.iter_mut().find(|merged| merged.kind == kind) {
-                    Some(merged) => merged.rounds.extend(course.rounds),
-                    None => courses.push(Merged { kind, rounds: course.rounds }),
-                }
-            }
-        }
-        courses.retain(|merged| !merged.rounds.is_empty());
-        let mut table = StudyTable::new(
-            CARD.key,
-            format!("Successive grasps, {}", plan.described()),
-            &[
-                ("sensors", ""),
-                ("model", ""),
-                ("object", ""),
-                ("combined by", ""),
-                ("grasps", ""),
-                ("F1", PERCENT),
-                ("accuracy", PERCENT),
-                ("rounds", ""),
-            ],
-        );
-        let mut stops = StudyTable::new(
-            "grasps-stops",
-            format!(
-                "Grasping until one object has a probability of {:.0} %, at most {MOST} times",
-                100.0 * StopRule::default().threshold
-            ),
-            &[
-                ("sensors", ""),
-                ("model", ""),
-                ("object", ""),
-                ("combined by", ""),
-                ("mean grasps", ""),
-                ("stopped when sure", PERCENT),
-                ("wrong of these", PERCENT),
-                ("right in all", PERCENT),
-                ("rounds", ""),
-            ],
-        );
-        for merged in &courses {
-            let named: Vec<Cell> = merged.kind.iter().map(Cell::text).collect();
-            for grasps in 1..=merged.most() {
-                let pool = merged.after(&classes, grasps);
-                let numbers = vec![
-                    Cell::Number(grasps as f64),
-                    Cell::interval(pool.f1()),
-                    Cell::interval(pool.accuracy()),
-                    Cell::Number(pool.len() as f64),
-                ];
-                table.push([named.clone(), numbers].concat(), pool.misjudged());
-            }
-            let (cells, wrong) = merged.stops();
-            stops.push([named, cells].concat(), wrong);
-        }
-        let findings = findings(&classes, &courses);
-        Ok(StudyReport::new(data, vec![table, stops], findings))
-    }
-
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        report.table(CARD.key).map(|(at, table)| figure(at, table)).into_iter().collect()
+        let facets = Facets {
+            plot: &|line| format!("{} sensors, {}", line.text("sensors"), line.text("object")),
+            series: &named,
+            along: Along::Axis(&axis, &|line| line.value("grasps")),
+            shift: [-0.03 * (series as f64 - 1.0), 0.06],
+            look: &|name, colour| lines(colour, name.ends_with(FEEDBACK)),
+            size: [1080, 860],
+            note: "Macro F1 with 95 % intervals, by bootstrap over rounds.",
+            ..Facets::USUAL
+        };
+        vec![facets.figure(report, "grasps")]
     }
 }
 
-/// Rounds of one kind over all parts: sensors, model, way to place the object, way to combine grasps.
+/// Ways to place the object and to combine grasps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Way {
+    placed: &'static str,
+    combined: &'static str,
+}
+
+impl Way {
+    fn of(course: &Course) -> Self {
+        let placed = if course.placed == ANEW { ANEW } else { LEFT };
+        Self { placed, combined: if course.combined == FEEDBACK { FEEDBACK } else { PRODUCT } }
+    }
+}
+
+/// Rounds of one kind over all parts.
 struct Merged {
-    kind: [String; 4],
+    kind: Kind<Way>,
     rounds: Vec<CourseRound>,
 }
 
@@ -293,171 +254,107 @@ impl Merged {
     }
 
     /// Decisions after some grasps, of the rounds that have as many as all kinds of tables need.
-    fn after(&self, classes: &[String], grasps: usize) -> Pool {
+    fn after(&self, classes: &[String], grasps: usize) -> Row<(Way, usize)> {
         let most = self.most();
         let whole = self.rounds.iter().filter(|round| round.decided.len() >= most);
-        Pool::of_decisions(classes, whole.map(|round| (round.first, round.truth, round.decided[grasps - 1])))
+        let decisions = whole.map(|round| (round.first, round.truth, round.decided[grasps - 1]));
+        Row::of_pool(self.kind.with((self.kind.factor, grasps)), Pool::of_decisions(classes, decisions))
     }
 
-    /// Cells of the table of stops, and some rounds that stopped wrongly.
-    fn stops(&self) -> (Vec<Cell>, Vec<TrialId>) {
-        let sure: Vec<&CourseRound> = self.rounds.iter().filter(|round| round.sure).collect();
-        let wrong: Vec<TrialId> = sure.iter().filter(|round| !round.is_right()).map(|round| round.first).collect();
-        let right = self.rounds.iter().filter(|round| round.is_right()).count();
-        let grasps: usize = self.rounds.iter().map(|round| round.stopped).sum();
-        let cells = vec![
-            Cell::Number(grasps as f64 / self.rounds.len() as f64),
-            Cell::Interval(Interval::of_share(sure.len(), self.rounds.len())),
-            Cell::interval((!sure.is_empty()).then(|| Interval::of_share(wrong.len(), sure.len()))),
-            Cell::Interval(Interval::of_share(right, self.rounds.len())),
-            Cell::Number(self.rounds.len() as f64),
-        ];
-        (cells, wrong.into_iter().take(SHOWN).collect())
+    fn share(&self, is: impl Fn(&CourseRound) -> bool, of: impl Fn(&CourseRound) -> bool) -> Option<Interval> {
+        let all: Vec<&CourseRound> = self.rounds.iter().filter(|round| of(round)).collect();
+        let count = all.iter().filter(|round| is(round)).count();
+        (!all.is_empty()).then(|| Interval::of_share(count, all.len()))
+    }
+
+    /// Share of wrong decisions among confident ones.
+    fn wrong(&self) -> Option<Interval> {
+        self.share(|round| !round.is_right(), |round| round.sure)
+    }
+
+    fn mean_grasps(&self) -> f64 {
+        self.rounds.iter().map(|round| round.stopped).sum::<usize>() as f64 / self.rounds.len() as f64
+    }
+
+    /// Some rounds that stopped wrongly.
+    fn misjudged(&self) -> Vec<TrialId> {
+        let wrong = self.rounds.iter().filter(|round| round.sure && !round.is_right());
+        wrong.map(|round| round.first).take(SHOWN).collect()
     }
 }
 
-fn findings(classes: &[String], courses: &[Merged]) -> Vec<Finding> {
-    let rule = "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
-    // The paper's figure: the iterated network with feedback; the object is put down anew.
-    let papers: Vec<&Merged> = courses.iter().filter(|merged| merged.kind[3] == FEEDBACK).collect();
-    let named = |merged: &Merged| merged.kind[..3].join(", ");
-    let gain = |merged: &Merged, from: usize, to: usize| -> Option<Interval> {
-        let to = to.min(merged.most());
-        (from < to).then(|| merged.after(classes, to).against(&merged.after(classes, from)))?.map(|gain| gain.f1)
-    };
-    let rising: Vec<(String, Gains)> = papers
-        .iter()
-        .map(|merged| {
-            let gains =
-                gain(merged, 1, STEADY).map(|gain| (format!("from one to {} grasps", STEADY.min(merged.most())), gain));
-            (named(merged), gains.into_iter().collect())
+fn stops_table(all: &[Merged]) -> StudyTable {
+    let sure = 100.0 * StopRule::default().threshold;
+    let title = format!("Grasping until one object has a probability of {sure:.0} %, at most {MOST} times");
+    TableRows::new("grasps-stops", title, all).with_trials(&Merged::misjudged).columns(&[
+        Column("sensors", "", &|own| own.kind.sensors.name().into()),
+        Column("model", "", &|own| own.kind.method.key.into()),
+        Column("object", "", &|own| own.kind.factor.placed.into()),
+        Column("combined by", "", &|own| own.kind.factor.combined.into()),
+        Column("mean grasps", "", &|own| Some(own.mean_grasps()).into()),
+        Column("stopped when sure", PERCENT, &|own| own.share(|round| round.sure, |_| true).into()),
+        Column("wrong of these", PERCENT, &|own| own.wrong().into()),
+        Column("right in all", PERCENT, &|own| own.share(CourseRound::is_right, |_| true).into()),
+        Column("rounds", "", &|own| own.rounds.len().into()),
+    ])
+}
+
+fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
+    // The paper's figure: the iterated network with feedback.
+    let most =
+        |kind: &Kind<(Way, usize)>| all.iter().find(|own| own.kind == kind.with(kind.factor.0)).map_or(0, Merged::most);
+    let named = |kind: &Kind<(Way, usize)>| format!("{}, {}", kind.model(), kind.factor.0.placed);
+    // Gain of grasps after some over fewer, or by feedback over the product.
+    let gains = |at: usize, name: &dyn Fn(usize) -> String, other: &dyn Fn(Way) -> (Way, usize)| {
+        gains_over(rows, |kind| {
+            let (way, grasps) = kind.factor;
+            let (is_last, (other, from)) = (grasps == at.min(most(kind)), other(way));
+            let is_wanted = is_last && way.combined == FEEDBACK && (other, from) != (way, grasps);
+            let found = || (named(kind), name(grasps), kind.with((other, if from == 0 { grasps } else { from })));
+            is_wanted.then(found).into_iter().collect()
         })
-        .collect();
-    let (mut found, mut verdicts) = (Vec::new(), Vec::new());
-    for merged in &papers {
-        let Some(late) = gain(merged, STEADY, MOST) else { continue };
-        found.push(format!(
-            "{}: {} points of macro F1 from {STEADY} to {} grasps",
-            named(merged),
-            points(late),
-            merged.most()
-        ));
-        verdicts.push(if late.high < NO_CHANGE {
-            Agreement::Agrees
-        } else if late.low > NO_CHANGE {
-            Agreement::Disagrees
-        } else {
-            Agreement::Partly
-        });
-    }
-    let against_product: Vec<(String, Gains)> = papers
-        .iter()
-        .map(|merged| {
-            let twin = |other: &&Merged| other.kind[..3] == merged.kind[..3] && other.kind[3] == PRODUCT;
-            let most = STEADY.min(merged.most());
-            let gain = courses
-                .iter()
-                .find(twin)
-                .and_then(|other| merged.after(classes, most).against(&other.after(classes, most)));
-            (
-                named(merged),
-                gain.map(|gain| (format!("over the {PRODUCT} after {most}"), gain.f1)).into_iter().collect(),
-            )
-        })
-        .collect();
-    let wrong = papers.iter().filter(|merged| merged.kind[2] == ANEW).map(|merged| {
-        let sure = merged.rounds.iter().filter(|round| round.sure);
-        let (count, wrong) = sure.fold((0, 0), |(n, wrong), round| (n + 1, wrong + usize::from(!round.is_right())));
-        (merged.kind[..2].join(", "), count, Interval::of_share(wrong, count))
-    });
-    let wrong: Vec<(String, usize, Interval)> = wrong.filter(|(_, count, _)| *count > 0).collect();
-    let promised = 1.0 - StopRule::default().threshold;
-    let verdict = |share: &Interval| match (share.high < promised, share.low > promised) {
-        (true, _) => Agreement::Agrees,
-        (_, true) => Agreement::Disagrees,
-        (false, false) => Agreement::Partly,
     };
-    let listed = wrong.iter().map(|(kind, count, share)| {
-        let [estimate, low, high] = [share.estimate, share.low, share.high].map(|x| 100.0 * x);
-        format!("{kind}: {estimate:.1} % ({low:.1} to {high:.1}) of {count} confident stops are wrong")
+    let rising = gains(STEADY, &|to| format!("from one to {to} grasps"), &|way| (way, 1));
+    let over_product =
+        gains(STEADY, &|to| format!("over the {PRODUCT} after {to}"), &|way| (Way { combined: PRODUCT, ..way }, 0));
+    let late = gains(MOST, &|to| format!("from {STEADY} to {to} grasps"), &|way| (way, STEADY));
+    let late = late.into_iter().flat_map(|(group, gains)| {
+        let found = move |(name, gain): (String, Interval)| {
+            let text = format!("{group}: {} points of macro F1 {name}", points(gain));
+            (text, Rule::AllBelow(NO_CHANGE).judge_one(gain))
+        };
+        gains.into_iter().map(found)
     });
+    let promised = Rule::AllBelow(1.0 - StopRule::default().threshold);
+    let papers = all.iter().filter(|own| own.kind.factor == Way { placed: ANEW, combined: FEEDBACK });
+    let wrong = papers.filter_map(|own| {
+        let (model, wrong, count) = (own.kind.model(), own.wrong()?, own.rounds.iter().filter(|own| own.sure).count());
+        let text = format!("{model}: {} of {count} confident stops are wrong", percent(wrong));
+        Some((text, promised.judge_one(wrong)))
+    });
+    let above = Rule::AllAbove(0.0);
     vec![
-        finding_on_gains(("V-E", "Accuracy and F1 rise over successive grasps", rule), &rising, better_than_each),
-        finding(
-            (
-                "V-E",
-                "Performance is steady after three or four grasps; further grasps add nothing",
-                "Agrees where the paired 95 % interval of the gain from four to eight grasps stays below one point, disagrees where it is \
-                 above",
-            ),
-            found.join("; "),
-            Agreement::of_all(verdicts),
-        ),
-        finding_on_gains(
-            (
-                "V-E",
-                "Feeding back the probabilities of earlier grasps uses them better than treating grasps as independent",
-                rule,
-            ),
-            &against_product,
-            better_than_each,
-        ),
-        finding(
-            (
-                "VI",
-                "A threshold on the probability makes the decision confident",
-                "Agrees where the 95 % interval of wrong decisions among confident ones stays below one minus the threshold",
-            ),
-            listed.collect::<Vec<_>>().join("; "),
-            Agreement::of_all(wrong.iter().map(|(_, _, share)| verdict(share))),
-        ),
+        Claim("V-E", "Accuracy and F1 rise over successive grasps", ALL_GAIN).on_gains(&rising, above),
+        Claim(
+            "V-E",
+            "Performance is steady after three or four grasps; further grasps add nothing",
+            "Agrees where the paired 95 % interval of the gain from four to eight grasps stays below one point, disagrees where it is \
+             above",
+        )
+        .of_each("", late),
+        Claim(
+            "V-E",
+            "Feeding back the probabilities of earlier grasps uses them better than treating grasps as independent",
+            ALL_GAIN,
+        )
+        .on_gains(&over_product, above),
+        Claim(
+            "VI",
+            "A threshold on the probability makes the decision confident",
+            "Agrees where the 95 % interval of wrong decisions among confident ones stays below one minus the threshold",
+        )
+        .of_each("", wrong),
     ]
-}
-
-/// A plot for each sensor model and way to place the object, one line per model and way to combine.
-fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    let mut names: Vec<String> = Vec::new();
-    let named = |row: usize| format!("{}, {}", table.text(row, "model"), table.text(row, "combined by"));
-    (0..table.rows.len()).for_each(|row| add_new(&mut names, &named(row)));
-    for sensors in table.texts("sensors") {
-        for placed in table.texts("object") {
-            let rows = table.rows_with(&[("sensors", sensors), ("object", placed)]);
-            let mut series = Vec::new();
-            for (colour, name) in names.iter().enumerate() {
-                let own: Vec<usize> = rows.iter().copied().filter(|row| named(*row) == *name).collect();
-                if own.is_empty() {
-                    continue;
-                }
-                for (point, row) in own.iter().enumerate() {
-                    let mark = FigureMark::Point(series.len(), point);
-                    links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
-                }
-                let shift = 0.06 * (colour as f64 - 0.5 * (names.len() - 1) as f64);
-                let points = own.iter().map(|row| {
-                    let grasps = table.cell(*row, "grasps").value().unwrap_or(f64::NAN);
-                    percent_point(table, *row, "F1", grasps + shift)
-                });
-                let line = if name.ends_with(FEEDBACK) { LineStyle::Bold } else { LineStyle::Thin };
-                series.push(DataSeries {
-                    name: name.clone(),
-                    colour,
-                    line,
-                    marker: Marker::of_series(colour),
-                    points: points.collect(),
-                });
-            }
-            if !series.is_empty() {
-                let most = rows.iter().filter_map(|row| table.cell(*row, "grasps").value()).fold(0.0, f64::max);
-                let x = PlotAxis::count("grasps of the object", most as usize);
-                let y = PlotAxis::linear(F1_PERCENT);
-                plots.push(Plot { title: format!("{sensors} sensors, {placed}"), x, y, series, ..Plot::default() });
-            }
-        }
-    }
-    let note = "Macro F1 with 95 % intervals, by bootstrap over rounds.".to_owned();
-    let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1080, 860], links }
 }
 
 #[cfg(test)]
@@ -503,11 +400,12 @@ mod tests {
             sure,
         };
         let rounds = vec![round(&[1, 0], 2, true), round(&[1, 0], 1, true), round(&[1, 1], 2, false)];
-        let merged = Merged { kind: Default::default(), rounds };
-        let (cells, wrong) = merged.stops();
-        assert_eq!(wrong, [1]);
-        assert_eq!(cells[0].value().map(|mean| (mean * 3.0).round()), Some(5.0));
-        assert_eq!(cells[2].value(), Some(0.5));
+        let method = palpate_learn::method("ids-lstm").expect("known");
+        let factor = Way { placed: ANEW, combined: FEEDBACK };
+        let merged =
+            Merged { kind: Kind { sensors: palpate_tactile::model::SensorModel::Virtual, method, factor }, rounds };
+        assert_eq!((merged.misjudged(), (merged.mean_grasps() * 3.0).round()), (vec![1], 5.0));
+        assert_eq!(merged.wrong().map(|wrong| wrong.estimate), Some(0.5));
         assert_eq!(merged.most(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
-use super::claims::stored_report;
 use super::report::{StudyColumn, StudyReport, StudyRow, StudyTable};
+use super::stored::stored_report;
 use super::{PaperStudy, grasps, models, recognition};
 use crate::study::shipped::shipped_text;
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};

@@ -1,38 +1,36 @@
 //! The paper's studies: each figure of its section V, and two of its future work, from one command each; and what
 //! recognition reaches beyond the paper.
 //!
-//! A [`PaperStudy`] divides its work into units. A unit takes a data set from the [`StudyBench`] and returns a
-//! [`UnitResult`]; finished units are kept, so that a study that was stopped goes on where it stopped. From all units it
-//! makes a [`StudyReport`]: tables, and a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
+//! A [`Study`](study::Study) is a grid of cells. A cell takes a data set from the [`StudyBench`]; what is found is kept, so that a
+//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a [`StudyReport`]: tables, and
+//! a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
 //!
-//! To add a study, write its file and add it to [`PAPER_STUDIES`]. Most have units of one kind: their `cases`.
+//! To add a study, write its file and add it to [`PAPER_STUDIES`]. Those that cross factors take their parts from `rows`.
 
 mod answers;
 mod bench;
-mod cases;
-mod claims;
 mod drawing;
 mod drift;
 mod emulated_grasps;
 mod folder;
 mod grasps;
 mod in_short;
+mod judging;
 mod layouts;
 mod modality;
 mod models;
 mod plan;
-mod pools;
 mod recognition;
 mod report;
-mod run;
+mod rows;
 mod shaking;
 mod signatures;
 mod stages;
+mod stored;
+mod study;
 mod training_size;
 
 pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
-pub(in crate::study) use claims::sections;
-pub use claims::stored_report;
 pub use folder::StudyFolder;
 pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
@@ -40,12 +38,9 @@ pub use report::{
     Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow,
     StudyTable,
 };
-pub use run::{run_study, study_fingerprint};
-
-use palpate_learn::Method;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+pub(in crate::study) use stored::sections;
+pub use stored::stored_report;
+pub use study::{PaperStudy, run_study, study_fingerprint};
 
 /// All studies of the paper, in the order of its figures.
 pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
@@ -95,55 +90,3 @@ impl StudyCard {
 
 /// Section of the paper of a study of our own methods.
 const OWN: &str = "none: our own methods";
-
-/// A unit of work of a study: the part of it that is computed at once and kept.
-#[derive(Clone, Debug)]
-pub struct StudyUnit {
-    /// Its name, different for each unit of a plan.
-    pub name: String,
-    /// Method that is fitted, on whose version the result depends.
-    pub method: Option<&'static Method>,
-}
-
-impl StudyUnit {
-    /// Name of its result: results of another version of the method are others.
-    fn stored_name(&self) -> String {
-        let version = self.method.map(|method| format!(" ({})", method.fingerprint()));
-        format!("{}{}", self.name, version.unwrap_or_default())
-    }
-}
-
-/// A study of the paper.
-pub trait PaperStudy: Sync {
-    /// Name and purpose.
-    fn card(&self) -> StudyCard;
-
-    /// The units of work. Units of the same data set follow each other.
-    fn units(&self, plan: &StudyPlan) -> Vec<StudyUnit>;
-
-    /// Computes a unit by its name; none where it was cancelled.
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError>;
-
-    /// Tables and findings from the results of all units, by name.
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError>;
-
-    /// Figures, drawn from the tables.
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure>;
-}
-
-/// Result of a unit, in a form of its study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct UnitResult(serde_json::Value);
-
-impl UnitResult {
-    /// Result of a unit.
-    pub fn new(result: &impl Serialize) -> Result<Self, StudyError> {
-        Ok(Self(serde_json::to_value(result)?))
-    }
-
-    /// The result in the form of its study.
-    pub fn read<T: DeserializeOwned>(&self) -> Result<T, StudyError> {
-        Ok(T::deserialize(&self.0)?)
-    }
-}

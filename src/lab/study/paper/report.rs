@@ -222,6 +222,75 @@ impl Cell {
     }
 }
 
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::text(text)
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(count: usize) -> Self {
+        Self::Number(count as f64)
+    }
+}
+
+impl From<Option<usize>> for Cell {
+    fn from(count: Option<usize>) -> Self {
+        count.map_or(Self::Missing, Self::from)
+    }
+}
+
+impl From<Option<f64>> for Cell {
+    fn from(value: Option<f64>) -> Self {
+        Self::number(value)
+    }
+}
+
+impl From<Option<Interval>> for Cell {
+    fn from(interval: Option<Interval>) -> Self {
+        Self::interval(interval)
+    }
+}
+
+/// A column of rows of a study: heading, unit, and value of a row.
+pub(super) struct Column<'a, R>(pub(super) &'static str, pub(super) &'static str, pub(super) &'a dyn Fn(&R) -> Cell);
+
+/// Typed rows of a table: its name, its title, and the trials behind a row.
+pub(super) struct TableRows<'a, R> {
+    name: &'a str,
+    title: String,
+    rows: &'a [R],
+    trials: &'a dyn Fn(&R) -> Vec<TrialId>,
+}
+
+impl<'a, R> TableRows<'a, R> {
+    /// Rows without trials behind them.
+    pub(super) fn new(name: &'a str, title: impl Into<String>, rows: &'a [R]) -> Self {
+        Self { name, title: title.into(), rows, trials: &|_| Vec::new() }
+    }
+
+    /// The same with trials behind each row.
+    pub(super) fn with_trials(self, trials: &'a dyn Fn(&R) -> Vec<TrialId>) -> Self {
+        Self { trials, ..self }
+    }
+
+    /// The table with these columns.
+    pub(super) fn columns(self, columns: &[Column<'_, R>]) -> StudyTable {
+        let headings: Vec<(&str, &str)> = columns.iter().map(|Column(name, unit, _)| (*name, *unit)).collect();
+        let mut table = StudyTable::new(self.name, self.title, &headings);
+        for row in self.rows {
+            table.push(columns.iter().map(|Column(.., cell)| cell(row)).collect(), (self.trials)(row));
+        }
+        table
+    }
+}
+
 /// Unit of columns of shares: stored from 0 to 1, shown in percent.
 pub const PERCENT: &str = "%";
 

@@ -1,34 +1,25 @@
 //! A hand that shakes what it holds (section VII, future work): what inertia adds to the recognition of the objects, and
 //! whether it tells apart objects that differ in nothing but their mass.
 
-use super::answers::{Judged, Pool, TestPart, fit_and_judge};
+use super::answers::{Judged, TestPart};
 use super::bench::{StudyBench, StudyError};
-use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{F1_PERCENT, named_rows, percent_row};
-use super::plan::{DataWanted, StudyPlan};
-use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{StudyCard, UnitResult};
-use palpate_geometry::drawing::{DataSeries, Figure, Marker, Plot, PlotAxis};
+use super::drawing::{Along, Facets};
+use super::judging::{Claim, Rule, points};
+use super::plan::DataWanted;
+use super::report::{Agreement, Column, Finding, LinkedFigure, StudyReport};
+use super::rows::{Kind, Row, find, pooled, unique};
+use super::study::{Study, StudyCell};
+use super::{StudyCard, StudyPlan};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Class, Dataset, Example, Labels, Method, method};
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Auto, Scene};
-use palpate_tactile::model::SensorModel;
-use std::collections::BTreeMap;
 
 pub(super) struct Shaken;
 
-const CARD: StudyCard = StudyCard {
-    key: "shaking",
-    title: "Shaking",
-    about: "what inertia adds to recognition: held still, lifted, shaken; the objects, and objects that differ in mass alone",
-    paper: "section VII, future work",
-    budget: "about 50 CPU minutes",
-};
-
 /// A hand's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Motion {
+pub(super) struct Motion {
     /// Name in tables.
     name: &'static str,
     /// Distance of the turning points from the middle (m); none where the hand lifts nothing.
@@ -63,39 +54,17 @@ const METHODS: [&str; 2] = ["extra-trees", "macro-layer"];
 const GRASPS: usize = 60;
 const QUICK: usize = 8;
 
-pub(super) struct Case {
-    sensors: SensorModel,
-    set: &'static str,
-    motion: Motion,
-    method: &'static Method,
-}
+/// A kind of grasps and a method: the set of classes and the motion.
+pub(super) struct Case(Kind<(&'static str, Motion)>);
 
-impl StudyCase for Case {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        // What a motion adds needs grasps with that motion.
-        if plan.query.is_some() {
-            return Vec::new();
-        }
-        let methods = || METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
-        let motions: Vec<Motion> =
-            plan.pick(MOTIONS.to_vec(), vec![MOTIONS[0], MOTIONS[2]], vec![MOTIONS[0], MOTIONS[2]]);
-        let mut cases = Vec::new();
-        for set in [MASSES, OBJECTS] {
-            for &motion in &motions {
-                for &sensors in &plan.sensors {
-                    cases.extend(methods().map(|method| Self { sensors, set, motion, method }));
-                }
-            }
-        }
-        cases
-    }
-
+impl StudyCell for Case {
     fn name(&self) -> String {
-        format!("{}, {}, {}, {}", self.set, self.motion.name, self.sensors.name(), self.method.key)
+        let (set, motion) = self.0.factor;
+        format!("{set}, {}, {}", motion.name, self.0.model())
     }
 
-    fn method(&self) -> &'static Method {
-        self.method
+    fn method(&self) -> Option<&'static Method> {
+        Some(self.0.method)
     }
 }
 
@@ -110,26 +79,23 @@ fn scene(motion: Motion) -> Scene {
 }
 
 /// Grasps of the objects, or of some of them with other masses, each mass a class of its own.
-fn grasps(bench: &StudyBench<'_>, case: &Case) -> Result<Option<Dataset>, StudyError> {
-    let plan = bench.plan();
-    let usual = plan.wanted(plan.grasps(GRASPS, QUICK), case.sensors);
-    if case.set == OBJECTS {
-        let data = bench.data(&DataWanted { scene: scene(case.motion), ..usual })?;
-        return Ok(data.map(|data| data.as_ref().clone()));
+fn grasps(bench: &StudyBench<'_>, Case(kind): &Case) -> Result<Dataset, StudyError> {
+    let (plan, (set, motion)) = (bench.plan(), kind.factor);
+    let usual = plan.wanted(plan.grasps(GRASPS, QUICK), kind.sensors);
+    if set == OBJECTS {
+        return Ok(bench.data(&DataWanted { scene: scene(motion), ..usual })?.as_ref().clone());
     }
     let mut merged: Option<Dataset> = None;
     for name in VARIED.iter().take(plan.pick(VARIED.len(), VARIED.len(), 1)) {
         let Some(known) = catalogue().iter().find(|known| known.name == *name) else { continue };
-        let mut scene = scene(case.motion);
+        let mut scene = scene(motion);
         scene.object.source.clone_from(&known.name);
         let Ok(Some(object)) = scene.load_object() else { continue };
         for factor in FACTORS {
             let mass = factor * object.mass.mass;
             scene.object.mass = Auto::Value(mass);
             let objects = vec![known.name.clone()];
-            let Some(data) = bench.data(&DataWanted { scene: scene.clone(), objects, ..usual.clone() })? else {
-                return Ok(None);
-            };
+            let data = bench.data(&DataWanted { scene: scene.clone(), objects, ..usual.clone() })?;
             let class = Class { name: format!("{name} {:.0} g", 1e3 * mass), size: None, shape: None };
             let into = merged.get_or_insert_with(|| Dataset { labels: Labels::default(), ..data.part(&[]) });
             let number = into.labels.classes.len();
@@ -138,100 +104,98 @@ fn grasps(bench: &StudyBench<'_>, case: &Case) -> Result<Option<Dataset>, StudyE
             into.about.grasps = into.examples.len();
         }
     }
-    Ok(merged)
+    merged.ok_or_else(|| StudyError::Missing("built-in objects".to_owned()))
 }
 
-impl CaseStudy for Shaken {
-    type Case = Case;
+impl Study for Shaken {
+    type Cell = Case;
+    type Found = Vec<Judged>;
 
-    const CARD: StudyCard = CARD;
+    const CARD: StudyCard = StudyCard {
+        key: "shaking",
+        title: "Shaking",
+        about: "what inertia adds to recognition: held still, lifted, shaken; the objects, and objects that differ in mass alone",
+        paper: "section VII, future work",
+        budget: "about 50 CPU minutes",
+    };
 
-    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
-        let plan = bench.plan();
-        let Some(data) = grasps(bench, &case)? else { return Ok(None) };
-        let mut parts: Vec<Judged> = Vec::new();
-        for part in 0..TestPart::usual(plan, 0).of {
-            let all = TestPart { train: usize::MAX, ..TestPart::usual(plan, part) };
-            let (train, test) = all.split(&data, plan.seed)?;
-            let Some(judged) = fit_and_judge(bench, case.method, &train, &test)? else { return Ok(None) };
-            parts.push(judged);
+    fn grid(plan: &StudyPlan) -> Vec<Case> {
+        // What a motion adds needs grasps with that motion.
+        if plan.query.is_some() {
+            return Vec::new();
         }
-        UnitResult::new(&parts).map(Some)
-    }
-
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut report = StudyReport::default();
-        let mut pools: Vec<(Case, Paired)> = Vec::new();
-        for case in Case::all(plan) {
-            let Some(unit) = units.get(&case.name()) else { continue };
-            let parts: Vec<Judged> = unit.read()?;
-            if let Some(answers) = parts.iter().find_map(Judged::answers) {
-                let line = format!("{}, {}: {}", case.set, case.motion.name, answers.data);
-                if !report.data.contains(&line) {
-                    report.data.push(line);
-                }
+        let short = [MOTIONS[0], MOTIONS[2]];
+        let motions = plan.pick(&MOTIONS[..], &short, &short);
+        let mut cases = Vec::new();
+        for factor in [MASSES, OBJECTS].into_iter().flat_map(|set| motions.iter().map(move |motion| (set, *motion))) {
+            for &sensors in &plan.sensors {
+                let methods = METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
+                cases.extend(methods.map(|method| Case(Kind { sensors, method, factor })));
             }
-            let pool = Pool::of(parts.iter().filter_map(Judged::answers));
-            let scores =
-                Paired { f1: pool.f1(), accuracy: pool.accuracy(), tested: pool.len(), trials: pool.misjudged() };
-            pools.push((case, scores));
         }
-        let mut table = StudyTable::new(
-            CARD.key,
-            format!("Motions of the hand, preset {}; differences to still", plan.preset),
-            &[
-                ("classes", ""),
-                ("sensors", ""),
-                ("model", ""),
-                ("motion", ""),
-                ("F1", PERCENT),
-                ("accuracy", PERCENT),
-                ("F1 against still", PERCENT),
-                ("tested", "grasps"),
-            ],
-        );
-        let mut measured = Vec::new();
-        for (case, own) in &pools {
-            let still = |other: &&(Case, Paired)| {
-                let (other, _) = other;
-                other.motion == MOTIONS[0]
-                    && (other.set, other.sensors, other.method.key) == (case.set, case.sensors, case.method.key)
-            };
-            let still = pools.iter().find(still).filter(|_| case.motion != MOTIONS[0]);
-            let gain = still.and_then(|(_, still)| independent(own.f1?, still.f1?));
-            table.push(
-                vec![
-                    Cell::text(case.set),
-                    Cell::text(case.sensors.name()),
-                    Cell::text(case.method.key),
-                    Cell::text(case.motion.name),
-                    Cell::interval(own.f1),
-                    Cell::interval(own.accuracy),
-                    Cell::interval(gain),
-                    Cell::Number(own.tested as f64),
-                ],
-                own.trials.clone(),
-            );
-            measured.extend(gain.map(|gain| {
-                (case.set, format!("{}, {}, {}", case.sensors.name(), case.method.key, case.motion.name), gain)
-            }));
-        }
-        report.findings = [finding(OBJECTS, &measured), finding(MASSES, &measured)].into_iter().collect();
-        report.tables.push(table);
-        Ok(report)
+        cases
     }
 
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        report.table(CARD.key).map(|(at, table)| figure(at, table)).into_iter().collect()
+    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Vec<Judged>, StudyError> {
+        let (plan, data) = (bench.plan(), grasps(bench, case)?);
+        let of_part = |part| {
+            let all = TestPart { train: usize::MAX, ..TestPart::usual(plan, part) };
+            bench.judge(case.0.method, &all.split(&data, plan.seed)?)
+        };
+        (0..TestPart::usual(plan, 0).of).map(of_part).collect()
     }
-}
 
-/// Scores of one case.
-struct Paired {
-    f1: Option<Interval>,
-    accuracy: Option<Interval>,
-    tested: usize,
-    trials: Vec<i64>,
+    fn report(plan: &StudyPlan, found: Vec<(Case, Vec<Judged>)>) -> StudyReport {
+        let data = unique(found.iter().filter_map(|(Case(kind), parts)| {
+            let (set, motion) = kind.factor;
+            Some(format!("{set}, {}: {}", motion.name, parts.iter().find_map(Judged::answers)?.data))
+        }));
+        let answers = found.into_iter().flat_map(|(Case(kind), parts)| parts.into_iter().map(move |own| (kind, own)));
+        let mut rows = pooled(answers);
+        let gain = |row: &Row<(&'static str, Motion)>| {
+            let still = row.kind.with((row.kind.factor.0, MOTIONS[0]));
+            independent(row.f1?, find(&rows, &still).filter(|still| still.kind != row.kind)?.f1?)
+        };
+        let gains: Vec<Option<Interval>> = rows.iter().map(gain).collect();
+        rows.iter_mut().zip(gains).for_each(|(row, gain)| row.gain = gain);
+        let title = format!("Motions of the hand, preset {}; differences to still", plan.preset);
+        let findings = vec![
+            finding("Shaking adds to the recognition of the objects", OBJECTS, &rows),
+            finding("Shaking tells apart objects that differ in mass alone", MASSES, &rows),
+        ];
+        StudyReport::new(
+            data,
+            vec![Row::table("shaking", title, &rows).columns(&[
+                Column("classes", "", &|row: &Row<(&'static str, Motion)>| row.kind.factor.0.into()),
+                Row::SENSORS,
+                Row::MODEL,
+                Column("motion", "", &|row| row.kind.factor.1.name.into()),
+                Row::F1,
+                Row::ACCURACY,
+                Row::gain("F1 against still"),
+                Row::TESTED,
+            ])],
+            findings,
+        )
+    }
+
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        let note =
+            format!("{:.0} mm at {FREQUENCY} Hz after a lift; 95 % intervals by bootstrap over test grasps.", 4.0);
+        let facets = Facets {
+            plot: &|line| format!("{}, {}", line.text("classes"), line.text("sensors")),
+            along: Along::Rows(&|line| line.text("motion").to_owned()),
+            shift: [0.0, -0.12],
+            named_once: true,
+            size: [1000, 620],
+            note: &note,
+            ..Facets::USUAL
+        };
+        let mut figure = facets.figure(report, "shaking");
+        let plots = figure.iter_mut().flat_map(|linked| &mut linked.figure.plots);
+        plots.for_each(|plot| plot.x.range = Some([0.0, 100.0]));
+        vec![figure]
+    }
 }
 
 /// Difference of two scores on different grasps: deviations add in squares (MOVER; Zou and Donner 2008).
@@ -243,65 +207,20 @@ fn independent(own: Interval, other: Interval) -> Option<Interval> {
     interval.estimate.is_finite().then_some(interval)
 }
 
-fn finding(set: &str, measured: &[(&'static str, String, Interval)]) -> Finding {
-    let own: Vec<_> = measured.iter().filter(|(of, name, _)| *of == set && name.contains("shaken")).collect();
-    let claim = match set {
-        MASSES => "Shaking tells apart objects that differ in mass alone",
-        _ => "Shaking adds to the recognition of the objects",
-    };
-    let listed = own.iter().map(|(_, name, gain)| {
-        format!("{name}: {:+.1} ({:+.1} to {:+.1})", 100.0 * gain.estimate, 100.0 * gain.low, 100.0 * gain.high)
+fn finding(claim: &str, set: &str, rows: &[Row<(&'static str, Motion)>]) -> Finding {
+    let shaken = rows.iter().filter(|row| row.kind.factor.0 == set && row.kind.factor.1.name.contains("shaken"));
+    let found = shaken.filter_map(|row| {
+        let text = format!("{}, {}: {}", row.kind.model(), row.kind.factor.1.name, points(row.gain?));
+        Some((text, Rule::AllAbove(0.0).judge_one(row.gain?)))
     });
-    Finding {
-        section: "VII".to_owned(),
-        claim: claim.to_owned(),
-        found: match own.is_empty() {
-            true => "shaken grasps are missing: they are simulated only without options that choose stored trials".to_owned(),
-            false => format!("points of macro F1 over still: {}", listed.collect::<Vec<_>>().join("; ")),
-        },
-        verdict: Agreement::of_all(own.iter().map(|(_, _, gain)| Agreement::of_gain(Some(*gain)))),
-        why: "Agrees where the 95 % interval of the gain over a hand that holds still for as long is above zero in each case, disagrees \
-              where it is below"
-            .to_owned(),
+    let rule = "Agrees where the 95 % interval of the gain over a hand that holds still for as long is above zero in each case, disagrees \
+                where it is below";
+    let mut finding = Claim("VII", claim, rule).of_each("points of macro F1 over still: ", found);
+    if finding.verdict == Agreement::NotMeasured {
+        finding.found =
+            "shaken grasps are missing: they are simulated only without options that choose stored trials".to_owned();
     }
-}
-
-/// A plot for each set of classes and sensors, one row for each motion.
-fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    let motions = table.texts("motion");
-    for set in table.texts("classes") {
-        for sensors in table.texts("sensors") {
-            let mut series = Vec::new();
-            for (colour, model) in table.texts("model").into_iter().enumerate() {
-                let mut points = Vec::new();
-                for row in table.rows_with(&[("classes", set), ("sensors", sensors), ("model", model)]) {
-                    let place = motions.iter().position(|motion| *motion == table.text(row, "motion")).unwrap_or(0);
-                    links.push(FigureLink {
-                        plot: plots.len(),
-                        mark: FigureMark::Point(series.len(), points.len()),
-                        table: at,
-                        row,
-                    });
-                    points.push(percent_row(table, row, "F1", -(place as f64) - 0.12 * colour as f64));
-                }
-                let name = if plots.is_empty() { model.to_owned() } else { String::new() };
-                series.push(DataSeries { name, colour, marker: Marker::Dot, points, ..DataSeries::default() });
-            }
-            let x = PlotAxis { range: Some([0.0, 100.0]), ..PlotAxis::linear(F1_PERCENT) };
-            plots.push(Plot {
-                title: format!("{set}, {sensors}"),
-                x,
-                y: named_rows(&motions),
-                series,
-                sideways: true,
-                ..Plot::default()
-            });
-        }
-    }
-    let note = format!("{:.0} mm at {FREQUENCY} Hz after a lift; 95 % intervals by bootstrap over test grasps.", 4.0);
-    let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1000, 620], links }
+    finding
 }
 
 #[cfg(test)]

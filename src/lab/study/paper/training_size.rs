@@ -1,28 +1,18 @@
 //! How many grasps a model has to learn from (Fig. 6c).
 
-use super::answers::{PairedDifference, Pool, TestPart, fit_and_judge};
+use super::answers::{Judged, TestPart};
 use super::bench::{StudyBench, StudyError};
-use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{F1_PERCENT, percent_point};
-use super::plan::StudyPlan;
-use super::pools::{Gains, Pools, better_than_each, finding, finding_on_gains, no_worse_than_any, points};
-use super::report::{Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{StudyCard, UnitResult};
-use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
+use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
+use super::judging::{Claim, Rule, points};
+use super::report::{Agreement, Column, Finding, LinkedFigure, StudyReport, StudyTable, TableRows};
+use super::rows::{Factor, Fit, Gains, Kind, Row, by_model, compare, crossed, described, gains_over, grouped, pooled};
+use super::study::Study;
+use super::{StudyCard, StudyPlan};
+use palpate_geometry::drawing::{PlotAxis, ReferenceLine};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Method, MethodKind, method};
-use palpate_tactile::model::SensorModel;
-use std::collections::BTreeMap;
+use palpate_learn::{MethodKind, method};
 
 pub(super) struct TrainingSize;
-
-const CARD: StudyCard = StudyCard {
-    key: "training-size",
-    title: "Size of the training set",
-    about: "models over 5 to 800 training grasps of each object (networks and noisy SVMs to fewer), and the fewest that are enough",
-    paper: "Fig. 6c",
-    budget: "about 140 CPU minutes",
-};
 
 /// Models of the figure: the paper's and what it is compared with.
 const MODELS: [&str; 9] =
@@ -48,313 +38,217 @@ fn sizes(plan: &StudyPlan) -> &'static [usize] {
     plan.pick(&[5, 10, 20, 50, 100, 200, 400, 800][..], &[5, 10, 20][..], &[2, 4][..])
 }
 
-/// A unit: a method fitted to so many grasps of each object.
-pub(super) struct Case {
-    sensors: SensorModel,
-    size: usize,
-    method: &'static Method,
-    part: usize,
+/// Training grasps of each object.
+impl Factor for usize {
+    fn named(&self, sensors: &str, method: &str) -> String {
+        format!("{sensors}, {method} of {self} grasps")
+    }
 }
 
-impl StudyCase for Case {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        let mut cases = Vec::new();
-        for (number, &sensors) in plan.sensors.iter().enumerate() {
-            for &size in sizes(plan) {
-                for method in MODELS.into_iter().filter_map(method) {
-                    let is_network = method.recipe.is_some();
-                    let most = match (is_network, number) {
-                        (true, 0) if method.key == TUNED => MOST_OF_TUNED,
-                        (true, 0) => MOST_OF_NETWORK,
-                        (true, _) => USUAL,
-                        (false, 1..) if method.key == "svm" => MOST_OF_NOISY_SVM,
-                        (false, _) => MOST,
-                    };
-                    if size > most || (size > USUAL && !BEYOND.contains(&method.key)) {
-                        continue;
-                    }
-                    let once = size > USUAL || (is_network && (number > 0 || method.key != PAPERS_MODEL));
-                    let parts = plan.pick(if once { 1 } else { PARTS }, 1, 1);
-                    cases.extend((0..parts).map(|part| Self { sensors, size, method, part }));
-                }
+/// Most training grasps of each object for a kind of fits; only the first sensors have all.
+fn most(kind: &Kind<usize>, is_first: bool) -> usize {
+    let most = match (kind.method.recipe.is_some(), is_first) {
+        (true, true) if kind.method.key == TUNED => MOST_OF_TUNED,
+        (true, true) => MOST_OF_NETWORK,
+        (true, false) => USUAL,
+        (false, false) if kind.method.key == "svm" => MOST_OF_NOISY_SVM,
+        (false, _) => MOST,
+    };
+    if BEYOND.contains(&kind.method.key) { most } else { most.min(USUAL) }
+}
+
+impl Study for TrainingSize {
+    type Cell = Fit<usize>;
+    type Found = Judged;
+
+    const CARD: StudyCard = StudyCard {
+        key: "training-size",
+        title: "Size of the training set",
+        about: "models over 5 to 800 training grasps of each object (networks and noisy SVMs to fewer), and the fewest that are enough",
+        paper: "Fig. 6c",
+        budget: "about 140 CPU minutes",
+    };
+
+    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
+        crossed(plan, sizes(plan), &MODELS, |kind| {
+            let is_first = plan.sensors.first() == Some(&kind.sensors);
+            if kind.factor > most(kind, is_first) {
+                return 0;
             }
-        }
-        cases
+            let is_costly = kind.method.recipe.is_some() && (!is_first || kind.method.key != PAPERS_MODEL);
+            plan.pick(if is_costly || kind.factor > USUAL { 1 } else { PARTS }, 1, 1)
+        })
     }
 
-    fn name(&self) -> String {
-        format!("{}, {} of {} grasps, part {}", self.sensors.name(), self.method.key, self.size, self.part + 1)
-    }
-
-    fn method(&self) -> &'static Method {
-        self.method
-    }
-}
-
-impl CaseStudy for TrainingSize {
-    type Case = Case;
-
-    const CARD: StudyCard = CARD;
-
-    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Judged, StudyError> {
         let plan = bench.plan();
-        let grasps = plan.grasps(MOST + TEST, 40);
-        let Some(data) = bench.data(&plan.wanted(grasps, case.sensors).read_by(case.method))? else { return Ok(None) };
+        let wanted = plan.wanted(plan.grasps(MOST + TEST, 40), kind.sensors);
         let of = plan.pick((MOST + TEST) / TEST, 2, 3);
-        let (train, test) = TestPart { of, part: case.part, train: case.size }.split(&data, plan.seed)?;
-        fit_and_judge(bench, case.method, &train, &test)?.map(|judged| UnitResult::new(&judged)).transpose()
+        let sets = bench.split(wanted, kind.method, TestPart { of, part: *part, train: kind.factor })?;
+        bench.judge(kind.method, &sets)
     }
 
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut pools = Pools::default();
-        for case in Case::all(plan) {
-            pools.add((case.sensors.name(), case.method.key, case.size), units, &case.name())?;
-        }
-        let curves: Vec<Point<'_>> = pools.pooled().into_iter().map(|(kind, pool)| Point { kind, pool }).collect();
-        let mut table = StudyTable::new(
-            CARD.key,
-            format!("Models by the number of training grasps of each object, {}", plan.described()),
-            &[
-                ("sensors", ""),
-                ("model", ""),
-                ("training grasps", ""),
-                ("F1", PERCENT),
-                ("accuracy", PERCENT),
-                ("gain of doubling", PERCENT),
-                ("tested", "grasps"),
-            ],
-        );
-        for point in &curves {
-            let gain = point.smaller(&curves).and_then(|smaller| point.pool.against(&smaller.pool));
-            table.push(
-                vec![
-                    Cell::text(point.kind.0),
-                    Cell::text(point.kind.1),
-                    Cell::Number(point.kind.2 as f64),
-                    Cell::interval(point.pool.f1()),
-                    Cell::interval(point.pool.accuracy()),
-                    Cell::interval(gain.map(|gain| gain.f1)),
-                    Cell::Number(point.pool.len() as f64),
-                ],
-                point.pool.misjudged(),
-            );
-        }
-        let least = least_table(&table);
-        let findings = findings(&curves, &least);
-        Ok(StudyReport::new(pools.data.clone(), vec![table, least], findings))
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Judged)>) -> StudyReport {
+        let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
+        let kinds: Vec<Kind<usize>> = rows.iter().map(|row| row.kind).collect();
+        compare(&mut rows, |kind| {
+            let smaller = kinds.iter().filter(|own| **own == Kind { factor: own.factor, ..*kind });
+            smaller.filter(|own| own.factor < kind.factor).max_by_key(|own| own.factor).copied()
+        });
+        let title = format!("Models by the number of training grasps of each object, {}", plan.described());
+        let enough = Enough::all(&rows);
+        let tables = vec![
+            Row::table("training-size", title, &rows).columns(&[
+                Row::SENSORS,
+                Row::MODEL,
+                Column("training grasps", "", &|row| row.kind.factor.into()),
+                Row::F1,
+                Row::ACCURACY,
+                Row::gain("gain of doubling"),
+                Row::TESTED,
+            ]),
+            Enough::table(&enough),
+        ];
+        StudyReport::new(described(&rows), tables, findings(&rows, &enough))
     }
 
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        report.table(CARD.key).map(|(at, table)| figure(at, table, report)).into_iter().collect()
-    }
-}
-
-/// A model after so many training grasps: sensors, model, size.
-struct Point<'a> {
-    kind: &'a (&'static str, &'static str, usize),
-    pool: Pool,
-}
-
-impl Point<'_> {
-    /// The same model after the next smaller number of grasps.
-    fn smaller<'a>(&self, curves: &'a [Self]) -> Option<&'a Self> {
-        let own = curves.iter().filter(|other| (other.kind.0, other.kind.1) == (self.kind.0, self.kind.1));
-        own.filter(|other| other.kind.2 < self.kind.2).max_by_key(|other| other.kind.2)
-    }
-}
-
-/// Fewest training grasps whose interval reaches the interval of the usual number, and of the largest.
-fn least_table(table: &StudyTable) -> StudyTable {
-    let mut least = StudyTable::new(
-        "training-size-least",
-        format!(
-            "Fewest training grasps of each object whose 95 % interval reaches that of {USUAL}, and of the largest number"
-        ),
-        &[
-            ("sensors", ""),
-            ("model", ""),
-            ("for that of 50", "grasps"),
-            ("for that of the largest", "grasps"),
-            ("largest", "grasps"),
-        ],
-    );
-    for sensors in table.texts("sensors") {
-        for model in table.texts("model") {
-            let rows = table.rows_with(&[("sensors", sensors), ("model", model)]);
-            let size = |row: usize| table.cell(row, "training grasps").value().unwrap_or(0.0);
-            let reaching = |wanted: Option<&usize>| -> Option<usize> {
-                let low = table.cell(*wanted?, "F1").spread()?[0];
-                rows.iter().copied().find(|row| table.cell(*row, "F1").spread().is_some_and(|ends| ends[1] >= low))
-            };
-            let usual = rows.iter().find(|row| size(**row) == USUAL as f64);
-            let (of_usual, of_largest) = (reaching(usual), reaching(rows.last()));
-            let largest = rows.last().map(|row| size(*row));
-            let cells = [of_usual.map(size), of_largest.map(size), largest].map(Cell::number);
-            least.push([vec![Cell::text(sensors), Cell::text(model)], cells.to_vec()].concat(), Vec::new());
-        }
-    }
-    least
-}
-
-fn findings(curves: &[Point<'_>], least: &StudyTable) -> Vec<Finding> {
-    let mut sensors: Vec<&str> = Vec::new();
-    let mut sizes: Vec<usize> = Vec::new();
-    for point in curves {
-        if !sensors.contains(&point.kind.0) {
-            sensors.push(point.kind.0);
-        }
-        if !sizes.contains(&point.kind.2) {
-            sizes.push(point.kind.2);
-        }
-    }
-    let of = |sensors: &str, model: &str, size: usize| {
-        curves.iter().find(|p| *p.kind == (sensors, model, size)).map(|p| &p.pool)
-    };
-    let gains = |group: MethodKind| -> Vec<(String, Gains)> {
-        let kinds = sensors.iter().flat_map(|sensors| sizes.iter().map(move |size| (*sensors, *size)));
-        let of_kind = |(sensors, size): (&str, usize)| {
-            let others = MODELS.into_iter().filter_map(method).filter(|m| m.kind == group);
-            let gains = others.filter_map(|other| {
-                let difference = of(sensors, PAPERS_MODEL, size)?.against(of(sensors, other.key, size)?)?;
-                Some((format!("over {}", other.key), difference.f1))
-            });
-            (format!("{sensors}, {size} grasps"), gains.collect())
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        let axis = |_: &[Line<'_>]| PlotAxis::logarithmic("training grasps of each object");
+        let figure = Facets {
+            along: Along::Axis(&axis, &|line| line.value("training grasps")),
+            look: &|model, colour| lines(colour, model == PAPERS_MODEL),
+            size: [1080, 520],
+            ..Facets::USUAL
         };
-        kinds.map(of_kind).collect()
-    };
-    let rule = "Agrees where every paired 95 % interval at every size is above zero, disagrees where one is below";
-    vec![
-        fewer_is_worse(curves, &sensors),
-        gains_shrink(curves, &sensors, least),
-        one_finding(
-            ("V-C", "The dual-stage LSTM outperforms other single models at every size", rule),
-            &gains(MethodKind::Single),
-            better_than_each,
-        ),
-        one_finding(
-            (
-                "V-C",
-                "The dual-stage LSTM remains comparable to ensembles at every size",
-                "Disagrees where the paired 95 % interval of an ensemble excludes zero in its favour",
-            ),
-            &gains(MethodKind::Ensemble),
-            no_worse_than_any,
-        ),
-    ]
-}
-
-/// A claim for all sizes together: one size refutes it.
-fn one_finding(
-    words: (&str, &str, &str),
-    kinds: &[(String, Gains)],
-    rule: fn(&[(String, Interval)]) -> Agreement,
-) -> Finding {
-    let all: Gains = kinds.iter().flat_map(|(_, gains)| gains.clone()).collect();
-    Finding { verdict: rule(&all), ..finding_on_gains(words, kinds, rule) }
-}
-
-/// Model and its paired difference between the smallest and the largest size that it was trained on.
-fn fewer_is_worse(curves: &[Point<'_>], sensors: &[&str]) -> Finding {
-    let gain = |sensors: &str, model: &str| -> Option<(String, Interval)> {
-        let own: Vec<&Point<'_>> = curves.iter().filter(|p| (p.kind.0, p.kind.1) == (sensors, model)).collect();
-        let (first, last) = (own.first()?, own.last()?);
-        let difference = last.pool.against(&first.pool)?;
-        Some((format!("{model} from {} to {}", first.kind.2, last.kind.2), difference.f1))
-    };
-    let kinds: Vec<(String, Gains)> = sensors
-        .iter()
-        .map(|sensors| ((*sensors).to_owned(), MODELS.iter().filter_map(|model| gain(sensors, model)).collect()))
-        .collect();
-    let rule = "Agrees where every model gains from the fewest to the most grasps: paired 95 % interval above zero";
-    finding_on_gains(("V-C", "Fewer training grasps give worse results", rule), &kinds, better_than_each)
-}
-
-/// The paper's model: gain of the first doubling against that of the last.
-fn gains_shrink(curves: &[Point<'_>], sensors: &[&str], least: &StudyTable) -> Finding {
-    let (mut found, mut verdicts) = (Vec::new(), Vec::new());
-    for sensors in sensors {
-        for model in MODELS {
-            let own: Vec<&Point<'_>> = curves.iter().filter(|p| (p.kind.0, p.kind.1) == (*sensors, model)).collect();
-            let steps: Vec<(usize, PairedDifference)> = own
-                .windows(2)
-                .filter_map(|pair| Some((pair[1].kind.2, pair[1].pool.against(&pair[0].pool)?)))
-                .collect();
-            let ([(first_size, first), .., (last_size, last)], true) = (steps.as_slice(), model == PAPERS_MODEL) else {
-                continue;
-            };
-            found.push(format!(
-                "{sensors}, {model}: {} points of macro F1 up to {first_size} grasps, {} up to {last_size}",
-                points(first.f1),
-                points(last.f1)
-            ));
-            verdicts.push(match (first.f1.low > last.f1.high, first.f1.high < last.f1.low) {
-                (true, _) => Agreement::Agrees,
-                (_, true) => Agreement::Disagrees,
-                (false, false) => Agreement::Partly,
-            });
-        }
-    }
-    for row in 0..least.rows.len() {
-        if least.text(row, "model") == PAPERS_MODEL
-            && let Some(size) = least.cell(row, "for that of the largest").value()
-        {
-            let largest = least.cell(row, "largest").value().unwrap_or(0.0);
-            let sensors = least.text(row, "sensors");
-            found.push(if size < largest {
-                format!("{sensors}: {size:.0} grasps are as good as {largest:.0}")
-            } else {
-                format!("{sensors}: fewer than {largest:.0} grasps are not as good as {largest:.0}")
-            });
-        }
-    }
-    let why = "Agrees where the 95 % interval of the first step's gain is above that of the last. Enough is the fewest grasps whose interval \
-               reaches that of the most";
-    finding(
-        ("V-C", "With more grasps the gain becomes less pronounced: there is a smallest set that is enough", why),
-        found.join("; "),
-        Agreement::of_all(verdicts),
-    )
-}
-
-/// A plot for each sensor model, one line per model.
-fn figure(at: usize, table: &StudyTable, report: &StudyReport) -> LinkedFigure {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    for sensors in table.texts("sensors") {
-        let mut series = Vec::new();
-        for (colour, model) in table.texts("model").into_iter().enumerate() {
-            let rows = table.rows_with(&[("sensors", sensors), ("model", model)]);
-            for (point, row) in rows.iter().enumerate() {
-                let mark = FigureMark::Point(series.len(), point);
-                links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
-            }
-            let points = rows.iter().map(|row| {
-                percent_point(table, *row, "F1", table.cell(*row, "training grasps").value().unwrap_or(f64::NAN))
-            });
-            let line = if model == PAPERS_MODEL { LineStyle::Bold } else { LineStyle::Thin };
-            let points = points.collect();
-            series.push(DataSeries { name: model.to_owned(), colour, line, marker: Marker::of_series(colour), points });
-        }
-        let enough = report.table("training-size-least").and_then(|(_, least)| {
-            let row = *least.rows_with(&[("sensors", sensors), ("model", PAPERS_MODEL)]).first()?;
-            let [at, largest] = ["for that of the largest", "largest"].map(|column| least.cell(row, column).value());
-            let (at, largest) = (at?, largest?);
+        let mut figure = figure.figure(report, "training-size");
+        let plots = figure.iter_mut().flat_map(|linked| &mut linked.figure.plots);
+        let least = LinkedPlots::of(report, "training-size-least");
+        let least = least.map_or_else(Vec::new, |least| least.lines_with(&[("model", PAPERS_MODEL)]));
+        for plot in plots {
+            let of_sensors = |line: &&Line<'_>| plot.title == format!("{} sensors", line.text("sensors"));
+            let Some(line) = least.iter().find(of_sensors) else { continue };
+            let [at, largest] = ["for that of the largest", "largest"].map(|column| line.value(column));
             let text = if at < largest {
                 format!("{at:.0} are enough for {PAPERS_MODEL}")
             } else {
                 format!("{PAPERS_MODEL}: fewer than {at:.0} are not enough")
             };
-            Some(ReferenceLine { horizontal: false, at, text })
-        });
-        plots.push(Plot {
-            title: format!("{sensors} sensors"),
-            x: PlotAxis::logarithmic("training grasps of each object"),
-            y: PlotAxis::linear(F1_PERCENT),
-            references: enough.into_iter().collect(),
-            series,
-            ..Plot::default()
-        });
+            plot.references.extend((!at.is_nan()).then_some(ReferenceLine { horizontal: false, at, text }));
+        }
+        vec![figure]
     }
-    let note = "Macro F1 after one grasp with 95 % intervals, by bootstrap over test grasps.".to_owned();
-    let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1080, 520], links }
+}
+
+/// Fewest training grasps of a model whose interval reaches the interval of the usual number, and of the largest.
+struct Enough {
+    kind: Kind<usize>,
+    of_usual: Option<usize>,
+    of_largest: Option<usize>,
+    largest: usize,
+}
+
+impl Enough {
+    fn all(rows: &[Row<usize>]) -> Vec<Self> {
+        let of_model = by_model(rows).into_iter().filter_map(|own| {
+            let reaching = |wanted: Option<&&Row<usize>>| -> Option<usize> {
+                let low = wanted?.f1?.low;
+                Some(own.iter().find(|row| row.f1.is_some_and(|f1| f1.high >= low))?.kind.factor)
+            };
+            let usual = own.iter().find(|row| row.kind.factor == USUAL);
+            let kind = own.last()?.kind;
+            Some(Self { kind, of_usual: reaching(usual), of_largest: reaching(own.last()), largest: kind.factor })
+        });
+        of_model.collect()
+    }
+
+    fn table(all: &[Self]) -> StudyTable {
+        let title = format!(
+            "Fewest training grasps of each object whose 95 % interval reaches that of {USUAL}, and of the largest number"
+        );
+        TableRows::new("training-size-least", title, all).columns(&[
+            Column("sensors", "", &|own| own.kind.sensors.name().into()),
+            Column("model", "", &|own| own.kind.method.key.into()),
+            Column("for that of 50", "grasps", &|own| own.of_usual.into()),
+            Column("for that of the largest", "grasps", &|own| own.of_largest.into()),
+            Column("largest", "grasps", &|own| own.largest.into()),
+        ])
+    }
+}
+
+fn findings(rows: &[Row<usize>], enough: &[Enough]) -> Vec<Finding> {
+    let gains = |group: MethodKind| {
+        gains_over(rows, |kind| {
+            let others = MODELS.into_iter().filter_map(method).filter(|own| own.kind == group);
+            let others = others.filter(|_| kind.method.key == PAPERS_MODEL).map(|method| {
+                let sensors_and_size = format!("{}, {} grasps", kind.sensors.name(), kind.factor);
+                (sensors_and_size, format!("over {}", method.key), Kind { method, ..*kind })
+            });
+            others.collect()
+        })
+    };
+    // A claim for all sizes together: one size refutes it.
+    let at_every_size = |claim: &str, why: &str, gains: &[(String, Gains)], rule: Rule| {
+        let all: Vec<Interval> = gains.iter().flat_map(|(_, gains)| gains).map(|(_, gain)| *gain).collect();
+        Finding { verdict: rule.judge(&all), ..Claim("V-C", claim, why).on_gains(gains, rule) }
+    };
+    vec![
+        fewer_is_worse(rows),
+        gains_shrink(rows, enough),
+        at_every_size(
+            "The dual-stage LSTM outperforms other single models at every size",
+            "Agrees where every paired 95 % interval at every size is above zero, disagrees where one is below",
+            &gains(MethodKind::Single),
+            Rule::AllAbove(0.0),
+        ),
+        at_every_size(
+            "The dual-stage LSTM remains comparable to ensembles at every size",
+            "Disagrees where the paired 95 % interval of an ensemble excludes zero in its favour",
+            &gains(MethodKind::Ensemble),
+            Rule::NoneBelow(0.0),
+        ),
+    ]
+}
+
+/// Each model from the smallest to the largest size that it was trained on.
+fn fewer_is_worse(rows: &[Row<usize>]) -> Finding {
+    let gains = grouped(by_model(rows).into_iter().filter_map(|own| {
+        let (first, last) = (own[0], own.last()?);
+        let Kind { sensors, method, .. } = first.kind;
+        let name = format!("{} from {} to {}", method.key, first.kind.factor, last.kind.factor);
+        Some((sensors.name().to_owned(), (name, last.pool.against(&first.pool)?.f1)))
+    }));
+    let rule = "Agrees where every model gains from the fewest to the most grasps: paired 95 % interval above zero";
+    Claim("V-C", "Fewer training grasps give worse results", rule).on_gains(&gains, Rule::AllAbove(0.0))
+}
+
+/// The paper's model: gain of the first doubling against that of the last.
+fn gains_shrink(rows: &[Row<usize>], enough: &[Enough]) -> Finding {
+    let steps = by_model(rows).into_iter().filter(|own| own[0].kind.method.key == PAPERS_MODEL).filter_map(|own| {
+        let steps: Vec<_> = own.iter().filter_map(|row| Some((row.kind.factor, row.gain?))).collect();
+        let [(first_size, first), .., (last_size, last)] = steps.as_slice() else { return None };
+        let [model, gained, late] = [own[0].kind.model(), points(*first), points(*last)];
+        let found = format!("{model}: {gained} points of macro F1 up to {first_size} grasps, {late} up to {last_size}");
+        let verdict = match (first.low > last.high, first.high < last.low) {
+            (true, _) => Agreement::Agrees,
+            (_, true) => Agreement::Disagrees,
+            (false, false) => Agreement::Partly,
+        };
+        Some((found, verdict))
+    });
+    let reached = enough.iter().filter(|own| own.kind.method.key == PAPERS_MODEL).filter_map(|own| {
+        let (sensors, size, largest) = (own.kind.sensors.name(), own.of_largest?, own.largest);
+        let found = if size < largest {
+            format!("{sensors}: {size} grasps are as good as {largest}")
+        } else {
+            format!("{sensors}: fewer than {largest} grasps are not as good as {largest}")
+        };
+        Some((found, Agreement::NotMeasured))
+    });
+    let claim = Claim(
+        "V-C",
+        "With more grasps the gain becomes less pronounced: there is a smallest set that is enough",
+        "Agrees where the 95 % interval of the first step's gain is above that of the last. Enough is the fewest grasps whose interval \
+         reaches that of the most",
+    );
+    claim.of_each("", steps.chain(reached))
 }

@@ -1,15 +1,13 @@
 //! Which grasp next: grasps of objects that stay where they are, until the recogniser is sure, from random poses of the
 //! gripper and from those that a guide chooses.
 
-use super::super::UnitResult;
 use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
-use super::super::report::{Cell, PERCENT, StudyTable};
+use super::super::report::{Cell, Column, PERCENT, StudyTable, TableRows};
 use super::questions::{LEARNED, QUESTIONS, Question, UNLABELLED};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::{GripperMove, Guide, KnownTouches, Recompute, Stance, TouchLibrary, grasp_soundly};
-use palpate_learn::metrics::Interval;
 use palpate_learn::{Belief, Dataset, Model, Pmf, Shipped, check_apart, method};
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::ObjectModel;
@@ -44,6 +42,16 @@ enum NextPose {
     Guided,
 }
 
+impl NextPose {
+    /// Word in tables.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Guided => "guided",
+        }
+    }
+}
+
 /// End of one round.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Ended {
@@ -72,7 +80,7 @@ impl BothRounds {
 
 /// All rounds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct GuidedRounds {
+pub(in crate::study::paper) struct GuidedRounds {
     pub(super) data: String,
     rounds: Vec<BothRounds>,
 }
@@ -122,8 +130,8 @@ impl GuidedCase {
         }
     }
 
-    /// A model, grasps that it has not learned from with its answers, and what it learned; none where it was cancelled.
-    fn model(self, bench: &StudyBench<'_>) -> Result<Option<(Model, TouchLibrary, String)>, StudyError> {
+    /// A model, grasps that it has not learned from with its answers, and what it learned.
+    fn model(self, bench: &StudyBench<'_>) -> Result<(Model, TouchLibrary, String), StudyError> {
         let missing = |what: &str| StudyError::Missing(what.to_owned());
         if self == Self::Unlabelled {
             let failed = |cause: &dyn std::fmt::Display| StudyError::Missing(cause.to_string());
@@ -131,26 +139,26 @@ impl GuidedCase {
             let touches = KnownTouches::shipped(Shipped::AnyGripper).map_err(|cause| failed(&cause))?;
             let library = touches.library(&model).ok_or_else(|| missing("channels of the shipped model"))?;
             let about = model.card.data.described();
-            return Ok(Some((model, library, about)));
+            return Ok((model, library, about));
         }
         let (plan, question) = (bench.plan(), self.question());
         let wanted = |grasps: usize, quick: usize, poses: u64| question.wanted(plan, plan.grasps(grasps, quick), poses);
         let method = method(GUIDED_METHOD).ok_or_else(|| missing(GUIDED_METHOD))?;
-        let Some(train) = bench.data(&wanted(LEARNED, 20, POSES))? else { return Ok(None) };
-        let Some(known) = bench.data(&wanted(KNOWN, 20, KNOWN_POSES))? else { return Ok(None) };
+        let train = bench.data(&wanted(LEARNED, 20, POSES))?;
+        let known = bench.data(&wanted(KNOWN, 20, KNOWN_POSES))?;
         check_apart(&train.examples, &known.examples)?;
-        let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
+        let model = bench.fit(method, &train)?;
         let known = known.relabelled(&model.card.labels).ok_or_else(|| missing("simulated grasps"))?;
         let library = library(&model, &known, bench)?;
-        Ok(Some((model, library, train.about.described())))
+        Ok((model, library, train.about.described()))
     }
 }
 
-/// Runs all rounds; none where it was cancelled.
-pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+/// Runs all rounds.
+pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<GuidedRounds, StudyError> {
     let (plan, question) = (bench.plan(), case.question());
     let missing = || StudyError::Missing("simulated grasps of the same objects".to_owned());
-    let Some((model, library, data)) = case.model(bench)? else { return Ok(None) };
+    let (model, library, data) = case.model(bench)?;
     let library = Arc::new(library);
     let wanted = question.wanted(plan, 1, 0);
     let preset = PosePreset::named(question.preset).ok_or_else(missing)?;
@@ -176,10 +184,9 @@ pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<Option<
             Some(BothRounds { class, random: run(NextPose::Random)?, guided: run(NextPose::Guided)? })
         };
         let ended: Option<Vec<_>> = (0..count).into_par_iter().map(round).collect();
-        let Some(ended) = ended else { return Ok(None) };
-        rounds.extend(ended);
+        rounds.extend(ended.ok_or(StudyError::Stopped)?);
     }
-    UnitResult::new(&GuidedRounds { data, rounds }).map(Some)
+    Ok(GuidedRounds { data, rounds })
 }
 
 /// The guide's library: grasps that the model has not learned from, and its answers.
@@ -258,51 +265,51 @@ impl Round<'_> {
     }
 }
 
+/// Rounds of a case with one way to choose poses.
+type Row<'a> = (GuidedCase, &'a [BothRounds], NextPose);
+
+/// A number of rounds, over resampled rounds of each object.
+fn resampled((_, rounds, _): &Row<'_>, number: impl Fn(&[usize]) -> f64) -> Cell {
+    let strata: Vec<usize> = rounds.iter().map(|own| own.class).collect();
+    Cell::interval(BOOTSTRAP.interval(&strata, |chosen| Some(number(chosen))))
+}
+
+/// Mean number of grasps after the first.
+fn after_first(rounds: &[BothRounds], next: NextPose, chosen: &[usize]) -> f64 {
+    let all = chosen.iter().map(|k| rounds[*k].of(next).grasps as f64 - 1.0);
+    all.sum::<f64>() / chosen.len().max(1) as f64
+}
+
+fn share(row: &Row<'_>, said: impl Fn(&Ended) -> Option<bool>) -> Cell {
+    resampled(row, |chosen| {
+        let said: Vec<bool> = chosen.iter().filter_map(|k| said(row.1[*k].of(row.2))).collect();
+        said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64
+    })
+}
+
 /// Table of grasps after the first with random poses and guided.
 pub(super) fn table(all: &[(GuidedCase, GuidedRounds)]) -> StudyTable {
-    let columns = [
-        ("grasps", ""),
-        ("poses", ""),
-        ("grasps after the first", ""),
-        ("saved", PERCENT),
-        ("to save", PERCENT),
-        ("sure", PERCENT),
-        ("right when sure", PERCENT),
-        ("rounds", ""),
-    ];
+    let rows = all.iter().flat_map(|(case, found)| {
+        [NextPose::Random, NextPose::Guided].map(|next| (*case, found.rounds.as_slice(), next))
+    });
+    let rows: Vec<Row<'_>> = rows.collect();
+    let if_guided = |(.., next): &Row<'_>, cell: &dyn Fn() -> Cell| match next {
+        NextPose::Random => Cell::Missing,
+        NextPose::Guided => cell(),
+    };
     let title = format!("Which grasp next: grasps until {:.0} % sure, of an object that nobody moves", 100.0 * SURE);
-    let mut table = StudyTable::new("guided", title, &columns);
-    for (case, found) in all {
-        let strata: Vec<usize> = found.rounds.iter().map(|own| own.class).collect();
-        let after_first = |next: NextPose, chosen: &[usize]| {
-            let all = chosen.iter().map(|k| found.rounds[*k].of(next).grasps as f64 - 1.0);
-            all.sum::<f64>() / chosen.len().max(1) as f64
-        };
-        for (name, next) in [("random", NextPose::Random), ("guided", NextPose::Guided)] {
-            let share = |of: &dyn Fn(&Ended) -> Option<bool>| -> Option<Interval> {
-                BOOTSTRAP.interval(&strata, |chosen| {
-                    let said: Vec<bool> = chosen.iter().filter_map(|k| of(found.rounds[*k].of(next))).collect();
-                    Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
-                })
-            };
-            let saved =
-                |chosen: &[usize]| Some(1.0 - after_first(next, chosen) / after_first(NextPose::Random, chosen));
-            let (saved, to_save) = match next {
-                NextPose::Random => (Cell::Missing, Cell::Missing),
-                NextPose::Guided => (Cell::interval(BOOTSTRAP.interval(&strata, saved)), Cell::Number(TO_SAVE)),
-            };
-            let cells = vec![
-                Cell::text(case.described()),
-                Cell::text(name),
-                Cell::interval(BOOTSTRAP.interval(&strata, |chosen| Some(after_first(next, chosen)))),
-                saved,
-                to_save,
-                Cell::interval(share(&|ended| Some(ended.sure))),
-                Cell::interval(share(&|ended| ended.sure.then_some(ended.right))),
-                Cell::Number(found.rounds.len() as f64),
-            ];
-            table.push(cells, Vec::new());
-        }
-    }
-    table
+    TableRows::new("guided", title, &rows).columns(&[
+        Column("grasps", "", &|(case, ..)| case.described().into()),
+        Column("poses", "", &|(.., next)| next.name().into()),
+        Column("grasps after the first", "", &|row| resampled(row, |chosen| after_first(row.1, row.2, chosen))),
+        Column("saved", PERCENT, &|row| {
+            let of = |next, chosen: &[usize]| after_first(row.1, next, chosen);
+            let saved = |chosen: &[usize]| 1.0 - of(NextPose::Guided, chosen) / of(NextPose::Random, chosen);
+            if_guided(row, &|| resampled(row, saved))
+        }),
+        Column("to save", PERCENT, &|row| if_guided(row, &|| Cell::Number(TO_SAVE))),
+        Column("sure", PERCENT, &|row| share(row, |ended| Some(ended.sure))),
+        Column("right when sure", PERCENT, &|row| share(row, |ended| ended.sure.then_some(ended.right))),
+        Column("rounds", "", &|(_, rounds, _)| rounds.len().into()),
+    ])
 }

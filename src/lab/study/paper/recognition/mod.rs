@@ -8,12 +8,13 @@ mod questions;
 
 use super::answers::{ModelAnswers, Pool, judge_answers};
 use super::bench::{StudyBench, StudyError};
-use super::cases::{CaseStudy, StudyCase};
-use super::drawing::{named_rows, percent_row};
+use super::drawing::{LinkedPlots, dots, named_rows};
 use super::emulated_grasps::EmulatedGrippers;
 use super::plan::StudyPlan;
-use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{OWN, StudyCard, UnitResult};
+use super::report::{Cell, Column, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
+use super::rows::{grouped, unique};
+use super::study::{Study, StudyCell};
+use super::{OWN, StudyCard};
 use crate::study::comparison::with_true_size_and_shape;
 use guided::{GuidedCase, GuidedRounds, guided};
 use new_objects::{mean_f1, new_object};
@@ -21,27 +22,18 @@ use novelty::{
     EMULATED_NOVELTY, EmulatedRounds, NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, OTHERS, Scored, area, decisions,
     emulated_novelty, novelty,
 };
-use palpate_geometry::drawing::{DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis};
+use palpate_geometry::drawing::{DataSeries, Marker, Plot, PlotAxis};
 use palpate_learn::evaluation::{answer, rounds};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{Belief, Dataset, Method, Shipped, check_apart, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_tactile::trial::TrialId;
 pub(super) use questions::UNLABELLED;
-use questions::{JUDGED, Learns, NEW_OBJECTS, QUESTIONS, Question, Reads, TESTED};
+use questions::{JUDGED, Learns, NEW_OBJECTS, QUESTIONS, Question, Reads, TESTED, Targets};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(super) struct Recognition;
-
-const CARD: StudyCard = StudyCard {
-    key: "recognition",
-    title: "Recognition beyond the paper",
-    about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
-    paper: OWN,
-    budget: "about 120 CPU minutes",
-};
 
 /// Seeds of the emulated grippers' parts, and grasps of each object by each.
 const EMULATED: std::ops::Range<u64> = 900..906;
@@ -55,29 +47,7 @@ pub(super) enum Case {
     Guided { which: GuidedCase, method: &'static Method },
 }
 
-impl StudyCase for Case {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        let mut cases = Vec::new();
-        for question in &QUESTIONS {
-            for method in question.methods.iter().filter_map(|key| method(key)) {
-                let draws = question.draws(plan).1;
-                cases.extend((0..draws).map(|draw| Self::Answers { question, method, draw }));
-            }
-        }
-        let left_out = || plan.objects().into_iter().take(plan.pick(usize::MAX, 2, 1));
-        let novelty = method(NOVELTY_METHOD);
-        cases.extend(left_out().filter_map(|left_out| Some(Self::Novelty { left_out, method: novelty? })));
-        cases.extend(method("geometry-network").map(|method| Self::EmulatedNovelty { method }));
-        for question in &NEW_OBJECTS {
-            for method in question.methods.iter().filter_map(|key| method(key)) {
-                cases.extend(left_out().map(|left_out| Self::NewObject { question, left_out, method }));
-            }
-        }
-        let guided = |which: GuidedCase| Some(Self::Guided { which, method: method(which.method())? });
-        cases.extend(GuidedCase::ALL.into_iter().filter_map(guided));
-        cases
-    }
-
+impl StudyCell for Case {
     fn name(&self) -> String {
         match self {
             Self::Answers { question, method, draw } => {
@@ -103,47 +73,41 @@ impl StudyCase for Case {
         }
     }
 
-    fn method(&self) -> &'static Method {
+    fn method(&self) -> Option<&'static Method> {
         match self {
             Self::Answers { method, .. }
             | Self::Novelty { method, .. }
             | Self::EmulatedNovelty { method }
             | Self::NewObject { method, .. }
-            | Self::Guided { method, .. } => method,
+            | Self::Guided { method, .. } => Some(method),
         }
     }
 }
 
 /// Answers after one grasp and after three.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Answered {
+pub(super) struct Answered {
     one: ModelAnswers,
     /// The same test grasps, each followed by two others of its object.
     three: Vec<usize>,
 }
 
-impl Case {
-    fn answers(
-        question: &Question,
-        method: &Method,
-        draw: usize,
-        bench: &StudyBench<'_>,
-    ) -> Result<Option<UnitResult>, StudyError> {
+impl Answered {
+    fn new(question: &Question, method: &Method, draw: usize, bench: &StudyBench<'_>) -> Result<Self, StudyError> {
         let plan = bench.plan();
         let (of_each, _) = question.draws(plan);
-        let Some(test) = tested(question, bench)? else { return Ok(None) };
+        let test = tested(question, bench)?;
         let model = match question.learns {
             Learns::Shipped(shipped) => shipped.model().map_err(|error| StudyError::Missing(error.to_string()))?,
             Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Given { .. } => {
-                let Some(all) = bench.data(&question.learned(plan))? else { return Ok(None) };
+                let all = bench.data(&question.learned(plan))?;
                 let own = all.by_class().into_iter().flat_map(|of| of.into_iter().skip(draw * of_each).take(of_each));
                 let mut train = all.part(&own.collect::<Vec<_>>());
                 check_apart(&train.examples, &test.examples)?;
                 if matches!(question.learns, Learns::Shuffled { .. }) {
                     train = train.with_shuffled_labels(plan.seed);
                 }
-                let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
-                model
+                bench.fit(method, &train)?
             }
         };
         let unseen = |k: &usize| !model.card.learned.contains(&test.examples[*k]);
@@ -160,17 +124,17 @@ impl Case {
         let rounds = rounds(model.recogniser.as_ref(), &test, &answers, plan.seed);
         let after_three = |belief: &Belief| belief.steps().get(2).or(belief.now()).map_or(0, |pmf| pmf.top().0);
         let three = rounds.iter().map(|round| after_three(&round.belief)).collect();
-        UnitResult::new(&Answered { one, three }).map(Some)
+        Ok(Self { one, three })
     }
 }
 
-/// Grasps that judge; none where it was cancelled.
-fn tested(question: &Question, bench: &StudyBench<'_>) -> Result<Option<Arc<Dataset>>, StudyError> {
+/// Grasps that judge.
+fn tested(question: &Question, bench: &StudyBench<'_>) -> Result<Arc<Dataset>, StudyError> {
     let plan = bench.plan();
     let wanted = question.wanted(plan, plan.grasps(TESTED, 10), JUDGED);
     match question.reads {
         Reads::Sensors { .. } | Reads::Contact => bench.data(&wanted),
-        Reads::Emulated => emulated(question.preset, &plan.objects(), plan).map(|data| Some(Arc::new(data))),
+        Reads::Emulated => emulated(question.preset, &plan.objects(), plan).map(Arc::new),
     }
 }
 
@@ -184,237 +148,232 @@ fn emulated(preset: &'static str, objects: &[String], plan: &StudyPlan) -> Resul
     EmulatedGrippers { scene: &scene, preset, seeds, objects, each }.grasps(&shipped.card.channels)
 }
 
-impl CaseStudy for Recognition {
-    type Case = Case;
+/// What is found in a cell.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(super) enum Found {
+    Answered(Answered),
+    Emulated(EmulatedRounds),
+    Guided(GuidedRounds),
+    Scored(Scored),
+}
 
-    const CARD: StudyCard = CARD;
+impl Found {
+    /// Description of the data.
+    fn data(&self) -> &str {
+        match self {
+            Self::Answered(own) => &own.one.data,
+            Self::Emulated(own) => &own.scored.data,
+            Self::Guided(own) => &own.data,
+            Self::Scored(own) => &own.data,
+        }
+    }
+}
 
-    fn measure(&self, case: Case, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+impl Study for Recognition {
+    type Cell = Case;
+    type Found = Found;
+
+    const CARD: StudyCard = StudyCard {
+        key: "recognition",
+        title: "Recognition beyond the paper",
+        about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
+        paper: OWN,
+        budget: "about 120 CPU minutes",
+    };
+
+    fn grid(plan: &StudyPlan) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for question in &QUESTIONS {
+            for method in question.methods.iter().filter_map(|key| method(key)) {
+                let draws = question.draws(plan).1;
+                cases.extend((0..draws).map(|draw| Case::Answers { question, method, draw }));
+            }
+        }
+        let left_out = || plan.objects().into_iter().take(plan.pick(usize::MAX, 2, 1));
+        let novelty = method(NOVELTY_METHOD);
+        cases.extend(left_out().filter_map(|left_out| Some(Case::Novelty { left_out, method: novelty? })));
+        cases.extend(method("geometry-network").map(|method| Case::EmulatedNovelty { method }));
+        for question in &NEW_OBJECTS {
+            for method in question.methods.iter().filter_map(|key| method(key)) {
+                cases.extend(left_out().map(|left_out| Case::NewObject { question, left_out, method }));
+            }
+        }
+        let guided = |which: GuidedCase| Some(Case::Guided { which, method: method(which.method())? });
+        cases.extend(GuidedCase::ALL.into_iter().filter_map(guided));
+        cases
+    }
+
+    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Found, StudyError> {
         if bench.plan().query.is_some() {
             let needs = "grasps of several presets that it simulates; leave out the options that choose trials";
             return Err(StudyError::Missing(needs.to_owned()));
         }
-        match case {
-            Case::Answers { question, method, draw } => Case::answers(question, method, draw, bench),
-            Case::Novelty { left_out, method } => novelty(&left_out, method, bench),
-            Case::EmulatedNovelty { .. } => emulated_novelty(bench),
-            Case::NewObject { question, left_out, method } => new_object(question, &left_out, method, bench),
-            Case::Guided { which, .. } => guided(which, bench),
-        }
+        Ok(match case {
+            Case::Answers { question, method, draw } => Found::Answered(Answered::new(question, method, *draw, bench)?),
+            Case::Novelty { left_out, method } => Found::Scored(novelty(left_out, method, bench)?),
+            Case::EmulatedNovelty { .. } => Found::Emulated(emulated_novelty(bench)?),
+            Case::NewObject { question, left_out, method } => {
+                Found::Scored(new_object(question, left_out, method, bench)?)
+            }
+            Case::Guided { which, .. } => Found::Guided(guided(*which, bench)?),
+        })
     }
 
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut kinds: Vec<(&'static Question, &'static str, Vec<Answered>)> = Vec::new();
-        let (mut scored, mut data): (Vec<Scored>, Vec<String>) = (Vec::new(), Vec::new());
-        let mut taught: Vec<(&'static Question, &'static str, Vec<Scored>)> = Vec::new();
-        let mut strangers: Option<(&'static str, EmulatedRounds)> = None;
-        let mut guided = Vec::new();
-        let mut note = |text: &String| {
-            if !data.contains(text) {
-                data.push(text.clone());
-            }
-        };
-        for case in Case::all(plan) {
-            let Some(unit) = units.get(&case.name()) else { continue };
-            match case {
-                Case::Answers { question, method, .. } => {
-                    let answered: Answered = unit.read()?;
-                    note(&answered.one.data);
-                    match kinds.iter_mut().find(|(own, key, _)| own.name == question.name && *key == method.key) {
-                        Some((.., parts)) => parts.push(answered),
-                        None => kinds.push((question, method.key, vec![answered])),
-                    }
+    fn report(_: &StudyPlan, found: Vec<(Case, Found)>) -> StudyReport {
+        let data = unique(found.iter().map(|(_, found)| found.data().to_owned()));
+        let (mut answered, mut taught, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut strangers, mut guided) = (Vec::new(), Vec::new());
+        for pair in found {
+            match pair {
+                (Case::Answers { question, method, .. }, Found::Answered(own)) => {
+                    answered.push(((question, method.key), own));
                 }
-                Case::Novelty { .. } => {
-                    let own: Scored = unit.read()?;
-                    note(&own.data);
-                    scored.push(own);
+                (Case::NewObject { question, method, .. }, Found::Scored(own)) => {
+                    taught.push(((question, method.key), own));
                 }
-                Case::EmulatedNovelty { method } => {
-                    let own: EmulatedRounds = unit.read()?;
-                    note(&own.scored.data);
-                    strangers = Some((method.key, own));
-                }
-                Case::NewObject { question, method, .. } => {
-                    let own: Scored = unit.read()?;
-                    note(&own.data);
-                    match taught.iter_mut().find(|(known, key, _)| known.name == question.name && *key == method.key) {
-                        Some((.., parts)) => parts.push(own),
-                        None => taught.push((question, method.key, vec![own])),
-                    }
-                }
-                Case::Guided { which, .. } => {
-                    let own: GuidedRounds = unit.read()?;
-                    note(&own.data);
-                    guided.push((which, own));
-                }
+                (Case::EmulatedNovelty { method }, Found::Emulated(own)) => strangers.push((method.key, own)),
+                (Case::Guided { which, .. }, Found::Guided(own)) => guided.push((which, own)),
+                (_, Found::Scored(own)) => left_out.push(own),
+                (_, Found::Answered(_) | Found::Emulated(_) | Found::Guided(_)) => {}
             }
         }
-        let title =
-            "Recognition beyond the paper: macro F1, for unknown objects the area under the curve, beside targets";
-        let columns = [
-            ("grasps", ""),
-            ("model", ""),
-            ("draws", ""),
-            ("one grasp", PERCENT),
-            ("to reach", PERCENT),
-            ("three grasps", PERCENT),
-            ("to reach after three", PERCENT),
-            ("beyond", ""),
-            ("reached", ""),
-            ("tested", "grasps"),
-        ];
-        let mut table = StudyTable::new(CARD.key, title, &columns);
-        for (question, key, parts) in &kinds {
-            let one = Pool::of(parts.iter().map(|part| &part.one));
-            let after = |part: &Answered| ModelAnswers { decided: part.three.clone(), ..part.one.clone() };
-            let three: Vec<ModelAnswers> = parts.iter().map(after).collect();
-            let three = Pool::of(&three);
-            let found = [one.f1(), three.f1()];
-            push(&mut table, [question.name, key], parts.len(), found, question.targets, (one.len(), one.misjudged()));
-        }
-        if !scored.is_empty() {
-            let found = [0, 1].map(|grasps| area(&scored, grasps));
+        let answered = grouped(answered);
+        let mut rows: Vec<Reached> = answered.iter().map(Reached::of_answers).collect();
+        if !left_out.is_empty() {
+            let found = [0, 1].map(|grasps| area(&left_out, grasps));
             let targets = NOVELTY_TARGETS.map(|both| both.map(Some));
-            let tested = scored.iter().map(|own| own.trials.len()).max().unwrap_or(0);
-            push(&mut table, [NOVELTY, NOVELTY_METHOD], scored.len(), found, targets, (tested, Vec::new()));
+            rows.push(Reached::of_scored([NOVELTY, NOVELTY_METHOD], found, targets, &left_out));
         }
-        let said = strangers.as_ref().map(|(_, own)| decisions(own));
-        if let Some((key, EmulatedRounds { scored, .. })) = strangers {
-            let (tested, all) = (scored.trials.len(), [scored]);
+        let said: Vec<StudyTable> = strangers.iter().map(|(_, own)| decisions(own)).collect();
+        for (model, EmulatedRounds { scored, .. }) in strangers {
+            let all = [scored];
             let found = [0, 1].map(|grasps| area(&all, grasps));
-            push(&mut table, [EMULATED_NOVELTY, key], 1, found, [[None; 2]; 2], (tested, Vec::new()));
+            rows.push(Reached::of_scored([EMULATED_NOVELTY, model], found, [[None; 2]; 2], &all));
         }
-        for (question, key, parts) in &taught {
-            let found = [0, 1].map(|grasps| mean_f1(parts, grasps));
-            let tested = parts.iter().map(|own| own.trials.len()).max().unwrap_or(0);
-            push(&mut table, [question.name, key], parts.len(), found, question.targets, (tested, Vec::new()));
+        for ((question, model), parts) in grouped(taught) {
+            let found = [0, 1].map(|grasps| mean_f1(&parts, grasps));
+            rows.push(Reached::of_scored([question.name, model], found, question.targets, &parts));
         }
         let next = (!guided.is_empty()).then(|| guided::table(&guided));
-        let tables = [Some(table), said, next, Some(costs(&kinds))];
-        Ok(StudyReport::new(data, tables.into_iter().flatten().collect(), Vec::new()))
+        let tables = [Reached::table(&rows)].into_iter().chain(said).chain(next).chain([costs(&answered)]);
+        StudyReport::new(data, tables.collect(), Vec::new())
     }
 
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        report.table(CARD.key).map(|(at, table)| figure(at, table)).into_iter().collect()
+    /// One plot for one grasp and one for three: a row for each question and model, with the target beside.
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        let Some(mut figure) = LinkedPlots::of(report, "recognition") else { return Vec::new() };
+        figure.named_once = true;
+        let names: Vec<String> =
+            figure.lines().map(|line| format!("{}, {}", line.text("grasps"), line.text("model"))).collect();
+        for (title, target) in [("one grasp", "to reach"), ("three grasps", "to reach after three")] {
+            figure.plots.push(Plot {
+                title: title.to_owned(),
+                x: PlotAxis { range: Some([0.0, 100.0]), ..PlotAxis::linear("macro F1, or area under the curve (%)") },
+                y: named_rows(&names),
+                ..Plot::default()
+            });
+            let shown = [(title, "reached", Marker::Dot), (target, "to reach", Marker::Ring)];
+            for (colour, (column, name, marker)) in shown.into_iter().enumerate() {
+                let lines = figure.lines().filter(|line| !line.value(column).is_nan());
+                let points = lines.map(|line| (line, line.percent_row(column, -(line.row as f64))));
+                figure.series(DataSeries { name: name.to_owned(), marker, ..dots(colour) }, points);
+            }
+        }
+        let note =
+            "Test grasps from collections with seeds of their own. 95 % intervals by bootstrap over test grasps.";
+        vec![Some(figure.figure("recognition", 2, [1240, 760], note))]
     }
 }
 
-/// Adds a row: what was found after one grasp and after three, and the targets.
-fn push(
-    table: &mut StudyTable,
-    names: [&str; 2],
+/// What was found after one grasp and after three, beside the targets.
+struct Reached {
+    names: [&'static str; 2],
     draws: usize,
     found: [Option<Interval>; 2],
-    [reach, beyond]: [[Option<f64>; 2]; 2],
-    (tested, misjudged): (usize, Vec<TrialId>),
-) {
-    let cell = |value: Option<f64>| value.map_or(Cell::Missing, Cell::Number);
-    let reaches = |targets: [Option<f64>; 2]| {
-        let both = found.iter().zip(targets).filter_map(|(found, target)| Some(found.as_ref()?.estimate >= target?));
-        both.collect::<Vec<bool>>()
-    };
-    let (reached, went_beyond) = (reaches(reach), reaches(beyond));
-    let verdict = match () {
-        () if reached.is_empty() => "-",
-        () if reached.contains(&false) => "no",
-        () if went_beyond.is_empty() || went_beyond.contains(&false) => "yes",
-        () => "beyond",
-    };
-    let listed: Vec<String> = beyond.iter().flatten().map(|target| format!("{:.0}", 100.0 * target)).collect();
-    table.push(
-        vec![
-            Cell::text(names[0]),
-            Cell::text(names[1]),
-            Cell::Number(draws as f64),
-            Cell::interval(found[0]),
-            cell(reach[0]),
-            Cell::interval(found[1]),
-            cell(reach[1]),
-            Cell::text(if listed.is_empty() { "-".to_owned() } else { listed.join(", ") }),
-            Cell::text(verdict),
-            Cell::Number(tested as f64),
-        ],
-        misjudged,
-    );
+    targets: Targets,
+    tested: usize,
+    misjudged: Vec<TrialId>,
+}
+
+/// Answers of all draws of a question by a method.
+type Draws = ((&'static Question, &'static str), Vec<Answered>);
+
+impl Reached {
+    fn of_answers(((question, model), parts): &Draws) -> Self {
+        let one = Pool::of(parts.iter().map(|part| &part.one));
+        let after = |part: &Answered| ModelAnswers { decided: part.three.clone(), ..part.one.clone() };
+        let three: Vec<ModelAnswers> = parts.iter().map(after).collect();
+        Self {
+            names: [question.name, model],
+            draws: parts.len(),
+            found: [one.f1(), Pool::of(&three).f1()],
+            targets: question.targets,
+            tested: one.len(),
+            misjudged: one.misjudged(),
+        }
+    }
+
+    fn of_scored(names: [&'static str; 2], found: [Option<Interval>; 2], targets: Targets, all: &[Scored]) -> Self {
+        let tested = all.iter().map(|own| own.trials.len()).max().unwrap_or(0);
+        Self { names, draws: all.len(), found, targets, tested, misjudged: Vec::new() }
+    }
+
+    fn beyond(&self) -> String {
+        let listed: Vec<String> =
+            self.targets[1].iter().flatten().map(|target| format!("{:.0}", 100.0 * target)).collect();
+        if listed.is_empty() { "-".to_owned() } else { listed.join(", ") }
+    }
+
+    fn verdict(&self) -> &'static str {
+        let [reached, went_beyond] = self.targets.map(|targets| {
+            let both = self.found.iter().zip(targets);
+            both.filter_map(|(found, target)| Some(found.as_ref()?.estimate >= target?)).collect::<Vec<bool>>()
+        });
+        match () {
+            () if reached.is_empty() => "-",
+            () if reached.contains(&false) => "no",
+            () if went_beyond.is_empty() || went_beyond.contains(&false) => "yes",
+            () => "beyond",
+        }
+    }
+
+    fn table(rows: &[Self]) -> StudyTable {
+        let title =
+            "Recognition beyond the paper: macro F1, for unknown objects the area under the curve, beside targets";
+        TableRows::new("recognition", title, rows).with_trials(&|row| row.misjudged.clone()).columns(&[
+            Column("grasps", "", &|row| row.names[0].into()),
+            Column("model", "", &|row| row.names[1].into()),
+            Column("draws", "", &|row| row.draws.into()),
+            Column("one grasp", PERCENT, &|row| row.found[0].into()),
+            Column("to reach", PERCENT, &|row| row.targets[0][0].into()),
+            Column("three grasps", PERCENT, &|row| row.found[1].into()),
+            Column("to reach after three", PERCENT, &|row| row.targets[0][1].into()),
+            Column("beyond", "", &|row| row.beyond().into()),
+            Column("reached", "", &|row| row.verdict().into()),
+            Column("tested", "grasps", &|row| row.tested.into()),
+        ])
+    }
 }
 
 /// What the models of the rows cost, means over draws.
-fn costs(kinds: &[(&'static Question, &'static str, Vec<Answered>)]) -> StudyTable {
-    let columns = [
-        ("grasps", ""),
-        ("model", ""),
-        ("training", "CPU s"),
-        ("answer", "ms"),
-        ("live step", "µs"),
-        ("file", "kB"),
-        ("parameters", ""),
-    ];
-    let mut table = StudyTable::new("costs", "Cost of the models", &columns);
-    for (question, key, parts) in kinds {
-        let mean = |of: &dyn Fn(&Answered) -> Option<f64>| {
-            let all: Option<Vec<f64>> = parts.iter().map(of).collect();
-            let all = all.filter(|all| !all.is_empty());
-            all.map_or(Cell::Missing, |all| Cell::Number(all.iter().sum::<f64>() / all.len() as f64))
-        };
-        let cost = |of: fn(&ModelAnswers) -> Option<f64>| mean(&|part| of(&part.one));
-        let row = vec![
-            Cell::text(question.name),
-            Cell::text(*key),
-            // Whatever made a shipped model is measured elsewhere.
-            if matches!(question.learns, Learns::Shipped(_)) {
-                Cell::Missing
-            } else {
-                cost(|own| Some(own.cost.train_cpu_s))
-            },
-            cost(|own| Some(own.cost.answer_ms)),
-            cost(|own| own.cost.step_us),
-            cost(|own| Some(own.cost.bytes as f64 * 1e-3)),
-            cost(|own| Some(own.cost.parameters as f64)),
-        ];
-        table.push(row, Vec::new());
-    }
-    table
-}
-
-/// One plot for one grasp and one for three: a row for each question and model, with the target as a line.
-fn figure(at: usize, table: &StudyTable) -> LinkedFigure {
-    let names: Vec<String> = (0..table.rows.len())
-        .map(|row| format!("{}, {}", table.text(row, "grasps"), table.text(row, "model")))
-        .collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    for (title, column, target) in
-        [("one grasp", "one grasp", "to reach"), ("three grasps", "three grasps", "to reach after three")]
-    {
-        let mut series = [(Marker::Dot, Vec::new()), (Marker::Ring, Vec::new())];
-        for row in 0..table.rows.len() {
-            for (number, (column, (_, points))) in [column, target].iter().zip(&mut series).enumerate() {
-                if table.cell(row, column).value().is_some() {
-                    let mark = FigureMark::Point(number, points.len());
-                    links.push(FigureLink { plot: plots.len(), mark, table: at, row });
-                    points.push(percent_row(table, row, column, -(row as f64)));
-                }
-            }
-        }
-        let shown = ["reached", "to reach"];
-        let series = series.into_iter().zip(shown).enumerate().map(|(colour, ((marker, points), name))| DataSeries {
-            name: if plots.is_empty() { name.to_owned() } else { String::new() },
-            colour,
-            line: LineStyle::None,
-            marker,
-            points,
-        });
-        plots.push(Plot {
-            title: title.to_owned(),
-            x: PlotAxis { range: Some([0.0, 100.0]), ..PlotAxis::linear("macro F1, or area under the curve (%)") },
-            y: named_rows(&names),
-            series: series.collect(),
-            ..Plot::default()
-        });
-    }
-    let note = "Test grasps from collections with seeds of their own. 95 % intervals by bootstrap over test grasps."
-        .to_owned();
-    let figure = Figure { title: table.title.clone(), plots, columns: 2, note };
-    LinkedFigure { name: CARD.key.to_owned(), figure, size: [1240, 760], links }
+fn costs(all: &[Draws]) -> StudyTable {
+    let mean = |(_, parts): &Draws, of: fn(&ModelAnswers) -> Option<f64>| -> Cell {
+        let all: Option<Vec<f64>> = parts.iter().map(|part| of(&part.one)).collect();
+        let all = all.filter(|all| !all.is_empty());
+        all.map(|all| all.iter().sum::<f64>() / all.len() as f64).into()
+    };
+    TableRows::new("costs", "Cost of the models", all).columns(&[
+        Column("grasps", "", &|row| row.0.0.name.into()),
+        Column("model", "", &|row| row.0.1.into()),
+        // Whatever made a shipped model is measured elsewhere.
+        Column("training", "CPU s", &|row| match row.0.0.learns {
+            Learns::Shipped(_) => Cell::Missing,
+            _ => mean(row, |own| Some(own.cost.train_cpu_s)),
+        }),
+        Column("answer", "ms", &|row| mean(row, |own| Some(own.cost.answer_ms))),
+        Column("live step", "µs", &|row| mean(row, |own| own.cost.step_us)),
+        Column("file", "kB", &|row| mean(row, |own| Some(own.cost.bytes as f64 * 1e-3))),
+        Column("parameters", "", &|row| mean(row, |own| Some(own.cost.parameters as f64))),
+    ])
 }

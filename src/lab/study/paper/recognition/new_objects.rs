@@ -1,6 +1,5 @@
 //! New objects: a model that knows all others is taught each object in turn, from simulated grasps alone.
 
-use super::super::UnitResult;
 use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
@@ -19,13 +18,13 @@ pub(super) fn new_object(
     left_out: &str,
     method: &Method,
     bench: &StudyBench<'_>,
-) -> Result<Option<UnitResult>, StudyError> {
+) -> Result<Scored, StudyError> {
     let plan = bench.plan();
-    let Some(test) = tested(question, bench)? else { return Ok(None) };
+    let test = tested(question, bench)?;
     let mut wanted = question.wanted(plan, plan.grasps(GRASPS, 20), POSES);
     // Sensors that are not drawn are read once.
     wanted.view.draws = plan.pick(READINGS, 2, 1);
-    let Some(all) = bench.data(&wanted)? else { return Ok(None) };
+    let all = bench.data(&wanted)?;
     check_apart(&all.examples, &test.examples)?;
     let of_class = |known: bool| -> Vec<usize> {
         let is_known = |k: &usize| all.labels.classes[all.examples[*k].class].name != left_out;
@@ -33,13 +32,12 @@ pub(super) fn new_object(
     };
     let known = all.part(&of_class(true)).without_empty_classes();
     let lesson = all.part(&of_class(false)).without_empty_classes();
-    let Some(model) = bench.fit(method, &known)? else { return Ok(None) };
-    let Some(model) = bench.teach(&model, &lesson)? else { return Ok(None) };
+    let model = bench.teach(&bench.fit(method, &known)?, &lesson)?;
     let missing = || StudyError::Missing(format!("grasps of {left_out}"));
     let new = model.card.labels.class(left_out).ok_or_else(missing)?;
     let test = test.relabelled(&model.card.labels).ok_or_else(missing)?;
     let says_new = |pmf: &Pmf| f64::from(u8::from(pmf.top().0 == new));
-    UnitResult::new(&Scored::of(&model, &test, |name| name == left_out, plan.seed, says_new)).map(Some)
+    Ok(Scored::of(&model, &test, |name| name == left_out, plan.seed, says_new))
 }
 
 /// Mean over the objects of the F1 of the object's class, over resampled trials.

@@ -1,11 +1,10 @@
 //! Known and unknown objects: each object is left out in turn, random shapes are the class "other", and its probability should
 //! be higher for the object that was left out.
 
-use super::super::UnitResult;
 use super::super::answers::BOOTSTRAP;
 use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::{DataWanted, POSES};
-use super::super::report::{Cell, PERCENT, StudyTable};
+use super::super::report::{Cell, Column, PERCENT, StudyTable, TableRows};
 use super::questions::QUESTIONS;
 use super::{emulated, tested};
 use crate::grasping::random_shapes;
@@ -29,7 +28,7 @@ const STRANGERS: std::ops::Range<u64> = 30_000..30_032;
 
 /// Score of each test grasp, and whether its object was left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Scored {
+pub(in crate::study::paper) struct Scored {
     pub(super) data: String,
     pub(super) trials: Vec<TrialId>,
     pub(super) is_new: Vec<bool>,
@@ -38,33 +37,29 @@ pub(super) struct Scored {
 }
 
 /// How surely each test grasp is of a known object, for a model that has not learned one of them.
-pub(super) fn novelty(
-    left_out: &str,
-    method: &Method,
-    bench: &StudyBench<'_>,
-) -> Result<Option<UnitResult>, StudyError> {
+pub(super) fn novelty(left_out: &str, method: &Method, bench: &StudyBench<'_>) -> Result<Scored, StudyError> {
     let plan = bench.plan();
     let grasps = plan.grasps(50, 20);
     let question = &QUESTIONS[0];
-    let Some(test) = tested(question, bench)? else { return Ok(None) };
-    let Some(all) = bench.data(&question.wanted(plan, grasps, POSES))? else { return Ok(None) };
+    let test = tested(question, bench)?;
+    let all = bench.data(&question.wanted(plan, grasps, POSES))?;
     let others = random_shapes(OTHERS.start..OTHERS.start + plan.pick(OTHERS.end - OTHERS.start, 100, 10));
     let wanted = DataWanted { objects: others, grasps: 1, ..question.wanted(plan, 1, POSES) };
-    let Some(others) = bench.data(&wanted)? else { return Ok(None) };
+    let others = bench.data(&wanted)?;
     let known: Vec<usize> =
         (0..all.examples.len()).filter(|k| all.labels.classes[all.examples[*k].class].name != left_out).collect();
     let other_channels = || StudyError::Missing("random shapes with the channels of the objects".to_owned());
     let train = all.part(&known).with(&others).ok_or_else(other_channels)?;
     check_apart(&train.examples, &test.examples)?;
-    let Some(model) = bench.fit(method, &train)? else { return Ok(None) };
+    let model = bench.fit(method, &train)?;
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
     let score = |pmf: &Pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln();
-    UnitResult::new(&Scored::of(&model, &test, |name| name == left_out, plan.seed, score)).map(Some)
+    Ok(Scored::of(&model, &test, |name| name == left_out, plan.seed, score))
 }
 
 /// Rounds with emulated grippers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct EmulatedRounds {
+pub(in crate::study::paper) struct EmulatedRounds {
     pub(super) scored: Scored,
     /// What the identification of window and commands says at the end of each round, and after how many grasps.
     decided: Vec<Decided>,
@@ -80,7 +75,7 @@ struct Decided {
 }
 
 /// How surely grasps of emulated grippers are of a known object, for the shipped model, and what is decided.
-pub(super) fn emulated_novelty(bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
+pub(super) fn emulated_novelty(bench: &StudyBench<'_>) -> Result<EmulatedRounds, StudyError> {
     let plan = bench.plan();
     let model = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
@@ -97,8 +92,7 @@ pub(super) fn emulated_novelty(bench: &StudyBench<'_>) -> Result<Option<UnitResu
         let class = if is_new(truth) { Some(other) } else { model.card.labels.class(truth) };
         Decided::of(&round.belief, &model.card, class)
     });
-    let decided = decided.collect();
-    UnitResult::new(&EmulatedRounds { scored, decided }).map(Some)
+    Ok(EmulatedRounds { scored, decided: decided.collect() })
 }
 
 impl Decided {
@@ -118,44 +112,35 @@ impl Decided {
     }
 }
 
+/// Share of rounds that something is said of, over resampled rounds.
+fn share(all: &[&Decided], said: impl Fn(&Decided) -> Option<bool>) -> Cell {
+    Cell::interval(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| {
+        let said: Vec<bool> = chosen.iter().filter_map(|k| said(all[*k])).collect();
+        Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
+    }))
+}
+
 /// Table of what is decided about known objects and others.
 pub(super) fn decisions(found: &EmulatedRounds) -> StudyTable {
-    let columns = [
-        ("objects", ""),
-        ("right", PERCENT),
-        ("said \"other\"", PERCENT),
-        ("sure", PERCENT),
-        ("right when sure", PERCENT),
-        ("grasps", ""),
-        ("rounds", ""),
-    ];
+    let mean_grasps = |all: &[&Decided]| {
+        let mean =
+            |chosen: &[usize]| chosen.iter().map(|k| all[*k].grasps as f64).sum::<f64>() / chosen.len().max(1) as f64;
+        Cell::interval(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| Some(mean(chosen))))
+    };
+    let rows = [("the sixteen", false), ("random shapes, none of them", true)].map(|(name, is_new)| {
+        let own = found.decided.iter().zip(&found.scored.is_new).filter(|(_, new)| **new == is_new);
+        (name, own.map(|(decided, _)| decided).collect::<Vec<&Decided>>())
+    });
     let title = "Grasps until sure, by emulated grippers, without labels: what the shipped model says";
-    let mut table = StudyTable::new("decisions", title, &columns);
-    for (name, is_new) in [("the sixteen", false), ("random shapes, none of them", true)] {
-        let own = || found.decided.iter().zip(&found.scored.is_new).filter(move |(_, new)| **new == is_new);
-        let all: Vec<&Decided> = own().map(|(decided, _)| decided).collect();
-        let strata = vec![0; all.len()];
-        let share = |of: &dyn Fn(&Decided) -> Option<bool>| {
-            Cell::interval(BOOTSTRAP.interval(&strata, |chosen| {
-                let said: Vec<bool> = chosen.iter().filter_map(|k| of(all[*k])).collect();
-                Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
-            }))
-        };
-        let grasps = |chosen: &[usize]| {
-            Some(chosen.iter().map(|k| all[*k].grasps as f64).sum::<f64>() / chosen.len().max(1) as f64)
-        };
-        let cells = vec![
-            Cell::text(name),
-            share(&|own| Some(own.right)),
-            share(&|own| Some(own.other)),
-            share(&|own| Some(own.sure)),
-            share(&|own| own.sure.then_some(own.right)),
-            Cell::interval(BOOTSTRAP.interval(&strata, grasps)),
-            Cell::Number(all.len() as f64),
-        ];
-        table.push(cells, Vec::new());
-    }
-    table
+    TableRows::new("decisions", title, &rows).columns(&[
+        Column("objects", "", &|(name, _)| (*name).into()),
+        Column("right", PERCENT, &|(_, all)| share(all, |own| Some(own.right))),
+        Column("said \"other\"", PERCENT, &|(_, all)| share(all, |own| Some(own.other))),
+        Column("sure", PERCENT, &|(_, all)| share(all, |own| Some(own.sure))),
+        Column("right when sure", PERCENT, &|(_, all)| share(all, |own| own.sure.then_some(own.right))),
+        Column("grasps", "", &|(_, all)| mean_grasps(all)),
+        Column("rounds", "", &|(_, all)| all.len().into()),
+    ])
 }
 
 impl Scored {

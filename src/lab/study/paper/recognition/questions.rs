@@ -43,6 +43,7 @@ pub(in crate::study::paper) enum Reads {
 }
 
 /// A row of the table.
+#[derive(PartialEq)]
 pub(in crate::study::paper) struct Question {
     pub(super) name: &'static str,
     pub(super) preset: &'static str,
@@ -52,9 +53,13 @@ pub(in crate::study::paper) struct Question {
     /// Methods; that of the shipped model where it is judged.
     pub(super) methods: &'static [&'static str],
     /// F1 to reach after one grasp and after three, and beyond that.
-    pub(super) targets: [[Option<f64>; 2]; 2],
+    pub(super) targets: Targets,
 }
 
+/// F1 to reach after one grasp and after three, and beyond that.
+pub(super) type Targets = [[Option<f64>; 2]; 2];
+
+const NETWORK: &[&str] = &["geometry-network"];
 const TREES: &[&str] = &["extra-trees", "geometry-trees"];
 const ALL: &[&str] = &["extra-trees", "geometry-trees", "geometry-network"];
 const VIRTUAL: Reads = Reads::Sensors { sensors: SensorModel::Virtual, build: 0.0 };
@@ -67,182 +72,147 @@ const FIFTY: Learns = Learns::Like { of_each: 50, draws: DRAWS };
 /// Grasps of grippers that are unknown in all respects.
 pub(in crate::study::paper) const UNLABELLED: &str = "no labels, unknown mechanics too, B";
 
+/// What most rows have in common.
+const USUAL: Question = Question {
+    name: "",
+    preset: "B",
+    fixed: false,
+    learns: FIFTY,
+    reads: VIRTUAL,
+    methods: NETWORK,
+    targets: [[None; 2]; 2],
+};
+
+/// Targets after one grasp alone: to reach, and beyond.
+const fn after_one(reach: f64, beyond: f64) -> Targets {
+    [[Some(reach), None], [Some(beyond), None]]
+}
+
+/// Targets after one grasp and after three: to reach, and beyond.
+const fn after_both(reach: [f64; 2], beyond: [f64; 2]) -> Targets {
+    [[Some(reach[0]), Some(reach[1])], [Some(beyond[0]), Some(beyond[1])]]
+}
+
 /// All rows.
-pub(super) const QUESTIONS: [Question; 17] = [
-    Question {
-        name: "B free, 50 of each",
-        preset: "B",
-        fixed: false,
-        learns: FIFTY,
-        reads: VIRTUAL,
-        methods: ALL,
-        targets: [[Some(0.84), Some(0.97)], [Some(0.87), Some(0.98)]],
-    },
+pub(super) static QUESTIONS: [Question; 17] = [
+    Question { name: "B free, 50 of each", methods: ALL, targets: after_both([0.84, 0.97], [0.87, 0.98]), ..USUAL },
     Question {
         name: "B fixed, 50 of each",
-        preset: "B",
         fixed: true,
-        learns: FIFTY,
-        reads: VIRTUAL,
         methods: ALL,
-        targets: [[Some(0.58), Some(0.83)], [Some(0.60), Some(0.85)]],
+        targets: after_both([0.58, 0.83], [0.60, 0.85]),
+        ..USUAL
     },
     Question {
         name: "B fixed, 400 of each",
-        preset: "B",
         fixed: true,
         learns: Learns::Like { of_each: LEARNED, draws: 1 },
-        reads: VIRTUAL,
         methods: &["geometry-trees", "geometry-network"],
         targets: [[Some(0.72), Some(0.94)], [Some(0.76), None]],
+        ..USUAL
     },
     Question {
         name: "A free, physical-like, 50 of each",
         preset: "A",
-        fixed: false,
-        learns: FIFTY,
         reads: PHYSICAL,
         methods: TREES,
-        targets: [[Some(0.95), None], [Some(0.96), None]],
+        targets: after_one(0.95, 0.96),
+        ..USUAL
     },
     Question {
         name: "A fixed, physical-like, 50 of each",
         preset: "A",
         fixed: true,
-        learns: FIFTY,
         reads: PHYSICAL,
         methods: TREES,
-        targets: [[Some(0.85), None], [Some(0.88), None]],
+        targets: after_one(0.85, 0.88),
+        ..USUAL
     },
     Question {
         name: "shipped model, B free",
-        preset: "B",
-        fixed: false,
         learns: Learns::Shipped(Shipped::PerfectSensors),
-        reads: VIRTUAL,
-        methods: &["geometry-network"],
         targets: [[Some(0.95), Some(0.995)], [Some(0.97), None]],
+        ..USUAL
     },
     Question {
         name: "shipped model, B free, mild noise",
-        preset: "B",
-        fixed: false,
         learns: Learns::Shipped(Shipped::PerfectSensors),
         reads: NOISY,
-        methods: &["geometry-network"],
-        targets: [[Some(0.90), None], [Some(0.93), None]],
+        targets: after_one(0.90, 0.93),
+        ..USUAL
     },
-    Question {
-        name: "shipped model, B fixed",
-        preset: "B",
-        fixed: true,
-        learns: Learns::Shipped(Shipped::FixedObjects),
-        reads: VIRTUAL,
-        methods: &["geometry-network"],
-        targets: [[None; 2]; 2],
-    },
+    Question { name: "shipped model, B fixed", fixed: true, learns: Learns::Shipped(Shipped::FixedObjects), ..USUAL },
     Question {
         name: "no labels, physical-like B",
-        preset: "B",
-        fixed: false,
         learns: Learns::Shipped(Shipped::AnyGripper),
         reads: ADAPTED,
-        methods: &["geometry-network"],
-        targets: [[Some(0.68), Some(0.90)], [Some(0.72), Some(0.93)]],
+        targets: after_both([0.68, 0.90], [0.72, 0.93]),
+        ..USUAL
     },
     Question {
         name: "no labels, physical-like A",
         preset: "A",
-        fixed: false,
         learns: Learns::Shipped(Shipped::AnyGripper),
         reads: ADAPTED,
-        methods: &["geometry-network"],
-        targets: [[None; 2]; 2],
+        ..USUAL
     },
     Question {
         name: "no labels, physical-like A, trained on A",
         preset: "A",
-        fixed: false,
         learns: Learns::Drawn { of_each: 150 },
         reads: ADAPTED,
-        methods: &["geometry-network"],
-        targets: [[Some(0.90), None], [Some(0.93), None]],
+        targets: after_one(0.90, 0.93),
+        ..USUAL
     },
     Question {
         name: UNLABELLED,
-        preset: "B",
-        fixed: false,
         learns: Learns::Shipped(Shipped::AnyGripper),
         reads: UNKNOWN,
-        methods: &["geometry-network"],
-        targets: [[Some(0.60), Some(0.85)], [Some(0.68), Some(0.90)]],
+        targets: after_both([0.60, 0.85], [0.68, 0.90]),
+        ..USUAL
     },
     Question {
         name: "no labels, emulated gripper, B",
-        preset: "B",
-        fixed: false,
         learns: Learns::Shipped(Shipped::AnyGripper),
         reads: Reads::Emulated,
-        methods: &["geometry-network"],
-        targets: [[Some(0.70), Some(0.93)], [Some(0.75), Some(0.95)]],
+        targets: after_both([0.70, 0.93], [0.75, 0.95]),
+        ..USUAL
     },
     Question {
         name: "control: shuffled labels, B free",
-        preset: "B",
-        fixed: false,
         learns: Learns::Shuffled { of_each: 50 },
-        reads: VIRTUAL,
         methods: &["geometry-trees"],
-        targets: [[None; 2]; 2],
+        ..USUAL
     },
     Question {
         name: "control: true size and shape given, B free",
-        preset: "B",
-        fixed: false,
         learns: Learns::Given { of_each: 50 },
-        reads: VIRTUAL,
         methods: &["geometry-trees"],
-        targets: [[None; 2]; 2],
+        ..USUAL
     },
     Question {
         name: "contact pressure, B free, 50 of each",
-        preset: "B",
-        fixed: false,
-        learns: FIFTY,
         reads: Reads::Contact,
         methods: &["extra-trees"],
-        targets: [[None; 2]; 2],
+        ..USUAL
     },
     Question {
         name: "contact pressure, B fixed, 50 of each",
-        preset: "B",
         fixed: true,
-        learns: FIFTY,
         reads: Reads::Contact,
         methods: &["extra-trees"],
-        targets: [[None; 2]; 2],
+        ..USUAL
     },
 ];
 
 /// Rows of new objects: each object in turn is taught to a model of the others; F1 of its class.
-pub(super) const NEW_OBJECTS: [Question; 2] = [
-    Question {
-        name: "new object by its file, B free",
-        preset: "B",
-        fixed: false,
-        learns: FIFTY,
-        reads: VIRTUAL,
-        methods: &["geometry-network"],
-        targets: [[Some(0.80), None], [Some(0.90), None]],
-    },
+pub(super) static NEW_OBJECTS: [Question; 2] = [
+    Question { name: "new object by its file, B free", targets: after_one(0.80, 0.90), ..USUAL },
     Question {
         name: "new object by its file, unknown gripper",
-        preset: "B",
-        fixed: false,
-        learns: FIFTY,
         reads: UNKNOWN,
-        methods: &["geometry-network"],
-        targets: [[Some(0.60), None], [Some(0.70), None]],
+        targets: after_one(0.60, 0.70),
+        ..USUAL
     },
 ];
 

@@ -1,5 +1,6 @@
 //! Bodies of known shape and width, grasped centred, and the settings of the gripper that are varied with them.
 
+use super::super::report::PERCENT;
 use super::course::{Course, Grasped, Signature, median, rank_correlation};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
@@ -98,24 +99,26 @@ fn with_width(all: &[&Signature], shape: Option<&str>, number: impl Fn(&Signatur
 /// A number over many grasps.
 pub(super) type Statistic = fn(&[&Signature]) -> Option<f64>;
 
-/// The numbers of a [`Summary`], in its order.
-pub(super) const STATISTICS: [Statistic; 10] = [
-    |all| median_of(all, None, |own| own.rises),
-    |all| median_of(all, None, |own| Some(own.before)),
-    |all| median_of(all, Some(ROUND), |own| own.rate),
-    |all| median_of(all, Some(FLAT), |own| own.rate),
-    |all| median_of(all, Some(FLAT), |own| own.line),
-    |all| median_of(all, Some(ROUND), |own| Some(own.share)),
-    |all| median_of(all, Some(FLAT), |own| Some(own.share)),
-    |all| with_width(all, Some(ROUND), |own| own.bend).map(|falls| -falls),
-    |all| median_of(all, None, |own| Some(own.rise_s)),
-    |all| with_width(all, None, |own| own.onset_s),
+/// The numbers of a [`Summary`], in its order: heading, unit, number.
+pub(super) const STATISTICS: [(&str, &str, Statistic); 10] = [
+    ("bending with time before contact, rank correlation", "", |all| median_of(all, None, |own| own.rises)),
+    ("pressure before contact", PERCENT, |all| median_of(all, None, |own| Some(own.before))),
+    ("rate after contact, round", PERCENT, |all| median_of(all, Some(ROUND), |own| own.rate)),
+    ("rate after contact, flat", PERCENT, |all| median_of(all, Some(FLAT), |own| own.rate)),
+    ("line after contact, flat (R²)", "", |all| median_of(all, Some(FLAT), |own| own.line)),
+    ("bending after contact, round", PERCENT, |all| median_of(all, Some(ROUND), |own| Some(own.share))),
+    ("bending after contact, flat", PERCENT, |all| median_of(all, Some(FLAT), |own| Some(own.share))),
+    ("bending with curvature of round objects, rank correlation", "", |all| {
+        with_width(all, Some(ROUND), |own| own.bend).map(|falls| -falls)
+    }),
+    ("time to 90 % of pressure", "s", |all| median_of(all, None, |own| Some(own.rise_s))),
+    ("onset with width, rank correlation", "", |all| with_width(all, None, |own| own.onset_s)),
 ];
 
 impl Summary {
     pub(super) fn of<'a>(signatures: impl IntoIterator<Item = &'a Signature>) -> Self {
         let all: Vec<&Signature> = signatures.into_iter().collect();
-        let numbers = STATISTICS.map(|statistic| statistic(&all));
+        let numbers = STATISTICS.map(|(.., statistic)| statistic(&all));
         let [rises, before, round_rate, flat_rate, flat_line, round_share, flat_share, curvature, rise_s, size] =
             numbers;
         Self {
@@ -165,7 +168,7 @@ pub(super) fn papers_scene() -> Scene {
 }
 
 /// Settings varied about the paper's scene.
-pub(super) const VARIED: [Varied; 6] = [
+pub(super) static VARIED: [Varied; 6] = [
     Varied {
         name: "torque at 1 bar",
         unit: "mN m",

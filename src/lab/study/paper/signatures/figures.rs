@@ -1,97 +1,63 @@
 //! Figures of signatures: curves over time, rates after contact by width, and settings about the paper's scene.
 
+use super::super::drawing::LinkedPlots;
+use super::super::report::{LinkedFigure, StudyReport};
+use super::super::rows::unique;
 use super::bodies::{FLAT, ROUND, VARIED};
 use super::{BODIES, DEFAULT, PAPER};
-use crate::study::paper::report::{FigureLink, FigureMark, LinkedFigure, StudyReport, StudyTable};
-use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
+use palpate_geometry::drawing::{DataPoint, DataSeries, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 
-pub(super) fn all(report: &StudyReport) -> Vec<LinkedFigure> {
-    let table = |name: &str| report.table(name);
-    let figures = [table("curves").map(curves), table("objects").and_then(rates), table("settings").map(settings)];
-    figures.into_iter().flatten().collect()
+pub(super) fn all(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+    let of = |table: &str, title: &str| {
+        let mut figure = LinkedPlots::of(report, table)?;
+        (figure.named_once, figure.title) = (true, title.to_owned());
+        Some(figure)
+    };
+    let curves = of("curves", "Tactile signatures, means of both fingers").map(curves);
+    let rates = of("objects", "Contact and what follows it, by width and shape").and_then(rates);
+    let title = "For what finger the sentences hold: scene paper with one setting changed";
+    vec![curves, rates, of("settings", title).map(settings)]
 }
 
-fn value(table: &StudyTable, row: usize, column: &str) -> f64 {
-    table.cell(row, column).value().unwrap_or(f64::NAN)
+fn plot(title: String, x: &str, y: String) -> Plot {
+    Plot { title, x: PlotAxis::linear(x), y: PlotAxis::linear(y), ..Plot::default() }
 }
 
 /// Bending and pressure over time, the default gripper above that of the paper's scene.
-fn curves((at, table): (usize, &StudyTable)) -> LinkedFigure {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
+fn curves(mut figure: LinkedPlots<'_>) -> LinkedFigure {
     for gripper in [DEFAULT, PAPER] {
         for (column, unit) in [("bending", "1/m"), ("pressure", "kPa")] {
-            let mut plot = Plot {
-                title: format!("Scene {gripper}: {column}"),
-                x: PlotAxis::linear("time (s)"),
-                y: PlotAxis::linear(format!("{column} ({unit})")),
-                ..Plot::default()
-            };
-            for (colour, class) in table.texts("class").into_iter().enumerate() {
-                let rows = table.rows_with(&[("gripper", gripper), ("class", class)]);
-                for (point, row) in rows.iter().enumerate() {
-                    let mark = FigureMark::Point(plot.series.len(), point);
-                    links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
-                }
-                let points =
-                    rows.iter().map(|row| DataPoint::new(value(table, *row, "time"), value(table, *row, column)));
+            figure.plots.push(plot(format!("Scene {gripper}: {column}"), "time (s)", format!("{column} ({unit})")));
+            for (colour, class) in unique(figure.lines().map(|line| line.text("class"))).into_iter().enumerate() {
+                let lines = figure.lines_with(&[("gripper", gripper), ("class", class)]).into_iter();
+                let points = lines.map(|line| (line, DataPoint::new(line.value("time"), line.value(column))));
                 let line = if class.starts_with("tiny") { LineStyle::Thin } else { LineStyle::Bold };
-                let name = if plots.is_empty() { class.to_owned() } else { String::new() };
-                plot.series.push(DataSeries { name, colour, line, points: points.collect(), ..DataSeries::default() });
+                figure.series(DataSeries { name: class.to_owned(), colour, line, ..DataSeries::default() }, points);
             }
-            plots.push(plot);
         }
     }
-    let figure = Figure {
-        title: "Tactile signatures, means of both fingers".to_owned(),
-        plots,
-        columns: 2,
-        note: "Objects centred and as placed. Bending: circle through the joints; pressure: force over contact area."
-            .to_owned(),
-    };
-    LinkedFigure { name: "signatures-curves".to_owned(), figure, size: [1080, 820], links }
+    let note = "Objects centred and as placed. Bending: circle through the joints; pressure: force over contact area.";
+    figure.figure("signatures-curves", 2, [1080, 820], note)
 }
 
 /// Onset and rate after contact against the width of bodies.
-fn rates((at, table): (usize, &StudyTable)) -> Option<LinkedFigure> {
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
+fn rates(mut figure: LinkedPlots<'_>) -> Option<LinkedFigure> {
     for (column, unit, scale) in [("onset", "s", 1.0), ("rate after contact", "% of that before", 100.0)] {
         for gripper in [DEFAULT, PAPER] {
-            let mut plot = Plot {
-                title: format!("Scene {gripper}: {column}"),
-                x: PlotAxis::linear("width (mm)"),
-                y: PlotAxis::linear(format!("{column} ({unit})")),
-                ..Plot::default()
-            };
-            if unit != "s" {
-                plot.references = thresholds();
+            let plot = plot(format!("Scene {gripper}: {column}"), "width (mm)", format!("{column} ({unit})"));
+            let references = if unit == "s" { Vec::new() } else { thresholds() };
+            figure.plots.push(Plot { references, ..plot });
+            for (colour, (shape, marker)) in [(ROUND, Marker::Dot), (FLAT, Marker::Square)].into_iter().enumerate() {
+                let lines =
+                    figure.lines_with(&[("gripper", gripper), ("grasps", BODIES), ("shape", shape)]).into_iter();
+                let points = lines.map(|line| (line, DataPoint::new(line.value("width"), scale * line.value(column))));
+                figure.series(DataSeries { name: shape.to_owned(), colour, marker, ..DataSeries::default() }, points);
             }
-            for (colour, shape) in [ROUND, FLAT].into_iter().enumerate() {
-                let rows = table.rows_with(&[("gripper", gripper), ("grasps", BODIES), ("shape", shape)]);
-                for (point, row) in rows.iter().enumerate() {
-                    let mark = FigureMark::Point(plot.series.len(), point);
-                    links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
-                }
-                let points = rows
-                    .iter()
-                    .map(|row| DataPoint::new(value(table, *row, "width"), scale * value(table, *row, column)));
-                let marker = if shape == ROUND { Marker::Dot } else { Marker::Square };
-                let name = if plots.is_empty() { shape.to_owned() } else { String::new() };
-                plot.series.push(DataSeries {
-                    name,
-                    colour,
-                    marker,
-                    points: points.collect(),
-                    ..DataSeries::default()
-                });
-            }
-            plots.push(plot);
         }
     }
-    let any = plots.iter().any(|plot| plot.series.iter().any(|series| !series.points.is_empty()));
-    let note = "Balls, lying cylinders, cubes and tall blocks, centred.".to_owned();
-    let title = "Contact and what follows it, by width and shape".to_owned();
-    let figure = Figure { title, plots, columns: 2, note };
-    any.then(|| LinkedFigure { name: "signatures-rates".to_owned(), figure, size: [1000, 760], links })
+    let any = figure.plots.iter().any(|plot| !plot.series.is_empty());
+    let note = "Balls, lying cylinders, cubes and tall blocks, centred.";
+    any.then(|| figure.figure("signatures-rates", 2, [1000, 760], note))
 }
 
 fn thresholds() -> Vec<ReferenceLine> {
@@ -99,63 +65,41 @@ fn thresholds() -> Vec<ReferenceLine> {
     vec![line(20.0, "steady below"), line(25.0, "increase above")]
 }
 
-/// Longest rise of pressure that is early.
-fn soon() -> ReferenceLine {
-    ReferenceLine { horizontal: true, at: 0.2, text: String::new() }
-}
-
 /// Rates, and below them the rise of pressure, against each setting of the paper's scene.
-fn settings((at, table): (usize, &StudyTable)) -> LinkedFigure {
+fn settings(mut figure: LinkedPlots<'_>) -> LinkedFigure {
     const RATES: [(&str, &str, Marker); 2] =
         [("rate after contact, round", "round", Marker::Dot), ("rate after contact, flat", "flat", Marker::Square)];
-    const RISE: [(&str, &str, Marker); 1] = [("time to 90 % of pressure", "both", Marker::Ring)];
-    let rows_of = [(&RATES[..], "rate after contact (%)", 100.0), (&RISE[..], "time to 90 % of pressure (s)", 1.0)];
-    let (mut plots, mut links) = (Vec::new(), Vec::new());
-    for (columns, title, scale) in rows_of {
+    const RISE: [(&str, &str, Marker); 1] = [("time to 90 % of pressure", "", Marker::Ring)];
+    let horizontal = |at: &f64| ReferenceLine { horizontal: true, at: *at, text: String::new() };
+    let vertical = |at: f64, text: &str| ReferenceLine { horizontal: false, at, text: text.to_owned() };
+    // Limits: steady below and increase above; longest rise of pressure that is early.
+    for (columns, title, scale, limits) in [
+        (&RATES[..], "rate after contact (%)", 100.0, &[20.0, 25.0][..]),
+        (&RISE[..], "time to 90 % of pressure (s)", 1.0, &[0.2][..]),
+    ] {
         for varied in &VARIED {
-            let rows = table.rows_with(&[("setting", varied.name)]);
             let unit = if varied.unit.is_empty() { String::new() } else { format!(" ({})", varied.unit) };
             let [usual, papers] = varied.known();
-            let vertical = |at: f64, text: &str| ReferenceLine { horizontal: false, at, text: text.to_owned() };
-            let both = (usual - papers).abs() < 1e-9 * papers.abs();
-            let marks = if both {
+            let scenes = if (usual - papers).abs() < 1e-9 * papers.abs() {
                 vec![vertical(papers, "both")]
             } else {
                 vec![vertical(usual, DEFAULT), vertical(papers, PAPER)]
             };
-            let limits = if scale == 1.0 { vec![soon()] } else { thresholds() };
-            let mut plot = Plot {
+            figure.plots.push(Plot {
                 x: PlotAxis::logarithmic(format!("{}{unit}", varied.name)),
                 y: PlotAxis::linear(title),
-                references: limits
-                    .into_iter()
-                    .map(|line| ReferenceLine { text: String::new(), ..line })
-                    .chain(marks)
-                    .collect(),
+                references: limits.iter().map(horizontal).chain(scenes).collect(),
                 ..Plot::default()
-            };
+            });
             for (colour, (column, name, marker)) in columns.iter().enumerate() {
-                for (point, row) in rows.iter().enumerate() {
-                    let mark = FigureMark::Point(plot.series.len(), point);
-                    links.push(FigureLink { plot: plots.len(), mark, table: at, row: *row });
-                }
-                let points = rows
-                    .iter()
-                    .map(|row| DataPoint::new(value(table, *row, "value"), scale * value(table, *row, column)));
-                let name = if plots.is_empty() { (*name).to_owned() } else { String::new() };
-                let (line, marker) = (LineStyle::Thin, *marker);
-                plot.series.push(DataSeries { name, colour, marker, line, points: points.collect() });
+                let lines = figure.lines_with(&[("setting", varied.name)]).into_iter();
+                let points = lines.map(|line| (line, DataPoint::new(line.value("value"), scale * line.value(column))));
+                let (name, line, marker) = ((*name).to_owned(), LineStyle::Thin, *marker);
+                figure.series(DataSeries { name, colour, marker, line, points: Vec::new() }, points);
             }
-            plots.push(plot);
         }
     }
-    let figure = Figure {
-        title: "For what finger the sentences hold: scene paper with one setting changed".to_owned(),
-        plots,
-        columns: VARIED.len(),
-        note: "Bending after contact over that before it: round objects steady below 20 %, flat ones increasing above 25 %; \
-               pressure saturates early below 0.2 s."
-            .to_owned(),
-    };
-    LinkedFigure { name: "signatures-settings".to_owned(), figure, size: [1560, 620], links }
+    let note = "Bending after contact over that before it: round objects steady below 20 %, flat ones increasing above 25 %; \
+                pressure saturates early below 0.2 s.";
+    figure.figure("signatures-settings", VARIED.len(), [1560, 620], note)
 }

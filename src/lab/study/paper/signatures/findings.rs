@@ -1,14 +1,16 @@
 //! The sentences of section V-A beside our numbers.
 
+use super::super::judging::Claim;
+use super::super::report::{Agreement, Finding};
 use super::bodies::Summary;
-use super::{DEFAULT, PAPER};
-use crate::study::paper::report::{Agreement, Finding};
+use super::{DEFAULT, Found, PAPER};
 
 /// Sentences in numbers for one kind of grasps with one gripper.
 pub(super) struct Measured {
     pub(super) gripper: &'static str,
     pub(super) kind: String,
     pub(super) summary: Summary,
+    pub(super) found: Found,
 }
 
 /// A sentence judged.
@@ -104,25 +106,19 @@ pub(super) fn sentences(own: &Summary) -> [Sentence; 5] {
 
 /// Each sentence for the default gripper and for the paper's scene, or for stored trials.
 pub(super) fn findings(measured: &[Measured]) -> Vec<Finding> {
-    let grippers = [DEFAULT, PAPER, "stored"].into_iter().filter(|own| measured.iter().any(|m| m.gripper == *own));
     let mut findings = Vec::new();
-    for gripper in grippers {
-        let own: Vec<&Measured> = measured.iter().filter(|m| m.gripper == gripper).collect();
-        let judged: Vec<[Sentence; 5]> = own.iter().map(|m| sentences(&m.summary)).collect();
-        for at in 0..5 {
-            let found = own.iter().zip(&judged).map(|(m, all)| format!("{}: {}", m.kind, all[at].found));
-            let about = match gripper {
-                DEFAULT => " (default gripper, free objects)".to_owned(),
-                PAPER => " (scene paper, fixed objects)".to_owned(),
-                other => format!(" ({other} trials)"),
-            };
-            findings.push(Finding {
-                section: "V-A".to_owned(),
-                claim: format!("{}{about}", judged[0][at].claim),
-                found: found.collect::<Vec<_>>().join("; "),
-                verdict: Agreement::of_all(judged.iter().map(|all| all[at].verdict)),
-                why: judged[0][at].rule.to_owned(),
-            });
+    let abouts = [
+        (DEFAULT, " (default gripper, free objects)"),
+        (PAPER, " (scene paper, fixed objects)"),
+        ("stored", " (stored trials)"),
+    ];
+    for (gripper, about) in abouts {
+        let own = measured.iter().filter(|own| own.gripper == gripper);
+        let judged: Vec<_> = own.map(|own| (own.kind.as_str(), sentences(&own.summary))).collect();
+        let Some((_, first)) = judged.first() else { continue };
+        for (at, Sentence { claim, rule, .. }) in first.iter().enumerate() {
+            let found = judged.iter().map(|(kind, all)| (format!("{kind}: {}", all[at].found), all[at].verdict));
+            findings.push(Claim("V-A", &format!("{claim}{about}"), rule).of_each("", found));
         }
     }
     findings

@@ -6,32 +6,27 @@ mod course;
 mod figures;
 mod findings;
 
+use super::StudyCard;
+use super::answers::SHOWN;
 use super::bench::{StudyBench, StudyError};
 use super::plan::{DataWanted, StudyPlan};
-use super::report::{Cell, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::{PaperStudy, StudyCard, StudyUnit, UnitResult};
+use super::report::{Agreement, Cell, Column, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
+use super::study::{Study, StudyCell};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
-use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, WIDTHS, papers_scene, papers_view};
+use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, Varied, WIDTHS, papers_scene, papers_view};
 use course::{Course, Grasped, Signature, median};
-use findings::{Measured, findings};
+use findings::{Measured, findings, sentences};
+use palpate_learn::Method;
 use palpate_learn::metrics::Bootstrap;
 use palpate_sim::objects::{ObjectModel, catalogue};
 use palpate_sim::scene::Scene;
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::{SimulatedTrial, TrialId};
+use palpate_tactile::trial::SimulatedTrial;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct TactileSignatures;
-
-const CARD: StudyCard = StudyCard {
-    key: "signatures",
-    title: "Tactile signatures",
-    about: "bending and pressure before and after contact; which of the paper's sentences hold, and for what finger",
-    paper: "Fig. 4a",
-    budget: "about 1 CPU minute",
-};
 
 /// Grasps of each object in random poses.
 const GRASPS: usize = 40;
@@ -50,56 +45,38 @@ fn scene_of(gripper: &str) -> Scene {
     scene
 }
 
-/// Kinds of grasps, by their names in tables.
+/// Name of centred bodies in tables.
 const BODIES: &str = "bodies, centred";
-const OBJECTS: &str = "objects, centred";
 
-/// A unit of work.
-enum Unit {
-    /// Bodies of known width, or the built-in objects, centred and as placed.
-    Centred { gripper: &'static str, kind: &'static str },
-    /// Objects in random poses.
-    Posed { gripper: &'static str, view: SensorView },
-    /// Trials of the plan's query.
-    Stored(SensorView),
-    /// A setting about the paper's scene.
-    Varied(usize),
+/// A unit of work: a gripper and grasps by it.
+pub(super) struct Unit {
+    gripper: &'static str,
+    /// Name of the grasps in tables.
+    kind: String,
+    grasps: Grasps,
 }
 
-impl Unit {
-    fn all(plan: &StudyPlan) -> Vec<Self> {
-        if plan.query.is_some() {
-            return plan.sensors.iter().map(|&sensors| Self::Stored(view_of(sensors))).collect();
-        }
-        let mut units = Vec::new();
-        for gripper in [DEFAULT, DEFAULT_FIXED, PAPER] {
-            units.extend([BODIES, OBJECTS].map(|kind| Self::Centred { gripper, kind }));
-        }
-        for gripper in [DEFAULT, PAPER] {
-            for &sensors in &plan.sensors {
-                let papers = (sensors == SensorModel::Virtual).then(papers_view);
-                let views = papers.into_iter().chain([view_of(sensors)]);
-                units.extend(views.map(|view| Self::Posed { gripper, view }));
-            }
-        }
-        units.extend((0..VARIED.len()).map(Self::Varied));
-        units
+/// Grasps of a unit.
+enum Grasps {
+    /// Bodies of known width, centred.
+    Bodies,
+    /// The built-in objects, centred and as placed.
+    Objects,
+    /// Objects in random poses.
+    Posed(SensorView),
+    /// Trials of the plan's query.
+    Stored(SensorView),
+    /// Bodies, with a setting varied about the paper's scene.
+    Varied(&'static Varied),
+}
+
+impl StudyCell for Unit {
+    fn name(&self) -> String {
+        format!("{}: {}", self.gripper, self.kind)
     }
 
-    /// Its gripper and kind of grasps.
-    fn kind(&self, plan: &StudyPlan) -> (&'static str, String) {
-        let read = |view: &SensorView| format!("{}, {}", view.sensors.name(), view.signals.name());
-        match self {
-            Self::Centred { gripper, kind } => (gripper, (*kind).to_owned()),
-            Self::Posed { gripper, view } => (gripper, format!("preset {}, {}", plan.preset, read(view))),
-            Self::Stored(view) => ("stored", read(view)),
-            Self::Varied(at) => (PAPER, VARIED[*at].name.to_owned()),
-        }
-    }
-
-    fn name(&self, plan: &StudyPlan) -> String {
-        let (gripper, kind) = self.kind(plan);
-        format!("{gripper}: {kind}")
+    fn method(&self) -> Option<&'static Method> {
+        None
     }
 }
 
@@ -110,7 +87,7 @@ fn view_of(sensors: SensorModel) -> SensorView {
 /// Result of a unit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-struct Found {
+pub(super) struct Found {
     /// Description of the data.
     data: String,
     signatures: Vec<Signature>,
@@ -123,7 +100,7 @@ struct Found {
 
 /// Course of one grasp, thinned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Curve {
+pub(super) struct Curve {
     object: String,
     size: String,
     shape: String,
@@ -166,15 +143,16 @@ fn width_mm(trial: &SimulatedTrial, object: &ObjectModel) -> Option<f64> {
     Some(1e3 * (object.resting.reach(across) + object.resting.reach(-across)))
 }
 
-fn centred(plan: &StudyPlan, gripper: &str, kind: &str) -> Found {
-    let scene = scene_of(gripper);
+/// Bodies, centred.
+fn bodies_found(plan: &StudyPlan, scene: &Scene) -> Found {
+    let widths = plan.pick(WIDTHS.as_slice(), &WIDTHS, &WIDTHS[..2]);
+    let signatures = bodies::signatures(scene, widths);
+    Found { lost: bodies::bodies(widths).len() - signatures.len(), signatures, ..Found::default() }
+}
+
+/// Built-in objects, centred and as placed.
+fn objects_found(plan: &StudyPlan, scene: &Scene) -> Found {
     let mut found = Found::default();
-    if kind == BODIES {
-        let widths = plan.pick(WIDTHS.as_slice(), &WIDTHS, &WIDTHS[..2]);
-        found.signatures = bodies::signatures(&scene, widths);
-        found.lost = bodies::bodies(widths).len() - found.signatures.len();
-        return found;
-    }
     for name in plan.objects() {
         let mut scene = scene.clone();
         scene.object.source.clone_from(&name);
@@ -194,8 +172,8 @@ fn centred(plan: &StudyPlan, gripper: &str, kind: &str) -> Found {
 }
 
 /// Signatures of the grasps of a data set.
-fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Option<Found>, StudyError> {
-    let Some(data) = bench.data(wanted)? else { return Ok(None) };
+fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Found, StudyError> {
+    let data = bench.data(wanted)?;
     let models: BTreeMap<&str, ObjectModel> = catalogue()
         .iter()
         .filter_map(|known| {
@@ -206,9 +184,7 @@ fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Option<Found>,
         .collect();
     let mut found = Found { data: data.about.described(), ..Found::default() };
     for example in &data.examples {
-        if bench.is_cancelled() {
-            return Ok(None);
-        }
+        bench.go_on()?;
         let class = &data.labels.classes[example.class];
         let course = Course::of(&data.channels, &example.grasp);
         let course = course.ok_or_else(|| {
@@ -226,77 +202,98 @@ fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Option<Found>,
         }
         found.signatures.push(signature);
     }
-    Ok(Some(found))
+    Ok(found)
 }
 
-impl PaperStudy for TactileSignatures {
-    fn card(&self) -> StudyCard {
-        CARD
+impl Study for TactileSignatures {
+    type Cell = Unit;
+    type Found = Found;
+
+    const CARD: StudyCard = StudyCard {
+        key: "signatures",
+        title: "Tactile signatures",
+        about: "bending and pressure before and after contact; which of the paper's sentences hold, and for what finger",
+        paper: "Fig. 4a",
+        budget: "about 1 CPU minute",
+    };
+
+    fn grid(plan: &StudyPlan) -> Vec<Unit> {
+        let read = |view: &SensorView| format!("{}, {}", view.sensors.name(), view.signals.name());
+        if plan.query.is_some() {
+            let stored = plan.sensors.iter().map(|&sensors| view_of(sensors));
+            return stored
+                .map(|view| Unit { gripper: "stored", kind: read(&view), grasps: Grasps::Stored(view) })
+                .collect();
+        }
+        let mut units = Vec::new();
+        for gripper in [DEFAULT, DEFAULT_FIXED, PAPER] {
+            units.push(Unit { gripper, kind: BODIES.to_owned(), grasps: Grasps::Bodies });
+            units.push(Unit { gripper, kind: "objects, centred".to_owned(), grasps: Grasps::Objects });
+        }
+        for gripper in [DEFAULT, PAPER] {
+            for &sensors in &plan.sensors {
+                let papers = (sensors == SensorModel::Virtual).then(papers_view);
+                units.extend(papers.into_iter().chain([view_of(sensors)]).map(|view| {
+                    let kind = format!("preset {}, {}", plan.preset, read(&view));
+                    Unit { gripper, kind, grasps: Grasps::Posed(view) }
+                }));
+            }
+        }
+        let varied =
+            |own: &'static Varied| Unit { gripper: PAPER, kind: own.name.to_owned(), grasps: Grasps::Varied(own) };
+        units.extend(VARIED.iter().map(varied));
+        units
     }
 
-    fn units(&self, plan: &StudyPlan) -> Vec<StudyUnit> {
-        Unit::all(plan).iter().map(|unit| StudyUnit { name: unit.name(plan), method: None }).collect()
-    }
-
-    fn measure(&self, unit: &str, bench: &StudyBench<'_>) -> Result<Option<UnitResult>, StudyError> {
-        let plan = bench.plan();
-        let own = Unit::all(plan).into_iter().find(|own| own.name(plan) == unit);
-        let found = match own.ok_or_else(|| StudyError::Unknown(format!("unit {unit}")))? {
-            Unit::Centred { gripper, kind } => Some(centred(plan, gripper, kind)),
-            Unit::Posed { gripper, view } => {
-                let (scene, usual) = (scene_of(gripper), plan.wanted(plan.grasps(GRASPS, QUICK), view.sensors));
-                of_data(bench, &DataWanted { fixed: scene.holds_object(), scene, view, ..usual })?
+    fn measure(unit: &Unit, bench: &StudyBench<'_>) -> Result<Found, StudyError> {
+        let (plan, scene) = (bench.plan(), scene_of(unit.gripper));
+        let found = match &unit.grasps {
+            Grasps::Bodies => bodies_found(plan, &scene),
+            Grasps::Objects => objects_found(plan, &scene),
+            Grasps::Posed(view) => {
+                let usual = plan.wanted(plan.grasps(GRASPS, QUICK), view.sensors);
+                of_data(bench, &DataWanted { fixed: scene.holds_object(), scene, view: view.clone(), ..usual })?
             }
-            Unit::Stored(view) => {
-                let usual = plan.wanted(usize::MAX, view.sensors);
-                of_data(bench, &DataWanted { view, ..usual })?
+            Grasps::Stored(view) => {
+                of_data(bench, &DataWanted { view: view.clone(), ..plan.wanted(usize::MAX, view.sensors) })?
             }
-            Unit::Varied(at) => {
+            Grasps::Varied(own) => {
                 let widths = plan.pick(WIDTHS.as_slice(), &WIDTHS[..4], &WIDTHS[..1]);
-                let values = VARIED[at]
+                let is_wanted = |value: &&f64| plan.pick(true, true, own.known().contains(value));
+                let varied = own
                     .values
                     .iter()
-                    .filter(|value| plan.pick(true, true, VARIED[at].known().iter().any(|known| known == *value)));
-                let varied =
-                    values.map(|&value| (value, Summary::of(&bodies::signatures(&VARIED[at].scene(value), widths))));
-                Some(Found { varied: varied.take_while(|_| !bench.is_cancelled()).collect(), ..Found::default() })
+                    .filter(is_wanted)
+                    .map(|&value| (value, Summary::of(&bodies::signatures(&own.scene(value), widths))));
+                Found { varied: varied.take_while(|_| !bench.is_cancelled()).collect(), ..Found::default() }
             }
         };
-        found.filter(|_| !bench.is_cancelled()).map(|found| UnitResult::new(&found)).transpose()
+        bench.go_on()?;
+        Ok(found)
     }
 
-    fn report(&self, plan: &StudyPlan, units: &BTreeMap<String, UnitResult>) -> Result<StudyReport, StudyError> {
-        let mut report = StudyReport::default();
-        let (mut sentences, mut each) = (sentence_table(plan), object_table());
-        let (mut curves, mut settings) = (curve_table(), setting_table());
-        let mut measured = Vec::new();
-        for unit in Unit::all(plan) {
-            let Some(result) = units.get(&unit.name(plan)) else { continue };
-            let found: Found = result.read()?;
-            let (gripper, kind) = unit.kind(plan);
-            if let Unit::Varied(at) = unit {
-                for (value, summary) in &found.varied {
-                    add_setting(&mut settings, at, *value, summary);
-                }
-                continue;
+    fn report(plan: &StudyPlan, found: Vec<(Unit, Found)>) -> StudyReport {
+        let (mut measured, mut settings) = (Vec::new(), Vec::new());
+        for (Unit { gripper, kind, grasps }, found) in found {
+            if let Grasps::Varied(varied) = grasps {
+                settings.extend(found.varied.into_iter().map(|(value, summary)| (varied, value, summary)));
+            } else {
+                measured.push(Measured { gripper, kind, summary: Summary::of(&found.signatures), found });
             }
-            if !found.data.is_empty() {
-                report.data.push(format!("{gripper}: {}", found.data));
-            }
-            let summary = Summary::of(&found.signatures);
-            add_sentences(&mut sentences, gripper, &kind, &found, &summary);
-            add_objects(&mut each, gripper, &kind, &found.signatures);
-            for curve in &found.curves {
-                add_curve(&mut curves, gripper, curve);
-            }
-            measured.push(Measured { gripper, kind, summary });
         }
-        report.tables = [sentences, each, settings, curves].into_iter().filter(|t| !t.rows.is_empty()).collect();
-        report.findings = findings(&measured);
-        Ok(report)
+        let described = measured.iter().filter(|own| !own.found.data.is_empty());
+        let data = described.map(|own| format!("{}: {}", own.gripper, own.found.data)).collect();
+        let tables = [
+            sentence_table(plan, &measured),
+            object_table(&measured),
+            setting_table(&settings),
+            curve_table(&measured),
+        ];
+        let tables = tables.into_iter().filter(|table| !table.rows.is_empty());
+        StudyReport::new(data, tables.collect(), findings(&measured))
     }
 
-    fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
         figures::all(report)
     }
 }
@@ -316,162 +313,122 @@ fn interval(all: &[&Signature], statistic: Statistic) -> Cell {
     Cell::interval(BOOTSTRAP.interval(&objects, |kept| statistic(&kept.iter().map(|k| all[*k]).collect::<Vec<_>>())))
 }
 
-fn sentence_table(plan: &StudyPlan) -> StudyTable {
-    StudyTable::new(
-        "signatures",
-        format!("Sentences of section V-A in numbers, preset {}; rates as shares of that before contact", plan.preset),
-        &[
-            ("gripper", ""),
-            ("grasps", ""),
-            ("held", "grasps"),
-            ("lost", "grasps"),
-            ("bending with time before contact, rank correlation", ""),
-            ("pressure before contact", PERCENT),
-            ("rate after contact, round", PERCENT),
-            ("rate after contact, flat", PERCENT),
-            ("line after contact, flat (R²)", ""),
-            ("bending after contact, round", PERCENT),
-            ("bending after contact, flat", PERCENT),
-            ("bending with curvature of round objects, rank correlation", ""),
-            ("time to 90 % of pressure", "s"),
-            ("onset with width, rank correlation", ""),
-        ],
-    )
+fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
+    let statistics = STATISTICS.map(|(name, unit, statistic)| {
+        let cell = move |own: &Measured| interval(&own.found.signatures.iter().collect::<Vec<_>>(), statistic);
+        (name, unit, cell)
+    });
+    let own: [Column<'_, Measured>; 4] = [
+        Column("gripper", "", &|own| own.gripper.into()),
+        Column("grasps", "", &|own| own.kind.as_str().into()),
+        Column("held", "grasps", &|own| own.summary.grasps.into()),
+        Column("lost", "grasps", &|own| own.found.lost.into()),
+    ];
+    let statistics = statistics.iter().map(|(name, unit, cell)| Column(*name, *unit, cell));
+    let columns: Vec<Column<'_, Measured>> = own.into_iter().chain(statistics).collect();
+    let title =
+        format!("Sentences of section V-A in numbers, preset {}; rates as shares of that before contact", plan.preset);
+    let shown = |own: &Measured| {
+        let trials = own.found.signatures.iter().filter_map(|own| own.of.trial);
+        let every = 1 + trials.clone().count() / SHOWN;
+        trials.step_by(every).collect()
+    };
+    TableRows::new("signatures", title, all).with_trials(&shown).columns(&columns)
 }
 
-fn add_sentences(table: &mut StudyTable, gripper: &str, kind: &str, found: &Found, summary: &Summary) {
-    let all: Vec<&Signature> = found.signatures.iter().collect();
-    let trials: Vec<TrialId> = all.iter().filter_map(|own| own.of.trial).collect();
-    let shown = trials.iter().step_by(1 + trials.len() / super::answers::SHOWN).copied().collect();
-    let counts = [summary.grasps, found.lost].map(|count| Cell::Number(count as f64));
-    let numbers = STATISTICS.map(|statistic| interval(&all, statistic));
-    table.push([Cell::text(gripper), Cell::text(kind)].into_iter().chain(counts).chain(numbers).collect(), shown);
+/// Grasps of one object.
+struct ObjectGrasps<'a> {
+    of: &'a Measured,
+    object: &'a str,
+    own: Vec<&'a Signature>,
 }
 
-fn object_table() -> StudyTable {
-    StudyTable::new(
-        "objects",
-        "Each object; medians over its grasps",
-        &[
-            ("gripper", ""),
-            ("grasps", ""),
-            ("object", ""),
-            ("shape", ""),
-            ("width", "mm"),
-            ("held", "grasps"),
-            ("onset", "s"),
-            ("bending after contact", PERCENT),
-            ("rate after contact", PERCENT),
-            ("line after contact (R²)", ""),
-            ("time to 90 % of pressure", "s"),
-            ("bending in the hold", "1/m"),
-            ("pressure in the hold", "kPa"),
-        ],
-    )
-}
-
-fn add_objects(table: &mut StudyTable, gripper: &str, kind: &str, signatures: &[Signature]) {
-    let mut by_object: BTreeMap<&str, Vec<&Signature>> = BTreeMap::new();
-    for signature in signatures {
-        by_object.entry(&signature.of.object).or_default().push(signature);
+/// Median over the grasps, with its interval.
+fn over_grasps(row: &ObjectGrasps<'_>, value: impl Fn(&Signature) -> Option<f64>) -> Cell {
+    let values: Vec<f64> = row.own.iter().filter_map(|signature| value(signature)).collect();
+    if values.len() < 3 {
+        return Cell::number(median(values));
     }
-    for (object, own) in by_object {
-        let of = |value: &dyn Fn(&Signature) -> Option<f64>| -> Cell {
-            let values: Vec<f64> = own.iter().filter_map(|signature| value(signature)).collect();
-            if values.len() < 3 {
-                return Cell::number(median(values));
-            }
-            let at = vec![0; values.len()];
-            Cell::interval(BOOTSTRAP.interval(&at, |kept| median(kept.iter().map(|k| values[*k]))))
-        };
-        table.push(
-            vec![
-                Cell::text(gripper),
-                Cell::text(kind),
-                Cell::text(object),
-                Cell::text(&own[0].of.shape),
-                Cell::number(median(own.iter().filter_map(|signature| signature.of.width_mm))),
-                Cell::Number(own.len() as f64),
-                of(&|own| Some(own.onset_s)),
-                of(&|own| Some(own.share)),
-                of(&|own| own.rate),
-                of(&|own| own.line),
-                of(&|own| Some(own.rise_s)),
-                of(&|own| Some(own.bend)),
-                of(&|own| Some(own.pressure_kpa)),
-            ],
-            own.iter().filter_map(|signature| signature.of.trial).take(super::answers::SHOWN).collect(),
-        );
-    }
+    let at = vec![0; values.len()];
+    Cell::interval(BOOTSTRAP.interval(&at, |kept| median(kept.iter().map(|k| values[*k]))))
 }
 
-fn curve_table() -> StudyTable {
-    StudyTable::new(
-        "curves",
-        "A tiny and a large object of each shape over time, centred, as in Fig. 4a",
-        &[("gripper", ""), ("object", ""), ("class", ""), ("time", "s"), ("bending", "1/m"), ("pressure", "kPa")],
-    )
+fn object_table(all: &[Measured]) -> StudyTable {
+    let rows = all.iter().flat_map(|of| {
+        let mut by_object: BTreeMap<&str, Vec<&Signature>> = BTreeMap::new();
+        for signature in &of.found.signatures {
+            by_object.entry(&signature.of.object).or_default().push(signature);
+        }
+        by_object.into_iter().map(move |(object, own)| ObjectGrasps { of, object, own })
+    });
+    let rows: Vec<ObjectGrasps<'_>> = rows.collect();
+    let shown =
+        |row: &ObjectGrasps<'_>| row.own.iter().filter_map(|signature| signature.of.trial).take(SHOWN).collect();
+    TableRows::new("objects", "Each object; medians over its grasps", &rows).with_trials(&shown).columns(&[
+        Column("gripper", "", &|row| row.of.gripper.into()),
+        Column("grasps", "", &|row| row.of.kind.as_str().into()),
+        Column("object", "", &|row| row.object.into()),
+        Column("shape", "", &|row| row.own[0].of.shape.as_str().into()),
+        Column("width", "mm", &|row| median(row.own.iter().filter_map(|own| own.of.width_mm)).into()),
+        Column("held", "grasps", &|row| row.own.len().into()),
+        Column("onset", "s", &|row| over_grasps(row, |own| Some(own.onset_s))),
+        Column("bending after contact", PERCENT, &|row| over_grasps(row, |own| Some(own.share))),
+        Column("rate after contact", PERCENT, &|row| over_grasps(row, |own| own.rate)),
+        Column("line after contact (R²)", "", &|row| over_grasps(row, |own| own.line)),
+        Column("time to 90 % of pressure", "s", &|row| over_grasps(row, |own| Some(own.rise_s))),
+        Column("bending in the hold", "1/m", &|row| over_grasps(row, |own| Some(own.bend))),
+        Column("pressure in the hold", "kPa", &|row| over_grasps(row, |own| Some(own.pressure_kpa))),
+    ])
 }
 
 /// Objects whose curves are shown: a tiny and a large one of each of the paper's shapes, of clear form.
 const SHOWN_CURVES: [&str; 6] = ["smallcube", "cube", "labello", "cylinder", "ball", "bigball"];
 
-fn add_curve(table: &mut StudyTable, gripper: &str, curve: &Curve) {
-    if !SHOWN_CURVES.contains(&curve.object.as_str()) {
-        return;
-    }
-    for [t, bend, pressure] in &curve.points {
-        let class = format!("{} {}", curve.size, curve.shape);
-        let numbers = [*t, *bend, *pressure].map(Cell::Number);
-        let texts = [Cell::text(gripper), Cell::text(&curve.object), Cell::text(class)];
-        table.push(texts.into_iter().chain(numbers).collect(), Vec::new());
+fn curve_table(all: &[Measured]) -> StudyTable {
+    let rows = all.iter().flat_map(|own| {
+        let shown = own.found.curves.iter().filter(|curve| SHOWN_CURVES.contains(&curve.object.as_str()));
+        shown.flat_map(move |curve| curve.points.iter().map(move |point| (own.gripper, curve, *point)))
+    });
+    let rows: Vec<(&str, &Curve, [f64; 3])> = rows.collect();
+    let title = "A tiny and a large object of each shape over time, centred, as in Fig. 4a";
+    TableRows::new("curves", title, &rows).columns(&[
+        Column("gripper", "", &|(gripper, ..)| (*gripper).into()),
+        Column("object", "", &|(_, curve, _)| curve.object.as_str().into()),
+        Column("class", "", &|(_, curve, _)| format!("{} {}", curve.size, curve.shape).into()),
+        Column("time", "s", &|(.., point)| Cell::Number(point[0])),
+        Column("bending", "1/m", &|(.., point)| Cell::Number(point[1])),
+        Column("pressure", "kPa", &|(.., point)| Cell::Number(point[2])),
+    ])
+}
+
+/// A setting, its value, and what follows.
+type Setting = (&'static Varied, f64, Summary);
+
+/// Named scene that has a value of a setting.
+fn scene_with(varied: &Varied, value: f64) -> &'static str {
+    match varied.known().map(|known| (known - value).abs() < 1e-9 * value.abs()) {
+        [true, true] => "default and paper",
+        [true, false] => DEFAULT,
+        [false, true] => PAPER,
+        [false, false] => "",
     }
 }
 
-fn setting_table() -> StudyTable {
-    StudyTable::new(
-        "settings",
-        "Scene paper with one setting changed, bodies centred",
-        &[
-            ("setting", ""),
-            ("value", ""),
-            ("unit", ""),
-            ("scene with this value", ""),
-            ("held", "grasps"),
-            ("rate after contact, round", PERCENT),
-            ("rate after contact, flat", PERCENT),
-            ("line after contact, flat (R²)", ""),
-            ("time to 90 % of pressure", "s"),
-            ("onset with width, rank correlation", ""),
-            ("sentences that hold", ""),
-        ],
-    )
-}
-
-fn add_setting(table: &mut StudyTable, at: usize, value: f64, summary: &Summary) {
-    let varied = &VARIED[at];
-    let [usual, papers] = varied.known().map(|known| (known - value).abs() < 1e-9 * value.abs());
-    let scene = match (usual, papers) {
-        (true, true) => "default and paper",
-        (true, false) => DEFAULT,
-        (false, true) => PAPER,
-        (false, false) => "",
-    };
-    let held = findings::sentences(summary).iter().filter(|own| own.verdict == super::Agreement::Agrees).count();
-    table.push(
-        vec![
-            Cell::text(varied.name),
-            Cell::Number(value),
-            Cell::text(varied.unit),
-            Cell::text(scene),
-            Cell::Number(summary.grasps as f64),
-            Cell::number(summary.round_rate),
-            Cell::number(summary.flat_rate),
-            Cell::number(summary.flat_line),
-            Cell::number(summary.rise_s),
-            Cell::number(summary.size),
-            Cell::Number(held as f64),
-        ],
-        Vec::new(),
-    );
+fn setting_table(all: &[Setting]) -> StudyTable {
+    let title = "Scene paper with one setting changed, bodies centred";
+    TableRows::new("settings", title, all).columns(&[
+        Column("setting", "", &|(varied, ..)| varied.name.into()),
+        Column("value", "", &|(_, value, _)| Cell::Number(*value)),
+        Column("unit", "", &|(varied, ..)| varied.unit.into()),
+        Column("scene with this value", "", &|(varied, value, _)| scene_with(varied, *value).into()),
+        Column("held", "grasps", &|(.., own)| own.grasps.into()),
+        Column("rate after contact, round", PERCENT, &|(.., own)| own.round_rate.into()),
+        Column("rate after contact, flat", PERCENT, &|(.., own)| own.flat_rate.into()),
+        Column("line after contact, flat (R²)", "", &|(.., own)| own.flat_line.into()),
+        Column("time to 90 % of pressure", "s", &|(.., own)| own.rise_s.into()),
+        Column("onset with width, rank correlation", "", &|(.., own)| own.size.into()),
+        Column("sentences that hold", "", &|(.., own)| {
+            sentences(own).iter().filter(|own| own.verdict == Agreement::Agrees).count().into()
+        }),
+    ])
 }
