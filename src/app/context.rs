@@ -11,11 +11,12 @@ use crate::app::shown::SourceData;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, PhaseSpan};
+use palpate_lab::study::Explanation;
 use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
-    EffectsWorker, ExplainRequest, ExplainedGrasp, GhostGrasp, GripperView, LabelDraft, LabelView, LibraryView,
-    MeasuredAccuracy, SceneAccuracyJob, Snapshot,
+    ExplainRequest, Explainer, GhostGrasp, GripperView, Job, LabelDraft, LabelView, LibraryView, MeasuredAccuracy,
+    SceneAccuracyJob, Snapshot,
 };
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
@@ -40,7 +41,7 @@ pub struct PanelContext<'a> {
     /// The last grasp of the simulation, while it is in the demo log.
     pub logged: Option<LoggedGrasp>,
     /// Measurement of the effects.
-    pub effects: &'a EffectsWorker,
+    pub effects: &'a Job<Scene, Explanation>,
     /// Last grasp of the other engine, where it is drawn.
     pub ghost: Option<&'a GhostGrasp>,
     /// Newest state of the real gripper; absent until its thread has begun.
@@ -51,8 +52,8 @@ pub struct PanelContext<'a> {
     pub studies: &'a Studies,
     /// Model that the real gripper uses.
     pub gripper_model: Option<&'a Model>,
-    /// Newest explanation of an answer.
-    pub explained: Option<&'a ExplainedGrasp>,
+    /// Explanations of answers.
+    pub explainer: &'a Explainer,
     /// Labels, plan and journal; absent until the store has been read.
     pub labels: Option<&'a LabelView>,
     /// Label being chosen.

@@ -1,7 +1,7 @@
 //! File dialog inside the window, where the system has none: a path, and the files of its folder.
 
 use crate::app::files::{Answer, Question, Wording};
-use crate::app::widgets::{text_field, wrapped};
+use crate::app::widgets::{failure_ui, text_field, wrapped};
 use egui::{Button, Id, Key, Modal, RichText, ScrollArea, Ui};
 use std::path::{Path, PathBuf};
 
@@ -64,7 +64,7 @@ impl PathDialog {
             let mut done = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
             done |= self.list_ui(ui, &wording, (room.y - 260.0).clamp(60.0, 300.0));
             if let Some(refused) = &self.refused {
-                wrapped(ui, RichText::new(refused).color(ui.visuals().error_fg_color));
+                failure_ui(ui, refused);
             }
             ui.horizontal(|ui| {
                 let text = match (saves, &self.replaced) {

@@ -1,6 +1,6 @@
-//! Small pictures of objects for lists: the built-in ones, and files opened lately, which a thread draws.
+//! Small pictures of objects for lists: the built-in ones, and files opened lately, which are drawn beside the window.
 
-use palpate_lab::workers::{PORTRAIT_SIDE, PortraitJob, Wake};
+use palpate_lab::workers::{Job, PORTRAIT_SIDE, Wake, portrait_job};
 use palpate_render::Picture;
 use palpate_sim::objects::{catalogue, thumbnail};
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,13 +9,13 @@ use std::path::Path;
 /// Textures by the name of a class or the path of a file.
 pub(super) struct Thumbnails {
     textures: BTreeMap<String, egui::TextureHandle>,
-    job: PortraitJob,
+    portraits: Job<String, Vec<u8>>,
     asked: BTreeSet<String>,
 }
 
 impl Thumbnails {
-    /// Reads those of the built-in objects and starts the thread for the others.
-    pub(super) fn start(ctx: &egui::Context, wake: Wake) -> std::io::Result<Self> {
+    /// Reads those of the built-in objects.
+    pub(super) fn new(ctx: &egui::Context, wake: Wake) -> Self {
         let mut textures = BTreeMap::new();
         for built_in in catalogue() {
             if let Some(picture) = thumbnail(&built_in.name).and_then(|bytes| Picture::from_png(bytes).ok()) {
@@ -23,7 +23,7 @@ impl Thumbnails {
                 textures.insert(built_in.name.clone(), texture(ctx, &built_in.name, size, &picture.rgba));
             }
         }
-        Ok(Self { textures, job: PortraitJob::start(wake)?, asked: BTreeSet::new() })
+        Self { textures, portraits: portrait_job(wake), asked: BTreeSet::new() }
     }
 
     /// All that are ready.
@@ -31,28 +31,23 @@ impl Thumbnails {
         &self.textures
     }
 
-    /// Takes in what has been drawn, and asks for the next of these files. A file is drawn once, and the next one only when
-    /// the one before is here: the thread keeps its newest picture alone.
+    /// Takes in what has been drawn, and has each of these files drawn once.
     pub(super) fn gather(&mut self, ctx: &egui::Context, files: &[String]) {
-        if !self.job.is_settled() {
-            return;
-        }
-        if let Some(portrait) = self.job.view()
-            && let Some(rgba) = &portrait.rgba
-            && !self.textures.contains_key(&portrait.source)
-        {
-            let drawn = texture(ctx, &portrait.source, [PORTRAIT_SIDE; 2], rgba);
+        for ended in self.portraits.take() {
+            let (source, Ok(rgba)) = (&*ended.command, ended.outcome) else { continue };
+            let drawn = texture(ctx, source, [PORTRAIT_SIDE; 2], &rgba);
             // Trials and classes name an object without its folder.
-            let stem = Path::new(&portrait.source).file_stem().and_then(|stem| stem.to_str());
+            let stem = Path::new(source).file_stem().and_then(|stem| stem.to_str());
             // Of files with one name the newest counts, but never before a built-in object.
             if let Some(stem) = stem.filter(|stem| thumbnail(stem).is_none()) {
                 self.textures.insert(stem.to_owned(), drawn.clone());
             }
-            self.textures.insert(portrait.source.clone(), drawn);
+            self.textures.insert(source.clone(), drawn);
         }
-        if let Some(next) = files.iter().find(|file| !self.asked.contains(*file)) {
-            self.asked.insert(next.clone());
-            self.job.ask(next.clone());
+        for file in files {
+            if self.asked.insert(file.clone()) {
+                self.portraits.start(file.clone());
+            }
         }
     }
 }

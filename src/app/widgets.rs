@@ -1,19 +1,62 @@
 //! Widgets that several panels share.
 
 use crate::app::actions::Actions;
+use crate::app::features::tools::ToolAction;
 use crate::app::theme::colour;
 use egui::text_edit::TextEditState;
 use egui::{
-    AsIdSalt, Button, Color32, Id, Label, Rect, Response, RichText, Stroke, TextEdit, Ui, UiBuilder, Widget, pos2,
+    AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Stroke, TextEdit, Ui, UiBuilder,
+    Widget, pos2,
 };
 use palpate_geometry::palette::{Theme, Trace};
-use palpate_lab::workers::GripperCommand;
+use palpate_lab::workers::{GripperCommand, Job, JobProgress};
 use palpate_store::labels::Sparkline;
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// Text that wraps.
 pub(super) fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// Why something failed, in red.
+pub(super) fn failure_ui(ui: &mut Ui, cause: impl Display) {
+    wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color));
+}
+
+/// Progress of a job, a remark below it, and a button that stops it; true once that is clicked. `hint` says what stopping
+/// does.
+pub(super) fn progress_ui(ui: &mut Ui, progress: &JobProgress, remark: Option<&str>, hint: &str) -> bool {
+    ui.add(ProgressBar::new(progress.share as f32).text(&progress.words));
+    if let Some(remark) = remark {
+        wrapped(ui, RichText::new(remark).strong());
+    }
+    ui.button("Stop").on_hover_text(hint).clicked()
+}
+
+/// A job in a panel: its controls or, while it runs, its progress and a button that stops it by an action; below, its last
+/// result or failure.
+pub(super) fn job_ui<C, O>(
+    ui: &mut Ui,
+    job: &Job<C, O>,
+    (hint, stop): (&str, ToolAction),
+    actions: &mut Actions,
+    controls: impl FnOnce(&mut Ui, &mut Actions),
+    result: impl FnOnce(&mut Ui, &O, &mut Actions),
+) {
+    match job.running() {
+        Some(running) => {
+            if progress_ui(ui, &running.progress, None, hint) {
+                actions.push(stop);
+            }
+        }
+        None => controls(ui, actions),
+    }
+    match job.last().map(|ended| ended.outcome) {
+        Some(Ok(outcome)) => result(ui, &outcome, actions),
+        Some(Err(cause)) => failure_ui(ui, cause),
+        None => {}
+    }
 }
 
 /// Field for a line of text, as wide as there is room. Its id is fixed: it keeps the keyboard while widgets above it come

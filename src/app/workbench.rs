@@ -37,9 +37,9 @@ use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
-    Command, EffectsWorker, Explain, ExplainedGrasp, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker,
-    Inspector, LabelCommand, LabelView, LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker,
-    SimWorkerSetup, Snapshot, Wake, examine_port, explain_scene, fit_trials, start_labeller, start_librarian,
+    Command, Explain, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelCommand, LabelView,
+    LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
+    effects_job, examine_port, explain_scene, fit_trials, open_trial_job, start_labeller, start_librarian,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
@@ -144,7 +144,6 @@ struct Published {
     ghost: Option<Arc<GhostGrasp>>,
     gripper: Option<Arc<GripperView>>,
     labels: Option<Arc<LabelView>>,
-    explained: Option<Arc<ExplainedGrasp>>,
     library: Option<Arc<LibraryView>>,
 }
 
@@ -172,8 +171,7 @@ impl Workbench {
             playing,
             wake: Arc::clone(&wake),
         });
-        let effects =
-            EffectsWorker::start(explain, Arc::clone(&wake)).map_err(ThreadError::of("the measurement of effects"))?;
+        let effects = effects_job(explain, Arc::clone(&wake));
         let scene_accuracy = SceneAccuracyJob::start(Arc::clone(&wake))
             .map_err(ThreadError::of("the measurement of what accuracy costs"))?;
         let worker = worker.map_err(ThreadError::of("the simulation"))?;
@@ -187,12 +185,10 @@ impl Workbench {
             wake: Arc::clone(&wake),
         })
         .map_err(ThreadError::of("the gripper's thread"))?;
-        let inspector = Inspector::start(store.clone(), Arc::clone(&wake))
-            .map_err(ThreadError::of("the thread that opens trials"))?;
-        let inspect = InspectFeature::new(inspector, models.clone(), GRASPS);
+        let inspect = InspectFeature::new(open_trial_job(store.clone(), Arc::clone(&wake)), models.clone(), GRASPS);
         let tools = GripperToolsSetup { examine: gripper.examine(setup.tools.examine), ..setup.tools };
-        let mut tools = GripperTools::start(tools, &store, &wake)?;
-        let studies = Studies::start(&store, &wake)?;
+        let tools = GripperTools::new(tools, &store, &wake);
+        let studies = Studies::new(&store, &wake);
         let adapter = setup.render_state.map(|state| {
             Viewport::install(state);
             state.adapter.get_info()
@@ -203,14 +199,12 @@ impl Workbench {
         // Keys for the scale are ours, so that it is remembered.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
         view.apply(ctx, ViewAction::SetScale(view.scale), None);
-        let mut notices = Notices::default();
-        let explainer = Explainer::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("explanations"))?;
-        let recognition = RecognitionFeature::new(models, explainer, &mut tools, &mut view, &mut notices);
-        let thumbnails =
-            Thumbnails::start(ctx, Arc::clone(&wake)).map_err(ThreadError::of("the pictures of objects"))?;
+        let explainer = Explainer::new(store.clone(), &wake);
+        let recognition = RecognitionFeature::new(models, explainer, &tools, &mut view);
+        let thumbnails = Thumbnails::new(ctx, Arc::clone(&wake));
         let mut workbench = Self {
             view,
-            notices,
+            notices: Notices::default(),
             simulation,
             gripper: GripperFeature::new(gripper, scene),
             labelling,
@@ -349,13 +343,12 @@ impl Workbench {
             ghost: self.simulation.ghost(&self.view),
             gripper: self.gripper.worker().view(),
             labels: self.labelling.labeller().view(),
-            explained: self.recognition.explained(),
             library: self.library.view(),
         }
     }
 
     fn context<'a>(&'a self, published: &'a Published) -> PanelContext<'a> {
-        let Published { snapshot, accuracy, ghost, gripper, labels, explained, library } = published;
+        let Published { snapshot, accuracy, ghost, gripper, labels, library } = published;
         let (snapshot, gripper, labels) = (snapshot.as_deref(), gripper.as_deref(), labels.as_deref());
         let source = self.view.source;
         PanelContext {
@@ -371,7 +364,7 @@ impl Workbench {
             tools: &self.tools,
             studies: &self.studies,
             gripper_model: self.recognition.gripper_model(),
-            explained: explained.as_deref(),
+            explainer: self.recognition.explainer(),
             labels,
             draft: self.labelling.session().draft(),
             library: library.as_deref(),

@@ -11,7 +11,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_lab::workers::{TrainCommand, TrainRequest, Trainer, TrainerView};
+use palpate_lab::workers::{EndedJob, Job, TrainRequest, Wake, load_model_job, training_data_job, training_job};
 use palpate_learn::{Example, Model, Shipped};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
@@ -19,7 +19,6 @@ use palpate_store::{BoardChunk, BoardInfo, Store};
 use palpate_tactile::board::{Board, Reading, Sensor};
 use palpate_tactile::calibration::{Input, Point, Record, SensorKind, plan};
 use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -95,65 +94,71 @@ fn unmounted(store: &mut Store) {
     trial(store, "", 20.0, 2.0, 0);
 }
 
-/// A trainer without a window.
-fn trainer(at: &Path, fill: fn(&mut Store)) -> (Trainer, Receiver<()>) {
-    let store = at.join("trials.sqlite");
-    fill(&mut Store::open(&store).unwrap());
-    let (result, woken) = channel();
+/// A `wake`, and the receiver of its calls.
+fn waker() -> (Wake, Receiver<()>) {
+    let (calls, woken) = channel();
     let wake = Arc::new(move || {
         // The test may have stopped listening.
-        let _heard = result.send(());
+        let _heard = calls.send(());
     });
-    (Trainer::start(store, at.join("models"), wake).unwrap(), woken)
+    (wake, woken)
 }
 
-fn until(trainer: &Trainer, woken: &Receiver<()>, wanted: impl Fn(&TrainerView) -> bool) -> Arc<TrainerView> {
+/// Starts a command and waits for its end.
+fn done<C: Send + Sync + 'static, O: Send + Sync + 'static>(
+    job: &Job<C, O>,
+    woken: &Receiver<()>,
+    command: C,
+) -> Result<Arc<O>, String> {
+    let number = job.start(command);
     loop {
-        if let Some(view) = trainer.view().filter(|view| wanted(view)) {
-            return view;
+        if let Some(ended) = job.last().filter(|ended: &EndedJob<C, O>| ended.number == number) {
+            return ended.outcome.map_err(|cause| cause.to_string());
         }
         woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
     }
 }
 
-fn request(method: &str) -> TrainCommand {
-    TrainCommand::Train(TrainRequest { method: method.to_owned(), seed: 1, quick: true })
+fn request(method: &str) -> TrainRequest {
+    TrainRequest { method: method.to_owned(), seed: 1, quick: true }
 }
 
 #[test]
 fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut trainer, woken) = trainer(folder.path(), labelled);
-    trainer.ask(TrainCommand::Look);
-    let view = until(&trainer, &woken, |view| view.classes.is_some());
-    let classes = view.classes.clone().unwrap().unwrap();
+    let (path, models) = (folder.path().join("trials.sqlite"), folder.path().join("models"));
+    labelled(&mut Store::open(&path).unwrap());
+    let (wake, woken) = waker();
+    let data = training_data_job(path.clone(), models.clone(), Arc::clone(&wake));
+    let listed = done(&data, &woken, ()).unwrap();
+    let classes = listed.classes.as_ref().unwrap();
     let counts: Vec<(&str, usize)> = classes.iter().map(|class| (class.name.as_str(), class.trials)).collect();
     assert_eq!(counts, [("ball", 15), ("box", 15), ("cube", 3), ("lemon", 15), ("tomato", 15)]);
-    assert_eq!(view.too_little(), None);
+    assert_eq!(listed.too_little(), None);
 
     // A long training is given up, and nothing comes of it.
-    let long = TrainRequest { method: "committee".to_owned(), seed: 1, quick: false };
-    trainer.ask(TrainCommand::Train(long));
-    until(&trainer, &woken, |view| view.running.is_some());
-    trainer.give_up();
-    trainer.ask(request("knn"));
-    let view = until(&trainer, &woken, |view| view.running.is_none() && view.finished.is_some());
-    let finished = view.finished.clone().unwrap().unwrap();
+    let training = training_job(path, models, Arc::clone(&wake));
+    training.start(TrainRequest { quick: false, ..request("macro-layer") });
+    while training.running().is_some_and(|running| running.progress.words.is_empty()) {
+        woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
+    }
+    training.stop();
+    let finished = done(&training, &woken, request("knn")).unwrap();
+    assert_eq!(training.take().len(), 1);
     let judged = &finished.judged;
     assert_eq!((judged.trials, judged.left_out), ([48, 12], 0));
     assert_eq!(judged.too_few.iter().map(|class| class.name.as_str()).collect::<Vec<_>>(), ["cube"]);
     let found = |truth: usize| judged.evaluation.confusion.count(truth, Some(truth));
     assert_eq!((found(0), found(1)), (3, 3), "what can be told apart is");
     assert!(found(2) + found(3) < 6 && judged.evaluation.f1_macro < 1.0, "what cannot is not");
-    assert_eq!(view.models.len(), 1);
-    assert!(view.models[0].about.starts_with("KNN, 4 classes, 48 grasps, macro F1 0."), "{:?}", view.models);
+    let saved = &done(&data, &woken, ()).unwrap().models;
+    assert_eq!(saved.len(), 1);
+    assert!(saved[0].about.starts_with("KNN, 4 classes, 48 grasps, macro F1 0."), "{saved:?}");
 
     // From its file it comes back with its card.
-    let path = view.models[0].path.clone();
-    trainer.ask(TrainCommand::Load(path.clone()));
-    let view = until(&trainer, &woken, |view| view.loaded.0 == 1);
-    let loaded = view.loaded.1.clone().unwrap().unwrap();
-    assert_eq!((&loaded.path, &loaded.model.card), (&path, &finished.trained.model.card));
+    let load = load_model_job(wake);
+    let loaded = done(&load, &woken, saved[0].path.clone()).unwrap();
+    assert_eq!((&loaded.path, &loaded.model.card), (&saved[0].path, &finished.trained.model.card));
     assert_eq!(loaded.model.card.metrics["f1_macro"], judged.evaluation.f1_macro);
 
     // Files that are none, or listen to something else, are told.
@@ -162,11 +167,8 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     foreign.card.channels[0] = "grip".to_owned();
     palpate_lab::datasets::save_model(&foreign, &odd).unwrap();
     for (file, result) in [("gone.safetensors", "cannot read the model"), ("odd.safetensors", "it needs grip")] {
-        let before = trainer.view().unwrap().loaded.0;
-        trainer.ask(TrainCommand::Load(folder.path().join(file)));
-        let view = until(&trainer, &woken, |view| view.loaded.0 > before);
-        let cause = view.loaded.1.clone().unwrap().unwrap_err();
-        assert!(cause.to_string().contains(result), "{cause}");
+        let cause = done(&load, &woken, folder.path().join(file)).unwrap_err();
+        assert!(cause.contains(result), "{cause}");
     }
 }
 
@@ -181,12 +183,12 @@ fn too_little_to_learn_from_is_told() {
         ),
     ] {
         let folder = tempfile::tempdir().unwrap();
-        let (trainer, woken) = trainer(folder.path(), fill);
-        trainer.ask(request("knn"));
-        let view = until(&trainer, &woken, |view| view.running.is_none());
-        let cause = view.finished.clone().unwrap().unwrap_err();
-        assert!(cause.to_string().contains(result), "{cause}");
-        assert!(view.models.is_empty(), "nothing is saved");
+        let (path, models) = (folder.path().join("trials.sqlite"), folder.path().join("models"));
+        fill(&mut Store::open(&path).unwrap());
+        let (wake, woken) = waker();
+        let cause = done(&training_job(path, models.clone(), wake), &woken, request("knn")).unwrap_err();
+        assert!(cause.contains(result), "{cause}");
+        assert!(!models.exists(), "nothing is saved");
     }
 }
 

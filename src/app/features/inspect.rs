@@ -7,7 +7,7 @@ use crate::app::playback::{Playback, Seek};
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, Keep, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
-use palpate_lab::workers::{Inspector, LabelView};
+use palpate_lab::workers::{Job, LabelView, OpenRequest};
 use palpate_learn::Models;
 use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::{TrialId, TrialSource};
@@ -97,7 +97,7 @@ struct ComparisonKey {
 
 /// State of inspection in the window.
 pub(in crate::app) struct InspectFeature {
-    inspector: Inspector,
+    opener: Job<OpenRequest, OpenTrial>,
     /// Trial that was asked for last.
     wanted: Option<TrialId>,
     open: Option<Arc<OpenTrial>>,
@@ -124,10 +124,10 @@ pub(in crate::app) struct InspectFeature {
 }
 
 impl InspectFeature {
-    pub(in crate::app) fn new(inspector: Inspector, models: Models, grasps: u32) -> Self {
+    pub(in crate::app) fn new(opener: Job<OpenRequest, OpenTrial>, models: Models, grasps: u32) -> Self {
         let options = OpenOptions { models, grasps: Some(grasps), ..OpenOptions::default() };
         Self {
-            inspector,
+            opener,
             wanted: None,
             open: None,
             history: TraceHistory::default(),
@@ -213,20 +213,20 @@ impl InspectFeature {
             self.options.sensors = view.sensors.clone();
             self.open_again();
         }
-        let opened: Vec<_> = self.inspector.opened().collect();
-        for outcome in opened {
-            match outcome.trial {
-                Ok(trial) if outcome.scenery => self.take_open(trial),
+        for ended in self.opener.take() {
+            let (id, scenery) = (ended.command.id, ended.command.options.keep == Keep::Scenery);
+            match ended.outcome {
+                Ok(trial) if scenery => self.take_open(trial),
                 Ok(trial) => self.take_pinned(trial),
                 Err(cause) => {
-                    self.awaited.retain(|id| *id != outcome.id);
-                    if self.wanted == Some(outcome.id) && outcome.scenery {
+                    self.awaited.retain(|awaited| *awaited != id);
+                    if self.wanted == Some(id) && scenery {
                         self.wanted = self.open.as_ref().map(|open| open.id);
                         if self.open.is_none() {
                             self.show_live(view);
                         }
                     }
-                    notices.error(format!("Trial {} cannot be opened: {cause}", outcome.id));
+                    notices.error(format!("Trial {id} cannot be opened: {cause}"));
                 }
             }
         }
@@ -286,7 +286,7 @@ impl InspectFeature {
     }
 
     fn ask(&self, id: TrialId, keep: Keep) {
-        self.inspector.open(id, OpenOptions { keep, ..self.options.clone() });
+        self.opener.start(OpenRequest { id, options: OpenOptions { keep, ..self.options.clone() } });
     }
 
     /// Applies an action; returns the change of a stored trial that follows from it.

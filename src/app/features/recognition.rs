@@ -3,14 +3,13 @@
 use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::InspectFeature;
 use crate::app::features::simulation::SimulationFeature;
-use crate::app::features::tools::{GripperTools, ToolAction};
+use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::workers::{
-    Command, EndedLesson, ExplainRequest, ExplainedGrasp, Explainer, GripperCommand, TeachRequest, TrainCommand,
-    TrainedModel,
+    Command, EndedJob, ExplainRequest, Explainer, GripperCommand, JobFailure, TeachRequest, TrainedModel,
 };
 use palpate_learn::{Model, Models, Shipped};
 use std::collections::VecDeque;
@@ -42,17 +41,13 @@ pub enum RecognitionAction {
 pub(in crate::app) struct RecognitionFeature {
     /// Models that come with the program.
     shipped: Models,
-    /// Models to be loaded, and for which gripper; the first one is being loaded.
-    loading: VecDeque<(PathBuf, ViewSource)>,
+    /// Grippers of the models that are being loaded, in order.
+    loading: VecDeque<ViewSource>,
     /// Models in use.
     models: Models,
     /// Object file that the model in use was last asked to learn.
     taught: Option<String>,
-    /// Number of lessons that were taken note of.
-    lessons: u64,
     explainer: Explainer,
-    /// Grasp explained last.
-    asked: Option<ExplainRequest>,
     /// Grasp on which advice was asked last.
     advised: Option<Arc<RecognisedGrasp>>,
 }
@@ -70,19 +65,16 @@ impl RecognitionFeature {
     pub(in crate::app) fn new(
         shipped: Models,
         explainer: Explainer,
-        tools: &mut GripperTools,
+        tools: &GripperTools,
         view: &mut ViewState,
-        notices: &mut Notices,
     ) -> Self {
         let models = shipped.clone();
-        let loading = VecDeque::new();
-        let (taught, asked, advised) = (None, None, None);
-        let mut feature = Self { shipped, loading, models, taught, lessons: 0, explainer, asked, advised };
+        let mut feature = Self { shipped, loading: VecDeque::new(), models, taught: None, explainer, advised: None };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
             if let Some(path) = path {
-                feature.load(path, gripper, tools, notices);
+                feature.load(path, gripper, tools);
             }
         }
         feature
@@ -94,16 +86,14 @@ impl RecognitionFeature {
     }
 
     /// Loads a model after those that are being loaded.
-    fn load(&mut self, path: PathBuf, gripper: ViewSource, tools: &mut GripperTools, notices: &mut Notices) {
-        if self.loading.is_empty() {
-            tools.apply(ToolAction::Train(TrainCommand::Load(path.clone())), notices);
-        }
-        self.loading.push_back((path, gripper));
+    fn load(&mut self, path: PathBuf, gripper: ViewSource, tools: &GripperTools) {
+        tools.load.start(path);
+        self.loading.push_back(gripper);
     }
 
-    /// Newest explanation.
-    pub(in crate::app) fn explained(&self) -> Option<Arc<ExplainedGrasp>> {
-        self.explainer.view()
+    /// Explanations of answers.
+    pub(in crate::app) fn explainer(&self) -> &Explainer {
+        &self.explainer
     }
 
     pub(in crate::app) fn apply(
@@ -124,16 +114,14 @@ impl RecognitionFeature {
                 }
                 ViewSource::Simulation | ViewSource::Trial => on.simulation.open_next(notices),
             },
-            RecognitionAction::Explain(request) => self.explain(request),
-            RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools, notices),
+            RecognitionAction::Explain(request) => self.explainer.explain(&request),
+            RecognitionAction::UseModel(Some(path)) => self.load(path, ViewSource::Gripper, on.tools),
             RecognitionAction::UseModel(None) => {
                 view.gripper_model = None;
                 let shipped = self.shipped.of(Shipped::AnyGripper).cloned();
                 self.use_for_gripper(shipped, on);
             }
-            RecognitionAction::UseSimulationModel(Some(path)) => {
-                self.load(path, ViewSource::Simulation, on.tools, notices);
-            }
+            RecognitionAction::UseSimulationModel(Some(path)) => self.load(path, ViewSource::Simulation, on.tools),
             RecognitionAction::UseSimulationModel(None) => {
                 view.simulation_model = None;
                 self.use_in_simulation(None, on, notices);
@@ -150,11 +138,11 @@ impl RecognitionFeature {
                     .filter(|snapshot| snapshot.object.as_ref().is_some_and(|object| object.name == name));
                 let object = held.map(|snapshot| snapshot.scene.object.clone());
                 if let Some(model) = self.models.of(Shipped::AnyGripper).cloned() {
-                    on.tools.teacher.ask(TeachRequest { model, name, object, recorded: true });
+                    on.tools.teaching.start(TeachRequest { model, name, object, recorded: true });
                 }
             }
             RecognitionAction::StopTeaching => {
-                on.tools.teacher.give_up();
+                on.tools.teaching.stop();
                 notices.info("The model stays as it is.");
             }
         }
@@ -210,21 +198,22 @@ impl RecognitionFeature {
         self.taught = Some(source.clone());
         if Path::new(source).is_file() {
             let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
-            on.tools.teacher.ask(TeachRequest { model: Arc::clone(model), name, object, recorded: false });
+            on.tools.teaching.start(TeachRequest { model: Arc::clone(model), name, object, recorded: false });
         }
     }
 
     /// Takes in a lesson that has ended.
-    fn take_lesson(&mut self, on: &mut Recognisers<'_>, view: &mut ViewState, notices: &mut Notices) {
-        let Some(teacher) = on.tools.teacher.view() else { return };
-        let Some(EndedLesson { request, outcome }) = &teacher.last else { return };
-        if std::mem::replace(&mut self.lessons, teacher.ended) == teacher.ended {
-            return;
-        }
+    fn take_lesson(
+        &mut self,
+        EndedJob { command: request, outcome, .. }: EndedJob<TeachRequest, TrainedModel>,
+        on: &mut Recognisers<'_>,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
         let is_current = |kind: &Shipped| self.models.of(*kind).is_some_and(|model| Arc::ptr_eq(model, &request.model));
         let simulated = [false, true].map(Shipped::simulated);
         match outcome {
-            Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(trained, on, view, notices),
+            Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&trained, on, view, notices),
             Ok(trained) if simulated.iter().any(is_current) => {
                 view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model), on, notices);
@@ -240,24 +229,13 @@ impl RecognitionFeature {
         }
     }
 
-    /// Explains a grasp instead of the one before, unless it is the same.
-    fn explain(&mut self, request: ExplainRequest) {
-        let is_same =
-            |asked: &ExplainRequest| asked.trial == request.trial && Arc::ptr_eq(&asked.grasp, &request.grasp);
-        if !self.asked.as_ref().is_some_and(is_same) {
-            self.explainer.give_up();
-            self.explainer.ask(request.clone());
-            self.asked = Some(request);
-        }
-    }
-
     /// Asks for advice after a grasp of the real gripper that decided nothing.
     fn ask_for_advice(&mut self, on: &Recognisers<'_>) {
         let Some(gripper) = on.gripper.worker().view() else { return };
         let undecided = gripper.identification.as_ref().filter(|view| view.decision.is_none() && !view.listening);
         let Some(last) = undecided.and_then(|view| view.last.clone()) else { return };
         if !self.advised.as_ref().is_some_and(|advised| Arc::ptr_eq(advised, &last)) {
-            on.tools.adviser.ask(Arc::clone(&last));
+            on.tools.advice.start(Arc::clone(&last));
             self.advised = Some(last);
         }
     }
@@ -273,14 +251,26 @@ impl RecognitionFeature {
             Some(Err(cause)) => notices.error(format!("Training failed: {cause}")),
             None => {}
         }
-        self.take_lesson(on, view, notices);
+        for ended in on.tools.teaching.take() {
+            self.take_lesson(ended, on, view, notices);
+        }
         self.teach_new_object(on);
         self.ask_for_advice(on);
-        let Some(outcome) = on.tools.loaded() else { return };
-        let gripper = self.loading.pop_front().map_or(ViewSource::Gripper, |(_, gripper)| gripper);
-        if let Some((next, _)) = self.loading.front() {
-            on.tools.apply(ToolAction::Train(TrainCommand::Load(next.clone())), notices);
+        for ended in on.tools.load.take() {
+            let gripper = self.loading.pop_front().unwrap_or(ViewSource::Gripper);
+            self.take_loaded(ended.outcome, gripper, on, view, notices);
         }
+    }
+
+    /// Uses a model that was loaded.
+    fn take_loaded(
+        &mut self,
+        outcome: Result<Arc<TrainedModel>, JobFailure>,
+        gripper: ViewSource,
+        on: &mut Recognisers<'_>,
+        view: &mut ViewState,
+        notices: &mut Notices,
+    ) {
         match (outcome, gripper) {
             (Ok(trained), ViewSource::Gripper) => self.use_file_for_gripper(&trained, on, view, notices),
             (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {

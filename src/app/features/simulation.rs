@@ -4,10 +4,9 @@ use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
+use palpate_lab::study::Explanation;
 use palpate_lab::study::accuracy::{AccuracyStudy, stored_accuracy};
-use palpate_lab::workers::{
-    Command, EffectsWorker, GhostGrasp, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot,
-};
+use palpate_lab::workers::{Command, GhostGrasp, Job, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot};
 use palpate_sim::gripper::Auto;
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::{PoseSpread, Scene};
@@ -50,7 +49,7 @@ pub enum SimulationAction {
 /// State of the simulated gripper in the window.
 pub(in crate::app) struct SimulationFeature {
     worker: SimWorker,
-    effects: EffectsWorker,
+    effects: Job<Scene, Explanation>,
     scene_accuracy: SceneAccuracyJob,
     stored_accuracy: Option<AccuracyStudy>,
     scene: Scene,
@@ -70,7 +69,7 @@ pub(in crate::app) struct SimulationFeature {
 impl SimulationFeature {
     pub(in crate::app) fn new(
         worker: SimWorker,
-        effects: EffectsWorker,
+        effects: Job<Scene, Explanation>,
         scene_accuracy: SceneAccuracyJob,
         scene: Scene,
     ) -> Self {
@@ -94,7 +93,8 @@ impl SimulationFeature {
         &self.worker
     }
 
-    pub(in crate::app) fn effects(&self) -> &EffectsWorker {
+    /// Measurement of the effects of a scene.
+    pub(in crate::app) fn effects(&self) -> &Job<Scene, Explanation> {
         &self.effects
     }
 
@@ -166,7 +166,7 @@ impl SimulationFeature {
                 view.ghost = ghost;
                 self.send(Command::SetGhost(ghost), notices);
             }
-            SimulationAction::MeasureEffects => self.effects.ask(&self.scene),
+            SimulationAction::MeasureEffects => _ = self.effects.start(self.scene.clone()),
             SimulationAction::MeasureAccuracy => {
                 self.scene_accuracy.give_up();
                 self.scene_accuracy.ask(Box::new(self.scene.clone()));
@@ -251,7 +251,7 @@ impl SimulationFeature {
     /// Takes a scene without noting the change.
     pub(in crate::app) fn use_scene(&mut self, scene: Scene) {
         self.scene = scene;
-        self.effects.give_up();
+        self.effects.stop();
         self.send_scene();
     }
 

@@ -1,16 +1,16 @@
-//! Studies of the paper in the window: which is chosen, and what of its results is shown; hands runs to the [`Student`].
+//! Studies of the paper in the window: which is chosen, and what of its results is shown; hands runs to the [`StudyRunner`].
 
 use crate::app::features::inspect::InspectAction;
 use crate::app::notices::Notices;
-use crate::app::startup::ThreadError;
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::paper::{LinkedFigure, PAPER_STUDIES, PaperStudy, paper_study};
+use palpate_lab::study::paper::{LinkedFigure, PAPER_STUDIES, PaperStudy, StudySize, paper_study};
 use palpate_lab::workers::{
-    Student, StudentCommand, StudentView, StudyOrigin, StudyOutcome, StudyRequest, StudyResult, Wake,
+    Job, JobFailure, RunningJob, StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner,
+    Wake, study_files_job, study_runner,
 };
 use palpate_render::figure_svg;
 use palpate_tactile::trial::TrialId;
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,39 +37,50 @@ pub enum StudyAction {
 
 /// State of the studies in the window.
 pub struct Studies {
-    student: Student,
+    runner: StudyRunner,
+    looks: Job<(), StudyFilesByKey>,
+    /// Files of all studies; empty before the first look.
+    files: Arc<StudyFilesByKey>,
+    /// Studies whose last run has failed.
+    failed: BTreeMap<String, (StudySize, JobFailure)>,
     store: PathBuf,
     chosen: &'static dyn PaperStudy,
     /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
-    /// Runs asked for, the running one first.
-    asked: VecDeque<StudyRequest>,
-    /// Runs up to this number have been reported.
-    reported: u64,
 }
 
 impl Studies {
-    /// Starts the thread on the store at `store`.
-    pub(in crate::app) fn start(store: &Path, wake: &Wake) -> Result<Self, ThreadError> {
+    /// Studies on the store at `store`.
+    pub(in crate::app) fn new(store: &Path, wake: &Wake) -> Self {
         let draw = |linked: &LinkedFigure| {
             figure_svg(&linked.figure, Theme::Light, linked.size).map_err(std::io::Error::other)
         };
-        let student = Student::start(store.to_owned(), Arc::new(draw), Arc::clone(wake));
-        Ok(Self {
-            student: student.map_err(ThreadError::of("the studies"))?,
+        Self {
+            runner: study_runner(store.to_owned(), Arc::new(draw), Arc::clone(wake)),
+            looks: study_files_job(store.to_owned(), Arc::clone(wake)),
+            files: Arc::default(),
+            failed: BTreeMap::new(),
             store: store.to_owned(),
             chosen: PAPER_STUDIES[0],
             origin: None,
             figure: 0,
-            asked: VecDeque::new(),
-            reported: 0,
-        })
+        }
     }
 
-    /// Newest state of the thread.
-    pub fn view(&self) -> Arc<StudentView> {
-        self.student.view().unwrap_or_default()
+    /// Files of a study; none before the first look.
+    pub fn files(&self, key: &str) -> Option<&StudyFiles> {
+        self.files.get(key)
+    }
+
+    /// The running study.
+    pub fn running(&self) -> Option<RunningJob<StudyRequest>> {
+        self.runner.running()
+    }
+
+    /// Size and failure of the last run of a study, where it has failed.
+    pub fn failed(&self, key: &str) -> Option<&(StudySize, JobFailure)> {
+        self.failed.get(key)
     }
 
     /// The chosen study.
@@ -84,7 +95,9 @@ impl Studies {
 
     /// Result that is shown; none where the study has none.
     pub fn result(&self) -> Option<Arc<StudyResult>> {
-        self.view().result(self.chosen.card().key, self.origin).cloned()
+        let results = &self.files(self.chosen.card().key)?.results;
+        let wanted = |result: &&Arc<StudyResult>| self.origin.is_some_and(|origin| origin.is_like(result.origin));
+        results.iter().find(wanted).or(results.first()).cloned()
     }
 
     /// Number of the figure of a result that is shown.
@@ -94,8 +107,7 @@ impl Studies {
 
     /// True where a study is asked for and has not begun.
     pub fn waits(&self, key: &str) -> bool {
-        let running = usize::from(self.view().running.is_some());
-        self.asked.iter().skip(running).any(|request| request.key == key)
+        self.runner.waiting().iter().any(|request| request.key == key)
     }
 
     /// The figure that is shown with its origin in the note, and its size (points).
@@ -109,24 +121,33 @@ impl Studies {
         (self.chosen, self.figure) = (study, 0);
     }
 
-    /// Reports runs that have ended.
+    /// Takes in files that were read, and reports runs that have ended.
     pub(in crate::app) fn gather(&mut self, notices: &mut Notices) {
-        let (view, before) = (self.view(), self.reported);
-        for (number, request, outcome) in view.outcomes.iter().filter(|(number, ..)| *number > before) {
-            let title = paper_study(&request.key).map_or(request.key.as_str(), |study| study.card().title);
-            match outcome {
-                StudyOutcome::Finished => {
+        for files in self.looks.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
+            self.files = files;
+        }
+        for ended in self.runner.take() {
+            let StudyRequest { key, size, .. } = &*ended.command;
+            let title = paper_study(key).map_or(key.as_str(), |study| study.card().title);
+            self.failed.remove(key);
+            match ended.outcome {
+                Ok(end) => {
+                    self.files = Arc::new(end.files.clone());
+                    if !end.finished {
+                        notices.info(format!("Study stopped: {title}. Run it again to resume."));
+                        continue;
+                    }
                     notices.info(format!("Study finished: {title}."));
-                    if request.key == self.chosen.card().key {
-                        (self.origin, self.figure) = (Some(StudyOrigin::Run(request.size)), 0);
+                    if key == self.chosen.card().key {
+                        (self.origin, self.figure) = (Some(StudyOrigin::Run(*size)), 0);
                     }
                 }
-                StudyOutcome::Stopped => notices.info(format!("Study stopped: {title}. Run it again to resume.")),
-                StudyOutcome::Withdrawn => {}
-                StudyOutcome::Failed(cause) => notices.error(format!("Study {title} failed: {cause}")),
+                Err(cause) => {
+                    notices.error(format!("Study {title} failed: {cause}"));
+                    self.failed.insert(key.clone(), (*size, cause));
+                    self.looks.start(());
+                }
             }
-            self.reported = *number;
-            self.asked.pop_front();
         }
     }
 
@@ -134,7 +155,7 @@ impl Studies {
     pub(in crate::app) fn apply(&mut self, action: StudyAction, notices: &mut Notices) -> Vec<InspectAction> {
         match action {
             // A run looks at its end, and other panels may have asked already.
-            StudyAction::Look if self.student.is_settled() => self.student.ask(StudentCommand::Look),
+            StudyAction::Look if self.runner.is_settled() && self.looks.is_settled() => _ = self.looks.start(()),
             StudyAction::Look => {}
             StudyAction::Choose(key) => {
                 if let Some(study) = paper_study(&key) {
@@ -151,14 +172,15 @@ impl Studies {
             }
             StudyAction::ShowResult(origin) => (self.origin, self.figure) = (Some(origin), 0),
             StudyAction::ShowFigure(figure) => self.figure = figure,
-            StudyAction::Run(request) if self.asked.iter().any(|asked| asked.key == request.key) => {
-                notices.info("This study is running or waits already.".to_owned());
-            }
             StudyAction::Run(request) => {
-                self.asked.push_back(request.clone());
-                self.student.ask(StudentCommand::Run(request));
+                let is_running = self.running().is_some_and(|running| running.command.key == request.key);
+                if is_running || self.waits(&request.key) {
+                    notices.info("This study is running or waits already.".to_owned());
+                } else {
+                    self.runner.start(request);
+                }
             }
-            StudyAction::Stop => self.student.give_up(),
+            StudyAction::Stop => self.runner.stop(),
             StudyAction::OpenTrials(trials) => {
                 let mut trials = trials.into_iter();
                 let Some(first) = trials.next() else { return Vec::new() };

@@ -1,14 +1,14 @@
-//! Tools, each in a thread of its own behind a panel: diagnostics, finger fit, training, teaching of new objects, advice on the
-//! next grasp.
+//! Tools, each a job behind a panel: diagnostics, finger fit, training, teaching of new objects, advice on the next grasp.
 
 use crate::app::notices::Notices;
-use crate::app::startup::ThreadError;
-use palpate_lab::study::TrainingError;
+use palpate_lab::grasping::{ObjectMove, RecognisedGrasp};
 use palpate_lab::workers::{
-    Adviser, DiagnosticsJob, Examine, ExamineRequest, FinishedTraining, FitCommand, FitTrials, Fitter, Teacher,
-    TrainCommand, TrainRequest, TrainedModel, Trainer, Wake,
+    DiagnosticsReport, Examine, ExamineRequest, FinishedTraining, FitTrials, FittedFinger, Job, JobFailure,
+    TeachRequest, TrainRequest, TrainedModel, TrainingData, Wake, advice_job, class_training_job, doctor_job, fit_job,
+    load_model_job, recorded_trials_job, training_data_job, training_job,
 };
-use palpate_learn::ModelError;
+use palpate_store::TrialRow;
+use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -34,98 +34,89 @@ pub enum ToolAction {
     Examine(ExamineRequest),
     /// Stop the examination and report so far.
     StopExamining,
-    /// List trials, or fit the finger to some.
-    Fit(FitCommand),
+    /// List the trials that the finger can be fitted to.
+    ListTrials,
+    /// Fit the finger to trials.
+    Fit(Vec<TrialId>),
     /// Cancel the fit.
     StopFitting,
-    /// Train on labelled trials, list them, or load a model.
-    Train(TrainCommand),
+    /// List labelled trials and saved models.
+    ListModels,
+    /// Train on labelled trials.
+    Train(TrainRequest),
     /// Train with the default method, and use the model.
     TrainAndUse,
     /// Cancel the training.
     StopTraining,
 }
 
-/// The tools' threads.
+/// The tools' jobs.
 pub struct GripperTools {
     /// Diagnostics of board and port.
-    pub examiner: DiagnosticsJob,
+    pub doctor: Job<ExamineRequest, DiagnosticsReport>,
+    /// List of trials of the real gripper.
+    pub trials: Job<(), Vec<TrialRow>>,
     /// Fit of the simulated finger.
-    pub fitter: Fitter,
+    pub fit: Job<Vec<TrialId>, FittedFinger>,
+    /// Labelled trials and saved models.
+    pub data: Job<(), TrainingData>,
     /// Training on labelled trials.
-    pub trainer: Trainer,
+    pub training: Job<TrainRequest, FinishedTraining>,
+    /// Loading of models.
+    pub load: Job<PathBuf, TrainedModel>,
     /// Teaching of new objects.
-    pub teacher: Teacher,
+    pub teaching: Job<TeachRequest, TrainedModel>,
     /// Advice on the next grasp of the real gripper.
-    pub adviser: Adviser,
-    /// Loads of models taken note of.
-    loads: u64,
-    /// Training whose model is used once it has ended.
-    awaited: Option<Awaited>,
-}
-
-struct Awaited {
-    /// Outcome of the training before it.
-    before: Option<Result<Arc<FinishedTraining>, Arc<TrainingError>>>,
-    /// It has been seen running.
-    begun: bool,
+    pub advice: Job<Arc<RecognisedGrasp>, ObjectMove>,
+    /// Number of the training whose model is used once it has ended.
+    awaited: Option<u64>,
 }
 
 impl GripperTools {
-    /// Starts the threads on the store at `store`.
-    pub(in crate::app) fn start(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Result<Self, ThreadError> {
-        let wake = || Arc::clone(wake);
-        Ok(Self {
-            examiner: DiagnosticsJob::start(setup.examine, wake()).map_err(ThreadError::of("the doctor"))?,
-            fitter: Fitter::start(store.to_owned(), setup.fit, wake()).map_err(ThreadError::of("the finger fit"))?,
-            trainer: Trainer::start(store.to_owned(), setup.models.clone(), wake())
-                .map_err(ThreadError::of("training"))?,
-            teacher: Teacher::start(store.to_owned(), setup.models, wake()).map_err(ThreadError::of("teaching"))?,
-            adviser: Adviser::start(wake()).map_err(ThreadError::of("advice"))?,
-            loads: 0,
+    /// The tools on the store at `store`.
+    pub(in crate::app) fn new(setup: GripperToolsSetup, store: &Path, wake: &Wake) -> Self {
+        let GripperToolsSetup { examine, fit, models } = setup;
+        let (store, wake) = (|| store.to_owned(), || Arc::clone(wake));
+        Self {
+            doctor: doctor_job(examine, wake()),
+            trials: recorded_trials_job(store(), wake()),
+            fit: fit_job(store(), fit, wake()),
+            data: training_data_job(store(), models.clone(), wake()),
+            training: training_job(store(), models.clone(), wake()),
+            load: load_model_job(wake()),
+            teaching: class_training_job(store(), models, wake()),
+            advice: advice_job(wake()),
             awaited: None,
-        })
+        }
     }
 
     pub(in crate::app) fn apply(&mut self, action: ToolAction, notices: &mut Notices) {
         match action {
-            ToolAction::Examine(request) => self.examiner.ask(request),
-            ToolAction::StopExamining => self.examiner.give_up(),
-            ToolAction::Fit(command) => self.fitter.ask(command),
-            ToolAction::StopFitting => self.fitter.give_up(),
-            ToolAction::Train(command) => self.trainer.ask(command),
+            ToolAction::Examine(request) => _ = self.doctor.start(request),
+            ToolAction::StopExamining => self.doctor.stop(),
+            ToolAction::ListTrials => _ = self.trials.start(()),
+            ToolAction::Fit(trials) => _ = self.fit.start(trials),
+            ToolAction::StopFitting => self.fit.stop(),
+            ToolAction::ListModels => _ = self.data.start(()),
+            ToolAction::Train(request) => _ = self.training.start(request),
             ToolAction::TrainAndUse => {
-                let before = self.trainer.view().and_then(|view| view.finished.clone());
-                self.awaited = Some(Awaited { before, begun: false });
                 let method = DEFAULT_METHOD.to_owned();
-                self.trainer.ask(TrainCommand::Train(TrainRequest { method, seed: TRAINING_SEED, quick: false }));
+                self.awaited = Some(self.training.start(TrainRequest { method, seed: TRAINING_SEED, quick: false }));
                 notices.info("Training on all labelled trials: see panel Training.");
             }
-            ToolAction::StopTraining => self.trainer.give_up(),
+            ToolAction::StopTraining => self.training.stop(),
         }
     }
 
     /// Outcome of [`ToolAction::TrainAndUse`], once it has ended.
-    pub(in crate::app) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, Arc<TrainingError>>> {
-        let awaited = self.awaited.as_mut()?;
-        let view = self.trainer.view()?;
-        awaited.begun |= view.running.is_some();
-        let same = match (&view.finished, &awaited.before) {
-            (Some(Ok(now)), Some(Ok(before))) => Arc::ptr_eq(now, before),
-            (Some(Err(now)), Some(Err(before))) => Arc::ptr_eq(now, before),
-            (now, before) => now.is_none() && before.is_none(),
-        };
-        let ended = view.running.is_none() && (awaited.begun || !same);
-        let outcome = view.finished.clone().filter(|_| ended)?;
-        self.awaited = None;
-        Some(outcome)
-    }
-
-    /// Model loaded since the last call, or why it could not be.
-    pub(in crate::app) fn loaded(&mut self) -> Option<Result<Arc<TrainedModel>, ModelError>> {
-        let view = self.trainer.view()?;
-        let (loads, outcome) = &view.loaded;
-        let is_new = *loads > std::mem::replace(&mut self.loads, *loads);
-        outcome.clone().filter(|_| is_new)
+    pub(in crate::app) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, JobFailure>> {
+        let ended = self.training.take();
+        if !ended.is_empty() {
+            self.data.start(());
+        }
+        ended
+            .into_iter()
+            .find(|ended| self.awaited.take_if(|number| *number == ended.number).is_some())
+            .map(|e| e.outcome)
     }
 }

@@ -28,7 +28,7 @@ const KEYS: &[Binding] = &[
     key(Modifiers::SHIFT, Key::Enter, "run the study in full", |c| run(c, StudySize::Full)),
     key(Modifiers::NONE, Key::Enter, "run the study in its quick form", |c| run(c, StudySize::Quick)),
     key(Modifiers::NONE, Key::Delete, "stop the running study, which can be resumed", |c| {
-        c.studies.view().running.as_ref()?;
+        c.studies.running()?;
         Some(StudyAction::Stop.into())
     })
     .otherwise("No study is running."),

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::plots::static_plot;
 use crate::app::theme::colour;
-use crate::app::widgets::{ANY_PORT, text_field, wrapped};
+use crate::app::widgets::{ANY_PORT, failure_ui, text_field, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
@@ -49,7 +49,7 @@ fn begin_ui(
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
     match ended {
         Some(Ok(text)) => wrapped(ui, RichText::new(text).strong()),
-        Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
+        Some(Err(cause)) => failure_ui(ui, cause),
         None => {}
     }
     wrapped(

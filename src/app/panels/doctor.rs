@@ -6,9 +6,9 @@ use crate::app::context::PanelContext;
 use crate::app::features::tools::ToolAction;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
-use crate::app::widgets::{command_ui, port_field, wrapped};
+use crate::app::widgets::{command_ui, failure_ui, port_field, progress_ui, wrapped};
 use egui::text::{LayoutJob, TextFormat};
-use egui::{CollapsingHeader, Color32, Grid, Label, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use egui::{CollapsingHeader, Color32, Grid, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
     Bleed, CHECKS, CheckFinding, CheckStatus, SKETCH, USUAL_LISTEN_S, WIRING_RULES, is_sound, summary, wires,
 };
@@ -19,21 +19,27 @@ use palpate_lab::workers::{
 };
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let view = context.tools.examiner.view().unwrap_or_default();
+    let doctor = &context.tools.doctor;
     let crosstalk = context.gripper.and_then(|gripper| gripper.crosstalk.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
             return crosstalk_running_ui(ui, crosstalk, running, actions);
         }
-        match &view.running {
-            Some((request, listened_s)) => running_ui(ui, request, *listened_s, actions),
+        match doctor.running() {
+            Some(running) => {
+                let remark = "Now bend each finger and press each pad.";
+                if progress_ui(ui, &running.progress, Some(remark), "End and report so far") {
+                    actions.push(ToolAction::StopExamining);
+                }
+            }
             None => begin_ui(ui, actions),
         }
         if let Some((crosstalk, ended)) = crosstalk.and_then(|view| Some((view, view.ended.as_ref()?))) {
             crosstalk_ended_ui(ui, crosstalk, ended);
         }
-        match &view.last {
-            Some(last) => examination_ui(ui, context.view.theme, last),
+        match doctor.last().map(|ended| ended.outcome) {
+            Some(Ok(report)) => examination_ui(ui, context.view.theme, &report),
+            Some(Err(cause)) => failure_ui(ui, cause),
             None => {
                 ui.add_space(6.0);
                 let about: Vec<&str> = CHECKS.iter().map(|check| check.about).collect();
@@ -114,7 +120,7 @@ fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<Stri
     ui.add_space(6.0);
     let bleeds = view.found.iter().any(|bleed| bleed.bleeds);
     match ended {
-        Err(cause) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
+        Err(cause) => failure_ui(ui, cause),
         Ok(report) => {
             for (k, text) in report.iter().enumerate() {
                 let text = RichText::new(format!("{text}."));
@@ -145,16 +151,6 @@ fn bleeds_ui(ui: &mut Ui, found: &[Bleed]) {
             ui.end_row();
         }
     });
-}
-
-fn running_ui(ui: &mut Ui, request: &ExamineRequest, listened_s: f64, actions: &mut Actions) {
-    let of = request.seconds;
-    let share = (listened_s / of.max(1e-9)) as f32;
-    ui.add(ProgressBar::new(share).text(format!("listening, {listened_s:.0} of {of:.0} s")));
-    wrapped(ui, RichText::new("Now bend each finger and press each pad.").strong());
-    if ui.button("Stop").on_hover_text("End and report so far").clicked() {
-        actions.push(ToolAction::StopExamining);
-    }
 }
 
 fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {

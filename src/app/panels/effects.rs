@@ -10,7 +10,6 @@ use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuil
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{ExplainedEffect, Explanation};
-use palpate_lab::workers::{EffectsState, EffectsView};
 use palpate_sim::frame::PlannedEffect;
 use palpate_sim::scene::{Effect, Setting};
 
@@ -32,23 +31,27 @@ const BEFORE: &str = "of the scene before";
 const LEAST_CHANGE: f64 = 1e-3;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    if context.effects.asked() != Some(context.scene) {
+    let (running, last) = (context.effects.running(), context.effects.last());
+    let fresh = last.as_ref().filter(|ended| *ended.command == *context.scene);
+    if fresh.is_none() && running.as_ref().is_none_or(|running| *running.command != *context.scene) {
         actions.push(SimulationAction::MeasureEffects);
     }
-    let view = context.effects.view();
-    let current = view.as_deref().filter(|view| *view.scene == *context.scene);
-    let ready = current.and_then(|view| match &view.state {
-        EffectsState::Ready(explanation) => Some(explanation.as_ref()),
-        EffectsState::Measuring(..) | EffectsState::Failed(_) => None,
-    });
-    let fresh = ready.is_some();
-    let explanation = ready.or_else(|| view.as_deref().and_then(|view| view.last.as_deref()));
+    let explanation = last.as_ref().and_then(|ended| ended.outcome.as_deref().ok());
+    let state = match fresh.map(|ended| &ended.outcome) {
+        Some(Ok(explanation)) => format!("a grasp takes {} ms of CPU time", three_digits(explanation.cpu_ms)),
+        Some(Err(cause)) => cause.to_string(),
+        None => running
+            .map(|running| running.progress.words)
+            .filter(|words| !words.is_empty())
+            .unwrap_or_else(|| "measuring ..".to_owned()),
+    };
+    let fresh = fresh.is_some();
     let mut scene = context.scene.clone();
     let unfolded_id = ui.scope_id().with("unfolded");
     let mut unfolded: Option<Effect> = ui.data(|data| data.get_temp(unfolded_id)).flatten();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
-        state_ui(ui, current, explanation);
+        state_ui(ui, if fresh || explanation.is_none() { state } else { format!("{BEFORE}: {state}") });
         header_ui(ui);
         for effect in Effect::ALL {
             let explained = explanation.and_then(|e| e.effects.iter().find(|e| e.planned.name == effect.name()));
@@ -72,18 +75,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 }
 
 /// State of the measurement, in a line.
-fn state_ui(ui: &mut Ui, view: Option<&EffectsView>, explanation: Option<&Explanation>) {
-    let text = match view.map(|view| &view.state) {
-        None | Some(EffectsState::Measuring(_, 0)) => "measuring ..".to_owned(),
-        Some(EffectsState::Measuring(done, of)) => format!("measuring .. {done} of {of}"),
-        Some(EffectsState::Ready(_)) => {
-            let cpu_ms = explanation.map_or(0.0, |explanation| explanation.cpu_ms);
-            format!("a grasp takes {} ms of CPU time", three_digits(cpu_ms))
-        }
-        Some(EffectsState::Failed(cause)) => cause.to_string(),
-    };
-    let fresh = matches!(view.map(|view| &view.state), Some(EffectsState::Ready(_)));
-    let text = if fresh || explanation.is_none() { text } else { format!("{BEFORE}: {text}") };
+fn state_ui(ui: &mut Ui, text: String) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     let line = egui::Label::new(RichText::new(&text).weak()).truncate();
     ui.scope_builder(UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)), |ui| ui.add(line));

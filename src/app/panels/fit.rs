@@ -9,13 +9,13 @@ use crate::app::features::tools::ToolAction;
 use crate::app::notices::UserMessage;
 use crate::app::plots::static_plot;
 use crate::app::theme::{colour, veil};
-use crate::app::widgets::{just_opened, wrapped};
-use egui::{Align, Button, Layout, ProgressBar, RichText, ScrollArea, Sense, Ui};
+use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
+use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{Course, Estimate, FingerFit, Known, MOST_STEPS, Remainder};
-use palpate_lab::workers::{FitCommand, FittedFinger};
+use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
+use palpate_lab::workers::FittedFinger;
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -25,26 +25,20 @@ use std::collections::BTreeSet;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "fit") {
-        actions.push(ToolAction::Fit(FitCommand::List));
+        actions.push(ToolAction::ListTrials);
     }
-    let view = context.tools.fitter.view().unwrap_or_default();
+    let tools = context.tools;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let hint =
             "Fits the simulated finger to trials of the real one: a few empty closes, and grasps of a fixed object.";
         wrapped(ui, RichText::new(hint).weak());
-        match view.running {
-            Some(steps) => running_ui(ui, steps, actions),
-            None => match &view.trials {
-                None => wrapped(ui, RichText::new("loading trials ..").weak()),
-                Some(Ok(rows)) => choice_ui(ui, rows, actions),
-                Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
-            },
-        }
-        match &view.ended {
-            Some(Ok(fitted)) => fitted_ui(ui, context, fitted, actions),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
-            None => {}
-        }
+        let controls = |ui: &mut Ui, actions: &mut Actions| match tools.trials.last().map(|ended| ended.outcome) {
+            None => wrapped(ui, RichText::new("loading trials ..").weak()),
+            Some(Ok(rows)) => choice_ui(ui, &rows, actions),
+            Some(Err(cause)) => failure_ui(ui, cause),
+        };
+        let stop = ("Cancel; nothing changes", ToolAction::StopFitting);
+        job_ui(ui, &tools.fit, stop, actions, controls, |ui, fitted, actions| fitted_ui(ui, context, fitted, actions));
     });
 }
 
@@ -81,10 +75,10 @@ fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let fit = ui.add_enabled(!chosen.is_empty(), Button::new("Fit"));
         if fit.on_disabled_hover_text("Choose at least one trial").clicked() {
-            actions.push(ToolAction::Fit(FitCommand::Fit(chosen.iter().copied().collect())));
+            actions.push(ToolAction::Fit(chosen.iter().copied().collect()));
         }
         if ui.button("Refresh").on_hover_text("Reload the trials").clicked() {
-            actions.push(ToolAction::Fit(FitCommand::List));
+            actions.push(ToolAction::ListTrials);
         }
     });
     ui.data_mut(|data| data.insert_temp(id, chosen));
@@ -94,14 +88,6 @@ fn trial_text(row: &TrialRow) -> String {
     let object = if row.object == EMPTY { "empty close" } else { &row.object };
     let began: String = row.created.replace('T', " ").chars().take(16).collect();
     format!("{}  {object}  {began}", row.id)
-}
-
-fn running_ui(ui: &mut Ui, steps: f64, actions: &mut Actions) {
-    let text = format!("step {:.0} of at most {MOST_STEPS}", steps.floor() + 1.0);
-    ui.add(ProgressBar::new((steps / f64::from(MOST_STEPS)) as f32).text(text));
-    if ui.button("Stop").on_hover_text("Cancel; nothing changes").clicked() {
-        actions.push(ToolAction::StopFitting);
-    }
 }
 
 fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, actions: &mut Actions) {

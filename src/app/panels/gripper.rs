@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::gripper::{CONTROLS, GripperAction, control_title};
 use crate::app::theme::{accented, colour, veil};
-use crate::app::widgets::{command_ui, stop_button, text_field, wrapped};
+use crate::app::widgets::{command_ui, failure_ui, stop_button, text_field, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::palette::Theme;
@@ -28,7 +28,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 /// Ports to connect to.
 fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if let Some(refused) = context.gripper.and_then(|gripper| gripper.refused.as_ref()) {
-        wrapped(ui, RichText::new(&refused.text).color(ui.visuals().error_fg_color));
+        failure_ui(ui, &refused.text);
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
         }
@@ -141,7 +141,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
     });
     wrapped(ui, RichText::new(link.format_summary()).small().weak());
     for text in link.line_remarks() {
-        wrapped(ui, RichText::new(text).color(ui.visuals().error_fg_color));
+        failure_ui(ui, text);
     }
     for text in link.wiring_remarks() {
         wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));

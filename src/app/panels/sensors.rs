@@ -10,7 +10,6 @@ use crate::app::features::view::ViewAction;
 
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
-use palpate_lab::workers::TrainCommand;
 use palpate_sim::scene::{Between, PRESETS, PoseSpread};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::{CATALOGUE, SignalDefinition};
@@ -102,10 +101,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let chosen = context.view.simulation_model.as_ref();
     if just_opened(ui, "sensors") {
-        actions.push(ToolAction::Train(TrainCommand::Look));
+        actions.push(ToolAction::ListModels);
     }
-    let view = context.tools.trainer.view();
-    let saved = view.as_ref().map_or(&[][..], |view| &view.models[..]);
+    let data = context.tools.data.outcome();
+    let saved = data.as_ref().map_or(&[][..], |data| &data.models);
     let mut name = |path: &Path, about: &str| {
         let file = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         if ui.radio(chosen.is_some_and(|own| own == path), file).on_hover_text(about).clicked() {

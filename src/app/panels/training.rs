@@ -6,44 +6,42 @@ use crate::app::context::PanelContext;
 use crate::app::features::recognition::RecognitionAction;
 use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED, ToolAction};
 use crate::app::theme::colour;
-use crate::app::widgets::{just_opened, wrapped};
-use egui::{Align2, Button, ComboBox, FontId, ProgressBar, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
+use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, TrainingStage, in_table_order};
-use palpate_lab::workers::{FinishedTraining, TrainCommand, TrainRequest, TrainerView};
+use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, in_table_order};
+use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, METHODS, counted, method};
 use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "training") {
-        actions.push(ToolAction::Train(TrainCommand::Look));
+        actions.push(ToolAction::ListModels);
     }
-    let view = context.tools.trainer.view().unwrap_or_default();
+    let data = context.tools.data.outcome();
+    let data = data.as_deref();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        match &view.running {
-            Some((request, stage)) => running_ui(ui, request, *stage, actions),
-            None => begin_ui(ui, &view, actions),
-        }
-        match &view.finished {
-            Some(Ok(finished)) => finished_ui(ui, context, finished, actions),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
-            None => {}
-        }
-        match &view.classes {
+        let stop = ("Cancel; nothing is saved", ToolAction::StopTraining);
+        let controls = |ui: &mut Ui, actions: &mut Actions| begin_ui(ui, data, actions);
+        job_ui(ui, &context.tools.training, stop, actions, controls, |ui, finished, actions| {
+            finished_ui(ui, context, finished, actions);
+        });
+        match data.map(|data| &data.classes) {
             Some(Ok(classes)) => classes_ui(ui, context, classes, actions),
-            Some(Err(cause)) => wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color)),
+            Some(Err(cause)) => failure_ui(ui, cause),
             None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
         }
-        models_ui(ui, context, &view, actions);
+        models_ui(ui, context, data, actions);
     });
 }
 
 /// Method, and the button that starts.
-fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Actions) {
+fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
     let id = egui::Id::unique("training method");
     let mut chosen = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_else(|| DEFAULT_METHOD.to_owned());
     let title = method(&chosen).map_or("", |method| method.title);
+    let too_little = data.and_then(TrainingData::too_little);
     ui.horizontal_wrapped(|ui| {
         let label = ui.label("Method");
         let combo = ComboBox::from_id_salt("training method").width(150.0).height(520.0).selected_text(title);
@@ -53,14 +51,13 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Actions) {
             }
         });
         shown.response.labelled_by(label.id);
-        let too_little = view.too_little();
-        let ready = matches!(&view.classes, Some(Ok(_))) && too_little.is_none();
+        let ready = data.is_some_and(|data| data.classes.is_ok()) && too_little.is_none();
         let train = ui
             .add_enabled(ready, Button::new("Train"))
             .on_hover_text("Train on all labelled trials of the real gripper");
-        if train.on_disabled_hover_text(too_little.unwrap_or_default()).clicked() {
+        if train.on_disabled_hover_text(too_little.as_deref().unwrap_or_default()).clicked() {
             let request = TrainRequest { method: chosen.clone(), seed: TRAINING_SEED, quick: false };
-            actions.push(ToolAction::Train(TrainCommand::Train(request)));
+            actions.push(ToolAction::Train(request));
         }
     });
     if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
@@ -68,23 +65,10 @@ fn begin_ui(ui: &mut Ui, view: &TrainerView, actions: &mut Actions) {
         let text = format!("{about}. {share:.0} % of each object's trials are held back for evaluation.");
         wrapped(ui, RichText::new(text).weak());
     }
-    if let Some(why) = view.too_little() {
+    if let Some(why) = too_little {
         wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
     }
     ui.data_mut(|data| data.insert_temp(id, chosen));
-}
-
-fn running_ui(ui: &mut Ui, request: &TrainRequest, stage: TrainingStage, actions: &mut Actions) {
-    let title = method(&request.method).map_or(request.method.as_str(), |method| method.title);
-    let (share, text) = match stage {
-        TrainingStage::Reading(done, of) => (done as f64 / of.max(1) as f64, format!("reading trials, {done} of {of}")),
-        TrainingStage::Fitting(share) => (share, format!("training {title}, {:.0} %", 100.0 * share)),
-        TrainingStage::Judging => (1.0, "evaluating".to_owned()),
-    };
-    ui.add(ProgressBar::new(share as f32).text(text));
-    if ui.button("Stop").on_hover_text("Cancel; nothing is saved").clicked() {
-        actions.push(ToolAction::StopTraining);
-    }
 }
 
 fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTraining, actions: &mut Actions) {
@@ -185,20 +169,21 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
 const BUTTON: f32 = 72.0;
 
 /// Saved models and the shipped one.
-fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &TrainerView, actions: &mut Actions) {
+fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, data: Option<&TrainingData>, actions: &mut Actions) {
+    let saved = data.map_or(&[][..], |data| &data.models);
     ui.add_space(8.0);
     ui.horizontal(|ui| {
         ui.strong("Models for the real gripper");
         if ui.button("Refresh").on_hover_text("Reload trials and models").clicked() {
-            actions.push(ToolAction::Train(TrainCommand::Look));
+            actions.push(ToolAction::ListModels);
         }
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
-    let saved = view.models.iter();
-    let saved = saved.map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
     // A model from outside the folder.
-    let other = context.view.gripper_model.as_deref().filter(|own| view.models.iter().all(|m| m.path != *own));
+    let other = context.view.gripper_model.as_deref().filter(|own| saved.iter().all(|m| m.path != *own));
     let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
+    let saved =
+        saved.iter().map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
     for (name, about, path) in std::iter::once(shipped).chain(other).chain(saved) {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - BUTTON).max(80.0);

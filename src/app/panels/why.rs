@@ -11,9 +11,8 @@ use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense,
 use palpate_geometry::palette::Rgb;
 use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
-use palpate_lab::workers::{ExplainRequest, ExplainedGrasp, NearestState};
+use palpate_lab::workers::ExplainRequest;
 use palpate_sim::objects::object_title;
-use std::sync::Arc;
 
 /// Height of a row (points).
 const ROW: f32 = 20.0;
@@ -44,30 +43,24 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             return;
         }
     };
-    let asked = |view: &ExplainedGrasp| same(&view.request, &request);
-    let Some(view) = context.explained.filter(|view| asked(view)) else {
+    let Some(explained) = context.explainer.explained(&request) else {
         actions.push(RecognitionAction::Explain(request));
         ui.weak("Leaving out channels and phases ..");
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
-        match &view.why {
-            Ok(why) => evidence_ui(ui, context, why),
+        match &explained.outcome {
+            Ok(why) => {
+                evidence_ui(ui, context, why);
+                nearest_ui(ui, context, &request, actions);
+            }
             Err(cause) => {
                 ui.heading("No explanation");
                 wrapped(ui, RichText::new(capitalised(&cause.to_string())));
             }
         }
-        if view.why.is_ok() {
-            nearest_ui(ui, context, &view.nearest, actions);
-        }
     });
-}
-
-/// True for requests about the same grasp.
-fn same(a: &ExplainRequest, b: &ExplainRequest) -> bool {
-    a.trial == b.trial && Arc::ptr_eq(&a.grasp, &b.grasp)
 }
 
 fn capitalised(text: &str) -> String {
@@ -236,20 +229,19 @@ fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink
     ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
 }
 
-fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, nearest: &NearestState, actions: &mut Actions) {
+fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, request: &ExplainRequest, actions: &mut Actions) {
     heading(ui, "Nearest stored trials", "By the root mean square difference of all channels over the grasp");
-    match nearest {
-        NearestState::Comparing(_, 0) => {
-            ui.weak("Reading the store ..");
-        }
-        NearestState::Comparing(done, of) => {
-            ui.weak(format!("Comparing .. {done} of {of}"));
-        }
-        NearestState::Failed(cause) => {
+    let nearest = &context.explainer.nearest;
+    match nearest.last().filter(|ended| ended.command.is_like(request)).map(|ended| ended.outcome) {
+        Some(Ok(report)) => report_ui(ui, context, &report, actions),
+        Some(Err(cause)) => {
             let ink = colour(context.view.theme.colours().error);
             wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
         }
-        NearestState::Ready(report) => report_ui(ui, context, report, actions),
+        None => {
+            let words = nearest.running().map(|running| running.progress.words).filter(|words| !words.is_empty());
+            ui.weak(words.unwrap_or_else(|| "Reading the store ..".to_owned()));
+        }
     }
 }
 

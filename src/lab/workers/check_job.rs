@@ -1,14 +1,13 @@
-//! Check of finished grasps in a thread of its own: comparison with a run at a tenth of the tolerance, and computing
+//! Check of finished grasps beside the simulation: comparison with a run at a tenth of the tolerance, and computing
 //! again until three levels agree.
 
-use super::background_job::BackgroundJob;
+use super::job::{Job, Newer};
 use super::messages::Wake;
 use crate::grasping::{EndState, grasp_until_agreement, prepare};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A finished grasp that can be computed again.
 #[derive(Clone)]
@@ -40,22 +39,17 @@ pub(super) enum CheckResult {
     ComputedAgain { grasp: u64, trial: Box<SimulatedTrial> },
 }
 
-pub(super) type CheckJob = BackgroundJob<CheckRequest, CheckResult>;
-
-/// Starts the thread.
-pub(super) fn start_check_job(wake: Wake) -> std::io::Result<CheckJob> {
-    BackgroundJob::spawn("check", wake, |request, stop: &AtomicBool, outlet| {
-        let cancelled = || stop.load(Ordering::Relaxed);
-        let result = match request {
-            CheckRequest::Compare(subject) => compare(&subject, &cancelled),
+/// The job; a check that is stopped has no result.
+pub(super) fn check_job(wake: Wake) -> Job<CheckRequest, CheckResult> {
+    Job::new("check", Newer::Replaces, wake, |request: &CheckRequest, run| {
+        let cancelled = || run.stopped();
+        Ok(match request {
+            CheckRequest::Compare(subject) => compare(subject, &cancelled),
             CheckRequest::ComputeAgain(subject) => {
                 let trial = grasp_until_agreement(&subject.scene, subject.object.as_deref(), subject.seed, &cancelled);
                 trial.map(|trial| CheckResult::ComputedAgain { grasp: subject.grasp, trial: Box::new(trial) })
             }
-        };
-        if let Some(result) = result {
-            outlet.publish(result);
-        }
+        })
     })
 }
 

@@ -1,14 +1,21 @@
-//! Ghost: the grasp computed by the other engine in a thread of its own, for comparison.
+//! Ghost: the grasp computed by the other engine, for comparison.
 
-use super::latest::Latest;
+use super::job::{Job, Newer};
 use super::messages::Wake;
 use crate::grasping::prepare;
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, Scene};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread::JoinHandle;
+
+/// Grasp to be computed.
+pub(super) struct GhostRequest {
+    /// Its number, as in [`super::TraceRow::grasp`].
+    pub(super) grasp: u64,
+    /// The scene, with the engine of the ghost.
+    pub(super) scene: Scene,
+    pub(super) object: Option<Arc<ObjectModel>>,
+}
 
 /// The whole of one grasp as another engine computes it.
 #[derive(Debug)]
@@ -29,68 +36,17 @@ impl GhostGrasp {
     }
 }
 
-/// Starts ghosts, one at a time: a newer one makes an older one stop.
-pub(super) struct GhostMaker {
-    wanted: bool,
-    newest: Arc<AtomicU64>,
-    result: Arc<Latest<GhostGrasp>>,
-    wake: Wake,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl GhostMaker {
-    pub(super) fn new(result: Arc<Latest<GhostGrasp>>, wake: Wake) -> Self {
-        Self { wanted: false, newest: Arc::new(AtomicU64::new(0)), result, wake, thread: None }
-    }
-
-    /// Whether grasps get a ghost from now on.
-    pub(super) fn set_wanted(&mut self, wanted: bool) {
-        self.wanted = wanted;
-    }
-
-    /// Computes the ghost of a grasp, if ghosts are wanted. A failure leaves it without one: nothing else depends on it.
-    pub(super) fn begin(&mut self, grasp: u64, scene: &Scene, object: Option<Arc<ObjectModel>>) {
-        self.stop();
-        if !self.wanted {
-            return;
-        }
-        let mut scene = scene.clone();
-        scene.solver.engine = scene.solver.engine.other();
-        self.newest.store(grasp, Ordering::Relaxed);
-        let (newest, result, wake) = (Arc::clone(&self.newest), Arc::clone(&self.result), Arc::clone(&self.wake));
-        let compute = move || {
-            let mut run = prepare(&scene, object.as_deref(), 0);
-            let mut frames = vec![run.gripper_mut().run_mut().first_look()];
-            while newest.load(Ordering::Relaxed) == grasp {
-                match run.next_frame() {
-                    Some(frame) => frames.push(frame.clone()),
-                    None => {
-                        result.publish(Arc::new(GhostGrasp { grasp, engine: scene.solver.engine, frames }));
-                        return wake();
-                    }
-                }
+/// The job; without a ghost nothing else changes.
+pub(super) fn ghost_job(wake: Wake) -> Job<GhostRequest, GhostGrasp> {
+    Job::new("ghost", Newer::Replaces, wake, |GhostRequest { grasp, scene, object }, run| {
+        let mut ghost = prepare(scene, object.as_deref(), 0);
+        let mut frames = vec![ghost.gripper_mut().run_mut().first_look()];
+        while !run.stopped() {
+            match ghost.next_frame() {
+                Some(frame) => frames.push(frame.clone()),
+                None => return Ok(Some(GhostGrasp { grasp: *grasp, engine: scene.solver.engine, frames })),
             }
-        };
-        self.thread = match std::thread::Builder::new().name("ghost".to_owned()).spawn(compute) {
-            Ok(thread) => Some(thread),
-            Err(error) => {
-                tracing::warn!("no ghost: {error}");
-                None
-            }
-        };
-    }
-
-    fn stop(&mut self) {
-        self.newest.store(u64::MAX, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // A ghost that broke is a ghost that is not shown.
-            let _ended = thread.join();
         }
-    }
-}
-
-impl Drop for GhostMaker {
-    fn drop(&mut self) {
-        self.stop();
-    }
+        Ok(None)
+    })
 }

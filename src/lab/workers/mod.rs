@@ -10,38 +10,43 @@
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
 //!
-//! The thread "check" compares each finished grasp with a finer run, and computes it again on request.
+//! A [`Job`] is work beside the window with a beginning and an end: a command in, progress, then an outcome or a failure
+//! out. Its thread runs while there is something to do. A newer command replaces the older ones, or waits for them.
 //!
-//! The thread "effects" measures on request what the effects of a scene cost and change, "accuracy-study" what each
-//! setting of accuracy costs there. The thread "ghost" computes each
-//! grasp by the other engine, if switched on; [`SimWorker::ghost`] has the newest.
+//! | job | command | outcome | newer |
+//! |---|---|---|---|
+//! | [`doctor_job`] | a port | findings | replaces |
+//! | [`fit_job`] | recorded trials | a fitted finger | replaces |
+//! | [`recorded_trials_job`] [`training_data_job`] [`study_files_job`] | | what the store and its folders hold | replaces |
+//! | [`training_job`] [`class_training_job`] [`load_model_job`] | method, object, file | a model | waits |
+//! | [`advice_job`] | a grasp | the move before the next one | replaces |
+//! | [`Explainer`] | a grasp | why the model gave its answer; the nearest trials | replaces |
+//! | [`effects_job`] | a scene | cost and change of each effect | replaces |
+//! | [`study_runner`] | a study of the paper | its result | waits |
+//! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
+//! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
+//!
+//! "accuracy-study" measures what each setting of accuracy costs in a scene.
 //!
 //! The thread "label" handles labels, "library" search and edits of all trials. Both show changes by other programs.
-//!
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
-//! "inspect" opens stored trials ([`Inspector`]). "why" explains the answer to a grasp and finds the stored trials nearest to it,
-//! "advise" how to move the object before the next one.
-//! "examine" runs the doctor's checks, "fit" fits the simulated finger to the real one, "train" trains on labelled trials,
-//! "study" runs the studies of the paper.
-//!
-//! "portraits" draws small pictures of objects from files.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
 mod accuracy_job;
-mod adviser;
+mod advice;
 mod background_job;
 mod check_job;
+mod class_training;
 mod current;
-mod diagnostics_job;
+mod doctor;
 mod effects;
-mod explainer;
-mod fitter;
+mod fit;
 mod ghost;
 mod gripper;
 mod held_object;
-mod inspector;
+mod job;
 mod labeller;
 mod labelling_session;
 mod latest;
@@ -51,6 +56,7 @@ mod listener;
 mod listener_tests;
 mod messages;
 mod object_search;
+mod open_trial;
 mod pace;
 mod portraits;
 mod refined_run;
@@ -59,23 +65,23 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 mod simulation_session;
-mod student;
-mod teacher;
-mod trainer;
+mod study_runner;
+mod training;
+mod why;
 
-pub use adviser::{Advice, Adviser};
+pub use advice::advice_job;
 pub use background_job::BackgroundJob;
-pub use diagnostics_job::{DiagnosticsJob, DiagnosticsReport, DiagnosticsView, Examine, ExamineRequest, examine_port};
-pub use effects::{EffectsState, EffectsView, EffectsWorker, Explain, explain_scene};
-pub use explainer::{ExplainRequest, ExplainedGrasp, Explainer, NearestState};
-pub use fitter::{FitCommand, FitTrials, FitTrialsError, FittedFinger, Fitter, FitterView, fit_trials};
+pub use class_training::{TeachRequest, class_training_job};
+pub use doctor::{DiagnosticsReport, Examine, ExamineRequest, doctor_job, examine_port};
+pub use effects::{Explain, effects_job, explain_scene};
+pub use fit::{FitTrials, FittedFinger, fit_job, fit_trials, recorded_trials_job};
 pub use ghost::GhostGrasp;
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
     CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
     RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
 };
-pub use inspector::{Inspector, OpenRequest, Opened};
+pub use job::{EndedJob, Job, JobFailure, JobProgress, JobRun, Newer, RunningJob};
 pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
@@ -89,12 +95,15 @@ pub use messages::{
     Status, TraceRow, Wake,
 };
 pub use object_search::NUMBERED_OBJECTS;
-pub use portraits::{PORTRAIT_SIDE, Portrait, PortraitJob};
+pub use open_trial::{OpenRequest, open_trial_job};
+pub use portraits::{PORTRAIT_SIDE, portrait_job};
 pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
-pub use student::{
-    DrawFigure, Student, StudentCommand, StudentError, StudentView, StudyFiles, StudyOrigin, StudyOutcome,
-    StudyRequest, StudyResult,
+pub use study_runner::{
+    DrawFigure, StudyEnd, StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner,
+    has_other_units, study_files_job, study_runner,
 };
-pub use teacher::{EndedLesson, TeachError, TeachRequest, Teacher, TeacherView};
-pub use trainer::{FinishedTraining, TrainCommand, TrainRequest, TrainedModel, Trainer, TrainerView};
+pub use training::{
+    FinishedTraining, TrainRequest, TrainedModel, TrainingData, load_model_job, training_data_job, training_job,
+};
+pub use why::{ExplainRequest, Explainer};

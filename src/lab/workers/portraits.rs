@@ -1,6 +1,6 @@
-//! Thread "portraits": draws small pictures of objects from files, for lists.
+//! Small pictures of objects from files, for lists, drawn beside the window.
 
-use super::background_job::BackgroundJob;
+use super::job::{Job, Newer};
 use super::messages::Wake;
 use crate::picture::portrait;
 use palpate_sim::objects::load_surface;
@@ -8,31 +8,17 @@ use palpate_sim::objects::load_surface;
 /// Side of a portrait (pixels): lists show it at 40 points, so that it is sharp on fine screens too.
 pub const PORTRAIT_SIDE: u32 = 96;
 
-/// Small picture of an object.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Portrait {
-    /// The file.
-    pub source: String,
-    /// Red, green, blue and opacity of [`PORTRAIT_SIDE`]² pixels, row by row from the top; none where the file cannot be read.
-    pub rgba: Option<Vec<u8>>,
-}
-
-/// Handle of the thread: files in, their portraits out.
-pub type PortraitJob = BackgroundJob<String, Portrait>;
-
-impl PortraitJob {
-    /// Starts the thread.
-    pub fn start(wake: Wake) -> std::io::Result<Self> {
-        Self::spawn("portraits", wake, |source: String, _stop, outlet| {
-            let rgba = load_surface(&source).ok().map(|surface| portrait(&surface, PORTRAIT_SIDE));
-            outlet.publish(Portrait { source, rgba });
-        })
-    }
+/// The job: files in, out come red, green, blue and opacity of [`PORTRAIT_SIDE`]² pixels, row by row from the top; nothing
+/// where the file cannot be read.
+pub fn portrait_job(wake: Wake) -> Job<String, Vec<u8>> {
+    Job::new("portraits", Newer::Waits, wake, |source: &String, _run| {
+        Ok(load_surface(source).ok().map(|surface| portrait(&surface, PORTRAIT_SIDE)))
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::background_job::watch::{until, waker};
+    use super::super::job::watch::{settled, waker};
     use super::*;
 
     #[test]
@@ -41,14 +27,15 @@ mod tests {
         let open = folder.path().join("open.obj");
         std::fs::write(&open, "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 2 3\nf 1 2 4\n").expect("written");
         let (wake, woken) = waker();
-        let job = PortraitJob::start(wake).expect("starts");
-        let sources = [open.as_path(), &folder.path().join("none.stl")].map(|path| path.display().to_string());
-        let [drawn, missing] = sources.map(|source| {
-            job.ask(source.clone());
-            until(&job, &woken, |portrait| portrait.source == source)
-        });
-        assert_eq!(drawn.rgba.as_ref().map(Vec::len), Some((4 * PORTRAIT_SIDE * PORTRAIT_SIDE) as usize));
-        assert_ne!(drawn.rgba, Some(portrait(&palpate_geometry::SurfaceMesh::default(), PORTRAIT_SIDE)));
-        assert_eq!(missing.rgba, None);
+        let job = portrait_job(wake);
+        for path in [open.as_path(), &folder.path().join("none.stl")] {
+            job.start(path.display().to_string());
+        }
+        settled(&job, &woken);
+        let drawn = job.take();
+        assert_eq!(drawn.iter().map(|ended| ended.number).collect::<Vec<_>>(), [1]);
+        let rgba = drawn[0].outcome.as_ref().expect("drawn");
+        assert_eq!(rgba.len(), (4 * PORTRAIT_SIDE * PORTRAIT_SIDE) as usize);
+        assert_ne!(**rgba, portrait(&palpate_geometry::SurfaceMesh::default(), PORTRAIT_SIDE));
     }
 }

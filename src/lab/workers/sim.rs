@@ -1,6 +1,7 @@
 //! Handle of the simulation thread: commands in, snapshots, trace rows and notices out.
 
-use super::ghost::GhostGrasp;
+use super::ghost::{GhostGrasp, GhostRequest, ghost_job};
+use super::job::Job;
 use super::latest::Latest;
 use super::messages::{Command, MeasuredAccuracy, NotSent, Notice, SimWorkerSetup, Snapshot, TraceRow};
 use super::simulation_session::{Outlets, Session};
@@ -16,7 +17,6 @@ const MOST_COMMANDS: usize = 256;
 const MOST_ROWS: usize = 9000;
 
 /// Handle of the simulation thread. Dropping it ends the thread and waits for pending writes.
-#[derive(Debug)]
 pub struct SimWorker {
     commands: SyncSender<Command>,
     snapshots: Arc<Latest<Snapshot>>,
@@ -25,7 +25,7 @@ pub struct SimWorker {
     rows_lost: Arc<AtomicBool>,
     loading: Arc<AtomicBool>,
     notices: Receiver<Notice>,
-    ghost: Arc<Latest<GhostGrasp>>,
+    ghost: Arc<Job<GhostRequest, GhostGrasp>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -37,7 +37,7 @@ impl SimWorker {
         let (notice_sender, notices) = channel();
         let snapshots = Arc::new(Latest::default());
         let accuracy = Arc::new(Latest::default());
-        let ghost = Arc::new(Latest::default());
+        let ghost = Arc::new(ghost_job(Arc::clone(&setup.wake)));
         let [rows_lost, loading] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let outlets = Outlets {
             snapshots: Arc::clone(&snapshots),
@@ -90,7 +90,7 @@ impl SimWorker {
 
     /// The newest grasp that the other engine has computed; compare its number with that of the snapshot.
     pub fn ghost(&self) -> Option<Arc<GhostGrasp>> {
-        self.ghost.get()
+        self.ghost.outcome()
     }
 
     /// True once after rows had to be dropped because the queue was full.

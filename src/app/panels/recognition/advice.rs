@@ -26,9 +26,8 @@ fn text(part: &Part<'_, '_>) -> Option<String> {
         }
         ViewSource::Gripper => {
             let last = part.view.last.as_ref().filter(|_| part.view.decision.is_none() && !part.view.listening)?;
-            let advice = part.context.tools.adviser.view()?;
-            let next = advice.next.filter(|_| Arc::ptr_eq(&advice.grasp, last))?;
-            Some(format!("Before the next grasp: {next}."))
+            let advice = part.context.tools.advice.last().filter(|advice| Arc::ptr_eq(&*advice.command, last))?;
+            Some(format!("Before the next grasp: {}.", advice.outcome.ok()?))
         }
     }
 }

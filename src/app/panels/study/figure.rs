@@ -39,11 +39,11 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
 
 /// Title; origins and figures to choose from; the button that exports.
 fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, result: &StudyResult, number: usize, actions: &mut Actions) {
-    let (view, card) = (context.studies.view(), context.studies.chosen().card());
+    let card = context.studies.chosen().card();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         ui.strong(card.title);
-        for other in view.studies.get(card.key).into_iter().flat_map(|files| &files.results) {
+        for other in context.studies.files(card.key).into_iter().flat_map(|files| &files.results) {
             let chosen = other.origin.is_like(result.origin);
             let button = ui.selectable_label(chosen, RichText::new(other.origin.title()).small());
             if button.on_hover_text(about_origin(other.origin)).clicked() {

@@ -4,11 +4,11 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::features::studies::StudyAction;
 use crate::app::theme::{accented, colour};
-use crate::app::widgets::{command_ui, just_opened, wrapped};
+use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::Rgb;
-use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudyFolder, StudyProgress, StudySize, StudyStep};
-use palpate_lab::workers::{StudentView, StudyFiles, StudyOrigin, StudyOutcome, StudyRequest};
+use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudyFolder, StudySize};
+use palpate_lab::workers::{JobProgress, StudyFiles, StudyOrigin, StudyRequest, has_other_units};
 use palpate_store::Store;
 
 /// Height of a row (points).
@@ -18,14 +18,13 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
     if just_opened(ui, "studies") {
         actions.push(StudyAction::Look);
     }
-    let view = context.studies.view();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for study in PAPER_STUDIES {
             let card = study.card();
             let chosen = card.key == context.studies.chosen().card().key;
-            row_ui(ui, context, &view, &card, chosen, actions);
+            row_ui(ui, context, &card, chosen, actions);
             if chosen {
-                ui.indent(card.key, |ui| chosen_ui(ui, context, &view, &card, actions));
+                ui.indent(card.key, |ui| chosen_ui(ui, context, &card, actions));
             }
         }
         ui.add_space(6.0);
@@ -42,17 +41,10 @@ fn run(key: &str, size: StudySize, anew: bool, actions: &mut Actions) {
     actions.push(StudyAction::Run(StudyRequest { key: key.to_owned(), size, anew }));
 }
 
-fn row_ui(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    view: &StudentView,
-    card: &StudyCard,
-    chosen: bool,
-    actions: &mut Actions,
-) {
+fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, chosen: bool, actions: &mut Actions) {
     let colours = context.view.theme.colours();
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    let (state, ink) = state(context, view, card.key);
+    let (state, ink) = state(context, card.key);
     let label = format!("{}, {}: {state}", card.title, card.paper);
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
     if chosen || response.hovered() || response.has_focus() {
@@ -79,19 +71,26 @@ fn row_ui(
     }
 }
 
+/// Progress of a study, while it runs.
+fn progress(context: &PanelContext<'_>, key: &str) -> Option<JobProgress> {
+    let JobProgress { share, words } = context.studies.running().filter(|running| running.command.key == key)?.progress;
+    let words = if words.is_empty() { "begins ..".to_owned() } else { words };
+    Some(JobProgress { share, words })
+}
+
 /// State of a study in a few words.
-fn state(context: &PanelContext<'_>, view: &StudentView, key: &str) -> (String, Rgb) {
+fn state(context: &PanelContext<'_>, key: &str) -> (String, Rgb) {
     let colours = context.view.theme.colours();
-    if let Some((_, progress)) = view.running.as_ref().filter(|(request, _)| request.key == key) {
-        return (progress.map_or("begins ..".to_owned(), progress_text), colours.accent);
+    if let Some(progress) = progress(context, key) {
+        return (progress.words, colours.accent);
     }
     if context.studies.waits(key) {
         return ("queued".to_owned(), colours.accent);
     }
-    if let Some((_, StudyOutcome::Failed(_))) = view.last(key) {
+    if context.studies.failed(key).is_some() {
         return ("failed".to_owned(), colours.error);
     }
-    let Some(StudyFiles { results, begun, .. }) = view.studies.get(key) else {
+    let Some(StudyFiles { results, begun, .. }) = context.studies.files(key) else {
         return ("..".to_owned(), colours.quiet_text);
     };
     let stopped = if begun.is_empty() { "" } else { ", another stopped" };
@@ -108,16 +107,8 @@ fn state(context: &PanelContext<'_>, view: &StudentView, key: &str) -> (String, 
     (format!("{text}{stopped}"), colours.quiet_text)
 }
 
-fn progress_text(progress: StudyProgress) -> String {
-    let StudyProgress { step, done, of } = progress;
-    match step {
-        StudyStep::Collecting => format!("simulating grasps, {done} of {of}"),
-        StudyStep::Measuring => format!("measuring, {done} of {of} parts"),
-    }
-}
-
 /// Purpose and cost of the chosen study, and its buttons.
-fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &StudentView, card: &StudyCard, actions: &mut Actions) {
+fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions: &mut Actions) {
     let key = card.key;
     wrapped(ui, RichText::new(format!("{}.", card.about)));
     let cost = format!(
@@ -125,11 +116,9 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &StudentView, card: 
         card.budget
     );
     wrapped(ui, RichText::new(cost).small().weak());
-    let running = view.running.as_ref().filter(|(request, _)| request.key == key);
-    if let Some((_, progress)) = running {
-        let share = progress.map_or(0.0, |progress| progress.done as f32 / progress.of.max(1) as f32);
-        let text = progress.map_or("begins ..".to_owned(), progress_text);
-        ui.add(ProgressBar::new(share).text(RichText::new(text).small()));
+    let running = progress(context, key);
+    if let Some(JobProgress { share, words }) = &running {
+        ui.add(ProgressBar::new(*share as f32).text(RichText::new(words).small()));
     }
     ui.horizontal_wrapped(|ui| {
         if running.is_some() || context.studies.waits(key) {
@@ -141,7 +130,7 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &StudentView, card: 
             }
             return;
         }
-        let begun = |size: StudySize| view.studies.get(key).is_some_and(|files| files.begun.contains(&size));
+        let begun = |size: StudySize| context.studies.files(key).is_some_and(|files| files.begun.contains(&size));
         for (size, title, shortcut) in
             [(StudySize::Quick, "Run quick", "Enter"), (StudySize::Full, "Run in full", "Shift+Enter")]
         {
@@ -155,16 +144,16 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &StudentView, card: 
             }
         }
     });
-    if let Some((request, StudyOutcome::Failed(cause))) = view.last(key).filter(|_| running.is_none()) {
-        wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color));
-        if cause.is_of_something_else()
+    if let Some((size, cause)) = context.studies.failed(key).filter(|_| running.is_none()) {
+        failure_ui(ui, cause);
+        if has_other_units(cause)
             && ui.button("Begin anew").on_hover_text("Forget the finished parts and run the study again").clicked()
         {
-            run(key, request.size, true, actions);
+            run(key, *size, true, actions);
         }
     }
-    for cause in view.studies.get(key).into_iter().flat_map(|files| &files.unreadable) {
-        wrapped(ui, RichText::new(cause).color(ui.visuals().error_fg_color));
+    for cause in context.studies.files(key).into_iter().flat_map(|files| &files.unreadable) {
+        failure_ui(ui, cause);
     }
     ui.collapsing("In the terminal", |ui| command_ui(ui, "this study", &command(context, card)));
     ui.add_space(4.0);

@@ -29,11 +29,10 @@ fn result_ui(
     }
     let result = context.studies.result();
     if result.is_none() {
-        let view = context.studies.view();
         let card = context.studies.chosen().card();
-        let text = match &view.running {
-            _ if view.studies.is_empty() => "Reading the results ..".to_owned(),
-            Some((request, _)) if request.key == card.key => {
+        let text = match context.studies.running() {
+            _ if context.studies.files(card.key).is_none() => "Reading the results ..".to_owned(),
+            Some(running) if running.command.key == card.key => {
                 format!("{}: its {what} appear here when the run is over.", card.title)
             }
             _ => {

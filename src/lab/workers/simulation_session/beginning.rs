@@ -1,6 +1,7 @@
 //! Beginning of rounds and grasps: object, pose, sensors, recording, and what the recogniser thinks so far.
 
 use super::super::current::Current;
+use super::super::ghost::GhostRequest;
 use super::super::held_object::{LoadedObject, card_of, stamp_of};
 use super::super::listener::Listener;
 use super::super::messages::Notice;
@@ -144,9 +145,12 @@ impl Session {
 
     /// The other engine computes the same grasp, where a ghost is wanted.
     pub(super) fn begin_ghost(&mut self) {
-        if let Some(current) = &self.current {
-            let model = self.object.as_ref().and_then(|object| object.model.clone());
-            self.ghost.begin(self.grasp, &current.scene, model);
+        self.outlets.ghost.stop();
+        if let Some(current) = self.current.as_ref().filter(|_| self.ghost_wanted) {
+            let object = self.object.as_ref().and_then(|object| object.model.clone());
+            let mut scene = Scene::clone(&current.scene);
+            scene.solver.engine = scene.solver.engine.other();
+            self.outlets.ghost.start(GhostRequest { grasp: self.grasp, scene, object });
         }
     }
 

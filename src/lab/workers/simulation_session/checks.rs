@@ -12,19 +12,17 @@ impl Session {
     pub(super) fn begin_check(&mut self, subject: Option<Subject>) {
         self.status.checking = None;
         self.subject = subject;
-        let Some(checker) = &mut self.checker else { return };
-        checker.give_up();
+        self.checker.stop();
         if let Some(subject) = &self.subject {
-            checker.ask(CheckRequest::Compare(subject.clone()));
+            self.checker.start(CheckRequest::Compare(subject.clone()));
             self.status.checking = Some(Checking::Comparing);
         }
     }
 
     /// Pauses, and computes the last finished grasp again until levels of accuracy agree.
     pub(super) fn compute_again(&mut self) {
-        if let (Some(checker), Some(subject)) = (&mut self.checker, &self.subject) {
-            checker.give_up();
-            checker.ask(CheckRequest::ComputeAgain(subject.clone()));
+        if let Some(subject) = &self.subject {
+            self.checker.start(CheckRequest::ComputeAgain(subject.clone()));
             self.status.checking = Some(Checking::ComputingAgain);
             self.status.playing = false;
             self.status.actual_speed = 0.0;
@@ -33,11 +31,9 @@ impl Session {
 
     /// Takes in the result of a check, where there is a new one of the last finished grasp.
     pub(super) fn take_check(&mut self) {
-        let Some(checker) = &self.checker else { return };
-        let settled = checker.is_settled();
-        let is_taken = |result: &Arc<CheckResult>| self.checked.as_ref().is_some_and(|old| Arc::ptr_eq(old, result));
-        if let Some(result) = checker.view().filter(|result| !is_taken(result)) {
-            self.checked = Some(Arc::clone(&result));
+        let settled = self.checker.is_settled();
+        // A check that failed leaves the grasp as it is.
+        for result in self.checker.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
             let answered = match &*result {
                 CheckResult::Compared { grasp, agrees } => {
                     self.take_comparison(*grasp, *agrees);

@@ -4,10 +4,11 @@ mod beginning;
 mod checks;
 
 use super::accuracy_job::AccuracyJob;
-use super::check_job::{CheckJob, CheckResult, Subject, start_check_job};
+use super::check_job::{CheckRequest, CheckResult, Subject, check_job};
 use super::current::Current;
-use super::ghost::{GhostGrasp, GhostMaker};
+use super::ghost::{GhostGrasp, GhostRequest};
 use super::held_object::LoadedObject;
+use super::job::Job;
 use super::latest::Latest;
 use super::listener::Listener;
 use super::messages::{
@@ -45,7 +46,7 @@ pub(super) struct Outlets {
     pub(super) rows_lost: Arc<AtomicBool>,
     pub(super) loading: Arc<AtomicBool>,
     pub(super) notices: Sender<Notice>,
-    pub(super) ghost: Arc<Latest<GhostGrasp>>,
+    pub(super) ghost: Arc<Job<GhostRequest, GhostGrasp>>,
     pub(super) wake: Wake,
 }
 
@@ -70,12 +71,9 @@ pub(super) struct Session {
     recorder: Option<Recorder>,
     /// Absent where its thread could not be started.
     accuracy_job: Option<AccuracyJob>,
-    /// Absent where its thread could not be started.
-    checker: Option<CheckJob>,
+    checker: Job<CheckRequest, CheckResult>,
     /// The last finished grasp, where it can be computed again.
     subject: Option<Subject>,
-    /// Result of the checker that was taken last.
-    checked: Option<Arc<CheckResult>>,
     models: Models,
     listener: Option<Listener>,
     /// Probability from which a class counts as certain, in place of the model's own.
@@ -103,7 +101,8 @@ pub(super) struct Session {
     pace: Pace,
     next_grasp_at: Option<Instant>,
     recorder_busy: bool,
-    ghost: GhostMaker,
+    /// Whether grasps get a ghost.
+    ghost_wanted: bool,
     /// Chooses poses, where the scene asks for it.
     advisor: Advisor,
 }
@@ -134,14 +133,13 @@ impl Session {
             }
         };
         let accuracy_job = AccuracyJob::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
-        let checker = start_check_job(Arc::clone(&outlets.wake)).ok();
+        let checker = check_job(Arc::clone(&outlets.wake));
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
             accuracy_job,
             checker,
             subject: None,
-            checked: None,
             models: setup.models,
             listener: None,
             threshold: None,
@@ -169,7 +167,7 @@ impl Session {
             pace: Pace::starting_at(0.0),
             next_grasp_at: None,
             recorder_busy: false,
-            ghost: GhostMaker::new(Arc::clone(&outlets.ghost), Arc::clone(&outlets.wake)),
+            ghost_wanted: false,
             advisor: Advisor::default(),
             outlets,
         };
@@ -311,7 +309,7 @@ impl Session {
                 self.begin_round();
             }
             Command::SetGhost(wanted) => {
-                self.ghost.set_wanted(wanted);
+                self.ghost_wanted = wanted;
                 self.begin_ghost();
             }
             Command::Quit => {}

@@ -1,13 +1,11 @@
-//! The doctor beside a window: a thread "examine" that looks at the gripper's port when asked to, says how far it is, and
-//! hands over its findings.
+//! The doctor beside the window: an examination of the gripper's port.
 
-use super::background_job::{BackgroundJob, Outlet};
+use super::job::{Job, Newer};
 use super::messages::Wake;
 use palpate_device::doctor::{CheckFinding, Observations, examine, findings};
 use palpate_device::serial::LinkOptions;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Examination to run.
@@ -30,70 +28,38 @@ pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bo
     examine(&options, Duration::from_secs_f64(seconds), goes_on)
 }
 
-/// Where the doctor stands.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DiagnosticsView {
-    /// Running examination and its duration so far (s).
-    pub running: Option<(ExamineRequest, f64)>,
-    /// What came out of the last examination.
-    pub last: Option<Arc<DiagnosticsReport>>,
-}
-
-/// What came out of an examination.
+/// Result of an examination.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiagnosticsReport {
-    /// The port that was listened to, in words; none where none could be opened.
+    /// The port and its board; none where none could be opened.
     pub port: Option<String>,
-    /// For how long (s).
+    /// Time over which it was listened to (s).
     pub listened_s: f64,
-    /// It was ended before its time.
+    /// It was stopped before its time.
     pub cut_short: bool,
-    /// What was found.
+    /// Findings of all checks.
     pub findings: Vec<CheckFinding>,
 }
 
-/// A handle on the thread.
-pub type DiagnosticsJob = BackgroundJob<ExamineRequest, DiagnosticsView>;
-
-impl DiagnosticsJob {
-    /// Starts the thread.
-    pub fn start(look: Examine, wake: Wake) -> std::io::Result<Self> {
-        let mut last = None;
-        Self::spawn("examine", wake, move |request, stop, outlet| {
-            let examination = Arc::new(examined(&look, &request, stop, outlet, last.as_ref()));
-            last = Some(Arc::clone(&examination));
-            outlet.publish(DiagnosticsView { running: None, last: Some(examination) });
-        })
-    }
-}
-
-fn examined(
-    look: &Examine,
-    request: &ExamineRequest,
-    stop: &AtomicBool,
-    outlet: &Outlet<DiagnosticsView>,
-    last: Option<&Arc<DiagnosticsReport>>,
-) -> DiagnosticsReport {
-    let report = |listened_s: f64| {
-        outlet.publish(DiagnosticsView { running: Some((request.clone(), listened_s)), last: last.cloned() });
-    };
-    report(0.0);
-    let seen = look(request, &mut |listened_s| {
-        report(listened_s);
-        !stop.load(Ordering::Relaxed)
-    });
-    let port = seen.link.as_ref().map(|link| format!("{} ({})", link.port.path.display(), link.port.title));
-    DiagnosticsReport {
-        port,
-        listened_s: seen.listened_s,
-        cut_short: stop.load(Ordering::Relaxed),
-        findings: findings(&seen),
-    }
+/// The job; once stopped, it reports what it has seen so far.
+pub fn doctor_job(examine: Examine, wake: Wake) -> Job<ExamineRequest, DiagnosticsReport> {
+    Job::new("examine", Newer::Replaces, wake, move |request: &ExamineRequest, run| {
+        let mut proceed = |listened_s: f64| {
+            let of = request.seconds;
+            run.progress(listened_s / of.max(1e-9), format!("listening, {listened_s:.0} of {of:.0} s"));
+            !run.stopped()
+        };
+        proceed(0.0);
+        let seen = examine(request, &mut proceed);
+        let port = seen.link.as_ref().map(|link| format!("{} ({})", link.port.path.display(), link.port.title));
+        let (listened_s, cut_short) = (seen.listened_s, run.stopped());
+        Ok(Some(DiagnosticsReport { port, listened_s, cut_short, findings: findings(&seen) }))
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::background_job::watch::{until, waker};
+    use super::super::job::watch::{settled, until, waker};
     use super::*;
     use palpate_device::doctor::{CheckStatus, is_sound};
     use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
@@ -113,19 +79,15 @@ mod tests {
         }
         std::fs::write(&bytes, file)?;
         let (wake, woken) = waker();
-        let doctor = DiagnosticsJob::start(Arc::new(examine_port), wake)?;
-        assert!(doctor.view().is_none(), "before a request");
-        doctor.ask(request(bytes, 5.0));
-        until(&doctor, &woken, |view| view.running.is_some() && view.last.is_none());
-        let view = until(&doctor, &woken, |view| view.running.is_none());
-        let examined = view.last.as_ref().ok_or("it has looked")?;
+        let doctor = doctor_job(Arc::new(examine_port), wake);
+        doctor.start(request(bytes, 5.0));
+        let examined = settled(&doctor, &woken).ok_or("it has looked")?.map_err(|cause| cause.to_string())?;
         assert!(examined.port.as_ref().is_some_and(|port| port.contains("board.bytes")), "{examined:?}");
         let verdict = |check: &str| examined.findings.iter().find(|f| f.check == check).map(|f| f.verdict);
         assert_eq!((verdict("lines"), verdict("firmware")), (Some(CheckStatus::Passed), Some(CheckStatus::Note)));
         assert!(!examined.cut_short && examined.listened_s < 5.0, "a file ends when it ends");
-        doctor.ask(request(folder.path().join("gone"), 5.0));
-        let view = until(&doctor, &woken, |view| view.running.is_none() && view.last != Some(Arc::clone(examined)));
-        let examined = view.last.as_ref().ok_or("it has looked")?;
+        doctor.start(request(folder.path().join("gone"), 5.0));
+        let examined = settled(&doctor, &woken).ok_or("it has looked")?.map_err(|cause| cause.to_string())?;
         assert!(examined.port.is_none() && !is_sound(&examined.findings));
         Ok(())
     }
@@ -142,12 +104,11 @@ mod tests {
             Observations { listened_s, ..examine_port(&nothing, &mut |_| true) }
         });
         let (wake, woken) = waker();
-        let mut doctor = DiagnosticsJob::start(look, wake)?;
-        doctor.ask(request(PathBuf::new(), 8.0));
-        until(&doctor, &woken, |view| view.running.as_ref().is_some_and(|(_, listened_s)| *listened_s > 0.1));
-        doctor.give_up();
-        let view = until(&doctor, &woken, |view| view.running.is_none());
-        let examined = view.last.as_ref().ok_or("it has looked")?;
+        let doctor = doctor_job(look, wake);
+        doctor.start(request(PathBuf::new(), 8.0));
+        until(&woken, || doctor.running().filter(|running| running.progress.share > 0.02));
+        doctor.stop();
+        let examined = settled(&doctor, &woken).ok_or("it has looked")?.map_err(|cause| cause.to_string())?;
         assert!(examined.cut_short && examined.listened_s > 0.1, "{examined:?}");
         Ok(())
     }

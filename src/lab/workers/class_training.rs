@@ -1,0 +1,64 @@
+//! Training of one more class, beside the window: a model learns a new object from its file or from recorded grasps, and is
+//! saved.
+
+use super::job::{Job, Newer};
+use super::messages::Wake;
+use super::training::TrainedModel;
+use crate::grasping::{LESSON_GRASPS, LessonStage, Lessons};
+use palpate_learn::Model;
+use palpate_sim::objects::titled;
+use palpate_sim::scene::ObjectSetup;
+use palpate_store::Store;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Seed of poses and fit: the same object gives the same model.
+const SEED: u64 = 1;
+/// Share of the time that simulating takes.
+const SIMULATING: f64 = 0.4;
+
+/// Object that a model is to learn.
+#[derive(Clone, Debug)]
+pub struct TeachRequest {
+    /// The model.
+    pub model: Arc<Model>,
+    /// Name of the object, for people.
+    pub name: String,
+    /// The object, if its grasps are simulated.
+    pub object: Option<ObjectSetup>,
+    /// True to learn recorded grasps with this name.
+    pub recorded: bool,
+}
+
+/// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
+pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, TrainedModel> {
+    Job::new("teach", Newer::Waits, wake, move |request: &TeachRequest, run| {
+        let name = titled(&request.name).to_lowercase();
+        let progress = |stage: LessonStage| {
+            let (share, words) = match stage {
+                LessonStage::Simulating(done, of) => {
+                    (SIMULATING * done as f64 / of.max(1) as f64, format!("grasp {done} of {of}"))
+                }
+                LessonStage::Fitting(share) => {
+                    (SIMULATING + (1.0 - SIMULATING) * share, format!("fitting, {:.0} %", 100.0 * share))
+                }
+            };
+            run.progress(share, format!("Learning {name}: {words}"));
+        };
+        let store = Store::open(&store)?;
+        let objects: Vec<ObjectSetup> = request.object.iter().cloned().collect();
+        let recorded: Vec<String> = request.recorded.then(|| request.name.clone()).into_iter().collect();
+        let lessons = Lessons {
+            objects: &objects,
+            classes: &[],
+            recorded: &recorded,
+            grasps: LESSON_GRASPS,
+            seed: SEED,
+            progress: &progress,
+            stop: run.stop(),
+        };
+        let model = lessons.teach(&request.model, Some(&store))?;
+        let trained = TrainedModel::save(model, &models, "taught", &store)?;
+        Ok(run.unless_stopped(trained))
+    })
+}
