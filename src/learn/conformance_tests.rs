@@ -331,7 +331,7 @@ fn the_strict_iterated_network_reads_the_earlier_pmf() {
 #[test]
 fn votes_of_trees_are_calibrated() {
     let (train, test) = (made_up(25, 1), made_up(25, 2));
-    for key in ["random-forest", "extra-trees", "rusboost", "rusboost-samme", "decision-tree"] {
+    for key in ["random-forest", "extra-trees", "rusboost", "decision-tree"] {
         let model = trained(method(key).expect("in the list"), &train);
         let answers = answer(model.recogniser.as_ref(), &test);
         let probabilities: Vec<Vec<f64>> =
@@ -362,6 +362,8 @@ fn truncated_or_altered_models_are_refused() {
         assert!(with(&|card| card.settings = serde_json::Value::Null).is_err(), "{}", method.key);
         let unknown = with(&|card| card.method = "oracle".to_owned());
         assert!(matches!(unknown, Err(ModelError::UnknownMethod { method, .. }) if method == "oracle"));
+        let removed = with(&|card| card.method = "committee".to_owned()).expect_err("removed").to_string();
+        assert!(removed.contains("\"committee\", which was removed after version 0.1.0"), "{removed}");
         let other = ["curvature_left", "curvature_right", "force_left", "grip"].map(str::to_owned);
         let text = model.check_channels(&other).expect_err("other channels").to_string();
         assert!(text.contains("needs force_right") && text.contains("does not know grip"), "{text}");
@@ -392,7 +394,6 @@ const SAVED: &[(&str, &[u8])] = &[
     ("ds-lstm-cross", include_bytes!("saved_models/ds-lstm-cross.safetensors")),
     ("ids-lstm-cross", include_bytes!("saved_models/ids-lstm-cross.safetensors")),
     ("macro-layer", include_bytes!("saved_models/macro-layer.safetensors")),
-    ("committee", include_bytes!("saved_models/committee.safetensors")),
     ("paper-macro-layer", include_bytes!("saved_models/paper-macro-layer.safetensors")),
     ("paper-ds-lstm", include_bytes!("saved_models/paper-ds-lstm.safetensors")),
     ("paper-ids-lstm", include_bytes!("saved_models/paper-ids-lstm.safetensors")),
@@ -405,9 +406,6 @@ const SAVED: &[(&str, &[u8])] = &[
     ("bagged-trees", include_bytes!("saved_models/bagged-trees.safetensors")),
     ("gradient-boosting", include_bytes!("saved_models/gradient-boosting.safetensors")),
     ("rusboost", include_bytes!("saved_models/rusboost.safetensors")),
-    ("rusboost-samme", include_bytes!("saved_models/rusboost-samme.safetensors")),
-    ("measures-svm", include_bytes!("saved_models/measures-svm.safetensors")),
-    ("measures-forest", include_bytes!("saved_models/measures-forest.safetensors")),
     ("extra-trees", include_bytes!("saved_models/extra-trees.safetensors")),
     ("geometry-trees", include_bytes!("saved_models/geometry-trees.safetensors")),
     ("geometry-network", include_bytes!("saved_models/geometry-network.safetensors")),

@@ -1,5 +1,5 @@
-//! A grasp as a row of features, for classifiers without a notion of time: means over windows of time, the same extended by
-//! events and by sums and differences of both fingers, or a few hand-crafted measures of each channel.
+//! A grasp as a row of features, for classifiers without a notion of time: means over windows of time, or the same extended
+//! by events and by sums and differences of both fingers.
 
 use crate::data::{Dataset, Sequence};
 use crate::gaps;
@@ -15,8 +15,6 @@ pub(crate) enum FeatureKind {
     /// Means of each channel over 30 equal windows of time on a compressed scale; half sum and absolute half difference of
     /// both fingers in each window; maximum, its time, last value and onsets of each channel.
     ExtendedCourse,
-    /// Hand-crafted measures of each channel: onset, height, slope, end value, difference between fingers.
-    Measures,
 }
 
 /// Mapping from grasps to rows, fitted to training data.
@@ -27,8 +25,6 @@ pub(crate) struct Features {
     channels: usize,
     /// Median duration of the training grasps (s).
     duration_s: f32,
-    /// Onset threshold of each channel, in its unit: a tenth of its range above its minimum.
-    risen: Vec<f32>,
     /// Counterpart of each channel on the other finger.
     mirror: Option<Vec<usize>>,
     /// Fixed levels of each channel; only for the extended course.
@@ -71,28 +67,18 @@ pub(crate) const REVISION: u32 = 1;
 pub(crate) const WINDOWS: usize = 30;
 /// Largest number of onsets of a channel.
 const MOST_ONSETS: usize = 8;
-/// Number of measures of each channel.
-const MEASURES: usize = 9;
 
 impl Features {
     pub(crate) fn fit(kind: FeatureKind, data: &Dataset) -> Self {
         let channels = data.channels.len();
         let duration_s = data.median_duration_s().max(1e-3);
-        let mut range = vec![(f32::INFINITY, f32::NEG_INFINITY); channels];
-        for (_, row) in data.examples.iter().flat_map(|e| e.grasp.rows()) {
-            for ((low, high), x) in range.iter_mut().zip(row) {
-                if x.is_finite() {
-                    (*low, *high) = (low.min(*x), high.max(*x));
-                }
-            }
-        }
-        let risen: Vec<f32> =
-            range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect();
         let levels = match kind {
-            FeatureKind::Course | FeatureKind::Measures => Vec::new(),
-            FeatureKind::ExtendedCourse => data.channels.iter().zip(&risen).map(|(c, r)| Levels::of(c, *r)).collect(),
+            FeatureKind::Course => Vec::new(),
+            FeatureKind::ExtendedCourse => {
+                data.channels.iter().zip(risen(data)).map(|(c, r)| Levels::of(c, r)).collect()
+            }
         };
-        Self { kind, channels, duration_s, risen, mirror: mirror(&data.channels), levels }
+        Self { kind, channels, duration_s, mirror: mirror(&data.channels), levels }
     }
 
     /// Number of features.
@@ -103,7 +89,6 @@ impl Features {
                 let onsets: usize = self.levels.iter().map(|levels| levels.onsets.len()).sum();
                 (self.channels + 2 * self.pairs().count()) * WINDOWS + 3 * self.channels + onsets
             }
-            FeatureKind::Measures => self.channels * (MEASURES + 1),
         }
     }
 
@@ -113,10 +98,9 @@ impl Features {
             && self.channels == channels
             && self.duration_s.is_finite()
             && self.duration_s > 0.0
-            && self.risen.len() == channels
             && self.mirror.as_ref().is_none_or(|m| m.len() == channels && m.iter().all(|to| *to < channels))
             && match self.kind {
-                FeatureKind::Course | FeatureKind::Measures => self.levels.is_empty(),
+                FeatureKind::Course => self.levels.is_empty(),
                 FeatureKind::ExtendedCourse => {
                     let sound = |l: &Levels| {
                         l.knee.is_finite() && l.onsets.len() <= MOST_ONSETS && l.onsets.iter().all(|x| x.is_finite())
@@ -124,11 +108,6 @@ impl Features {
                     self.levels.len() == channels && self.levels.iter().all(sound)
                 }
             }
-    }
-
-    /// True for features of which the beginning of a grasp gives some for good.
-    pub(crate) fn tell_beginnings(&self) -> bool {
-        self.kind != FeatureKind::Measures
     }
 
     /// Window of a reading, from the time since the start of the grasp (s); the last one has no end.
@@ -177,7 +156,6 @@ impl Features {
         match self.kind {
             FeatureKind::Course => self.course(grasp),
             FeatureKind::ExtendedCourse => self.extended_course(grasp),
-            FeatureKind::Measures => self.measures(grasp),
         }
     }
 
@@ -238,45 +216,19 @@ impl Features {
         }
         sums
     }
-
-    fn measures(&self, grasp: &Sequence) -> Vec<f32> {
-        let mut row = Vec::with_capacity(self.width());
-        let count = grasp.len().max(1) as f32;
-        let last = grasp.len().saturating_sub(1);
-        let at =
-            |sample: usize, channel: usize| grasp.values.get(sample * self.channels + channel).copied().unwrap_or(0.0);
-        for channel in 0..self.channels {
-            let values = || (0..grasp.len()).map(|sample| at(sample, channel));
-            let mean = values().sum::<f32>() / count;
-            let deviation = (values().map(|x| (x - mean) * (x - mean)).sum::<f32>() / count).sqrt();
-            let highest = values().fold(f32::NEG_INFINITY, f32::max).max(f32::MIN);
-            let onset = (0..grasp.len()).find(|sample| at(*sample, channel) > self.risen[channel]);
-            let onset_t = onset.map_or(self.duration_s, |sample| grasp.t_s[sample]);
-            let end = tail_mean(grasp, channel, self.channels, 0.1);
-            let half = (0..grasp.len()).find(|sample| at(*sample, channel) > 0.5 * end).unwrap_or(last);
-            // Rise during a tenth of the grasp after onset.
-            let from = onset.unwrap_or(last);
-            let to = (from + grasp.len() / 10).min(last);
-            let rise = at(to, channel) - at(from, channel);
-            let middle = at(grasp.len() / 2, channel);
-            let late = at(grasp.len() * 2 / 3, channel);
-            let half_t = grasp.t_s.get(half).copied().unwrap_or(0.0);
-            row.extend([mean, deviation, highest, end, onset_t, half_t, rise, middle, late]);
-        }
-        for channel in 0..self.channels {
-            let other = self.mirror.as_ref().map_or(channel, |mirror| mirror[channel]);
-            row.push(row[channel * MEASURES + 3] - row[other * MEASURES + 3]);
-        }
-        row.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-        row
-    }
 }
 
-/// Mean over the last share of a channel's samples.
-fn tail_mean(grasp: &Sequence, channel: usize, channels: usize, share: f32) -> f32 {
-    let count = ((grasp.len() as f32 * share).ceil() as usize).clamp(1, grasp.len().max(1));
-    let values = grasp.values.iter().skip(channel).step_by(channels.max(1));
-    values.skip(grasp.len().saturating_sub(count)).sum::<f32>() / count as f32
+/// Onset threshold of each channel, in its unit: a tenth of its range above its minimum.
+fn risen(data: &Dataset) -> Vec<f32> {
+    let mut range = vec![(f32::INFINITY, f32::NEG_INFINITY); data.channels.len()];
+    for (_, row) in data.examples.iter().flat_map(|e| e.grasp.rows()) {
+        for ((low, high), x) in range.iter_mut().zip(row) {
+            if x.is_finite() {
+                (*low, *high) = (low.min(*x), high.max(*x));
+            }
+        }
+    }
+    range.iter().map(|(low, high)| if high > low { low + 0.1 * (high - low) } else { 0.0 }).collect()
 }
 
 #[cfg(test)]
@@ -297,20 +249,6 @@ mod tests {
             examples: vec![Example { id: 1, class: 0, grasp, ..Example::default() }],
             about: DataCard::default(),
         }
-    }
-
-    #[test]
-    fn measures_find_the_step() {
-        let data = data();
-        let features = Features::fit(FeatureKind::Measures, &data);
-        let row = features.row(&data.examples[0].grasp);
-        assert_eq!(row.len(), features.width());
-        let [mean, _, highest, end, onset, half, ..] = row[..] else { panic!("too short") };
-        assert!((mean - 1.0).abs() < 1e-5 && highest == 2.0 && end == 2.0, "{row:?}");
-        assert!((onset - 0.51).abs() < 1e-5 && (half - 0.51).abs() < 1e-5);
-        assert_eq!(row[2 * MEASURES..], [-2.0, 2.0]);
-        let mirrored = features.mirrored(&data.examples[0].grasp).expect("has two sides");
-        assert_eq!(mirrored[3], 4.0);
     }
 
     #[test]

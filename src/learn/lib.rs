@@ -95,7 +95,7 @@ pub use fitting::{Fitting, LearnError};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;
-pub use model::{LoadError, Model, ModelCard, ModelError};
+pub use model::{LoadError, Model, ModelCard, ModelError, REMOVED_METHODS};
 pub use model_file::Models;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};

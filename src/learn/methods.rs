@@ -224,7 +224,7 @@ fn on_one_thread<T: Send>(fit: impl FnOnce() -> Result<T, LearnError> + Send) ->
 }
 
 /// All methods: the paper's networks first, then its baselines, then further ones.
-pub const METHODS: [Method; 26] = [
+pub const METHODS: [Method; 22] = [
     network!(
         "ds-lstm",
         "DS-LSTM",
@@ -261,13 +261,6 @@ pub const METHODS: [Method; 26] = [
         Network,
         "The paper's recurrent macro-layer alone: LSTM, fully connected, dropout, fully connected",
         Recipe::macro_layer()
-    ),
-    network!(
-        "committee",
-        "Committee",
-        Network,
-        "Four macro-layers with different initial weights, outputs averaged",
-        Recipe::committee()
     ),
     network!(
         "paper-macro-layer",
@@ -323,15 +316,6 @@ pub const METHODS: [Method; 26] = [
         GradientBoosting
     ),
     tabular!("rusboost", "RUSBoost (M2)", Ensemble, "AdaBoost.M2 on class-balanced random subsets", RusBoostM2),
-    tabular!(
-        "rusboost-samme",
-        "RUSBoost (SAMME)",
-        Ensemble,
-        "SAMME boosting on class-balanced random subsets, as in imbalanced-learn",
-        RusBoostSamme
-    ),
-    tabular!("measures-svm", "Measures + SVM", Further, "Support vector machine on hand-crafted features", MeasuresSvm),
-    tabular!("measures-forest", "Measures + forest", Further, "Random forest on hand-crafted features", MeasuresForest),
     tabular!(
         "extra-trees",
         "Extra-trees",

@@ -229,7 +229,7 @@ pub enum ModelError {
         cause: LoadError,
     },
     /// A method unknown to this version.
-    #[error("\"{name}\" uses the method \"{method}\", which this version does not know; update Palpate")]
+    #[error("\"{name}\" uses the method \"{method}\", {}", why_unknown(method))]
     UnknownMethod {
         /// File name.
         name: String,
@@ -242,4 +242,15 @@ pub enum ModelError {
         /// Missing and unknown channels.
         difference: String,
     },
+}
+
+/// Methods of version 0.1.0 that are gone; stored results still name them.
+pub const REMOVED_METHODS: [&str; 4] = ["committee", "rusboost-samme", "measures-svm", "measures-forest"];
+
+fn why_unknown(method: &str) -> &'static str {
+    if REMOVED_METHODS.contains(&method) {
+        "which was removed after version 0.1.0; train a model with another method (`palpate train --list`)"
+    } else {
+        "which this version does not know; update Palpate"
+    }
 }

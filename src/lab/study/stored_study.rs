@@ -2,6 +2,7 @@
 //! numbers.
 
 use super::result_file::{ResultFileError, program};
+use palpate_learn::REMOVED_METHODS;
 use palpate_store::{FileKind, write_whole};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -28,9 +29,10 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
         Self { command: command.to_owned(), program: program(), cpu_hours, result }
     }
 
-    /// Reads a stored result.
+    /// Reads a stored result. Methods that are gone are marked with the last version that had them.
     pub fn parse(json: &str) -> Result<Self, serde_json::Error> {
-        serde_json::from_str(json)
+        let mark = |json: String, key: &&str| json.replace(key, &format!("{key} (0.1.0)"));
+        serde_json::from_str(&REMOVED_METHODS.iter().fold(json.to_owned(), mark))
     }
 
     /// Writes it, an element of a list per line.
@@ -114,6 +116,14 @@ mod tests {
         assert_eq!(section.put_into(&document).as_ref(), Some(&wanted));
         assert_eq!(section.put_into(&wanted).as_ref(), Some(&wanted));
         assert_eq!(section.put_into("no section"), None);
+    }
+
+    #[test]
+    fn methods_that_are_gone_are_marked() -> Result<(), serde_json::Error> {
+        let stored = StoredStudy::new("palpate study models", 1.0, ["svm", "measures-svm"].map(str::to_owned));
+        let read = StoredStudy::<[String; 2]>::parse(&serde_json::to_string(&stored)?)?;
+        assert_eq!(read.result, ["svm", "measures-svm (0.1.0)"]);
+        Ok(())
     }
 
     #[test]

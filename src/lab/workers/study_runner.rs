@@ -5,7 +5,7 @@ use super::job::{Job, JobFailure, JobRun, Newer, spare_threads};
 use super::messages::Wake;
 use crate::study::paper::{
     LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyFolder, StudyPlan, StudyProgress,
-    StudyReport, StudySize, StudyStep, StudyWork, paper_study, run_study, stored_report, study_fingerprint,
+    StudyReport, StudySize, StudyStep, StudyWork, is_current, paper_study, run_study, stored_report,
 };
 use crate::study::{ResultFileError, StoredStudy, program};
 use palpate_store::Store;
@@ -156,7 +156,7 @@ fn shown(
     stored: StoredStudy<StudyReport>,
     program: &str,
 ) -> Arc<StudyResult> {
-    let is_current = |size| stored.result.fingerprint == study_fingerprint(study, &StudyPlan::of_size(size));
+    let is_current = |size| is_current(&stored.result, study, &StudyPlan::of_size(size));
     let current = match origin {
         // Samples are of many sizes.
         StudyOrigin::Run(StudySize::Sample { .. }) => true,

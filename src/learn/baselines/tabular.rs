@@ -15,7 +15,7 @@ use crate::features::{self, FeatureKind, Features, WINDOWS};
 use crate::fitting::{Fitting, LearnError, check_enough};
 use crate::forest::{
     self, Examples, FeatureSampling, Forest, ForestSettings, GradientBoosting, GradientBoostingSettings, RusBoost,
-    RusBoostForm, RusBoostSettings, Table, TreeSettings,
+    RusBoostSettings, Table, TreeSettings,
 };
 use crate::model::{LoadError, ModelCard};
 use crate::pmf::Pmf;
@@ -36,11 +36,8 @@ pub(crate) enum TabularKind {
     GeometryTrees,
     GradientBoosting,
     RusBoostM2,
-    RusBoostSamme,
     Neighbours,
     Svm,
-    MeasuresSvm,
-    MeasuresForest,
 }
 
 /// Features and a classifier of them. Forests answer on the beginning of a grasp too: features that are not known yet count
@@ -113,14 +110,12 @@ const REVISION: u32 = 2;
 impl TabularKind {
     fn features(self) -> FeatureKind {
         match self {
-            Self::MeasuresSvm | Self::MeasuresForest => FeatureKind::Measures,
             Self::ExtraTrees | Self::GeometryTrees => FeatureKind::ExtendedCourse,
             Self::DecisionTree
             | Self::RandomForest
             | Self::BaggedTrees
             | Self::GradientBoosting
             | Self::RusBoostM2
-            | Self::RusBoostSamme
             | Self::Neighbours
             | Self::Svm => FeatureKind::Course,
         }
@@ -131,7 +126,7 @@ impl TabularKind {
     }
 
     fn wants_scaling(self) -> bool {
-        matches!(self, Self::Neighbours | Self::Svm | Self::MeasuresSvm)
+        matches!(self, Self::Neighbours | Self::Svm)
     }
 
     /// Uses of mirrored grasps that are tried; the one with the best answers on held-out grasps is kept.
@@ -150,20 +145,15 @@ impl TabularKind {
     /// and cost more.
     fn parts(self) -> usize {
         match self {
-            Self::GradientBoosting | Self::RusBoostM2 | Self::RusBoostSamme | Self::Svm | Self::MeasuresSvm => 3,
+            Self::GradientBoosting | Self::RusBoostM2 | Self::Svm => 3,
             _ => 6,
         }
     }
 
     fn classifier(self) -> Classifier {
-        let rus = |form: RusBoostForm, max_depth: Option<usize>| {
-            let base = RusBoostSettings::default();
-            let tree = TreeSettings { max_depth, ..base.tree };
-            Classifier::RusBoost(RusBoostSettings { form, tree, ..base })
-        };
         match self {
             Self::DecisionTree => Classifier::Forest(ForestSettings::decision_tree()),
-            Self::RandomForest | Self::MeasuresForest => Classifier::Forest(ForestSettings::random_forest()),
+            Self::RandomForest => Classifier::Forest(ForestSettings::random_forest()),
             Self::BaggedTrees => Classifier::Forest(ForestSettings::bagged_trees()),
             Self::ExtraTrees | Self::GeometryTrees => Classifier::Forest(ForestSettings::extra_trees()),
             Self::GradientBoosting => {
@@ -171,10 +161,9 @@ impl TabularKind {
                 let tree = TreeSettings { min_leaf: 10, features: FeatureSampling::Sqrt, ..base.tree };
                 Classifier::GradientBoosting(GradientBoostingSettings { tree, ..base })
             }
-            Self::RusBoostM2 => rus(RusBoostForm::M2, None),
-            Self::RusBoostSamme => rus(RusBoostForm::Samme, Some(4)),
+            Self::RusBoostM2 => Classifier::RusBoost(RusBoostSettings::default()),
             Self::Neighbours => Classifier::Neighbours,
-            Self::Svm | Self::MeasuresSvm => Classifier::Svm,
+            Self::Svm => Classifier::Svm,
         }
     }
 
@@ -185,6 +174,8 @@ impl TabularKind {
             Classifier::Svm => Svm::decided_by(),
             trees => format!("{trees:?}, revision {}", forest::REVISION),
         };
+        // Stored results have the fingerprint of 0.1.0, which had a second form.
+        let classifier = classifier.replace("RusBoostSettings {", "RusBoostSettings { form: M2,");
         let mut decided_by = serde_json::json!({
             "features": self.features(),
             "revisions": [REVISION, features::REVISION],
@@ -323,7 +314,7 @@ impl FeatureRows<'_> {
     /// Calibrates answers on the beginnings of held-out grasps, for each stage but the last.
     fn so_far(&self, maker: &RowMaker, held_out: &HeldOut, mirroring: Mirroring) -> Vec<Calibration> {
         let answers_in_part = held_out.models.iter().flatten().all(|model| model.answers_in_part());
-        if !answers_in_part || !maker.features.tell_beginnings() {
+        if !answers_in_part {
             return Vec::new();
         }
         let every = self.data.examples.len().div_ceil(MOST_BEGINNINGS);
@@ -429,8 +420,7 @@ impl Tabular {
             Classifier::Neighbours => Box::new(Neighbours::load(arrays, columns, classes)?),
             Classifier::Svm => Box::new(Svm::load(arrays, columns, classes)?),
         };
-        let tells_beginnings = model.answers_in_part() && learned.features.tell_beginnings();
-        if !(learned.so_far.is_empty() || tells_beginnings) {
+        if !(learned.so_far.is_empty() || model.answers_in_part()) {
             return Err(LoadError::Card { part: "the calibration" });
         }
         Ok(Self(Arc::new(Fitted { learned, rows, model, other: card.labels.other() })))

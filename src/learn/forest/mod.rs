@@ -22,7 +22,7 @@ mod tree_arrays;
 
 pub(crate) use bagging::{Forest, ForestSettings};
 pub(crate) use gradient::{GradientBoosting, GradientBoostingSettings};
-pub(crate) use rusboost::{RusBoost, RusBoostForm, RusBoostSettings};
+pub(crate) use rusboost::{RusBoost, RusBoostSettings};
 pub(crate) use tree::{FeatureSampling, TreeSettings};
 
 use crate::fitting::LearnError;
@@ -157,11 +157,6 @@ fn softmax(numbers: &mut [f64]) {
     normalise(numbers);
 }
 
-/// Index of the largest number; of equal ones, the first.
-fn greatest<T: Copy + PartialOrd>(numbers: &[T]) -> usize {
-    (1..numbers.len()).fold(0, |best, at| if numbers[at] > numbers[best] { at } else { best })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,6 +211,5 @@ mod tests {
         let mut numbers = [1000.0, 1000.0, -1000.0];
         softmax(&mut numbers);
         assert_eq!(numbers, [0.5, 0.5, 0.0]);
-        assert_eq!(greatest(&[1, 3, 3]), 1);
     }
 }

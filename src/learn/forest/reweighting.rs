@@ -1,7 +1,7 @@
 //! Weights of rows and trees from round to round of boosting.
 
 use super::tree::Tree;
-use super::{Examples, greatest, normalise};
+use super::{Examples, normalise};
 
 /// Decision about a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,17 +12,6 @@ pub(super) enum Judgement {
     KeepAsLast(f64),
     /// Drop it: worse than chance. Other rows may give a better one.
     Forget,
-    /// Drop it and end boosting.
-    Stop,
-}
-
-/// Rule that changes the weights of rows.
-pub(super) trait Reweighting {
-    /// Weight of each row; they sum to 1.
-    fn weights(&self) -> Vec<f64>;
-
-    /// Judges a tree on all rows and updates their weights.
-    fn judge(&mut self, tree: &Tree, learning_rate: f64) -> Judgement;
 }
 
 /// AdaBoost.M2 (Freund and Schapire 1997): every pair of row i and class y other than its own has a weight w(i, y),
@@ -66,17 +55,17 @@ impl<'a> M2<'a> {
         }
         margins
     }
-}
 
-impl Reweighting for M2<'_> {
-    fn weights(&self) -> Vec<f64> {
+    /// Weight of each row; they sum to 1.
+    pub(super) fn weights(&self) -> Vec<f64> {
         if self.present.len() < 2 {
             return vec![1.0; self.examples.labels.len()];
         }
         self.pairs.chunks_exact(self.present.len()).map(|pairs| pairs.iter().sum()).collect()
     }
 
-    fn judge(&mut self, tree: &Tree, learning_rate: f64) -> Judgement {
+    /// Judges a tree on all rows and updates their weights.
+    pub(super) fn judge(&mut self, tree: &Tree, learning_rate: f64) -> Judgement {
         if self.present.len() < 2 {
             return Judgement::KeepAsLast(1.0);
         }
@@ -92,46 +81,6 @@ impl Reweighting for M2<'_> {
         }
         normalise(&mut self.pairs);
         Judgement::Keep(-log_beta)
-    }
-}
-
-/// SAMME (Zhu et al. 2009) as in imbalanced-learn: rows whose class is not the greatest share of their leaf gain
-/// weight. A tree without errors is the last; one no better than chance is dropped and ends boosting.
-pub(super) struct Samme<'a> {
-    examples: &'a Examples<'a>,
-    classes: f64,
-    weights: Vec<f64>,
-}
-
-impl<'a> Samme<'a> {
-    pub(super) fn new(examples: &'a Examples<'a>) -> Self {
-        let mut weights: Vec<f64> = (0..examples.labels.len()).map(|row| examples.weight(row)).collect();
-        normalise(&mut weights);
-        Self { examples, classes: examples.present().len() as f64, weights }
-    }
-}
-
-impl Reweighting for Samme<'_> {
-    fn weights(&self) -> Vec<f64> {
-        self.weights.clone()
-    }
-
-    fn judge(&mut self, tree: &Tree, learning_rate: f64) -> Judgement {
-        let is_wrong = |(row, label): (usize, &usize)| greatest(tree.leaf(self.examples.table.row(row))) != *label;
-        let wrong: Vec<bool> = self.examples.labels.iter().enumerate().map(is_wrong).collect();
-        let error: f64 = self.weights.iter().zip(&wrong).filter(|(_, wrong)| **wrong).map(|(weight, _)| weight).sum();
-        if error <= 0.0 {
-            return Judgement::KeepAsLast(1.0);
-        }
-        if error >= 1.0 - 1.0 / self.classes - LEAST_EDGE {
-            return Judgement::Stop;
-        }
-        let tree_weight = learning_rate * (((1.0 - error) / error).ln() + (self.classes - 1.0).ln());
-        for (weight, _) in self.weights.iter_mut().zip(wrong).filter(|(_, wrong)| *wrong) {
-            *weight *= tree_weight.exp();
-        }
-        normalise(&mut self.weights);
-        Judgement::Keep(tree_weight)
     }
 }
 
@@ -171,20 +120,8 @@ mod tests {
     }
 
     #[test]
-    fn misclassified_rows_gain_weight() {
-        // Row 3 is taken for class 1: error 1/4 of three classes, so its weight grows by 3 · 2.
-        let mut rule = Samme::new(&EXAMPLES);
-        let Judgement::Keep(word) = rule.judge(&tree(), 1.0) else { panic!("better than chance") };
-        assert!((word - 6.0_f64.ln()).abs() < 1e-12);
-        for (got, want) in rule.weights().iter().zip([1.0, 1.0, 1.0, 6.0]) {
-            assert!((got - want / 9.0).abs() < 1e-12);
-        }
-    }
-
-    #[test]
     fn trees_worse_than_chance_are_dropped() {
         let wrong = Tree { nodes: vec![Node::Leaf(0)], values: vec![0.0, 0.0, 0.0, 1.0], width: 4 };
         assert_eq!(M2::new(&EXAMPLES).judge(&wrong, 1.0), Judgement::Forget);
-        assert_eq!(Samme::new(&EXAMPLES).judge(&wrong, 1.0), Judgement::Stop);
     }
 }

@@ -1,33 +1,19 @@
-//! RUSBoost (Seiffert et al. 2010): each round of boosting uses a random subset with equally many rows of each class, as
+//! RUSBoost (Seiffert et al. 2010): each round of AdaBoost.M2 uses a random subset with equally many rows of each class, as
 //! many as the smallest class has. Rare classes count as much as common ones, and other rounds use other rows.
 
 use super::bins::Bins;
-use super::reweighting::{Judgement, M2, Reweighting, Samme};
+use super::reweighting::{Judgement, M2};
 use super::split::Target;
 use super::tree::{FeatureSampling, Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_class_trees, load_classes, save_trees};
-use super::{Examples, check_boosting, drawn, greatest, normalise, random_of, softmax};
+use super::{Examples, check_boosting, drawn, normalise, random_of};
 use crate::arrays::{ArrayError, Arrays, check_each};
 use crate::fitting::LearnError;
 use rand_chacha::ChaCha8Rng;
 
-/// Rule for the weights of rows and trees.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum RusBoostForm {
-    /// AdaBoost.M2, as published: trees give the probability of each class, and pairs of row and class that are easily
-    /// confused gain weight.
-    #[default]
-    M2,
-    /// SAMME, as in imbalanced-learn: trees vote for one class, and misclassified rows gain weight. Its probabilities
-    /// have the right order, but are nearly equal with many classes; it often ends after a few rounds.
-    Samme,
-}
-
 /// Settings of [`RusBoost`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RusBoostSettings {
-    /// Rule for the weights. Default: as published.
-    pub(crate) form: RusBoostForm,
     /// Number of rounds, at least 1, each of one tree. Default 200.
     pub(crate) rounds: usize,
     /// Exponent of the change of weights, above 0 and at most 10. Default 1, as published.
@@ -42,7 +28,7 @@ pub(crate) struct RusBoostSettings {
 impl Default for RusBoostSettings {
     fn default() -> Self {
         let tree = TreeSettings { features: FeatureSampling::Shuffled, ..TreeSettings::default() };
-        Self { form: RusBoostForm::M2, rounds: 200, learning_rate: 1.0, tree, seed: 0 }
+        Self { rounds: 200, learning_rate: 1.0, tree, seed: 0 }
     }
 }
 
@@ -51,7 +37,6 @@ impl Default for RusBoostSettings {
 pub(crate) struct RusBoost {
     columns: usize,
     classes: usize,
-    form: RusBoostForm,
     /// Classes with training rows, ascending; others are never predicted.
     present: Vec<usize>,
     trees: Vec<Tree>,
@@ -67,13 +52,10 @@ impl RusBoost {
     pub(crate) fn fit(examples: &Examples<'_>, settings: &RusBoostSettings) -> Result<Self, LearnError> {
         examples.check()?;
         check_boosting(settings.rounds, settings.learning_rate);
-        Ok(match settings.form {
-            RusBoostForm::M2 => boost(examples, settings, M2::new(examples)),
-            RusBoostForm::Samme => boost(examples, settings, Samme::new(examples)),
-        })
+        Ok(boost(examples, settings))
     }
 
-    /// Probability of each class: the weighted mean share (M2), or a softmax of weighted votes (SAMME).
+    /// Probability of each class: the weighted mean share.
     ///
     /// # Panics
     /// If the row has another number of features than the training rows.
@@ -81,43 +63,17 @@ impl RusBoost {
         assert_eq!(row.len(), self.columns, "values of a row");
         let mut sums = vec![0.0; self.classes];
         for (tree, weight) in self.trees.iter().zip(&self.tree_weights) {
-            let leaf = tree.leaf(row);
-            match self.form {
-                RusBoostForm::M2 => {
-                    for (sum, share) in sums.iter_mut().zip(leaf) {
-                        *sum += weight * f64::from(*share);
-                    }
-                }
-                RusBoostForm::Samme => sums[greatest(leaf)] += weight,
+            for (sum, share) in sums.iter_mut().zip(tree.leaf(row)) {
+                *sum += weight * f64::from(*share);
             }
         }
         normalise(&mut sums);
-        match self.form {
-            RusBoostForm::M2 => sums,
-            RusBoostForm::Samme => self.softmax_of_votes(&sums),
-        }
-    }
-
-    /// A tree votes 1 for its class and -1 / (K - 1) for others; with v the mean vote, p = softmax(v / (K - 1)).
-    fn softmax_of_votes(&self, sums: &[f64]) -> Vec<f64> {
-        let others = (self.present.len() as f64 - 1.0).max(1.0);
-        let mut votes: Vec<f64> =
-            self.present.iter().map(|&class| (sums[class] - (1.0 - sums[class]) / others) / others).collect();
-        softmax(&mut votes);
-        let mut probabilities = vec![0.0; self.classes];
-        for (class, vote) in self.present.iter().zip(votes) {
-            probabilities[*class] = vote;
-        }
-        probabilities
+        sums
     }
 
     /// Adds the model to the arrays of a model file.
     pub(crate) fn save(&self, arrays: &mut Arrays) {
-        let form = match self.form {
-            RusBoostForm::M2 => 0,
-            RusBoostForm::Samme => 1,
-        };
-        arrays.put_integers("trees.form", [form]);
+        arrays.put_integers("trees.form", [M2_FORM]);
         arrays.put_integers("trees.present", self.present.iter().copied());
         arrays.put_f64("trees.words", self.tree_weights.clone());
         save_trees(&self.trees, self.columns, self.classes, arrays);
@@ -125,14 +81,11 @@ impl RusBoost {
 
     /// Restores a model from a model file.
     pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
-        let form = match *arrays.indices("trees.form", 2, "0 or 1")? {
-            [0] => RusBoostForm::M2,
-            [_] => RusBoostForm::Samme,
-            ref other => {
-                let (name, found) = ("trees.form".to_owned(), vec![other.len()]);
-                return Err(ArrayError::Shape { name, found, expected: vec![1] });
-            }
-        };
+        let form = arrays.indices("trees.form", M2_FORM + 1, "0")?;
+        if form.len() != 1 {
+            let (name, found) = ("trees.form".to_owned(), vec![form.len()]);
+            return Err(ArrayError::Shape { name, found, expected: vec![1] });
+        }
         arrays.require("trees.words", &[arrays.integers("trees.tree_nodes")?.len()], "trees.tree_nodes")?;
         let trees = load_class_trees(arrays, columns, classes)?;
         let tree_weights = arrays.f64_vector("trees.words")?;
@@ -149,14 +102,17 @@ impl RusBoost {
         if let Some(index) = named.iter().zip(&present).position(|(named, present)| named != present) {
             return Err(ArrayError::Value { name: "trees.present".to_owned(), index, expected });
         }
-        Ok(Self { columns, classes, form, present, trees, tree_weights: tree_weights.to_vec() })
+        Ok(Self { columns, classes, present, trees, tree_weights: tree_weights.to_vec() })
     }
 }
 
+/// Number of AdaBoost.M2 in model files.
+const M2_FORM: usize = 0;
 /// Largest weight of a tree; no fit comes near it, because errors are no smaller than rounding.
 const MOST_WEIGHT: f64 = 1e12;
 
-fn boost(examples: &Examples<'_>, settings: &RusBoostSettings, mut rule: impl Reweighting) -> RusBoost {
+fn boost(examples: &Examples<'_>, settings: &RusBoostSettings) -> RusBoost {
+    let mut rule = M2::new(examples);
     let bins = Bins::new(&examples.table);
     let by_class = rows_by_class(examples);
     let (mut trees, mut tree_weights) = (Vec::new(), Vec::new());
@@ -175,7 +131,7 @@ fn boost(examples: &Examples<'_>, settings: &RusBoostSettings, mut rule: impl Re
         } else {
             first = first.or(Some(tree));
         }
-        if matches!(judgement, Judgement::KeepAsLast(_) | Judgement::Stop) {
+        if matches!(judgement, Judgement::KeepAsLast(_)) {
             break;
         }
     }
@@ -184,7 +140,7 @@ fn boost(examples: &Examples<'_>, settings: &RusBoostSettings, mut rule: impl Re
         tree_weights.push(1.0);
     }
     let (columns, classes) = (examples.table.columns, examples.classes);
-    RusBoost { columns, classes, form: settings.form, present: examples.present(), trees, tree_weights }
+    RusBoost { columns, classes, present: examples.present(), trees, tree_weights }
 }
 
 /// Rows of each class that has any.
@@ -225,27 +181,22 @@ mod tests {
         let found = |recalls: [f64; scikit_learn_tests::CLASSES]| 0.5 * (recalls[4] + recalls[5]);
         let forest = Forest::fit(&train.examples(), &ForestSettings { trees: 50, ..ForestSettings::random_forest() })?;
         let without = found(test.recalls(|row| forest.predict(row)));
-        for form in [RusBoostForm::M2, RusBoostForm::Samme] {
-            let settings = RusBoostSettings { form, rounds: 50, ..RusBoostSettings::default() };
-            let model = RusBoost::fit(&train.examples(), &settings)?;
-            let with = found(test.recalls(|row| model.predict(row)));
-            assert!(with > without + 0.15, "{form:?}: {with:.3}, forest {without:.3}");
-        }
+        let model = RusBoost::fit(&train.examples(), &RusBoostSettings { rounds: 50, ..RusBoostSettings::default() })?;
+        let with = found(test.recalls(|row| model.predict(row)));
+        assert!(with > without + 0.15, "{with:.3}, forest {without:.3}");
         Ok(())
     }
 
     #[test]
     fn seeds_decide_and_probabilities_sum_to_one() -> Result<(), LearnError> {
         let data = scikit_learn_tests::Data::new(0..200);
-        for form in [RusBoostForm::M2, RusBoostForm::Samme] {
-            let tree = TreeSettings { max_depth: Some(4), ..TreeSettings::default() };
-            let settings = RusBoostSettings { form, rounds: 5, tree, ..RusBoostSettings::default() };
-            let model = RusBoost::fit(&data.examples(), &settings)?;
-            assert_eq!(model, RusBoost::fit(&data.examples(), &settings)?);
-            assert_ne!(model, RusBoost::fit(&data.examples(), &RusBoostSettings { seed: 1, ..settings })?);
-            for row in 0..200 {
-                assert!((model.predict(data.row(row)).iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            }
+        let tree = TreeSettings { max_depth: Some(4), ..TreeSettings::default() };
+        let settings = RusBoostSettings { rounds: 5, tree, ..RusBoostSettings::default() };
+        let model = RusBoost::fit(&data.examples(), &settings)?;
+        assert_eq!(model, RusBoost::fit(&data.examples(), &settings)?);
+        assert_ne!(model, RusBoost::fit(&data.examples(), &RusBoostSettings { seed: 1, ..settings })?);
+        for row in 0..200 {
+            assert!((model.predict(data.row(row)).iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
         Ok(())
     }
@@ -253,15 +204,13 @@ mod tests {
     #[test]
     fn a_single_class_and_identical_rows_are_handled() -> Result<(), LearnError> {
         let table = Table { values: &[1.0, 1.0, 1.0], columns: 1 };
-        for form in [RusBoostForm::M2, RusBoostForm::Samme] {
-            let settings = RusBoostSettings { form, ..RusBoostSettings::default() };
-            let one = Examples { table, labels: &[2, 2, 2], classes: 3, weights: None };
-            assert_eq!(RusBoost::fit(&one, &settings)?.predict(&[0.0]), [0.0, 0.0, 1.0]);
-            let alike = Examples { labels: &[0, 1, 2], ..one };
-            let model = RusBoost::fit(&alike, &settings)?;
-            assert_eq!((model.trees.len(), model.tree_weights.clone()), (1, vec![1.0]));
-            assert!((model.predict(&[0.0]).iter().sum::<f64>() - 1.0).abs() < 1e-12);
-        }
+        let settings = RusBoostSettings::default();
+        let one = Examples { table, labels: &[2, 2, 2], classes: 3, weights: None };
+        assert_eq!(RusBoost::fit(&one, &settings)?.predict(&[0.0]), [0.0, 0.0, 1.0]);
+        let alike = Examples { labels: &[0, 1, 2], ..one };
+        let model = RusBoost::fit(&alike, &settings)?;
+        assert_eq!((model.trees.len(), model.tree_weights.clone()), (1, vec![1.0]));
+        assert!((model.predict(&[0.0]).iter().sum::<f64>() - 1.0).abs() < 1e-12);
         Ok(())
     }
 }

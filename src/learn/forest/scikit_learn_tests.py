@@ -1,7 +1,6 @@
-"""Prints the numbers that scikit_learn_tests.rs compares with; needs scikit-learn 1.9.1 and imbalanced-learn 0.14.2."""
+"""Prints the numbers that scikit_learn_tests.rs compares with; needs scikit-learn 1.9.1."""
 
 import numpy as np
-from imblearn.ensemble import RUSBoostClassifier
 from sklearn.ensemble import (
     BaggingClassifier,
     ExtraTreesClassifier,
@@ -78,6 +77,3 @@ banded("random forest", lambda s: RandomForestClassifier(100, random_state=s))
 banded("extra-trees", lambda s: ExtraTreesClassifier(100, random_state=s))
 banded("bagged trees", lambda s: BaggingClassifier(n_estimators=50, random_state=s))
 banded("gradient boosting", lambda s: GradientBoostingClassifier(n_estimators=50, subsample=0.5, random_state=s))
-for depth in (2, 4):
-    base = tree(max_depth=depth)
-    banded(f"rusboost, depth {depth}", lambda s: RUSBoostClassifier(base, n_estimators=50, random_state=s))

@@ -1,6 +1,4 @@
-//! Calibrated networks: one macro-layer, or a committee of several with different initial weights, and temperatures per
-//! time step that calibrate its probabilities. A committee averages the scores of its members; temperatures are fitted to
-//! these means, because members that are calibrated individually are underconfident together.
+//! Calibrated networks: a macro-layer, and temperatures per time step that calibrate its probabilities.
 //!
 //! Temperatures are fitted to held-out grasps: a first network is trained without a sixth of the grasps and evaluated on
 //! them; the final one is trained on all. Cross-fitting leaves out each of several larger parts once, so that every grasp
@@ -14,11 +12,10 @@ use crate::pmf::Pmf;
 use crate::temperature::{Temperatures, best_temperature};
 use std::ops::Range;
 
-/// Networks and their temperatures.
+/// A network and its temperatures.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Calibrated {
-    /// At least one, all of the same shape.
-    pub(super) members: Vec<MacroLayer>,
+    pub(super) layer: MacroLayer,
     /// `[groups][steps]`; the last step applies to later ones.
     pub(super) temperatures: Vec<Vec<f32>>,
 }
@@ -27,8 +24,6 @@ pub(super) struct Calibrated {
 #[derive(Clone, Debug)]
 pub(super) struct Plan<'a> {
     pub(super) shape: MacroShape,
-    /// Number of networks in the committee.
-    pub(super) members: usize,
     pub(super) training: &'a Training,
     /// Part of each sequence; part 0 is held out for calibration.
     pub(super) held_out: &'a [usize],
@@ -70,20 +65,20 @@ impl Calibrated {
         let (middle, seed) = (0.5 * (plan.share.start + plan.share.end), plan.seed);
         let first = Plan { share: plan.share.start..middle, ..plan.clone() };
         let fold_of = plan.held_out;
-        let members = first.train(inputs, fitting, seed, &|k| fold_of[k] != 0)?;
+        let layer = first.train(inputs, fitting, seed, &|k| fold_of[k] != 0)?;
         let mut held_out: HeldOut = vec![None; inputs.count()];
         for (k, held) in held_out.iter_mut().enumerate().filter(|(k, _)| fold_of[*k] == 0) {
-            *held = Some(scores_at_every_step(&members, &inputs.sequences[k]));
+            *held = Some(scores_at_every_step(&layer, &inputs.sequences[k]));
         }
         let second = Plan { share: middle..plan.share.end, ..plan.clone() };
-        let members = second.train(inputs, fitting, seed + 1, &|_| true)?;
+        let layer = second.train(inputs, fitting, seed + 1, &|_| true)?;
         let answered: Vec<(&[f32], &[usize])> = held_out
             .iter()
             .enumerate()
             .filter_map(|(k, held)| Some((held.as_deref()?, inputs.targets[k].as_slice())))
             .collect();
         let temperatures = fit_temperatures(&answered, &plan.shape.groups);
-        Ok((Self { members, temperatures }, held_out))
+        Ok((Self { layer, temperatures }, held_out))
     }
 
     /// Scores every sequence by a network trained on the other parts only.
@@ -98,9 +93,9 @@ impl Calibrated {
         for part in 0..parts {
             let from = plan.share.start + share * part as f64;
             let one = Plan { share: from..from + share, ..plan.clone() };
-            let members = one.train(inputs, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
+            let layer = one.train(inputs, fitting, plan.seed + 10 + part as u64, &|k| part_of[k] != part)?;
             for (k, held) in held_out.iter_mut().enumerate().filter(|(k, _)| part_of[*k] == part) {
-                *held = Some(scores_at_every_step(&members, &inputs.sequences[k]));
+                *held = Some(scores_at_every_step(&layer, &inputs.sequences[k]));
             }
         }
         Ok(held_out)
@@ -115,24 +110,14 @@ impl Calibrated {
         share: Range<f64>,
         fitting: &Fitting<'_>,
     ) -> Result<(), LearnError> {
-        let of_each = (share.end - share.start) / self.members.len() as f64;
-        for (member, layer) in self.members.iter_mut().enumerate() {
-            let from = share.start + of_each * member as f64;
-            let mut go_on = progress_of(fitting, from, of_each, training.epochs);
-            train_on(layer, inputs, training, seed_of(seed, member), &mut go_on);
-            fitting.check()?;
-        }
-        Ok(())
+        let mut go_on = progress_of(fitting, share.start, share.end - share.start, training.epochs);
+        train_on(&mut self.layer, inputs, training, seed, &mut go_on);
+        fitting.check()
     }
 
-    /// Shape of every member.
+    /// Shape of the network.
     pub(super) fn shape(&self) -> &MacroShape {
-        self.members[0].shape()
-    }
-
-    /// Replaces every member.
-    pub(super) fn change(&mut self, change: impl Fn(&MacroLayer) -> MacroLayer) {
-        self.members.iter_mut().for_each(|layer| *layer = change(layer));
+        self.layer.shape()
     }
 
     /// Calibrated PMF of each group from the scores after a step.
@@ -147,29 +132,19 @@ impl Calibrated {
 }
 
 impl Plan<'_> {
-    /// Trains every member on some of the sequences.
+    /// Trains a network on some of the sequences.
     fn train(
         &self,
         inputs: &StageInputs,
         fitting: &Fitting<'_>,
         seed: u64,
         keeps: &dyn Fn(usize) -> bool,
-    ) -> Result<Vec<MacroLayer>, LearnError> {
+    ) -> Result<MacroLayer, LearnError> {
         let subset = Subset { inputs, kept: (0..inputs.count()).filter(|k| keeps(*k)).collect() };
-        let share = (self.share.end - self.share.start) / self.members.max(1) as f64;
-        let learned = |member: usize| {
-            let from = self.share.start + share * member as f64;
-            let mut go_on = progress_of(fitting, from, share, self.training.epochs);
-            let layer = train(self.shape.clone(), &subset, self.training, seed_of(seed, member), &mut go_on);
-            fitting.check().map(|()| layer)
-        };
-        (0..self.members.max(1)).map(learned).collect()
+        let mut go_on = progress_of(fitting, self.share.start, self.share.end - self.share.start, self.training.epochs);
+        let layer = train(self.shape.clone(), &subset, self.training, seed, &mut go_on);
+        fitting.check().map(|()| layer)
     }
-}
-
-/// Seed of a member.
-fn seed_of(seed: u64, member: usize) -> u64 {
-    seed.wrapping_add(1_000_003 * member as u64)
 }
 
 /// Callback of the training loop: reports progress, and stops on request.
@@ -205,9 +180,9 @@ fn calibrated_pmfs(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], 
 }
 
 /// Scores of one sequence after each of its steps, `[steps][outputs]`.
-fn scores_at_every_step(members: &[MacroLayer], x: &[f32]) -> Vec<f32> {
-    let mut live = LiveCommittee::new(members);
-    x.chunks_exact(members[0].shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()
+fn scores_at_every_step(layer: &MacroLayer, x: &[f32]) -> Vec<f32> {
+    let mut live = LiveMacroLayer::new(layer);
+    x.chunks_exact(layer.shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()
 }
 
 /// Number of equal sections of a grasp with one temperature each.
@@ -252,35 +227,10 @@ fn interpolated(knots: &[f64], share: f64) -> f32 {
     (knots[low] * (1.0 - rest) + knots[high] * rest) as f32
 }
 
-/// Committee that takes one sample at a time.
-#[derive(Clone, Debug)]
-struct LiveCommittee {
-    members: Vec<LiveMacroLayer>,
-    mean: Vec<f32>,
-}
-
-impl LiveCommittee {
-    fn new(members: &[MacroLayer]) -> Self {
-        let outputs = members.first().map_or(0, |layer| layer.shape().outputs());
-        Self { members: members.iter().map(LiveMacroLayer::new).collect(), mean: vec![0.0; outputs] }
-    }
-
-    /// Takes a sample; returns the mean scores, one per output.
-    fn step(&mut self, x: &[f32], log_prior: &[f32]) -> &[f32] {
-        let share = 1.0 / self.members.len().max(1) as f32;
-        self.mean.fill(0.0);
-        for member in &mut self.members {
-            let scores = member.step(x, log_prior);
-            self.mean.iter_mut().zip(scores).for_each(|(mean, score)| *mean += share * score);
-        }
-        &self.mean
-    }
-}
-
-/// Calibrated networks that take one sample at a time.
+/// Calibrated network that takes one sample at a time.
 #[derive(Clone, Debug)]
 pub(super) struct LiveCalibrated {
-    committee: LiveCommittee,
+    layer: LiveMacroLayer,
     groups: Vec<usize>,
     temperatures: Vec<Vec<f32>>,
     step: usize,
@@ -289,7 +239,7 @@ pub(super) struct LiveCalibrated {
 impl LiveCalibrated {
     pub(super) fn new(network: &Calibrated) -> Self {
         Self {
-            committee: LiveCommittee::new(&network.members),
+            layer: LiveMacroLayer::new(&network.layer),
             groups: network.shape().groups.clone(),
             temperatures: network.temperatures.clone(),
             step: 0,
@@ -297,13 +247,13 @@ impl LiveCalibrated {
     }
 
     pub(super) fn reset(&mut self) {
-        self.committee.members.iter_mut().for_each(LiveMacroLayer::reset);
+        self.layer.reset();
         self.step = 0;
     }
 
     /// Takes a sample; returns the calibrated PMF of each group.
     pub(super) fn step(&mut self, x: &[f32], log_prior: &[f32]) -> Vec<Pmf> {
-        let pmfs = calibrated_pmfs(self.committee.step(x, log_prior), &self.groups, &self.temperatures, self.step);
+        let pmfs = calibrated_pmfs(self.layer.step(x, log_prior), &self.groups, &self.temperatures, self.step);
         self.step += 1;
         pmfs
     }

@@ -8,7 +8,7 @@
 //! | `recipe.rs` | settings of a network and its training |
 //! | `preparation.rs` | readings to inputs: time steps and scaling |
 //! | `training_set.rs` | inputs of a stage and their augmentation |
-//! | `calibrated.rs` | committees with calibrated probabilities, cross-fitting |
+//! | `calibrated.rs` | networks with calibrated probabilities, cross-fitting |
 //! | `training.rs` | AdamW, learning-rate schedule, training loop |
 //! | `macro_layer.rs`, `lstm.rs`, `gates.rs`, `gemm.rs` | the kernel, from layer to matrix product |
 
@@ -68,5 +68,8 @@ pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Box<dyn Recognis
 
 /// Everything that decides a fit, besides the data, the seed and the options of the fit.
 pub(crate) fn decided_by(recipe: &Recipe) -> serde_json::Value {
-    serde_json::json!({ "recipe": recipe, "revision": REVISION })
+    let mut decided_by = serde_json::json!({ "recipe": recipe, "revision": REVISION });
+    // Stored results have the fingerprints of 0.1.0, where a stage could have several networks.
+    decided_by["recipe"]["members"] = 1.into();
+    decided_by
 }

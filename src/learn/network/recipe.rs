@@ -7,7 +7,6 @@ use serde_json::{Map, Value};
 
 /// Structure and training of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// Rate of time steps, to which readings are averaged (Hz).
     pub rate_hz: f32,
@@ -15,9 +14,6 @@ pub struct Recipe {
     pub units: usize,
     /// Width of the first fully connected layer; zero to omit it.
     pub hidden: usize,
-    /// Number of networks in each stage's committee.
-    #[serde(default = "one")]
-    pub members: usize,
     /// True to estimate size and shape in a first stage (section III).
     pub two_stages: bool,
     /// True to feed back the PMF of earlier grasps (section III).
@@ -39,16 +35,8 @@ pub struct Recipe {
     pub training: Training,
 }
 
-/// Largest committee.
-pub(super) const MOST_MEMBERS: usize = 20;
-
 /// Sampling rate of the paper: 300 samples in 4 s (Hz).
 const PAPER_RATE_HZ: f32 = 75.0;
-
-/// Committee size in files without one.
-pub(super) fn one() -> usize {
-    1
-}
 
 impl Recipe {
     /// The macro-layer alone (Fig. 2a).
@@ -57,7 +45,6 @@ impl Recipe {
             rate_hz: 8.0,
             units: 128,
             hidden: 64,
-            members: 1,
             two_stages: false,
             iterated: false,
             parts: 3,
@@ -78,11 +65,6 @@ impl Recipe {
                 long_memory: false,
             },
         }
-    }
-
-    /// A committee of four macro-layers.
-    pub const fn committee() -> Self {
-        Self { members: 4, ..Self::macro_layer() }
     }
 
     /// The macro-layer as the paper has it. The paper leaves open how it was trained; see
@@ -168,7 +150,6 @@ impl Recipe {
             self.training.early_read_outs > 0,
             "also learns from outputs during the grasp; the paper reads out at the end",
         );
-        differs(self.members > 1, "averages several networks; the paper has one");
         differs(
             !self.strict,
             "calibrates probabilities by temperatures from held-out grasps; the paper takes them as they come",
@@ -223,7 +204,6 @@ impl Recipe {
             recipe.units = recipe.units.min(32);
             recipe.hidden = recipe.hidden.min(32);
             recipe.parts = recipe.parts.min(2);
-            recipe.members = recipe.members.min(2);
             recipe.training.epochs = recipe.training.epochs.min(40);
         }
         recipe.check()?;
@@ -260,7 +240,6 @@ impl Recipe {
         within("rate_hz", f64::from(self.rate_hz), 0.1, 1000.0)?;
         within("units", self.units as f64, 1.0, 4096.0)?;
         within("hidden", self.hidden as f64, 0.0, 4096.0)?;
-        within("members", self.members as f64, 1.0, MOST_MEMBERS as f64)?;
         within("parts", self.parts as f64, 2.0, 20.0)?;
         within("noise", f64::from(self.noise), 0.0, 10.0)?;
         within("epochs", training.epochs as f64, 1.0, 100_000.0)?;
@@ -272,8 +251,8 @@ impl Recipe {
         within("early_read_outs", training.early_read_outs as f64, 0.0, 1000.0)?;
         within("early_share", f64::from(training.early_share), 0.0, 1.0)?;
         within("longest_gradient", training.longest_gradient, 1e-6, 1e6)?;
-        if self.strict && (self.members > 1 || self.cross_fitted) {
-            let cause = "a strict network has one member and is not cross-fitted".to_owned();
+        if self.strict && self.cross_fitted {
+            let cause = "a strict network is not cross-fitted".to_owned();
             return Err(LearnError::Setting { name: "strict".to_owned(), cause });
         }
         Ok(())

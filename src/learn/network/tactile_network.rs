@@ -14,7 +14,7 @@
 use super::calibrated::{Calibrated, HeldOut, LiveCalibrated, Plan};
 use super::macro_layer::{MacroLayer, MacroShape};
 use super::preparation::{Binner, Preparation};
-use super::recipe::{MOST_MEMBERS, Recipe};
+use super::recipe::Recipe;
 use super::training_set::{Earlier, StageInputs};
 use crate::arrays::Arrays;
 use crate::belief::{Rejection, StopRule, agreement};
@@ -52,18 +52,12 @@ struct Learned {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct NetworkCard {
     shape: MacroShape,
-    #[serde(default = "super::recipe::one")]
-    members: usize,
     temperatures: Vec<Vec<f32>>,
 }
 
 impl NetworkCard {
     fn of(network: &Calibrated) -> Self {
-        Self {
-            shape: network.shape().clone(),
-            members: network.members.len(),
-            temperatures: network.temperatures.clone(),
-        }
+        Self { shape: network.shape().clone(), temperatures: network.temperatures.clone() }
     }
 }
 
@@ -175,26 +169,18 @@ fn read_network(
 ) -> Result<Calibrated, LoadError> {
     let shape = &card.shape;
     let valid = shape.fits(inputs, groups)
-        && (1..=MOST_MEMBERS).contains(&card.members)
         && card.temperatures.len() == groups.len()
         && card.temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
     if !valid {
         return Err(LoadError::Card { part: "the shape of the network" });
     }
-    let read = |member: usize| -> Result<MacroLayer, LoadError> {
-        let mut values = Vec::new();
-        for block in shape.blocks() {
-            values.extend(arrays.f32s(&array_name(name, member, block.name), &block.shape)?);
-        }
-        MacroLayer::from_values(shape.clone(), values).ok_or(LoadError::Card { part: "the shape of the network" })
-    };
-    let members: Result<Vec<MacroLayer>, LoadError> = (0..card.members).map(read).collect();
-    Ok(Calibrated { members: members?, temperatures: card.temperatures.clone() })
-}
-
-/// Name of an array in a file; the first member has no number.
-fn array_name(stage: &str, member: usize, block: &str) -> String {
-    if member == 0 { format!("{stage}.{block}") } else { format!("{stage}.{}.{block}", member + 1) }
+    let mut values = Vec::new();
+    for block in shape.blocks() {
+        values.extend(arrays.f32s(&format!("{name}.{}", block.name), &block.shape)?);
+    }
+    let layer = MacroLayer::from_values(shape.clone(), values);
+    let layer = layer.ok_or(LoadError::Card { part: "the shape of the network" })?;
+    Ok(Calibrated { layer, temperatures: card.temperatures.clone() })
 }
 
 /// Indices of the grasps for stage one and for stage two.
@@ -257,7 +243,6 @@ impl StageFitting<'_> {
         let middle = if self.recipe.cross_fitted { 0.5 * (share.start + share.end) } else { share.end };
         let plan = Plan {
             shape: self.shape(inputs.width, vec![labels.sizes.len(), labels.shapes.len()], false),
-            members: self.recipe.members,
             training: &self.recipe.training,
             held_out: &self.parts(&labelled, CALIBRATION),
             seed: self.fitting.seed.wrapping_mul(1000),
@@ -347,7 +332,6 @@ impl StageFitting<'_> {
         let at_once = inputs_with(!recipe.cross_fitted, None);
         let plan = Plan {
             shape: self.shape(at_once.width, vec![classes], false),
-            members: recipe.members,
             training: &recipe.training,
             held_out: &self.parts(grasps, CALIBRATION),
             seed,
@@ -356,7 +340,7 @@ impl StageFitting<'_> {
         let (mut network, held_out) = Calibrated::fit(&plan, &at_once, self.fitting)?;
         let complete = if recipe.cross_fitted && added > 0 {
             let inputs = inputs_with(true, None);
-            network.change(|layer| layer.with_inputs(added));
+            network.layer = network.layer.with_inputs(added);
             network.refine(&inputs, &refining, seed + 50, plan.share.end..plan.share.end + 0.05, self.fitting)?;
             inputs
         } else {
@@ -390,7 +374,7 @@ impl StageFitting<'_> {
         let earlier = Earlier::new(alone.clone(), &class_of, classes, MOST_EARLIER);
         // The network starts as the product of experts and learns corrections.
         let gain = network.last_temperature();
-        network.change(|layer| layer.with_inputs(classes).with_prior(gain));
+        network.layer = network.layer.with_inputs(classes).with_prior(gain);
         network.refine(&inputs_with(true, Some(earlier)), &refining, seed + 100, at(0.95)..at(1.0), self.fitting)?;
         Ok((network, named(alone)))
     }
@@ -449,19 +433,16 @@ impl Recogniser for TactileNetwork {
         let mut arrays = Arrays::default();
         let stages = [("stage_one", self.stage_one.as_ref()), ("stage_two", Some(&self.stage_two))];
         for (name, network) in stages.into_iter().filter_map(|(name, network)| Some((name, network?))) {
-            for (member, layer) in network.members.iter().enumerate() {
-                for block in layer.shape().blocks() {
-                    let values = &layer.values()[block.place.clone()];
-                    arrays.put(array_name(name, member, block.name), &block.shape, values.to_vec());
-                }
+            for block in network.shape().blocks() {
+                let values = &network.layer.values()[block.place.clone()];
+                arrays.put(format!("{name}.{}", block.name), &block.shape, values.to_vec());
             }
         }
         arrays
     }
 
     fn parameters(&self) -> usize {
-        let of = |network: &Calibrated| network.members.iter().map(|layer| layer.values().len()).sum();
-        self.stage_one.as_ref().map_or(0, of) + of(&self.stage_two)
+        self.stage_one.iter().chain([&self.stage_two]).map(|network| network.layer.values().len()).sum()
     }
 
     fn settings(&self) -> serde_json::Value {

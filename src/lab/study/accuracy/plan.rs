@@ -151,7 +151,7 @@ impl AccuracyPlan {
         let recognition = RecognitionPlan {
             settings: trained(),
             test: reference(),
-            methods: ["knn", "random-forest", "measures-svm", "macro-layer"].map(str::to_owned).to_vec(),
+            methods: ["knn", "random-forest", "svm", "macro-layer"].map(str::to_owned).to_vec(),
             preset: "B".to_owned(),
             train_grasps: 40,
             test_grasps: 40,

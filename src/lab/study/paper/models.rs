@@ -44,9 +44,9 @@ fn papers_model() -> Option<&'static Method> {
     PAPERS_MODEL.into_iter().find_map(method)
 }
 
-/// True for networks that are many in one.
+/// True for networks that are trained many times.
 fn is_costly(method: &Method) -> bool {
-    method.recipe.is_some_and(|recipe| recipe().members > 1 || recipe().cross_fitted)
+    method.recipe.is_some_and(|recipe| recipe().cross_fitted)
 }
 
 /// True for the paper's model and what it is compared with.

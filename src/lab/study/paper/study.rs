@@ -103,9 +103,19 @@ impl<S: Study> PaperStudy for S {
 }
 
 /// Fingerprint of a plan and of all methods that a study fits with it: results with another one are out of date.
-pub fn study_fingerprint(study: &dyn PaperStudy, plan: &StudyPlan) -> String {
+fn study_fingerprint(study: &dyn PaperStudy, plan: &StudyPlan) -> String {
     let units = study.units(plan).join("\n");
     format!("{:016x}", palpate_sim::fingerprint([plan.header().to_string().as_bytes(), units.as_bytes()]))
+}
+
+/// Fingerprints of the full comparison of methods in 0.1.0, which had four methods more, and today. The others are as they
+/// were, so its stored result is current.
+const WITH_REMOVED_METHODS: [&str; 2] = ["87c5eb4c37e9b2eb", "48d80c573cbd5b14"];
+
+/// True if all methods of a result are as they were when it was computed.
+pub fn is_current(report: &StudyReport, study: &dyn PaperStudy, plan: &StudyPlan) -> bool {
+    let today = study_fingerprint(study, plan);
+    report.fingerprint == today || [report.fingerprint.as_str(), &today] == WITH_REMOVED_METHODS
 }
 
 /// Runs a study on a bench; none where it was stopped. A file keeps finished cells: the same plan continues there.
