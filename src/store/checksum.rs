@@ -107,34 +107,3 @@ pub(super) fn add_triggers(connection: &Connection) -> rusqlite::Result<()> {
          BEGIN UPDATE trials SET checksum = carried(checksum, {old}, {new}) WHERE id = NEW.id; END;"
     ))
 }
-
-/// CRC-32 of bytes alone, as older versions stored it.
-pub(super) fn of_bytes<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    parts.into_iter().for_each(|bytes| hasher.update(bytes));
-    hasher.finalize()
-}
-
-/// Gives the rows of older versions checksums. Their blobs had a CRC-32 of their bytes alone, or none; a mismatch stays one.
-pub(super) fn add_to_old(connection: &Connection) -> rusqlite::Result<()> {
-    let flags = FunctionFlags::SQLITE_UTF8 | FunctionFlags::SQLITE_DETERMINISTIC;
-    connection.create_scalar_function("of_bytes", -1, flags, |context| {
-        Ok(of_bytes(values(context).filter_map(|value| value.as_bytes().ok())))
-    })?;
-    let set = |table: &str, checksum: &str, key: &str, columns: &str| {
-        format!(
-            "UPDATE {table} SET {checksum} = carried(coalesce({checksum}, of_bytes({columns})), of_bytes({columns}),
-                 checksum((SELECT uid FROM trials WHERE id = trial), {key}{columns}));"
-        )
-    };
-    let of_chunks = |chunks: Chunks| set(chunks.table, chunks.checksum, "number, ", &chunks.columns.join(", "));
-    connection.execute_batch(&[FRAMES, READINGS, BYTES].map(of_chunks).concat())?;
-    connection.execute_batch(&set("readings", "checksum", "", "channels, samples"))?;
-    connection.execute_batch(&format!(
-        "UPDATE board_trials SET checksum = checksum((SELECT uid FROM trials WHERE id = trial), about);
-         UPDATE trials SET chunks = coalesce((SELECT max(number) + 1 FROM chunks WHERE trial = id),
-             (SELECT max(number) + 1 FROM board_chunks WHERE trial = id), 0);
-         UPDATE trials SET checksum = {};",
-        of_trial("trials")
-    ))
-}

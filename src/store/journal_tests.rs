@@ -268,35 +268,6 @@ fn all_that_goes_with_a_trial_is_merged_and_only_once() -> Outcome {
     Ok(())
 }
 
-#[test]
-fn a_store_from_before_there_were_labels_is_brought_up_to_date() -> Outcome {
-    let folder = tempfile::tempdir()?;
-    let path = folder.path().join("old.sqlite");
-    let store = store_with(&path, &["lemon"])?;
-    // What version 6 did not have is taken away again.
-    drop(store);
-    rusqlite::Connection::open(&path)?.execute_batch(
-        "DROP TABLE journal; DROP TABLE tares; DROP TABLE guesses; DROP TABLE label_plan;
-         DROP INDEX chunks_by_trial; DROP INDEX board_chunks_by_trial; ALTER TABLE trials DROP COLUMN checksum; ALTER TABLE trials DROP COLUMN chunks;
-         ALTER TABLE board_trials DROP COLUMN checksum; ALTER TABLE chunks DROP COLUMN checksum; ALTER TABLE readings DROP COLUMN checksum;
-         ALTER TABLE board_chunks DROP COLUMN checksum; ALTER TABLE board_chunks DROP COLUMN bytes_checksum;
-         ALTER TABLE trials DROP COLUMN note; ALTER TABLE trials DROP COLUMN tags;
-         ALTER TABLE trials DROP COLUMN unsure; ALTER TABLE trials DROP COLUMN reviewed;
-         DROP TABLE memberships; DROP INDEX trials_by_identity; DROP INDEX trials_of_demo_log;
-         ALTER TABLE trials DROP COLUMN demo; ALTER TABLE trials DROP COLUMN identity; ALTER TABLE trials DROP COLUMN origin;
-         ALTER TABLE trials DROP COLUMN earlier; ALTER TABLE trials DROP COLUMN phases;
-         UPDATE board_trials SET about = '{\"port\":\"p\",\"cadence\":{\"rate_hz\":50.0,\"lost\":2}}';
-         PRAGMA user_version = 6;",
-    )?;
-    let store = Store::open(&path)?;
-    let row = &store.labels().trials()?[0];
-    assert_eq!((row.object.as_deref(), row.cadence.as_str()), (Some("lemon"), "50.00 Hz, jitter 0.0 ms, 2 lost"));
-    assert!(row.flags.is_empty() && row.sparkline.iter().all(Vec::is_empty));
-    store.labels().set_label(1, "ball")?;
-    assert!(store.journal().undo()?.is_some());
-    Ok(())
-}
-
 /// What somebody does.
 #[derive(Clone, Debug)]
 enum Deed {

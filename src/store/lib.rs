@@ -19,7 +19,7 @@
 //! | 2 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
-//! | 2 | `schema`, `free_space`, `open_file` | tables and their migration; free space on the disk; whether the open file is still there |
+//! | 2 | `schema`, `free_space`, `open_file` | tables; free space on the disk; whether the open file is still there |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
 //! | 4 | `chunks` | chunks of a trial, checked |
 //! | 4 | `trial_rows` | the list of trials |
@@ -67,6 +67,8 @@ mod imported_trials;
 mod journal;
 #[cfg(test)]
 mod journal_tests;
+#[cfg(test)]
+mod kept_store_tests;
 mod label_repository;
 mod labelled_export;
 mod labelled_trials;
@@ -76,8 +78,6 @@ mod library;
 mod library_tests;
 mod merge;
 mod new_file;
-#[cfg(test)]
-mod old_store_tests;
 mod open_file;
 mod points_csv;
 mod reading_blob;

@@ -146,7 +146,7 @@ impl Store {
             let cause = "no such file".to_owned();
             return Err(StoreError::Open { path: other.to_owned(), cause });
         }
-        // Opening it updates its tables, or says why it cannot be read.
+        // Opening it says why it cannot be read.
         let theirs = Self::open(other)?;
         let damaged: Vec<TrialId> = theirs.list(true)?.iter().filter(|row| row.damaged).map(|row| row.id).collect();
         let fault = |e: rusqlite::Error| self.fault(&e);

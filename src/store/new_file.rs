@@ -98,7 +98,7 @@ impl Drop for NewFolder {
 }
 
 /// A name beside a path, on the same disk, that nobody else has.
-pub(super) fn unfinished(path: &Path) -> PathBuf {
+fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".palpate-{:016x}.unfinished", RandomState::new().hash_one(path)))
 }
 

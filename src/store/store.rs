@@ -1,7 +1,7 @@
 //! The SQLite store: its connection, and the trials in it. A write-ahead log, so that a kill at any moment loses at
 //! most the chunk being written and never harms another trial, and so that several programs can share one store.
 //!
-//! Tables and migrations are in `schema`. Each group of tables beside trials has a repository: [`Store::labels`],
+//! Tables are in `schema`. Each group of tables beside trials has a repository: [`Store::labels`],
 //! [`Store::journal`], [`Store::calibrations`].
 //!
 //! Deleting marks a trial; purging removes it. Chunks are only ever added.
@@ -11,7 +11,7 @@ use super::demo_log::{TrialPlace, keep, log, place_of};
 use super::frame_blob::encode_frames;
 use super::identity::{Stored, add_to, known};
 use super::open_file::OpenFile;
-use super::schema::{APPLICATION_ID, SCHEMA_VERSION, migrate};
+use super::schema::{APPLICATION_ID, SCHEMA_VERSION, make_tables};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain, row_fault};
 use palpate_geometry::Pose;
 use palpate_sim::frame::{Frame, Plan, Quality};
@@ -97,17 +97,9 @@ impl Store {
         self.connection.pragma_update(None, "foreign_keys", true).map_err(fault)?;
         add_functions(&self.connection).map_err(fault)?;
         let transaction = self.write()?;
-        let copy = migrate(&transaction, self.file())?;
+        make_tables(&transaction, &path)?;
         self.commit(transaction)?;
-        add_triggers(&self.connection).map_err(fault)?;
-        self.warnings.extend(copy.map(|copy| {
-            format!(
-                "the store was updated to version {SCHEMA_VERSION}; a copy of the file before the update is \"{}\". Delete it \
-                 when you no longer need the older program",
-                copy.display()
-            )
-        }));
-        Ok(())
+        add_triggers(&self.connection).map_err(fault)
     }
 
     /// Sets SQLite's journal mode. SQLite takes this lock without waiting for it; this waits, so that two programs can
@@ -135,7 +127,7 @@ impl Store {
         done
     }
 
-    /// Refuses files of other programs and of newer versions, before anything is written.
+    /// Refuses files of other programs and of other versions, before anything is written.
     fn check_identity(&self) -> Result<(), StoreError> {
         let read = |pragma: &str| {
             self.connection.pragma_query_value(None, pragma, |row| row.get::<_, i32>(0)).map_err(|e| self.fault(&e))
@@ -151,6 +143,9 @@ impl Store {
         }
         if version > SCHEMA_VERSION {
             return Err(StoreError::Newer { path: self.path.clone(), found: version, known: SCHEMA_VERSION });
+        }
+        if version < SCHEMA_VERSION && tables > 0 {
+            return Err(StoreError::Older { path: self.path.clone(), found: version, known: SCHEMA_VERSION });
         }
         Ok(())
     }

@@ -53,17 +53,19 @@ pub enum StoreError {
         /// Newest version that this program reads.
         known: i32,
     },
-    /// An older store cannot be copied before its update.
+    /// Written before the tables were released.
     #[error(
-        "the store is from an older Palpate, and its copy \"{path}\" cannot be written before the update: {cause}. Free \
-         some space or make the folder writable, then try again; the store is unchanged",
+        "\"{path}\" was made by an earlier development version of Palpate (store version {found}, this program reads {known}). \
+         Commit 29b20e5 still converts it: git checkout 29b20e5 && cargo run --release -- trials list --store \"{path}\"",
         path = path.display()
     )]
-    NotCopied {
-        /// Path of the copy.
+    Older {
+        /// Path of the store.
         path: PathBuf,
-        /// Message of the system.
-        cause: String,
+        /// Its version.
+        found: i32,
+        /// Version that this program reads.
+        known: i32,
     },
     /// Another program keeps the store locked.
     #[error("the store is busy: another program has been writing to it for {} s; try again", BUSY_TIMEOUT.as_secs())]

@@ -130,7 +130,7 @@ fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
 }
 
 #[test]
-fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
+fn foreign_newer_older_and_damaged_files_are_refused() -> Result<(), Box<dyn std::error::Error>> {
     let folder = folder();
     let text = folder.path().join("notes.txt");
     std::fs::write(&text, "no database at all, but long enough to be looked at as one would be".repeat(20))?;
@@ -144,6 +144,8 @@ fn foreign_newer_and_damaged_files_are_refused() -> Result<(), Box<dyn std::erro
     Store::open(&newer)?;
     Connection::open(&newer)?.pragma_update(None, "user_version", 99)?;
     assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
+    Connection::open(&newer)?.pragma_update(None, "user_version", 14)?;
+    assert!(matches!(Store::open(&newer), Err(StoreError::Older { found: 14, .. })));
 
     let damaged = folder.path().join("damaged.sqlite");
     let id = Store::open(&damaged)?.insert(&trial(5))?.id();

@@ -9,13 +9,13 @@ use palpate_store::labels::{ClassClash, compared};
 use palpate_store::{CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
-use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Sensors, SignalDefinition, Signals};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Sensors through which simulated trials are read. Imported trials have their own channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "StoredView")]
+#[serde(default)]
 pub struct SensorView {
     /// Name of the sensor layout: `C1`.
     pub layout: String,
@@ -35,30 +35,6 @@ impl Default for SensorView {
     fn default() -> Self {
         let (sensors, signals) = (SensorModel::Virtual, SignalDefinition::Parts);
         Self { layout: "C1".to_owned(), sensors, draws: 1, signals, rate_hz: None, cut: Cut::default() }
-    }
-}
-
-/// A view as this version or an earlier one stored it. Earlier ones divided force by an area, and had force as a channel
-/// of its own by default.
-#[derive(Deserialize)]
-struct StoredView {
-    layout: String,
-    sensors: SensorModel,
-    draws: Option<u32>,
-    signals: Option<SignalDefinition>,
-    area: Option<String>,
-    rate_hz: Option<f64>,
-    #[serde(default)]
-    cut: Cut,
-}
-
-impl From<StoredView> for SensorView {
-    fn from(stored: StoredView) -> Self {
-        let by_hull = stored.area.is_some_and(|area| area == "hull");
-        let earlier = if by_hull { SignalDefinition::Hull } else { SignalDefinition::Parts };
-        let StoredView { layout, sensors, rate_hz, cut, .. } = stored;
-        let draws = stored.draws.unwrap_or(1);
-        Self { layout, sensors, draws, signals: earlier, rate_hz, cut }.with_signals(stored.signals.unwrap_or(earlier))
     }
 }
 
@@ -398,12 +374,9 @@ fn board_signals(
 impl SensorView {
     /// Sensors that a recogniser expects of simulated trials.
     pub fn of_model(card: &ModelCard) -> Self {
-        let data = &card.data;
-        // Earlier versions learnt the force of a board's pads beside their pressure.
-        let forces =
-            card.channels.iter().filter_map(|name| Quantity::of_name(name)).any(|own| own.0 == Quantity::Force);
+        let (data, usual) = (&card.data, Self::default());
         Self {
-            layout: data.layout.clone().unwrap_or_else(|| if forces { "C1+F" } else { "C1" }.to_owned()),
+            layout: data.layout.clone().unwrap_or(usual.layout),
             sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
             draws: 1,
             signals: data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default(),
@@ -506,22 +479,14 @@ mod tests {
     }
 
     #[test]
-    fn stored_views_of_earlier_versions_show_what_pads_measure() -> serde_json::Result<()> {
-        let view = |text: &str| serde_json::from_str::<SensorView>(text);
-        let earlier = view(r#"{ "layout": "C6+F", "sensors": "physical-like", "area": "participation" }"#)?;
-        let wanted =
-            SensorView { layout: "C6".to_owned(), sensors: SensorModel::PhysicalLike, ..SensorView::default() };
-        assert_eq!(
-            (&earlier, view(r#"{ "layout": "C1+F", "sensors": "virtual" }"#)?),
-            (&wanted, SensorView::default())
-        );
-        let hull = view(r#"{ "layout": "C1+F", "sensors": "virtual", "area": "hull" }"#)?;
-        assert_eq!((hull.layout.as_str(), hull.signals), ("C1+F", SignalDefinition::Hull));
-        for own in [&wanted, &hull] {
-            assert_eq!(&view(&serde_json::to_string(own)?)?, own);
+    fn views_are_read_as_written_and_physical_sensors_have_signals_of_parts_alone() -> serde_json::Result<()> {
+        let parts = SensorView { layout: "C6".to_owned(), sensors: SensorModel::PhysicalLike, ..SensorView::default() };
+        let hull = SensorView { layout: "C1+F".to_owned(), signals: SignalDefinition::Hull, ..SensorView::default() };
+        for own in [&parts, &hull] {
+            assert_eq!(&serde_json::from_str::<SensorView>(&serde_json::to_string(own)?)?, own);
             assert!(own.learnt().is_ok());
         }
-        let impossible = SensorView { signals: SignalDefinition::Contact, ..wanted };
+        let impossible = SensorView { signals: SignalDefinition::Contact, ..parts };
         assert_eq!(impossible.learnt(), Err(LayoutError::NoSuchPart));
         Ok(())
     }

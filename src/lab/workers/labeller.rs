@@ -297,22 +297,4 @@ mod tests {
         theirs.purge().expect("purges");
         until(&labeller, &woken, |view| view.trials.is_empty());
     }
-
-    #[test]
-    fn an_update_of_the_store_is_reported_once() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("s.sqlite");
-        let old = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/suite/data/store_0_1.sqlite");
-        std::fs::copy(old, &path).expect("copies");
-        let (wake, woken) = waker();
-        let labeller = start_labeller(path, wake).expect("starts");
-        labeller.ask(LabelCommand::Refresh);
-        labeller.ask(LabelCommand::Refresh);
-        let view = until(&labeller, &woken, |_| labeller.is_settled());
-        assert!(
-            matches!(&view.outcomes[..], [(1, LabelOutcome::Warning(text))] if text.contains("s.before-v15.sqlite")),
-            "{:?}",
-            view.outcomes
-        );
-    }
 }
