@@ -67,55 +67,33 @@ pub(super) struct MovieArguments {
 const MOST_PICTURES: f64 = 15_000.0;
 
 pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let out = &arguments.out;
-    let target = Target::of(out)?;
-    let Some(id) = arguments.trial else { return film(arguments, &target) };
+    check_target(&arguments.out)?;
+    let Some(id) = arguments.trial else { return film(arguments) };
     let store = read_store(store)?;
     let open = open_drawable(&store, id)?;
     let times = times(arguments, &open.trial)?;
     let full_scale = open.stage.full_scale_of(open.trial.frames.iter().map(AsRef::as_ref));
     let mut shot = Shot { drawer: Drawer::new()?, open: &open, full_scale, arguments };
-    let stop = stop_flag()?;
-    let mut writer = Writer::begin(&target, out, arguments, times.len())?;
-    for (number, t_s) in times.iter().enumerate() {
-        if stop.load(Ordering::Relaxed) {
-            return Err("stopped; nothing was written".into());
-        }
-        writer.add(number, &shot.picture(*t_s)?)?;
-    }
-    end(writer, out, times.len())
+    write(arguments, times.len(), |add| {
+        times.iter().enumerate().try_for_each(|(number, t_s)| add(number, &shot.picture(*t_s)?))
+    })
 }
 
 /// Films presenter mode, with a store of its own.
-fn film(arguments: &MovieArguments, target: &Target) -> Result<(), Failure> {
-    let MovieArguments { out, size, theme, demo, .. } = arguments;
+fn film(arguments: &MovieArguments) -> Result<(), Failure> {
     let step_s = step_s(arguments);
-    let pictures = count(demo.unwrap_or_default(), step_s)?;
+    let pictures = count(arguments.demo.unwrap_or_default(), step_s)?;
     let folder = TemporaryFolder::new()?;
     let window = OffscreenWindow {
         scene: Scene::default(),
         store: folder.path().join("trials.sqlite"),
         mode: Mode::Demo,
-        theme: *theme,
-        size: *size,
+        theme: arguments.theme,
+        size: arguments.size,
         trial: None,
         at_s: 0.0,
     };
-    let stop = stop_flag()?;
-    let mut writer = Writer::begin(target, out, arguments, pictures)?;
-    film_presentation(&window, pictures, step_s, |number, picture| -> Result<(), Failure> {
-        if stop.load(Ordering::Relaxed) {
-            return Err("stopped; nothing was written".into());
-        }
-        writer.add(number, picture)
-    })?;
-    end(writer, out, pictures)
-}
-
-fn end(writer: Writer, out: &Path, pictures: usize) -> Result<(), Failure> {
-    writer.finish(out)?;
-    note(&format!("{pictures} pictures"));
-    say(out.display())
+    write(arguments, pictures, |add| film_presentation(&window, pictures, step_s, add))
 }
 
 /// Times of the pictures (s).
@@ -182,75 +160,53 @@ impl Shot<'_> {
 /// Kinds of movies in one file.
 const KINDS: &[FileKind] = &[FileKind::Apng, FileKind::Gif];
 
-/// Where pictures go.
-enum Target {
-    File(FileKind, MovieFormat),
-    Folder,
+/// Kind of the movie's file; none for a folder of pictures.
+fn kind_of(out: &Path) -> Option<FileKind> {
+    FileKind::of(out, KINDS).filter(|_| !out.is_dir())
 }
 
-impl Target {
-    fn of(out: &Path) -> Result<Self, Failure> {
-        check_folder(out)?;
-        if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
-            return Err(format!("\"{}\" is not empty; choose an empty or new folder", out.display()).into());
+fn check_target(out: &Path) -> Result<(), Failure> {
+    check_folder(out)?;
+    if std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_some()) {
+        return Err(format!("\"{}\" is not empty; choose an empty or new folder", out.display()).into());
+    }
+    kind_of(out).map_or(Ok(()), |kind| check_replaced(out, kind))
+}
+
+/// Takes a picture and its number.
+type AddPicture<'a> = &'a mut dyn FnMut(usize, &Picture) -> Result<(), Failure>;
+
+/// Writes the pictures that `draw` adds; what is not finished leaves nothing.
+fn write(
+    arguments: &MovieArguments,
+    pictures: usize,
+    draw: impl FnOnce(AddPicture<'_>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let (out, stop) = (&arguments.out, stop_flag()?);
+    let go_on = || if stop.load(Ordering::Relaxed) { Err("stopped; nothing was written") } else { Ok(()) };
+    let finished = match kind_of(out) {
+        Some(kind) => {
+            let format = if kind == FileKind::Gif { MovieFormat::Gif } else { MovieFormat::Apng };
+            let mut file = NewFile::create(out, kind).map_err(|cause| cannot(out, &cause))?;
+            let mut movie = MovieWriter::new(&mut file, format, arguments.size, pictures as u32, arguments.fps)?;
+            draw(&mut |_, picture| {
+                go_on()?;
+                Ok(movie.add(picture)?)
+            })?;
+            movie.finish()?;
+            file.finish()
         }
-        let Some(kind) = FileKind::of(out, KINDS).filter(|_| !out.is_dir()) else { return Ok(Self::Folder) };
-        check_replaced(out, kind)?;
-        Ok(Self::File(kind, if kind == FileKind::Gif { MovieFormat::Gif } else { MovieFormat::Apng }))
-    }
-}
-
-/// Writes pictures; what is not finished leaves nothing.
-enum Writer {
-    File { movie: MovieWriter<SharedFile>, file: SharedFile },
-    Folder(NewFolder),
-}
-
-/// The file of a movie, which its encoder writes to and which gets its name at the end.
-#[derive(Clone)]
-struct SharedFile(std::rc::Rc<std::cell::RefCell<NewFile>>);
-
-impl std::io::Write for SharedFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.borrow_mut().flush()
-    }
-}
-
-impl Writer {
-    fn begin(target: &Target, out: &Path, arguments: &MovieArguments, pictures: usize) -> Result<Self, Failure> {
-        match target {
-            Target::File(kind, format) => {
-                let file = NewFile::create(out, *kind).map_err(|cause| cannot(out, &cause))?;
-                let file = SharedFile(std::rc::Rc::new(std::cell::RefCell::new(file)));
-                let movie = MovieWriter::new(file.clone(), *format, arguments.size, pictures as u32, arguments.fps)?;
-                Ok(Self::File { movie, file })
-            }
-            Target::Folder => Ok(Self::Folder(NewFolder::create(out).map_err(|cause| cannot(out, &cause))?)),
-        }
-    }
-
-    fn add(&mut self, number: usize, picture: &Picture) -> Result<(), Failure> {
-        match self {
-            Self::File { movie, .. } => Ok(movie.add(picture)?),
-            Self::Folder(folder) => {
+        None => {
+            let folder = NewFolder::create(out).map_err(|cause| cannot(out, &cause))?;
+            draw(&mut |number, picture| {
+                go_on()?;
                 let path = folder.unfinished().join(format!("frame_{:05}.png", number + 1));
                 std::fs::write(&path, picture.to_png()?).map_err(|cause| cannot(&path, &cause))
-            }
+            })?;
+            folder.finish()
         }
-    }
-
-    fn finish(self, out: &Path) -> Result<(), Failure> {
-        let finished = match self {
-            Self::File { movie, file } => {
-                movie.finish()?;
-                std::rc::Rc::into_inner(file.0).ok_or("the movie is still being written")?.into_inner().finish()
-            }
-            Self::Folder(folder) => folder.finish(),
-        };
-        finished.map_err(|cause| cannot(out, &cause))
-    }
+    };
+    finished.map_err(|cause| cannot(out, &cause))?;
+    note(&format!("{pictures} pictures"));
+    say(out.display())
 }

@@ -232,7 +232,10 @@ impl Screen {
                     let at = self.kind.with_unit(*stimulus);
                     note(&format!("  {at}: {counts:.1} counts, noise {spread:.1}, {readings} readings"));
                 }
-                None => note("last point removed: record it again"),
+                None => {
+                    let at = self.kind.with_unit(procedure.next().unwrap_or_default());
+                    note(&format!("{at} removed: record it again"));
+                }
             }
             (self.points, self.since) = (points.len(), Instant::now());
         }
