@@ -9,8 +9,8 @@ use palpate::app::{Mode, StudyAction, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    Agreement, Cell, Finding, PERCENT, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable, paper_study,
-    study_fingerprint,
+    Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable,
+    paper_study, study_fingerprint,
 };
 use palpate_lab::workers::StudyRequest;
 use palpate_learn::metrics::Interval;
@@ -37,18 +37,42 @@ pub(crate) fn scripted_result(store: &mut Store) {
             table.push(cells, vec![k as i64 + 1, 1]);
         }
     }
-    let finding = |section: &str, claim: &str, found: &str, verdict: Agreement| Finding {
-        section: section.to_owned(),
-        claim: claim.to_owned(),
-        found: found.to_owned(),
-        verdict,
-        why: "Agrees where every interval of the difference lies above zero".to_owned(),
-    };
+    let gain = |low: f64, high: f64| Some(Interval { estimate: 0.5 * (low + high), low, high });
+    let finding =
+        |section: &str, claim: &str, found: &str, verdict: Agreement, measured: &[(&str, f64, f64)]| Finding {
+            section: section.to_owned(),
+            claim: claim.to_owned(),
+            found: found.to_owned(),
+            measured: measured
+                .iter()
+                .map(|(what, low, high)| ClaimNumber::new(*what, gain(*low, *high), POINTS, 0.0))
+                .collect(),
+            verdict,
+            why: "Agrees where every interval of the difference lies above zero".to_owned(),
+        };
     let findings = vec![
-        finding("V-D", "Ensembles are best", "extra-trees .83 (.79 to .86), macro-layer .79", Agreement::Agrees),
-        finding("V-D", "The SVM is as good as networks", "SVM .64, macro-layer .79", Agreement::Disagrees),
-        finding("VI", "It costs less", "training 3.0 s and 1.5 s", Agreement::Partly),
-        finding("VI", "It is small", "", Agreement::NotMeasured),
+        finding(
+            "V-D",
+            "Ensembles are best",
+            "Every interval lies above the line.",
+            Agreement::Agrees,
+            &[("extra-trees over macro-layer", 0.01, 0.07), ("extra-trees over svm", 0.15, 0.23)],
+        ),
+        finding(
+            "V-D",
+            "The SVM is as good as networks",
+            "Intervals lie below the line.",
+            Agreement::Disagrees,
+            &[("svm over macro-layer", -0.19, -0.11)],
+        ),
+        finding(
+            "VI",
+            "It costs less",
+            "Some do, others do not.",
+            Agreement::Partly,
+            &[("svm over trees", -0.02, 0.03)],
+        ),
+        finding("VI", "It is small", "", Agreement::NotMeasured, &[]),
     ];
     let data = vec!["virtual sensors: 320 grasps of 16 objects, preset B, layout C1".to_owned()];
     let fingerprint = study_fingerprint(paper_study("models").expect("known"), &StudyPlan::of_size(StudySize::Quick));
@@ -135,6 +159,8 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     for word in ["✔ agrees", "✖ disagrees", "± partly", "– not measured"] {
         assert!(bench.harness.query_by_label(word).is_some(), "{word}");
     }
+    let strip = "svm over macro-layer: -15.0 (-19.0 to -11.0) points, line at +0.0";
+    assert!(bench.harness.query_by_label(strip).is_some(), "{strip}");
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_label_contains("than today's: run the study again").is_some());
     bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::E);

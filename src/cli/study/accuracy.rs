@@ -4,8 +4,8 @@ use super::super::Failure;
 use super::super::terminal::{say, say_json, table};
 use super::files::{StudyOutput, note_stopped};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::StoredStudy;
 use palpate_lab::study::accuracy::{AccuracyPlan, AccuracyStudy, SceneGroup, SettingFamily, accuracy_figure};
+use palpate_lab::study::{StoredStudy, StudyCommand};
 use palpate_learn::method;
 use palpate_sim::objects::titled;
 
@@ -38,7 +38,8 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
         note_stopped(&format!("{:.2} CPU hours", file.cpu_hours()));
         return Ok(());
     };
-    let stored = StoredStudy::new(&command(arguments), file.cpu_hours(), study);
+    let command = StudyCommand::new("accuracy").flag("quick", arguments.quick).option("poses", arguments.poses);
+    let stored = StoredStudy::new(command.text(), file.cpu_hours(), study);
     let written = folder.write("accuracy", &stored, &accuracy_figure(&stored))?;
     if arguments.json {
         return say_json(&stored);
@@ -46,18 +47,6 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
     print(&stored.result)?;
     say("")?;
     say(format!("{}. {written}", stored.cpu_time()))
-}
-
-/// The command that repeats the study, without where it writes to.
-fn command(arguments: &AccuracyArguments) -> String {
-    let mut command = "palpate study accuracy".to_owned();
-    if arguments.quick {
-        command.push_str(" --quick");
-    }
-    if let Some(poses) = arguments.poses {
-        command.push_str(&format!(" --poses {poses}"));
-    }
-    command
 }
 
 fn print(study: &AccuracyStudy) -> Result<(), Failure> {

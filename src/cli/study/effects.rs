@@ -3,7 +3,7 @@
 use super::super::Failure;
 use super::super::terminal::{say, say_json, table};
 use super::files::{StudyOutput, note_stopped};
-use palpate_lab::study::{AuditPlan, AuditReport, ResultFile, StoredStudy, audit_effects, audit_figure};
+use palpate_lab::study::{AuditPlan, AuditReport, ResultFile, StoredStudy, StudyCommand, audit_effects, audit_figure};
 
 /// Arguments of `palpate study effects`.
 #[derive(Debug, clap::Args)]
@@ -45,9 +45,10 @@ pub(super) fn run(arguments: &EffectsArguments) -> Result<(), Failure> {
         return Ok(());
     }
     let report = AuditReport::new(results.units().values().take(scenes as usize));
-    let seed = if plan.seed == 1 { String::new() } else { format!(" --seed {}", plan.seed) };
-    let amount = if scenes == SCENES { String::new() } else { format!(" --scenes {scenes}") };
-    let stored = StoredStudy::new(&format!("palpate study effects{amount}{seed}"), results.cpu_hours(), report);
+    let command = StudyCommand::new(NAME)
+        .option("scenes", (scenes != SCENES).then_some(scenes))
+        .option("seed", (plan.seed != 1).then_some(plan.seed));
+    let stored = StoredStudy::new(command.text(), results.cpu_hours(), report);
     let written = folder.write(NAME, &stored, &audit_figure(&stored))?;
     if arguments.json {
         say_json(&stored)

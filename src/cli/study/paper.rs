@@ -13,8 +13,8 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::DatasetQuery;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyFolder, StudyPlan, StudyProgress,
-    StudyReport, StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
+    Cell, Finding, PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyFolder, StudyPlan,
+    StudyProgress, StudyReport, StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
 };
 use palpate_render::figure_svg;
 use palpate_tactile::model::SensorModel;
@@ -198,15 +198,29 @@ fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, quick: bool)
     for table in &stored.result.tables {
         print_table(table)?;
     }
-    for finding in &stored.result.findings {
-        say(format!("\n[{}] {}: {}", finding.verdict.name(), finding.section, finding.claim))?;
-        say(format!("  found: {}", finding.found))?;
-        say(format!("  {}", finding.why))?;
-    }
+    stored.result.findings.iter().try_for_each(print_finding)?;
     if quick {
         note("a quick study: do not quote its numbers");
     }
     Ok(())
+}
+
+/// A claim, the verdict, and the numbers around the line that decides.
+fn print_finding(finding: &Finding) -> Result<(), Failure> {
+    say(format!("\n[{}] {}: {}", finding.verdict.name(), finding.section, finding.claim))?;
+    say(format!("  {}", finding.found))?;
+    let rows: Vec<Vec<String>> = finding
+        .strips()
+        .map(|(own, strip)| {
+            let line = Cell::Number(own.line).shown(&own.unit);
+            vec![format!("  {}", own.what), own.shown(), line, strip.to_string()]
+        })
+        .collect();
+    if !rows.is_empty() {
+        table(&["  measured", "value", "line", "around the line"], &rows)?;
+    }
+    finding.left_out().map_or(Ok(()), |more| say(format!("  {more}")))?;
+    say(format!("  {}", finding.why))
 }
 
 /// Rows of long tables that are printed; the files have all.

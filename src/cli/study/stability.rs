@@ -4,10 +4,10 @@ use super::super::Failure;
 use super::super::terminal::{say, say_json, table};
 use super::files::{StudyOutput, note_stopped};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::StoredStudy;
 use palpate_lab::study::stability::{
     CaseRow, RandomReport, StabilityPlan, StabilityReport, policy_table, stability_figure,
 };
+use palpate_lab::study::{StoredStudy, StudyCommand};
 use serde::Serialize;
 
 /// Arguments of `palpate study stability`.
@@ -61,22 +61,12 @@ impl StabilityArguments {
     }
 
     /// The command that repeats this study.
-    fn command(&self) -> String {
-        let mut command = "palpate study stability".to_owned();
-        if self.quick {
-            command.push_str(" --quick");
-        }
-        let plan = self.plan();
-        for (given, name, value) in [
-            (self.scenes.is_some(), "scenes", plan.scenes),
-            (self.grasps.is_some(), "grasps", plan.grasps as u64),
-            (self.seed != 1, "seed", plan.seed),
-        ] {
-            if given {
-                command.push_str(&format!(" --{name} {value}"));
-            }
-        }
-        command
+    fn command(&self) -> StudyCommand {
+        StudyCommand::new("stability")
+            .flag("quick", self.quick)
+            .option("scenes", self.scenes)
+            .option("grasps", self.grasps)
+            .option("seed", (self.seed != 1).then_some(self.seed))
     }
 }
 
@@ -90,7 +80,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
         note_stopped(&format!("{cpu_hours:.2} CPU hours"));
         return Ok(());
     }
-    let stored = StoredStudy::new(&arguments.command(), cpu_hours, plan.report(&results));
+    let stored = StoredStudy::new(arguments.command().text(), cpu_hours, plan.report(&results));
     let written = folder.write("stability", &stored, &stability_figure(&stored))?;
     let cpu_time = stored.cpu_time();
     let report = Report { table: plan.case_rows(&results), report: stored.result, cpu_hours };

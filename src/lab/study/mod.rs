@@ -41,4 +41,4 @@ pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cos
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
 pub use result_file::{ResultFile, ResultFileError, program};
 pub use search::{SearchError, SearchRow, search};
-pub use stored_study::{GeneratedSection, StoredStudy, markdown_table};
+pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, markdown_table};

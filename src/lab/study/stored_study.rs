@@ -6,6 +6,7 @@ use palpate_learn::REMOVED_METHODS;
 use palpate_store::{FileKind, write_whole};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 use std::path::Path;
 
 /// Result of a study with its origin.
@@ -66,6 +67,37 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
     /// The origin without Markdown, for pictures and terminals.
     pub fn plain_origin(&self) -> String {
         self.origin().replace('`', "")
+    }
+}
+
+/// The command that repeats a study, with the options that differ from the usual ones.
+#[derive(Clone, Debug)]
+pub struct StudyCommand(String);
+
+impl StudyCommand {
+    /// `palpate study KEY`.
+    pub fn new(key: &str) -> Self {
+        Self(format!("palpate study {key}"))
+    }
+
+    /// With an option without a value, where it is given.
+    #[must_use]
+    pub fn flag(self, name: &str, is_given: bool) -> Self {
+        if is_given { Self(format!("{} --{name}", self.0)) } else { self }
+    }
+
+    /// With an option and its value, where it has one.
+    #[must_use]
+    pub fn option(self, name: &str, value: Option<impl Display>) -> Self {
+        match value {
+            Some(value) => Self(format!("{} --{name} {value}", self.0)),
+            None => self,
+        }
+    }
+
+    /// The command.
+    pub fn text(&self) -> &str {
+        &self.0
     }
 }
 

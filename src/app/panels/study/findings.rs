@@ -5,9 +5,9 @@ use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::theme::{colour, veil};
 use crate::app::widgets::wrapped;
-use egui::{Frame, Margin, RichText, ScrollArea, Ui};
+use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::study::paper::{Agreement, Finding};
+use palpate_lab::study::paper::{Agreement, Cell, Finding};
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(result) = result_ui(ui, context, "study-findings", "findings", actions) else { return };
@@ -54,8 +54,38 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         });
         wrapped(ui, RichText::new(&finding.claim));
         if !finding.found.is_empty() {
-            wrapped(ui, RichText::new(format!("Here: {}", finding.found)));
+            wrapped(ui, RichText::new(&finding.found));
         }
+        numbers_ui(ui, theme, finding, colour(ink));
         wrapped(ui, RichText::new(&finding.why).small().weak());
     });
+}
+
+/// Width and height of a strip (points).
+const STRIP: [f32; 2] = [64.0, 12.0];
+
+/// The numbers of a finding, one below the other, each with its interval around the line that decides.
+fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
+    let quiet = colour(theme.colours().quiet_text);
+    for (own, strip) in finding.strips() {
+        ui.horizontal(|ui| {
+            let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
+            let text = format!("{}: {}, line at {}", own.what, own.shown(), Cell::Number(own.line).shown(&own.unit));
+            response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
+            let inner = rect.shrink2(vec2(4.0, 1.0));
+            let at = |place: f64| inner.left() + inner.width() * place as f32;
+            let [low, estimate, high, line] = strip.0.map(at);
+            ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(1.0, quiet.gamma_multiply(0.4)));
+            ui.painter().vline(line, rect.y_range(), Stroke::new(1.0, quiet));
+            ui.painter().hline(low..=high, rect.center().y, Stroke::new(2.5, ink));
+            ui.painter().circle_filled(pos2(estimate, rect.center().y), 3.0, ink);
+            response.on_hover_text(text);
+            let estimate = Cell::from(own.value.value()).shown(&own.unit);
+            ui.add(Label::new(RichText::new(format!("{estimate} {}", own.unit)).small()).extend());
+            ui.add(Label::new(RichText::new(&own.what).small().weak()).truncate());
+        });
+    }
+    if let Some(more) = finding.left_out() {
+        ui.label(RichText::new(more).small().weak());
+    }
 }

@@ -4,15 +4,15 @@
 use super::answers::{Judged, ModelAnswers, PARTS, TestPart, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, LinkedPlots};
-use super::judging::{Claim, Rule, points};
-use super::report::{Agreement, Cell, Column, Finding, LinkedFigure, PERCENT, StudyReport};
-use super::rows::{Kind, Row, compare, described, find, pooled, unique};
-use super::study::{Study, StudyCell};
+use super::judging::{Claim, Rule};
+use super::report::{Agreement, Cell, Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport};
+use super::rows::{Factor, Fit, Kind, Row, compare, described, find, pooled, unique};
+use super::study::Study;
 use super::{StudyCard, StudyPlan};
 use crate::datasets::{SensorView, noise_seed, sequence_of};
 use palpate_geometry::drawing::{DataSeries, LineStyle, Marker, Plot, PlotAxis};
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, Example, Method, Sequence, method};
+use palpate_learn::{Dataset, Example, Sequence, method};
 use palpate_sim::gripper::Phase;
 use palpate_tactile::model::{PhysicalLike, SensorModel};
 use rand::{RngExt, SeedableRng};
@@ -46,34 +46,38 @@ impl DriftOf {
 
 /// Largest drifts, as shares: of the gain, and of the channel's range for the zero.
 const LEVELS: [f64; 4] = [0.0, 0.05, 0.10, 0.20];
-/// Names of the ways of reading.
-const AS_READ: &str = "as read";
-const ZEROED: &str = "re-zeroed";
-const READINGS: [&str; 2] = [AS_READ, ZEROED];
+/// How grasps are read, and what the test varies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reading {
+    AsRead,
+    /// Less a zero taken before contact.
+    Zeroed,
+    /// As read, with hysteresis in training or test.
+    Hysteresis,
+}
+
+impl Reading {
+    const DRIFTED: [Self; 2] = [Self::AsRead, Self::Zeroed];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::AsRead | Self::Hysteresis => "as read",
+            Self::Zeroed => "re-zeroed",
+        }
+    }
+}
+
+impl Factor for Reading {
+    fn named(&self, sensors: &str, method: &str) -> String {
+        match self {
+            Self::AsRead | Self::Zeroed => format!("{sensors}, {}, {method}", self.name()),
+            Self::Hysteresis => format!("hysteresis, {method}"),
+        }
+    }
+}
+
 /// Beginning of a grasp over which zeros are taken (s): fingers have hardly begun to bend.
 const ZERO_S: f32 = 0.1;
-
-pub(super) enum Case {
-    Drifted { sensors: SensorModel, reading: &'static str, method: &'static Method, part: usize },
-    Hysteresis { method: &'static Method, part: usize },
-}
-
-impl StudyCell for Case {
-    fn name(&self) -> String {
-        match self {
-            Self::Drifted { sensors, reading, method, part } => {
-                format!("{}, {reading}, {}, part {}", sensors.name(), method.key, part + 1)
-            }
-            Self::Hysteresis { method, part } => format!("hysteresis, {}, part {}", method.key, part + 1),
-        }
-    }
-
-    fn method(&self) -> Option<&'static Method> {
-        match self {
-            Self::Drifted { method, .. } | Self::Hysteresis { method, .. } => Some(method),
-        }
-    }
-}
 
 /// A copy of the grasps with other readings.
 fn with_readings(data: &Dataset, read: impl Fn(usize, &Example) -> Sequence) -> Dataset {
@@ -178,10 +182,10 @@ const HYSTERESIS: [(&str, bool, bool); 4] = [
 ];
 
 /// Reading and condition.
-type Reading = (&'static str, String);
+type Drifted = (Reading, String);
 
 impl Study for Drift {
-    type Cell = Case;
+    type Cell = Fit<Reading>;
     type Found = Answers;
 
     const CARD: StudyCard = StudyCard {
@@ -192,83 +196,67 @@ impl Study for Drift {
         budget: "about 30 CPU minutes",
     };
 
-    fn grid(plan: &StudyPlan) -> Vec<Case> {
-        let methods = || METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
+    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
+        let methods = METHODS.into_iter().take(plan.pick(2, 1, 1)).filter_map(method);
+        let kinds = |sensors: SensorModel, readings: &'static [Reading]| {
+            let kind = move |method, factor: &Reading| Kind { sensors, method, factor: *factor };
+            methods.clone().flat_map(move |method| readings.iter().map(move |reading| kind(method, reading)))
+        };
+        let drifted = plan.sensors.iter().flat_map(|sensors| kinds(*sensors, &Reading::DRIFTED));
+        let has_hysteresis = plan.query.is_none() && plan.sensors.contains(&SensorModel::PhysicalLike);
+        let hysteresis = has_hysteresis.then(|| kinds(SensorModel::PhysicalLike, &[Reading::Hysteresis]));
         let parts = plan.pick(PARTS, 1, 1);
-        let mut cases = Vec::new();
-        for &sensors in &plan.sensors {
-            for method in methods() {
-                for reading in READINGS {
-                    cases.extend((0..parts).map(|part| Case::Drifted { sensors, reading, method, part }));
-                }
-            }
-        }
-        if plan.query.is_none() && plan.sensors.contains(&SensorModel::PhysicalLike) {
-            cases.extend(methods().flat_map(|method| (0..parts).map(move |part| Case::Hysteresis { method, part })));
-        }
-        cases
+        drifted.chain(hysteresis.into_iter().flatten()).flat_map(|kind| kind.fits(parts)).collect()
     }
 
-    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Answers, StudyError> {
-        let plan = bench.plan();
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Answers, StudyError> {
+        let (plan, Kind { sensors, method, factor: reading }) = (bench.plan(), *kind);
         let mut answers = Answers::new();
-        match *case {
-            Case::Drifted { sensors, reading, method, part } => {
-                let data = bench.data(&usual_grasps(plan, sensors))?;
-                let [train, test] = TestPart::usual(plan, part).split(&data, plan.seed)?;
-                let ranges = ranges(&train);
-                let read = |data: Dataset| if reading == ZEROED { zeroed(&data) } else { data };
-                let model = bench.fit(method, &read(train))?;
-                for (kind, level) in conditions() {
-                    bench.go_on()?;
-                    let test = drifted(&test, &ranges, kind, level, plan.seed);
-                    answers.push((condition(kind, level), judge(&model, &read(test))));
-                }
+        let data = bench.data(&usual_grasps(plan, sensors))?;
+        let [train, test] = TestPart::usual(plan, *part).split(&data, plan.seed)?;
+        if reading == Reading::Hysteresis {
+            let read = |hysteresis| read_again(bench, &data, &PhysicalLike { hysteresis, ..PhysicalLike::default() });
+            let (without, with) = (read(false)?, read(true)?);
+            for (name, in_training, in_test) in HYSTERESIS {
+                let of = |on: bool, grasps: &Dataset| same_grasps(if on { &with } else { &without }, grasps);
+                let (train, test) = (of(in_training, &train), of(in_test, &test));
+                answers.push((name.to_owned(), judge(&bench.fit(method, &train)?, &test)));
             }
-            Case::Hysteresis { method, part } => {
-                let data = bench.data(&usual_grasps(plan, SensorModel::PhysicalLike))?;
-                let read =
-                    |hysteresis| read_again(bench, &data, &PhysicalLike { hysteresis, ..PhysicalLike::default() });
-                let (without, with) = (read(false)?, read(true)?);
-                let [train, test] = TestPart::usual(plan, part).split(&data, plan.seed)?;
-                for (name, in_training, in_test) in HYSTERESIS {
-                    let of = |on: bool, grasps: &Dataset| same_grasps(if on { &with } else { &without }, grasps);
-                    let (train, test) = (of(in_training, &train), of(in_test, &test));
-                    answers.push((name.to_owned(), judge(&bench.fit(method, &train)?, &test)));
-                }
+        } else {
+            let ranges = ranges(&train);
+            let read = |data: Dataset| if reading == Reading::Zeroed { zeroed(&data) } else { data };
+            let model = bench.fit(method, &read(train))?;
+            for (kind, level) in conditions() {
+                bench.go_on()?;
+                let test = drifted(&test, &ranges, kind, level, plan.seed);
+                answers.push((condition(kind, level), judge(&model, &read(test))));
             }
         }
         bench.go_on()?;
         Ok(answers)
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Case, Answers)>) -> StudyReport {
-        let answers = found.into_iter().flat_map(|(case, answers)| {
-            let (sensors, reading, method) = match case {
-                Case::Drifted { sensors, reading, method, .. } => (sensors, reading, method),
-                Case::Hysteresis { method, .. } => (SensorModel::PhysicalLike, AS_READ, method),
-            };
-            let kind = move |condition| Kind { sensors, method, factor: (reading, condition) };
-            answers.into_iter().map(move |(condition, own)| (kind(condition), Judged::Answers(own)))
-        });
-        let mut rows: Vec<Row<Reading>> = pooled(answers);
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Answers)>) -> StudyReport {
+        let mut rows: Vec<Row<Drifted>> = pooled(found.into_iter().flat_map(|(fit, answers)| {
+            let judged = |(condition, own)| (fit.kind.with((fit.kind.factor, condition)), Judged::Answers(own));
+            answers.into_iter().map(judged).collect::<Vec<_>>()
+        }));
         compare(&mut rows, |kind| {
-            let (reading, condition) = &kind.factor;
-            let reference = if condition.starts_with("hysteresis") { HYSTERESIS[0].0 } else { NONE };
-            Some(kind.with((*reading, reference.to_owned())))
+            let reference = if kind.factor.0 == Reading::Hysteresis { HYSTERESIS[0].0 } else { NONE };
+            Some(kind.with((kind.factor.0, reference.to_owned())))
         });
         let title = format!("Drift of the sensors in the test, preset {}; differences to none", plan.preset);
         StudyReport::new(
             described(&rows),
             vec![Row::table("drift", title, &rows).columns(&[
                 Row::SENSORS,
-                Column("reading", "", &|row| row.kind.factor.0.into()),
+                Column("reading", "", &|row| row.kind.factor.0.name().into()),
                 Row::MODEL,
                 Column("drift up to", "", &|row| row.kind.factor.1.as_str().into()),
                 Row::F1,
                 Row::ACCURACY,
                 Row::gain("F1 against none"),
-                Column("F1 against as read", PERCENT, &|row| Cell::interval(against_as_read(&rows, row))),
+                Column("F1 against as read", PERCENT, &|row| Cell::from(against_as_read(&rows, row))),
                 Row::TESTED,
             ])],
             findings(&rows),
@@ -288,18 +276,19 @@ impl Study for Drift {
                 ..Plot::default()
             });
             for (colour, model) in models.iter().enumerate() {
-                for reading in READINGS {
-                    let lines = figure.lines_with(&[("sensors", sensors), ("reading", reading), ("model", model)]);
+                for reading in Reading::DRIFTED {
+                    let lines =
+                        figure.lines_with(&[("sensors", sensors), ("reading", reading.name()), ("model", model)]);
                     let points = LEVELS.into_iter().filter_map(|level| {
                         let condition = condition(kind, level);
                         let line = lines.iter().find(|line| line.text("drift up to") == condition)?;
                         Some((*line, line.percent("F1", 100.0 * level)))
                     });
                     let (line, marker) = match reading {
-                        ZEROED => (LineStyle::Bold, Marker::Dot),
-                        _ => (LineStyle::Dashed, Marker::Ring),
+                        Reading::Zeroed => (LineStyle::Bold, Marker::Dot),
+                        Reading::AsRead | Reading::Hysteresis => (LineStyle::Dashed, Marker::Ring),
                     };
-                    let name = format!("{model}, {reading}");
+                    let name = format!("{model}, {}", reading.name());
                     figure.series(DataSeries { name, colour, line, marker, points: Vec::new() }, points);
                 }
             }
@@ -311,28 +300,25 @@ impl Study for Drift {
 }
 
 /// Difference of a re-zeroed row to the same as read.
-fn against_as_read(rows: &[Row<Reading>], row: &Row<Reading>) -> Option<Interval> {
+fn against_as_read(rows: &[Row<Drifted>], row: &Row<Drifted>) -> Option<Interval> {
     let (reading, condition) = &row.kind.factor;
-    let as_read = find(rows, &row.kind.with((AS_READ, condition.clone())));
-    Some(row.pool.against(&as_read.filter(|_| *reading == ZEROED)?.pool)?.f1)
+    let as_read = find(rows, &row.kind.with((Reading::AsRead, condition.clone())));
+    Some(row.pool.against(&as_read.filter(|_| *reading == Reading::Zeroed)?.pool)?.f1)
 }
 
-fn findings(rows: &[Row<Reading>]) -> Vec<Finding> {
+fn findings(rows: &[Row<Drifted>]) -> Vec<Finding> {
     let most = format!("{:.0} %", 100.0 * LEVELS[LEVELS.len() - 1]);
-    let claim = |claim: &str, why: &str, rule: Rule, pick: &dyn Fn(&Row<Reading>) -> Option<Interval>| {
-        let found = rows.iter().filter_map(|row| {
-            let gain = pick(row)?;
-            let text = format!("{}, {}: {}", row.kind.model(), row.kind.factor.1, points(gain));
-            Some((text, rule.judge_one(gain)))
-        });
-        Claim("VI", claim, why).of_each("points of macro F1: ", found)
+    let claim = |claim: &str, why: &str, rule: Rule, pick: &dyn Fn(&Row<Drifted>) -> Option<Interval>| {
+        let found =
+            rows.iter().filter_map(|row| Some((format!("{}, {}", row.kind.model(), row.kind.factor.1), pick(row)?)));
+        Claim("VI", claim, why).on_each(POINTS, rule, found)
     };
     let findings = [
         claim(
             "Drifts of the sensors lower recognition",
             "Agrees where the paired 95 % interval of the loss to gains and zeros drawn within 20 % is above zero in each case",
             Rule::AllBelow(0.0),
-            &|row| row.gain.filter(|_| row.kind.factor.0 == AS_READ && row.kind.factor.1.ends_with(&most)),
+            &|row| row.gain.filter(|_| row.kind.factor.0 == Reading::AsRead && row.kind.factor.1.ends_with(&most)),
         ),
         claim(
             "A zero taken before contact takes back what a drift of zeros costs",

@@ -6,7 +6,7 @@
 use super::answers::{Pool, SHOWN, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
-use super::judging::{ALL_GAIN, Claim, Rule, percent, points};
+use super::judging::{ALL_GAIN, Claim, Rule};
 use super::plan::DataWanted;
 use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
 use super::rows::{Fit, Kind, Row, crossed, gains_over, grouped, unique};
@@ -318,42 +318,33 @@ fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
     let over_product =
         gains(STEADY, &|to| format!("over the {PRODUCT} after {to}"), &|way| (Way { combined: PRODUCT, ..way }, 0));
     let late = gains(MOST, &|to| format!("from {STEADY} to {to} grasps"), &|way| (way, STEADY));
-    let late = late.into_iter().flat_map(|(group, gains)| {
-        let found = move |(name, gain): (String, Interval)| {
-            let text = format!("{group}: {} points of macro F1 {name}", points(gain));
-            (text, Rule::AllBelow(NO_CHANGE).judge_one(gain))
-        };
-        gains.into_iter().map(found)
-    });
-    let promised = Rule::AllBelow(1.0 - StopRule::default().threshold);
     let papers = all.iter().filter(|own| own.kind.factor == Way { placed: ANEW, combined: FEEDBACK });
     let wrong = papers.filter_map(|own| {
-        let (model, wrong, count) = (own.kind.model(), own.wrong()?, own.rounds.iter().filter(|own| own.sure).count());
-        let text = format!("{model}: {} of {count} confident stops are wrong", percent(wrong));
-        Some((text, promised.judge_one(wrong)))
+        let count = own.rounds.iter().filter(|own| own.sure).count();
+        Some((format!("{}: wrong of {count} confident stops", own.kind.model()), own.wrong()?))
     });
     let above = Rule::AllAbove(0.0);
     vec![
-        Claim("V-E", "Accuracy and F1 rise over successive grasps", ALL_GAIN).on_gains(&rising, above),
+        Claim("V-E", "Accuracy and F1 rise over successive grasps", ALL_GAIN).on_gains(above, rising),
         Claim(
             "V-E",
             "Performance is steady after three or four grasps; further grasps add nothing",
             "Agrees where the paired 95 % interval of the gain from four to eight grasps stays below one point, disagrees where it is \
              above",
         )
-        .of_each("", late),
+        .on_gains(Rule::AllBelow(NO_CHANGE), late),
         Claim(
             "V-E",
             "Feeding back the probabilities of earlier grasps uses them better than treating grasps as independent",
             ALL_GAIN,
         )
-        .on_gains(&over_product, above),
+        .on_gains(above, over_product),
         Claim(
             "VI",
             "A threshold on the probability makes the decision confident",
             "Agrees where the 95 % interval of wrong decisions among confident ones stays below one minus the threshold",
         )
-        .of_each("", wrong),
+        .on_each(PERCENT, Rule::AllBelow(1.0 - StopRule::default().threshold), wrong),
     ]
 }
 

@@ -1,8 +1,9 @@
 //! Claims of the paper beside our intervals: the rules that decide, and the findings that they give.
 
-use super::report::{Agreement, Finding};
+use super::report::{Agreement, ClaimNumber, Finding, POINTS};
 use super::rows::Gains;
 use palpate_learn::metrics::Interval;
+use std::cmp::Ordering;
 
 /// Rule of a claim over intervals. One interval on the wrong side refutes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,9 +37,47 @@ impl Rule {
         }
     }
 
-    /// Agreement of one interval with it.
-    pub(super) fn judge_one(self, one: Interval) -> Agreement {
-        self.judge(&[one])
+    /// The line on whose sides the verdict differs.
+    fn line(self) -> f64 {
+        match self {
+            Self::AllAbove(limit) | Self::AllBelow(limit) | Self::NoneBelow(limit) => limit,
+            Self::Within(low, high) => 0.5 * (low + high),
+        }
+    }
+
+    /// Sentences of a verdict: agrees, partly, disagrees.
+    fn sentences(self) -> [&'static str; 3] {
+        match self {
+            Self::AllAbove(_) => [
+                "Every interval lies above the line.",
+                "Some intervals lie above the line, others do not.",
+                "Intervals lie below the line.",
+            ],
+            Self::AllBelow(_) => [
+                "Every interval lies below the line.",
+                "Some intervals lie below the line, others do not.",
+                "Intervals lie above the line.",
+            ],
+            Self::NoneBelow(_) => [
+                "No interval lies below the line.",
+                "In some cases an interval lies below the line.",
+                "Intervals lie below the line.",
+            ],
+            Self::Within(..) => [
+                "Every interval reaches the paper's number.",
+                "Some intervals reach the paper's number, others do not.",
+                "No interval reaches the paper's number.",
+            ],
+        }
+    }
+
+    /// Orders intervals from those that are most against the claim.
+    fn most_against(self, own: &Interval, other: &Interval) -> Ordering {
+        match self {
+            Self::AllAbove(_) | Self::NoneBelow(_) => own.high.total_cmp(&other.high),
+            Self::AllBelow(_) => other.low.total_cmp(&own.low),
+            Self::Within(..) => Ordering::Equal,
+        }
     }
 }
 
@@ -50,47 +89,54 @@ pub(super) struct Claim<'a>(pub(super) &'a str, pub(super) &'a str, pub(super) &
 pub(super) const ALL_GAIN: &str = "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
 
 impl Claim<'_> {
-    /// Finding of a verdict.
-    pub(super) fn finding(self, found: String, verdict: Agreement) -> Finding {
-        let [section, claim, why] = [self.0, self.1, self.2].map(str::to_owned);
-        Finding { section, claim, found, verdict, why }
+    /// Finding of a verdict on numbers, with the sentences of the verdicts: agrees, partly, disagrees.
+    pub(super) fn finding(self, measured: Vec<ClaimNumber>, verdict: Agreement, sentences: [&str; 3]) -> Finding {
+        let found = match verdict {
+            Agreement::Agrees => sentences[0],
+            Agreement::Partly => sentences[1],
+            Agreement::Disagrees => sentences[2],
+            Agreement::NotMeasured => "Not measured.",
+        };
+        let [section, claim, found, why] = [self.0, self.1, found, self.2].map(str::to_owned);
+        Finding { section, claim, found, measured, verdict, why }
     }
 
-    /// Finding of several sentences, each with its verdict.
-    pub(super) fn of_each(self, prefix: &str, parts: impl IntoIterator<Item = (String, Agreement)>) -> Finding {
-        let (found, verdicts): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-        self.finding(format!("{prefix}{}", found.join("; ")), Agreement::of_all(verdicts))
+    /// Finding on groups of intervals, each judged by a rule.
+    pub(super) fn on_groups(self, unit: &str, groups: impl IntoIterator<Item = (Rule, Gains)>) -> Finding {
+        let (mut measured, mut verdicts, mut sentences) = (Vec::new(), Vec::new(), [""; 3]);
+        for (rule, group) in groups {
+            verdicts.push(rule.judge(&group.iter().map(|(_, interval)| *interval).collect::<Vec<_>>()));
+            measured.extend(group.into_iter().map(|(what, interval)| (rule, what, interval)));
+            sentences = rule.sentences();
+        }
+        if measured.len() > Finding::SHOWN {
+            measured.sort_by(|(rule, _, own), (_, _, other)| rule.most_against(own, other));
+        }
+        let evidence = |(rule, what, interval): (Rule, String, Interval)| {
+            ClaimNumber::new(what, Some(interval), unit, rule.line())
+        };
+        self.finding(measured.into_iter().map(evidence).collect(), Agreement::of_all(verdicts), sentences)
+    }
+
+    /// Finding on intervals, each judged by a rule.
+    pub(super) fn on_each(self, unit: &str, rule: Rule, all: impl IntoIterator<Item = (String, Interval)>) -> Finding {
+        self.on_groups(unit, all.into_iter().map(|one| (rule, vec![one])))
     }
 
     /// Finding on gains of macro F1, each group judged by a rule.
-    pub(super) fn on_gains(self, groups: &[(String, Gains)], rule: Rule) -> Finding {
-        if groups.is_empty() {
-            return self.finding("not measured".to_owned(), Agreement::NotMeasured);
-        }
-        let group = |(group, gains): &(String, Gains)| {
-            let listed: Vec<String> = gains.iter().map(|(name, gain)| format!("{name} {}", points(*gain))).collect();
-            let intervals: Vec<Interval> = gains.iter().map(|(_, gain)| *gain).collect();
-            (format!("{group}: {}", listed.join(", ")), rule.judge(&intervals))
-        };
-        self.of_each("points of macro F1; ", groups.iter().map(group))
+    pub(super) fn on_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
+        self.on_groups(POINTS, groups.into_iter().map(|group| (rule, named_gains(group))))
     }
+}
+
+/// Gains of a group, each named with it.
+pub(super) fn named_gains((group, gains): (String, Gains)) -> Gains {
+    gains.into_iter().map(|(name, gain)| (format!("{group}: {name}"), gain)).collect()
 }
 
 /// The same interval from the other side.
 pub(super) fn negated(Interval { estimate, low, high }: Interval) -> Interval {
     Interval { estimate: -estimate, low: -high, high: -low }
-}
-
-/// An interval in percent.
-pub(super) fn percent(Interval { estimate, low, high }: Interval) -> String {
-    let [estimate, low, high] = [estimate, low, high].map(|share| format!("{:.1}", 100.0 * share));
-    format!("{estimate} % ({low} to {high})")
-}
-
-/// A difference in points.
-pub(super) fn points(Interval { estimate, low, high }: Interval) -> String {
-    let [estimate, low, high] = [estimate, low, high].map(|share| format!("{:+.1}", 100.0 * share));
-    format!("{estimate} ({low} to {high})")
 }
 
 #[cfg(test)]
@@ -109,9 +155,15 @@ mod tests {
         assert_eq!(judged(&[up, down]), [Disagrees, Disagrees, Disagrees, Disagrees]);
         assert_eq!(judged(&[down, open]), [Disagrees, Partly, Disagrees, Disagrees]);
         assert_eq!(judged(&[]), [NotMeasured; 4]);
-        let found = Claim("V-D", "better", "rule")
-            .on_gains(&[("virtual".to_owned(), vec![(String::new(), up)])], Rule::AllAbove(0.0));
-        assert!(found.found.contains("virtual:  +15.0 (+10.0 to +20.0)"), "{}", found.found);
-        assert_eq!(Claim("V-D", "better", "rule").on_gains(&[], Rule::AllAbove(0.0)).verdict, NotMeasured);
+        let gains = |gains: Vec<Interval>| {
+            vec![("virtual".to_owned(), gains.into_iter().map(|own| ("a".to_owned(), own)).collect())]
+        };
+        let found = Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), gains(vec![up]));
+        assert_eq!((found.measured[0].what.as_str(), found.verdict), ("virtual: a", Agrees));
+        assert_eq!(Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), Vec::new()).verdict, NotMeasured);
+        // Of many the worst come first.
+        let many =
+            Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), gains([vec![up; 10], vec![down]].concat()));
+        assert_eq!((many.measured[0].value.value(), many.verdict), (Some(down.estimate), Disagrees));
     }
 }

@@ -3,8 +3,8 @@
 use super::answers::{Judged, PARTS, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets};
-use super::judging::{Claim, Rule, percent, points};
-use super::report::{Agreement, Column, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
+use super::judging::{Claim, Rule};
+use super::report::{Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
 use super::rows::{Factor, Fit, Kind, Row, by_model, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
 use super::{StudyCard, StudyPlan, StudySize};
@@ -125,7 +125,7 @@ impl Study for Layouts {
             ]),
             recommended_table(&chosen),
         ];
-        StudyReport::new(described(&rows), tables, vec![simplest_is_enough(&rows, &chosen), better_than_zuo(&rows)])
+        StudyReport::new(described(&rows), tables, vec![simplest_is_enough(&rows), better_than_zuo(&rows)])
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
@@ -167,17 +167,12 @@ fn recommended_table(all: &[Recommended<'_>]) -> StudyTable {
     ])
 }
 
-fn simplest_is_enough(rows: &[Row<Signals>], chosen: &[Recommended<'_>]) -> Finding {
+fn simplest_is_enough(rows: &[Row<Signals>]) -> Finding {
     let most = by_model(rows).into_iter().filter_map(|own| {
         let gains = own.into_iter().filter(|row| row.kind.factor.are_of_parts());
         let gains = gains.filter_map(|row| Some((row, row.gain?)));
         let (row, gain) = gains.max_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))?;
-        let (model, points, layout) = (row.kind.model(), points(gain), row.kind.factor.name());
-        let found = format!("{model}: the most that a layout gains over {SIMPLEST} is {points} points ({layout})");
-        Some((found, Rule::AllBelow(MINIMAL).judge_one(gain)))
-    });
-    let chosen = chosen.iter().map(|[_, own]| {
-        (format!("{}: {} is recommended", own.kind.model(), own.kind.factor.name()), Agreement::NotMeasured)
+        Some((format!("{}: {} over {SIMPLEST}", row.kind.model(), row.kind.factor.name()), gain))
     });
     let claim = Claim(
         "V-B",
@@ -185,13 +180,7 @@ fn simplest_is_enough(rows: &[Row<Signals>], chosen: &[Recommended<'_>]) -> Find
         "Agrees where no layout gains more than 2 points over C1, with its paired 95 % interval; disagrees where one gains more. The \
          paper numbers its layouts without saying which is which, but for C1",
     );
-    let mut finding = claim.of_each("", most.chain(chosen));
-    let best = rows.iter().filter(|row| row.f1.is_some()).max_by(|a, b| f1(a).total_cmp(&f1(b)));
-    if let Some(Row { kind: Kind { sensors, method, factor }, f1: Some(f1), .. }) = best {
-        let (layout, sensors) = (factor.name(), sensors.name());
-        finding.found += &format!(". Best of all: {layout}, {sensors}, {}: {}", method.key, percent(*f1));
-    }
-    finding
+    claim.on_each(POINTS, Rule::AllBelow(MINIMAL), most)
 }
 
 fn better_than_zuo(rows: &[Row<Signals>]) -> Finding {
@@ -205,5 +194,5 @@ fn better_than_zuo(rows: &[Row<Signals>]) -> Finding {
     });
     let claim = "The macro-layer is more accurate than the network of Zuo et al.";
     let rule = "Agrees where the paired 95 % interval is above zero for every layout, disagrees where one is below";
-    Claim("V-B", claim, rule).on_gains(&gains, Rule::AllAbove(0.0))
+    Claim("V-B", claim, rule).on_gains(Rule::AllAbove(0.0), gains)
 }

@@ -35,8 +35,8 @@ pub use folder::StudyFolder;
 pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub use report::{
-    Agreement, Cell, FigureLink, FigureMark, Finding, LinkedFigure, PERCENT, StudyColumn, StudyReport, StudyRow,
-    StudyTable,
+    Agreement, Cell, ClaimNumber, FigureLink, FigureMark, Finding, IntervalStrip, LinkedFigure, PERCENT, POINTS,
+    StudyColumn, StudyReport, StudyRow, StudyTable,
 };
 pub(in crate::study) use stored::sections;
 pub use stored::stored_report;

@@ -3,8 +3,8 @@
 use super::answers::{Judged, PARTS, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::judging::{ALL_GAIN, Claim, Rule, percent};
-use super::report::{Column, Finding, LinkedFigure, StudyReport};
+use super::judging::{ALL_GAIN, Claim, Rule};
+use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
 use super::rows::{Factor, Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
 use super::{StudyCard, StudyPlan};
@@ -184,7 +184,7 @@ fn gains(rows: &[Row<Pattern>]) -> [Finding; 2] {
         "The physical gripper performs worse than the simulated one",
     ];
     let [better, worse] = claims.map(|claim| Claim("V-B", claim, ALL_GAIN));
-    [better.on_gains(&both, Rule::AllAbove(0.0)), worse.on_gains(&clean, Rule::AllAbove(0.0))]
+    [better.on_gains(Rule::AllAbove(0.0), both), worse.on_gains(Rule::AllAbove(0.0), clean)]
 }
 
 /// Two objects that the paper names as confused: are they confused more often than two objects are on average?
@@ -200,17 +200,12 @@ fn confused([a, b]: [&str; 2], whole: &[&Row<Pattern>]) -> Finding {
         let share = Interval::of_share(taken, count(&|truth, _| pair.contains(&truth)));
         let wrong = count(&|truth, decided| truth != decided) as f64 / count(&|_, _| true).max(1) as f64;
         let average = wrong / (row.pool.classes.len() as f64 - 1.0).max(1.0);
-        let (sensors, shown) = (row.kind.sensors.name(), percent(share));
-        let found = format!(
-            "{sensors}: {shown} of their grasps are taken for each other, {:.1} % for any other object on average",
-            100.0 * average
-        );
-        Some((found, Rule::AllAbove(average).judge_one(share)))
+        Some((Rule::AllAbove(average), vec![(format!("{}: taken for each other", row.kind.sensors.name()), share)]))
     };
     let claim = format!("{a} and {b} are confused, since shape and size are similar");
     let rule =
         "Agrees where the 95 % interval of the share is above the average of all pairs, disagrees where it is below";
-    Claim("V-B", &claim, rule).of_each("", whole.iter().filter_map(of_sensors))
+    Claim("V-B", &claim, rule).on_groups(PERCENT, whole.iter().filter_map(of_sensors))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::answers::{Judged, ModelAnswers, ModelCost, TRAIN, TestPart, usual_gra
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{F1_PERCENT, Facets, Line, dots};
 use super::judging::{ALL_GAIN, Claim, Rule, negated};
-use super::report::{Agreement, Column, Finding, LinkedFigure, StudyReport};
+use super::report::{Agreement, ClaimNumber, Column, Finding, LinkedFigure, StudyReport};
 use super::rows::{Factor, Fit, Gains, Kind, Row, compare, crossed, described, grouped, pooled, unique};
 use super::study::Study;
 use super::{StudyCard, StudyPlan};
@@ -187,7 +187,7 @@ fn findings(rows: &[Row<Balance>]) -> Vec<Finding> {
             .filter_map(|row| Some((grasps(&row.kind), (format!("over {}", row.kind.method.key), negated(row.gain?)))));
         let mut gains: Vec<(String, Gains)> = grouped(gains);
         gains.iter_mut().for_each(|(_, gains)| gains.sort_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate)));
-        Claim("V-D", claim, why).on_gains(&gains, rule)
+        Claim("V-D", claim, why).on_gains(rule, gains)
     };
     let (balanced, above) = (Balance::Balanced, Rule::AllAbove(0.0));
     vec![
@@ -215,7 +215,7 @@ fn costs(rows: &[Row<Balance>]) -> Finding {
         "VI",
         "The dual-stage LSTM is as precise as ensembles and costs less",
         "Agrees where both its training and its answer to a grasp take less CPU time than those of every ensemble, disagrees where \
-         both take more",
+         both take more. The lines are the times of the dual-stage LSTM",
     );
     let costs = |is_wanted: &dyn Fn(&Method) -> bool| -> Vec<(&str, [f64; 2])> {
         let own = rows.iter().filter(|row| grasps(&row.kind) == grasps(&rows[0].kind) && is_wanted(row.kind.method));
@@ -227,19 +227,25 @@ fn costs(rows: &[Row<Balance>]) -> Finding {
     };
     let own = costs(&|method| papers_model().is_some_and(|papers| papers.key == method.key));
     let ensembles = costs(&|method| method.kind == MethodKind::Ensemble);
+    let sentences = [
+        "Every ensemble takes more CPU time than the paper's model, for both.",
+        "Some ensembles take more CPU time than the paper's model, others less.",
+        "Every ensemble takes less CPU time than the paper's model, for both.",
+    ];
     let ([(_, papers)], false) = (own.as_slice(), ensembles.is_empty()) else {
-        return claim.finding(String::new(), Agreement::NotMeasured);
+        return claim.finding(Vec::new(), Agreement::NotMeasured, sentences);
     };
-    let listed = own
-        .iter()
-        .chain(&ensembles)
-        .map(|(key, [train_s, answer_ms])| format!("{key} {train_s:.1} s and {answer_ms:.2} ms"));
-    let found = format!("CPU time of training and of an answer to a grasp: {}", listed.collect::<Vec<_>>().join(", "));
+    let measured =
+        [("training", "CPU s"), ("answer to a grasp", "ms")].into_iter().enumerate().flat_map(|(at, (what, unit))| {
+            ensembles
+                .iter()
+                .map(move |(key, cost)| ClaimNumber::new(format!("{key}: {what}"), Some(cost[at]), unit, papers[at]))
+        });
     let cheaper = ensembles.iter().flat_map(|(_, cost)| [papers[0] < cost[0], papers[1] < cost[1]]);
     let verdict = match unique(cheaper).as_slice() {
         [true] => Agreement::Agrees,
         [false] => Agreement::Disagrees,
         _ => Agreement::Partly,
     };
-    claim.finding(found, verdict)
+    claim.finding(measured.collect(), verdict, sentences)
 }

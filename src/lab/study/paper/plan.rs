@@ -1,6 +1,7 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
 use crate::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
+use crate::study::stored_study::StudyCommand;
 use palpate_learn::Method;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
@@ -154,47 +155,35 @@ impl StudyPlan {
         }
     }
 
-    /// Options of the command line that give this plan.
-    pub(super) fn options(&self) -> String {
-        let mut options = String::new();
-        let usual = Self::of_size(self.size);
-        match self.size {
-            StudySize::Full => {}
-            StudySize::Quick => options += " --quick",
-            StudySize::Sample { objects, trials } => {
-                options += &format!(" (a sample of {objects} objects, {trials} trials)");
-            }
-        }
-        if self.preset != usual.preset || self.query.as_ref().is_some_and(|query| query.preset.is_some()) {
-            options += &format!(" --preset {}", self.preset);
-        }
-        if let ([only], None) = (self.sensors.as_slice(), &self.query) {
-            options += &format!(" --sensors {}", only.name());
-        }
-        if let Some(query) = &self.query {
-            let mut add = |name: &str, value: Option<String>| {
-                options += &value.map_or_else(String::new, |value| format!(" --{name} {value}"));
-            };
-            let listed = |values: Vec<String>| (!values.is_empty()).then(|| values.join(","));
-            add("collection", query.collection.clone());
-            add("source", query.source.map(|source| source.to_string()));
-            add("tag", query.tag.clone());
-            add("since", query.since.as_ref().map(ToString::to_string));
-            add("until", query.until.as_ref().map(ToString::to_string));
-            add(
-                "physics",
-                query.physics.map(|physics| match physics {
-                    PhysicsVersion::Known(version) => version.to_string(),
-                    PhysicsVersion::Unknown => "unknown".to_owned(),
-                }),
-            );
-            add("calibration", listed(query.calibrations.iter().map(ToString::to_string).collect()));
-            add("objects", listed(query.objects.clone()));
-            add("include-flagged", query.include_flagged.then(String::new));
-        }
-        if self.seed != usual.seed {
-            options += &format!(" --seed {}", self.seed);
-        }
-        options
+    /// The command line that runs a study with this plan.
+    pub(super) fn command(&self, key: &str) -> StudyCommand {
+        let (usual, query) = (Self::of_size(self.size), self.query.clone().unwrap_or_default());
+        let sample = match self.size {
+            StudySize::Sample { objects, trials } => format!(" (a sample of {objects} objects, {trials} trials)"),
+            StudySize::Full | StudySize::Quick => String::new(),
+        };
+        let sensors = match self.sensors.as_slice() {
+            [only] if self.query.is_none() => Some(only.name()),
+            _ => None,
+        };
+        let physics = query.physics.map(|physics| match physics {
+            PhysicsVersion::Known(version) => version.to_string(),
+            PhysicsVersion::Unknown => "unknown".to_owned(),
+        });
+        let listed = |values: Vec<String>| (!values.is_empty()).then(|| values.join(","));
+        StudyCommand::new(&format!("{key}{sample}"))
+            .flag("quick", self.size == StudySize::Quick)
+            .option("preset", (self.preset != usual.preset || query.preset.is_some()).then_some(&self.preset))
+            .option("sensors", sensors)
+            .option("collection", query.collection)
+            .option("source", query.source)
+            .option("tag", query.tag)
+            .option("since", query.since)
+            .option("until", query.until)
+            .option("physics", physics)
+            .option("calibration", listed(query.calibrations.iter().map(ToString::to_string).collect()))
+            .option("objects", listed(query.objects))
+            .flag("include-flagged", query.include_flagged)
+            .option("seed", (self.seed != usual.seed).then_some(self.seed))
     }
 }

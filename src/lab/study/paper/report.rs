@@ -66,18 +66,94 @@ pub enum Cell {
 }
 
 /// A claim of the paper, and what we find.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Section of the paper.
     pub section: String,
     /// Its claim, in short.
     pub claim: String,
-    /// Our result, with numbers.
+    /// Our result in a sentence.
     pub found: String,
+    /// The numbers behind it; of many, those that are most against the claim come first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub measured: Vec<ClaimNumber>,
     /// Agreement.
     pub verdict: Agreement,
     /// Rule of the verdict, or reason of a difference.
     pub why: String,
+}
+
+/// A number behind a finding, beside the line that decides.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClaimNumber {
+    /// What is measured.
+    pub what: String,
+    /// Its value, mostly an interval.
+    pub value: Cell,
+    /// Unit of the value and of the line.
+    pub unit: String,
+    /// Value on whose sides the verdict differs.
+    pub line: f64,
+}
+
+impl ClaimNumber {
+    /// A number or an interval.
+    pub fn new(what: impl Into<String>, value: impl Into<Cell>, unit: &str, line: f64) -> Self {
+        Self { what: what.into(), value: value.into(), unit: unit.to_owned(), line }
+    }
+
+    /// The value with its unit, for reading.
+    pub fn shown(&self) -> String {
+        format!("{} {}", self.value.shown(&self.unit), self.unit).trim_end().to_owned()
+    }
+
+    /// Low end, estimate, high end and line.
+    fn places(&self) -> [f64; 4] {
+        let value = self.value.value().unwrap_or(f64::NAN);
+        let [low, high] = self.value.spread().unwrap_or([value; 2]);
+        [low, value, high, self.line]
+    }
+}
+
+/// Places of low end, estimate, high end and line of a number from left to right, from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntervalStrip(pub [f64; 4]);
+
+/// Width of a strip in text (characters).
+const STRIP: usize = 24;
+
+impl std::fmt::Display for IntervalStrip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [low, estimate, high, line] = self.0.map(|place| (place * (STRIP - 1) as f64).round() as usize);
+        let sign = |k: usize| match k {
+            _ if k == estimate => '●',
+            _ if k == line => '│',
+            _ if (low..=high).contains(&k) => '─',
+            _ => '·',
+        };
+        f.write_str(&(0..STRIP).map(sign).collect::<String>())
+    }
+}
+
+impl Finding {
+    /// Most numbers that are shown.
+    pub const SHOWN: usize = 10;
+
+    /// The numbers that are shown, each with its strip on the scale of its unit.
+    pub fn strips(&self) -> impl Iterator<Item = (&ClaimNumber, IntervalStrip)> {
+        let shown = &self.measured[..self.measured.len().min(Self::SHOWN)];
+        shown.iter().map(|own| {
+            let of_unit = shown.iter().filter(|other| other.unit == own.unit).flat_map(ClaimNumber::places);
+            let (low, high) = of_unit.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+            (own, IntervalStrip(own.places().map(|at| (at - low) / (high - low).max(f64::MIN_POSITIVE))))
+        })
+    }
+
+    /// A line on numbers that are not shown; none where all are.
+    pub fn left_out(&self) -> Option<String> {
+        let more = self.measured.len().checked_sub(Self::SHOWN).filter(|more| *more > 0)?;
+        Some(format!("and {more} more, less against the claim"))
+    }
 }
 
 /// Agreement of a finding with the paper.
@@ -176,16 +252,6 @@ impl Cell {
         Self::Text(text.into())
     }
 
-    /// A number where there is one.
-    pub fn number(value: Option<f64>) -> Self {
-        value.filter(|value| value.is_finite()).map_or(Self::Missing, Self::Number)
-    }
-
-    /// An interval where there is one.
-    pub fn interval(interval: Option<Interval>) -> Self {
-        interval.map_or(Self::Missing, Self::Interval)
-    }
-
     /// Estimate or number.
     pub fn value(&self) -> Option<f64> {
         match self {
@@ -205,9 +271,10 @@ impl Cell {
 
     /// The cell for reading, rounded. Shares are shown in percent.
     pub fn shown(&self, unit: &str) -> String {
-        let scale = if unit == PERCENT { 100.0 } else { 1.0 };
+        let scale = if [PERCENT, POINTS].contains(&unit) { 100.0 } else { 1.0 };
         let number = |value: f64| match unit {
             PERCENT => format!("{:.1}", scale * value),
+            POINTS => format!("{:+.1}", scale * value),
             "" if value.fract() == 0.0 => format!("{value:.0}"),
             _ => palpate_geometry::units::three_digits(value),
         };
@@ -248,13 +315,13 @@ impl From<Option<usize>> for Cell {
 
 impl From<Option<f64>> for Cell {
     fn from(value: Option<f64>) -> Self {
-        Self::number(value)
+        value.filter(|value| value.is_finite()).map_or(Self::Missing, Self::Number)
     }
 }
 
 impl From<Option<Interval>> for Cell {
     fn from(interval: Option<Interval>) -> Self {
-        Self::interval(interval)
+        interval.map_or(Self::Missing, Self::Interval)
     }
 }
 
@@ -293,6 +360,9 @@ impl<'a, R> TableRows<'a, R> {
 
 /// Unit of columns of shares: stored from 0 to 1, shown in percent.
 pub const PERCENT: &str = "%";
+
+/// Unit of differences of shares: stored from -1 to 1, shown in percentage points.
+pub const POINTS: &str = "points";
 
 impl StudyColumn {
     /// Heading with its unit.
@@ -423,6 +493,25 @@ mod tests {
             "{text}"
         );
         assert_eq!(serde_json::from_str::<StudyReport>(&text).expect("reads"), report);
+    }
+
+    #[test]
+    fn numbers_of_a_finding_stand_around_the_line() {
+        let of =
+            |low: f64, high: f64| ClaimNumber::new("a", Some(interval(0.5 * (low + high), low, high)), POINTS, 0.0);
+        let finding = |measured: Vec<ClaimNumber>| {
+            let [section, claim, found, why] = ["V-B", "better", "Some are.", "rule"].map(str::to_owned);
+            Finding { section, claim, found, measured, verdict: Agreement::Partly, why }
+        };
+        let two = finding(vec![of(0.0, 0.2), of(-0.1, 0.1)]);
+        let strips: Vec<String> = two.strips().map(|(_, strip)| strip.to_string()).collect();
+        assert_eq!(strips, ["········│───────●───────", "────────●───────········"]);
+        assert_eq!((two.measured[0].shown(), two.left_out()), ("+10.0 (+0.0 to +20.0) points".to_owned(), None));
+        let many = finding(vec![of(0.0, 0.2); 13]);
+        assert_eq!(
+            (many.strips().count(), many.left_out().as_deref()),
+            (10, Some("and 3 more, less against the claim"))
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::StudyPlan;
 use super::answers::{Judged, PARTS, Pool};
-use super::report::{Cell, Column, PERCENT, TableRows};
+use super::report::{Column, PERCENT, TableRows};
 use super::study::StudyCell;
 use palpate_learn::metrics::{Interval, holm};
 use palpate_learn::{Method, method};
@@ -46,6 +46,14 @@ impl<F> Kind<F> {
         plan.pick(if once { 1 } else { PARTS }, 1, 1)
     }
 
+    /// Fits on so many parts.
+    pub(super) fn fits(&self, parts: usize) -> Vec<Fit<F>>
+    where
+        F: Clone,
+    {
+        (0..parts).map(|part| Fit { kind: self.clone(), part }).collect()
+    }
+
     /// Sensors and method.
     pub(super) fn model(&self) -> String {
         format!("{}, {}", self.sensors.name(), self.method.key)
@@ -81,7 +89,7 @@ pub(super) fn crossed<F: Clone>(
         for factor in factors {
             for method in methods.iter().filter_map(|key| method(key)) {
                 let kind = Kind { sensors, method, factor: factor.clone() };
-                cells.extend((0..parts(&kind)).map(|part| Fit { kind: kind.clone(), part }));
+                cells.extend(kind.fits(parts(&kind)));
             }
         }
     }
@@ -111,7 +119,7 @@ impl<F: 'static> Row<F> {
 
     /// Column of differences to the reference.
     pub(super) const fn gain(name: &'static str) -> Column<'static, Self> {
-        Column(name, PERCENT, &|row| Cell::interval(row.gain))
+        Column(name, PERCENT, &|row| row.gain.into())
     }
 
     /// Table of rows with some misjudged trials behind each.

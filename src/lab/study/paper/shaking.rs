@@ -4,9 +4,9 @@
 use super::answers::{Judged, TestPart};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets};
-use super::judging::{Claim, Rule, points};
+use super::judging::{Claim, Rule};
 use super::plan::DataWanted;
-use super::report::{Agreement, Column, Finding, LinkedFigure, StudyReport};
+use super::report::{Agreement, Column, Finding, LinkedFigure, POINTS, StudyReport};
 use super::rows::{Kind, Row, find, pooled, unique};
 use super::study::{Study, StudyCell};
 use super::{StudyCard, StudyPlan};
@@ -209,16 +209,13 @@ fn independent(own: Interval, other: Interval) -> Option<Interval> {
 
 fn finding(claim: &str, set: &str, rows: &[Row<(&'static str, Motion)>]) -> Finding {
     let shaken = rows.iter().filter(|row| row.kind.factor.0 == set && row.kind.factor.1.name.contains("shaken"));
-    let found = shaken.filter_map(|row| {
-        let text = format!("{}, {}: {}", row.kind.model(), row.kind.factor.1.name, points(row.gain?));
-        Some((text, Rule::AllAbove(0.0).judge_one(row.gain?)))
-    });
+    let found = shaken.filter_map(|row| Some((format!("{}, {}", row.kind.model(), row.kind.factor.1.name), row.gain?)));
     let rule = "Agrees where the 95 % interval of the gain over a hand that holds still for as long is above zero in each case, disagrees \
                 where it is below";
-    let mut finding = Claim("VII", claim, rule).of_each("points of macro F1 over still: ", found);
+    let mut finding = Claim("VII", claim, rule).on_each(POINTS, Rule::AllAbove(0.0), found);
     if finding.verdict == Agreement::NotMeasured {
         finding.found =
-            "shaken grasps are missing: they are simulated only without options that choose stored trials".to_owned();
+            "Shaken grasps are missing: they are simulated only without options that choose stored trials.".to_owned();
     }
     finding
 }

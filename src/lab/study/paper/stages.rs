@@ -7,8 +7,8 @@
 use super::answers::{Judged, TestPart, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::judging::{ALL_GAIN, Claim, Rule, percent};
-use super::report::{Column, Finding, LinkedFigure, StudyReport};
+use super::judging::{ALL_GAIN, Claim, Rule};
+use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
 use super::rows::{Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
 use super::{StudyCard, StudyPlan};
@@ -229,19 +229,17 @@ impl Study for Stages {
 fn findings(first: &[Row<String>], second: &[Row<String>]) -> Vec<Finding> {
     let stage_one = PROPERTIES.map(|(property, papers)| {
         let of_network = first.iter().filter(|row| row.kind.method.key == MODELS[0] && row.kind.factor == property);
-        let near = Rule::Within(papers - NEAR, papers + NEAR);
-        let found = of_network
-            .filter_map(|row| Some((format!("{}: {}", row.kind.model(), percent(row.f1?)), near.judge_one(row.f1?))));
+        let found = of_network.filter_map(|row| Some((row.kind.model(), row.f1?)));
         let claim = format!("Stage one recognises the {property} with an F1 of {:.0} %", 100.0 * papers);
-        Claim("V-C", &claim, "Agrees where the 95 % interval comes within 5 points of the paper's number")
-            .of_each("", found)
+        let rule = "Agrees where the 95 % interval comes within 5 points of the paper's number";
+        Claim("V-C", &claim, rule).on_each(PERCENT, Rule::Within(papers - NEAR, papers + NEAR), found)
     });
     let gains = |claim: &str, name: &str, over: &[&str]| {
         let gains = gains_over(second, |kind: &Kind<String>| {
             let over = over.iter().filter(|_| kind.factor == name);
             over.map(|other| (kind.model(), format!("over {other}"), kind.with((*other).to_owned()))).collect()
         });
-        Claim("V-C", claim, ALL_GAIN).on_gains(&gains, Rule::AllAbove(0.0))
+        Claim("V-C", claim, ALL_GAIN).on_gains(Rule::AllAbove(0.0), gains)
     };
     let stage_two = [
         gains(

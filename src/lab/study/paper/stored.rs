@@ -1,6 +1,6 @@
 //! The paper's claims beside our numbers, from the stored results of its studies.
 
-use super::report::{Finding, StudyReport};
+use super::report::{Cell, ClaimNumber, Finding, IntervalStrip, StudyReport};
 use super::{PAPER_STUDIES, PaperStudy};
 use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 
@@ -62,10 +62,19 @@ fn overview() -> String {
     markdown_table(&["study", "shows", "paper", "cost of the full form"], &rows.collect::<Vec<_>>())
 }
 
+/// Claims one after the other: the claim, the verdict, and the numbers around the line that decides.
 fn claims(findings: &[Finding]) -> String {
-    let rows = findings.iter().map(|finding| {
-        let Finding { section, claim, found, verdict, why } = finding;
-        vec![section.clone(), claim.clone(), found.clone(), format!("**{}**", verdict.name()), why.clone()]
-    });
-    markdown_table(&["section", "the paper", "here", "verdict", "rule or reason"], &rows.collect::<Vec<_>>())
+    let claim = |finding: &Finding| {
+        let Finding { section, claim, found, verdict, why, .. } = finding;
+        let row = |(own, strip): (&ClaimNumber, IntervalStrip)| {
+            vec![own.what.clone(), own.shown(), Cell::Number(own.line).shown(&own.unit), format!("`{strip}`")]
+        };
+        let rows: Vec<Vec<String>> = finding.strips().map(row).collect();
+        let table =
+            (!rows.is_empty()).then(|| markdown_table(&["measured", "value", "line", "around the line"], &rows));
+        let said = format!("**{}** ({section}) {claim}. {found}", verdict.name());
+        let parts = [Some(said), table, finding.left_out(), Some(format!("{why}."))];
+        parts.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
+    };
+    findings.iter().map(claim).collect::<Vec<_>>().join("\n\n")
 }

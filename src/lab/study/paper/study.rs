@@ -126,6 +126,6 @@ pub fn run_study(
 ) -> Result<Option<StoredStudy<StudyReport>>, StudyError> {
     let Some((cpu_hours, report)) = study.run(bench, results)? else { return Ok(None) };
     let report = StudyReport { fingerprint: study_fingerprint(study, bench.plan()), ..report };
-    let command = format!("palpate study {}{}", study.card().key, bench.plan().options());
-    Ok(Some(StoredStudy::new(&command, cpu_hours, report)))
+    let command = bench.plan().command(study.card().key);
+    Ok(Some(StoredStudy::new(command.text(), cpu_hours, report)))
 }

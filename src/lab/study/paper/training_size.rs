@@ -3,13 +3,14 @@
 use super::answers::{Judged, TestPart};
 use super::bench::{StudyBench, StudyError};
 use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
-use super::judging::{Claim, Rule, points};
-use super::report::{Agreement, Column, Finding, LinkedFigure, StudyReport, StudyTable, TableRows};
+use super::judging::{Claim, Rule, named_gains};
+use super::report::{
+    Agreement, ClaimNumber, Column, Finding, LinkedFigure, POINTS, StudyReport, StudyTable, TableRows,
+};
 use super::rows::{Factor, Fit, Gains, Kind, Row, by_model, compare, crossed, described, gains_over, grouped, pooled};
 use super::study::Study;
 use super::{StudyCard, StudyPlan};
 use palpate_geometry::drawing::{PlotAxis, ReferenceLine};
-use palpate_learn::metrics::Interval;
 use palpate_learn::{MethodKind, method};
 
 pub(super) struct TrainingSize;
@@ -109,7 +110,7 @@ impl Study for TrainingSize {
             ]),
             Enough::table(&enough),
         ];
-        StudyReport::new(described(&rows), tables, findings(&rows, &enough))
+        StudyReport::new(described(&rows), tables, findings(&rows))
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
@@ -175,7 +176,7 @@ impl Enough {
     }
 }
 
-fn findings(rows: &[Row<usize>], enough: &[Enough]) -> Vec<Finding> {
+fn findings(rows: &[Row<usize>]) -> Vec<Finding> {
     let gains = |group: MethodKind| {
         gains_over(rows, |kind| {
             let others = MODELS.into_iter().filter_map(method).filter(|own| own.kind == group);
@@ -187,23 +188,22 @@ fn findings(rows: &[Row<usize>], enough: &[Enough]) -> Vec<Finding> {
         })
     };
     // A claim for all sizes together: one size refutes it.
-    let at_every_size = |claim: &str, why: &str, gains: &[(String, Gains)], rule: Rule| {
-        let all: Vec<Interval> = gains.iter().flat_map(|(_, gains)| gains).map(|(_, gain)| *gain).collect();
-        Finding { verdict: rule.judge(&all), ..Claim("V-C", claim, why).on_gains(gains, rule) }
+    let at_every_size = |claim: &str, why: &str, gains: Vec<(String, Gains)>, rule: Rule| {
+        Claim("V-C", claim, why).on_groups(POINTS, [(rule, gains.into_iter().flat_map(named_gains).collect())])
     };
     vec![
         fewer_is_worse(rows),
-        gains_shrink(rows, enough),
+        gains_shrink(rows),
         at_every_size(
             "The dual-stage LSTM outperforms other single models at every size",
             "Agrees where every paired 95 % interval at every size is above zero, disagrees where one is below",
-            &gains(MethodKind::Single),
+            gains(MethodKind::Single),
             Rule::AllAbove(0.0),
         ),
         at_every_size(
             "The dual-stage LSTM remains comparable to ensembles at every size",
             "Disagrees where the paired 95 % interval of an ensemble excludes zero in its favour",
-            &gains(MethodKind::Ensemble),
+            gains(MethodKind::Ensemble),
             Rule::NoneBelow(0.0),
         ),
     ]
@@ -218,37 +218,35 @@ fn fewer_is_worse(rows: &[Row<usize>]) -> Finding {
         Some((sensors.name().to_owned(), (name, last.pool.against(&first.pool)?.f1)))
     }));
     let rule = "Agrees where every model gains from the fewest to the most grasps: paired 95 % interval above zero";
-    Claim("V-C", "Fewer training grasps give worse results", rule).on_gains(&gains, Rule::AllAbove(0.0))
+    Claim("V-C", "Fewer training grasps give worse results", rule).on_gains(Rule::AllAbove(0.0), gains)
 }
 
-/// The paper's model: gain of the first doubling against that of the last.
-fn gains_shrink(rows: &[Row<usize>], enough: &[Enough]) -> Finding {
-    let steps = by_model(rows).into_iter().filter(|own| own[0].kind.method.key == PAPERS_MODEL).filter_map(|own| {
+/// The paper's model: gain of the first doubling against that of the last, which is the line.
+fn gains_shrink(rows: &[Row<usize>]) -> Finding {
+    let (mut measured, mut verdicts) = (Vec::new(), Vec::new());
+    for own in by_model(rows).into_iter().filter(|own| own[0].kind.method.key == PAPERS_MODEL) {
         let steps: Vec<_> = own.iter().filter_map(|row| Some((row.kind.factor, row.gain?))).collect();
-        let [(first_size, first), .., (last_size, last)] = steps.as_slice() else { return None };
-        let [model, gained, late] = [own[0].kind.model(), points(*first), points(*last)];
-        let found = format!("{model}: {gained} points of macro F1 up to {first_size} grasps, {late} up to {last_size}");
-        let verdict = match (first.low > last.high, first.high < last.low) {
+        let [(first_size, first), .., (last_size, last)] = steps.as_slice() else { continue };
+        for (size, gain) in [(first_size, first), (last_size, last)] {
+            let what = format!("{}: step to {size} grasps", own[0].kind.model());
+            measured.push(ClaimNumber::new(what, Some(*gain), POINTS, last.estimate));
+        }
+        verdicts.push(match (first.low > last.high, first.high < last.low) {
             (true, _) => Agreement::Agrees,
             (_, true) => Agreement::Disagrees,
             (false, false) => Agreement::Partly,
-        };
-        Some((found, verdict))
-    });
-    let reached = enough.iter().filter(|own| own.kind.method.key == PAPERS_MODEL).filter_map(|own| {
-        let (sensors, size, largest) = (own.kind.sensors.name(), own.of_largest?, own.largest);
-        let found = if size < largest {
-            format!("{sensors}: {size} grasps are as good as {largest}")
-        } else {
-            format!("{sensors}: fewer than {largest} grasps are not as good as {largest}")
-        };
-        Some((found, Agreement::NotMeasured))
-    });
+        });
+    }
     let claim = Claim(
         "V-C",
         "With more grasps the gain becomes less pronounced: there is a smallest set that is enough",
-        "Agrees where the 95 % interval of the first step's gain is above that of the last. Enough is the fewest grasps whose interval \
-         reaches that of the most",
+        "Agrees where the 95 % interval of the first step's gain is above that of the last, which is the line. Enough is the fewest grasps \
+         whose interval reaches that of the most",
     );
-    claim.of_each("", steps.chain(reached))
+    let sentences = [
+        "The first step gains more than the last.",
+        "The first step gains more than the last in some cases, not in others.",
+        "The last step gains more than the first.",
+    ];
+    claim.finding(measured, Agreement::of_all(verdicts), sentences)
 }

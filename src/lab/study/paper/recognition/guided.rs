@@ -271,7 +271,7 @@ type Row<'a> = (GuidedCase, &'a [BothRounds], NextPose);
 /// A number of rounds, over resampled rounds of each object.
 fn resampled((_, rounds, _): &Row<'_>, number: impl Fn(&[usize]) -> f64) -> Cell {
     let strata: Vec<usize> = rounds.iter().map(|own| own.class).collect();
-    Cell::interval(BOOTSTRAP.interval(&strata, |chosen| Some(number(chosen))))
+    Cell::from(BOOTSTRAP.interval(&strata, |chosen| Some(number(chosen))))
 }
 
 /// Mean number of grasps after the first.

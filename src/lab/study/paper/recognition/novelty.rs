@@ -114,7 +114,7 @@ impl Decided {
 
 /// Share of rounds that something is said of, over resampled rounds.
 fn share(all: &[&Decided], said: impl Fn(&Decided) -> Option<bool>) -> Cell {
-    Cell::interval(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| {
+    Cell::from(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| {
         let said: Vec<bool> = chosen.iter().filter_map(|k| said(all[*k])).collect();
         Some(said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64)
     }))
@@ -125,7 +125,7 @@ pub(super) fn decisions(found: &EmulatedRounds) -> StudyTable {
     let mean_grasps = |all: &[&Decided]| {
         let mean =
             |chosen: &[usize]| chosen.iter().map(|k| all[*k].grasps as f64).sum::<f64>() / chosen.len().max(1) as f64;
-        Cell::interval(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| Some(mean(chosen))))
+        Cell::from(BOOTSTRAP.interval(&vec![0; all.len()], |chosen| Some(mean(chosen))))
     };
     let rows = [("the sixteen", false), ("random shapes, none of them", true)].map(|(name, is_new)| {
         let own = found.decided.iter().zip(&found.scored.is_new).filter(|(_, new)| **new == is_new);

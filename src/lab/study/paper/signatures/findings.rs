@@ -1,7 +1,7 @@
 //! The sentences of section V-A beside our numbers.
 
 use super::super::judging::Claim;
-use super::super::report::{Agreement, Finding};
+use super::super::report::{Agreement, ClaimNumber, Finding, PERCENT};
 use super::bodies::Summary;
 use super::{DEFAULT, Found, PAPER};
 
@@ -13,12 +13,27 @@ pub(super) struct Measured {
     pub(super) found: Found,
 }
 
-/// A sentence judged.
+/// A sentence of the paper in numbers.
 pub(super) struct Sentence {
     claim: &'static str,
     rule: &'static str,
-    found: String,
-    pub(super) verdict: Agreement,
+    numbers: Vec<SentenceNumber>,
+}
+
+/// A number of a sentence.
+struct SentenceNumber {
+    what: &'static str,
+    value: Option<f64>,
+    unit: &'static str,
+    /// Least value where the sentence holds, or the largest.
+    line: Limit,
+}
+
+/// Limit of a number.
+#[derive(Clone, Copy)]
+enum Limit {
+    AtLeast(f64),
+    AtMost(f64),
 }
 
 /// Least rank correlation of what is said to go together.
@@ -34,72 +49,73 @@ const SOON_S: f64 = 0.20;
 /// Most pressure before contact, as a share of the hold's, that is low.
 const LOW: f64 = 0.05;
 
-/// Agreement of a sentence with its rule, all parts of which must hold.
-fn judged(parts: &[Option<bool>]) -> Agreement {
-    let all = |wanted: Option<bool>| parts.iter().all(|part| *part == wanted);
-    if all(None) {
-        Agreement::NotMeasured
-    } else if all(Some(true)) {
-        Agreement::Agrees
-    } else if all(Some(false)) {
-        Agreement::Disagrees
-    } else {
-        Agreement::Partly
+impl SentenceNumber {
+    fn holds(&self) -> Option<bool> {
+        self.value.map(|value| match self.line {
+            Limit::AtLeast(line) => value >= line,
+            Limit::AtMost(line) => value <= line,
+        })
+    }
+
+    /// The number for a kind of grasps; none where it was not measured.
+    fn evidence(&self, kind: &str) -> Option<ClaimNumber> {
+        let (Limit::AtLeast(line) | Limit::AtMost(line)) = self.line;
+        Some(ClaimNumber::new(format!("{kind}: {}", self.what), Some(self.value?), self.unit, line))
     }
 }
 
-fn number(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |value| format!("{value:.2}"))
-}
-
-fn percent(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |value| format!("{:.0} %", 100.0 * value))
+impl Sentence {
+    /// Agreement of a sentence with its rule, all parts of which must hold.
+    pub(super) fn verdict(&self) -> Agreement {
+        let holds = |wanted: Option<bool>| self.numbers.iter().all(|number| number.holds() == wanted);
+        match [None, Some(true), Some(false)].map(holds) {
+            [true, ..] => Agreement::NotMeasured,
+            [_, true, _] => Agreement::Agrees,
+            [.., true] => Agreement::Disagrees,
+            [false, false, false] => Agreement::Partly,
+        }
+    }
 }
 
 /// All sentences for one summary.
 pub(super) fn sentences(own: &Summary) -> [Sentence; 5] {
+    let number = |what, value, unit, line| SentenceNumber { what, value, unit, line };
     [
         Sentence {
             claim: "Bending rises from the beginning of closing to contact, while the contact signal stays low",
             rule: "Rank correlation of bending with time before contact at least 0.9, mean pressure then at most 5 % of the hold's; \
                    contact is where pressure stays above 5 %",
-            found: format!("rank correlation {}, pressure {}", number(own.rises), percent(own.before)),
-            verdict: judged(&[own.rises.map(|r| r >= CLOSE), own.before.map(|before| before <= LOW)]),
+            numbers: vec![
+                number("rank correlation", own.rises, "", Limit::AtLeast(CLOSE)),
+                number("pressure", own.before, PERCENT, Limit::AtMost(LOW)),
+            ],
         },
         Sentence {
             claim: "On rounded objects bending reaches a steady state, correlated with their curvature",
             rule: "Median rate of bending from 0.4 to 0.75 s after contact at most 20 % of that before; rank correlation of the hold's \
                    bending with one over the width at least 0.9",
-            found: format!(
-                "rate {}, {} of the bending after contact, correlation with curvature {}",
-                percent(own.round_rate),
-                percent(own.round_share),
-                number(own.curvature)
-            ),
-            verdict: judged(&[own.round_rate.map(|rate| rate <= STEADY), own.curvature.map(|r| r >= CLOSE)]),
+            numbers: vec![
+                number("rate", own.round_rate, PERCENT, Limit::AtMost(STEADY)),
+                number("correlation with curvature", own.curvature, "", Limit::AtLeast(CLOSE)),
+            ],
         },
         Sentence {
             claim: "On flat objects bending goes on increasing linearly after contact",
             rule: "The same rate at least 25 %, and a line explains 95 % of the variance of bending after contact",
-            found: format!(
-                "rate {}, {} of the bending after contact, R² {}",
-                percent(own.flat_rate),
-                percent(own.flat_share),
-                number(own.flat_line)
-            ),
-            verdict: judged(&[own.flat_rate.map(|rate| rate >= INCREASE), own.flat_line.map(|r2| r2 >= LINEAR)]),
+            numbers: vec![
+                number("rate", own.flat_rate, PERCENT, Limit::AtLeast(INCREASE)),
+                number("R²", own.flat_line, "", Limit::AtLeast(LINEAR)),
+            ],
         },
         Sentence {
             claim: "Pressure saturates a few samples after contact and stays steady",
             rule: "Median time from contact to 90 % of the hold's pressure at most 0.2 s, which is 15 samples or two actuation ticks",
-            found: format!("{} s", number(own.rise_s)),
-            verdict: judged(&[own.rise_s.map(|rise| rise <= SOON_S)]),
+            numbers: vec![number("time", own.rise_s, "s", Limit::AtMost(SOON_S))],
         },
         Sentence {
             claim: "Larger objects are touched earlier",
             rule: "Rank correlation of onset with the width across the fingers at most -0.9",
-            found: format!("rank correlation {}", number(own.size)),
-            verdict: judged(&[own.size.map(|r| r <= -CLOSE)]),
+            numbers: vec![number("rank correlation", own.size, "", Limit::AtMost(-CLOSE))],
         },
     ]
 }
@@ -112,13 +128,21 @@ pub(super) fn findings(measured: &[Measured]) -> Vec<Finding> {
         (PAPER, " (scene paper, fixed objects)"),
         ("stored", " (stored trials)"),
     ];
+    let said = [
+        "It holds for all kinds of grasps.",
+        "It holds for some kinds of grasps, or in a part of its numbers.",
+        "It holds for no kind of grasps.",
+    ];
     for (gripper, about) in abouts {
         let own = measured.iter().filter(|own| own.gripper == gripper);
         let judged: Vec<_> = own.map(|own| (own.kind.as_str(), sentences(&own.summary))).collect();
         let Some((_, first)) = judged.first() else { continue };
         for (at, Sentence { claim, rule, .. }) in first.iter().enumerate() {
-            let found = judged.iter().map(|(kind, all)| (format!("{kind}: {}", all[at].found), all[at].verdict));
-            findings.push(Claim("V-A", &format!("{claim}{about}"), rule).of_each("", found));
+            let of_kind = judged.iter().map(|(kind, all)| (*kind, &all[at]));
+            let verdict = Agreement::of_all(of_kind.clone().map(|(_, sentence)| sentence.verdict()));
+            let numbers =
+                of_kind.flat_map(|(kind, own)| own.numbers.iter().filter_map(move |number| number.evidence(kind)));
+            findings.push(Claim("V-A", &format!("{claim}{about}"), rule).finding(numbers.collect(), verdict, said));
         }
     }
     findings
@@ -130,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_sentence_holds_where_all_its_numbers_do() {
-        let verdicts = |own: &Summary| sentences(own).map(|sentence| sentence.verdict);
+        let verdicts = |own: &Summary| sentences(own).map(|sentence| sentence.verdict());
         let good = Summary {
             rises: Some(1.0),
             before: Some(0.01),

@@ -304,13 +304,13 @@ const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 500, seed: 0 };
 /// A statistic of signatures, with its interval where there are several grasps of an object.
 fn interval(all: &[&Signature], statistic: Statistic) -> Cell {
     if all.iter().all(|own| own.of.trial.is_none()) {
-        return Cell::number(statistic(all));
+        return Cell::from(statistic(all));
     }
     let names: BTreeSet<&str> = all.iter().map(|own| own.of.object.as_str()).collect();
     let names: Vec<&str> = names.into_iter().collect();
     let objects: Vec<usize> =
         all.iter().map(|own| names.iter().position(|name| *name == own.of.object).unwrap_or_default()).collect();
-    Cell::interval(BOOTSTRAP.interval(&objects, |kept| statistic(&kept.iter().map(|k| all[*k]).collect::<Vec<_>>())))
+    Cell::from(BOOTSTRAP.interval(&objects, |kept| statistic(&kept.iter().map(|k| all[*k]).collect::<Vec<_>>())))
 }
 
 fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
@@ -347,10 +347,10 @@ struct ObjectGrasps<'a> {
 fn over_grasps(row: &ObjectGrasps<'_>, value: impl Fn(&Signature) -> Option<f64>) -> Cell {
     let values: Vec<f64> = row.own.iter().filter_map(|signature| value(signature)).collect();
     if values.len() < 3 {
-        return Cell::number(median(values));
+        return Cell::from(median(values));
     }
     let at = vec![0; values.len()];
-    Cell::interval(BOOTSTRAP.interval(&at, |kept| median(kept.iter().map(|k| values[*k]))))
+    Cell::from(BOOTSTRAP.interval(&at, |kept| median(kept.iter().map(|k| values[*k]))))
 }
 
 fn object_table(all: &[Measured]) -> StudyTable {
@@ -428,7 +428,7 @@ fn setting_table(all: &[Setting]) -> StudyTable {
         Column("time to 90 % of pressure", "s", &|(.., own)| own.rise_s.into()),
         Column("onset with width, rank correlation", "", &|(.., own)| own.size.into()),
         Column("sentences that hold", "", &|(.., own)| {
-            sentences(own).iter().filter(|own| own.verdict == Agreement::Agrees).count().into()
+            sentences(own).iter().filter(|own| own.verdict() == Agreement::Agrees).count().into()
         }),
     ])
 }
