@@ -16,7 +16,7 @@ use palpate_lab::study::accuracy::AccuracyStudy;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{
     ExplainRequest, Explainer, GhostGrasp, GripperView, Job, LabelDraft, LabelView, LibraryView, MeasuredAccuracy,
-    SceneAccuracyJob, Snapshot,
+    Snapshot,
 };
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
@@ -32,8 +32,6 @@ pub struct PanelContext<'a> {
     pub snapshot: Option<&'a Snapshot>,
     /// Cost and error of the last scene measured.
     pub accuracy: Option<&'a MeasuredAccuracy>,
-    /// Measurement of what accuracy costs in a scene.
-    pub scene_accuracy: &'a SceneAccuracyJob,
     /// Stored study of what accuracy costs; absent where it cannot be read.
     pub stored_accuracy: Option<&'a AccuracyStudy>,
     /// Scene as set by the user.

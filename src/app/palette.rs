@@ -185,7 +185,6 @@ fn commands(context: &PanelContext<'_>) -> Vec<(String, Action)> {
         (text("Show each compared trial"), InspectAction::ShowSpread(false).into()),
         (text("Show the whole grasp in all plots"), ViewAction::SetTimeWindow(None).into()),
         (text("Measure effects of the scene"), SimulationAction::MeasureEffects.into()),
-        (text("Measure what accuracy costs in the scene"), SimulationAction::MeasureAccuracy.into()),
         (text("Compute the last grasp again"), Command::ComputeAgain.into()),
         (text("Use the shipped model for the real gripper"), RecognitionAction::UseModel(None).into()),
         (text("Teach the model the object file in the hand"), RecognitionAction::TeachObject.into()),

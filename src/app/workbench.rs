@@ -38,8 +38,8 @@ use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
     Command, Explain, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelCommand, LabelView,
-    LabellingAction, LibraryView, MeasuredAccuracy, SceneAccuracyJob, SimWorker, SimWorkerSetup, Snapshot, Wake,
-    effects_job, examine_port, explain_scene, fit_trials, open_trial_job, start_labeller, start_librarian,
+    LabellingAction, LibraryView, MeasuredAccuracy, SimWorker, SimWorkerSetup, Snapshot, Wake, effects_job,
+    examine_port, explain_scene, fit_trials, open_trial_job, start_labeller, start_librarian,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
@@ -172,10 +172,8 @@ impl Workbench {
             wake: Arc::clone(&wake),
         });
         let effects = effects_job(explain, Arc::clone(&wake));
-        let scene_accuracy = SceneAccuracyJob::start(Arc::clone(&wake))
-            .map_err(ThreadError::of("the measurement of what accuracy costs"))?;
         let worker = worker.map_err(ThreadError::of("the simulation"))?;
-        let simulation = SimulationFeature::new(worker, effects, scene_accuracy, scene.clone());
+        let simulation = SimulationFeature::new(worker, effects, scene.clone());
         let gripper = GripperWorker::start(GripperSetup {
             scene: scene.clone(),
             store: store.clone(),
@@ -354,7 +352,6 @@ impl Workbench {
         PanelContext {
             snapshot,
             accuracy: accuracy.as_deref(),
-            scene_accuracy: self.simulation.scene_accuracy(),
             stored_accuracy: self.simulation.stored_accuracy(),
             scene: self.simulation.scene(),
             logged: self.logged(),

@@ -407,35 +407,6 @@ fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
     bench.until(|s| s.scene.solver.engine == palpate_sim::scene::EngineKind::Rapier);
 }
 
-#[test]
-fn what_accuracy_costs_is_never_that_of_an_earlier_scene() {
-    let mut bench = whole_window();
-    bench.tell(ViewAction::ShowPanel("accuracy"));
-    let mut scene = Scene::default();
-    EMPTY.clone_into(&mut scene.object.source);
-    scene.timing.duration_s = 1.0;
-    let of_this = "this scene, one grasp per setting";
-    let change = |bench: &mut Bench, scene: &Scene| {
-        bench.tell(SimulationAction::SetScene(Box::new(scene.clone())));
-        bench.harness.run_steps(2);
-    };
-    change(&mut bench, &scene);
-    bench.tell(SimulationAction::MeasureAccuracy);
-    bench.until_shown(true, of_this);
-    // Another accuracy is another point of the same picture.
-    scene.solver.accuracy = Accuracy::Draft;
-    change(&mut bench, &scene);
-    assert!(bench.harness.query_by_label(of_this).is_some());
-    let [mut object, mut programme] = [scene.clone(), scene];
-    "lemon".clone_into(&mut object.object.source);
-    programme.programme.peak_bar = 0.6;
-    for other in [object, programme] {
-        change(&mut bench, &other);
-        assert!(bench.harness.query_by_label(of_this).is_none());
-        assert!(bench.harness.query_by_label_contains("stored study").is_some());
-    }
-}
-
 /// Moves the pointer over the plot of what accuracy costs until it shows a text there. Rapier and coarse settings stand in its
 /// upper half.
 fn point_at(bench: &mut Bench, text: &str) -> egui::Pos2 {
@@ -463,28 +434,6 @@ fn the_picture_of_what_accuracy_costs_shows_the_setting_under_the_pointer() {
         bench.harness.render().unwrap()
     });
     compare("panel_accuracy_wide", &side_by_side(&dark, &light), "the CPU renderer of the tests");
-}
-
-#[test]
-fn a_scene_is_measured_at_every_setting_on_request() {
-    let mut bench = whole_window();
-    bench.tell(SimulationAction::OpenObject(EMPTY.to_owned()));
-    bench.until(|s| s.object.is_none());
-    bench.tell(ViewAction::ShowPanel("accuracy"));
-    bench.harness.run_steps(3);
-    bench.harness.get_by_label("Measure this scene").click();
-    bench.harness.run_steps(2);
-    bench.until_shown(true, "this scene, one grasp per setting");
-    // Another accuracy of the same scene keeps it, another scene does not.
-    bench.harness.get_by_role_and_label(Role::Button, "Adopt reference").click();
-    bench.until(|s| s.scene.solver.accuracy == Accuracy::Reference);
-    bench.until_shown(true, "this scene, one grasp per setting");
-    bench.tell(SimulationAction::OpenObject("ball".to_owned()));
-    bench.until_shown(true, "stored study");
-    bench.harness.get_by_label("Measure this scene").click();
-    bench.until_shown(true, "measuring");
-    bench.harness.get_by_label("Stop").click();
-    bench.until_shown(true, "Measure this scene");
 }
 
 #[test]

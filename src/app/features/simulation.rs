@@ -6,7 +6,7 @@ use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::study::Explanation;
 use palpate_lab::study::accuracy::{AccuracyStudy, stored_accuracy};
-use palpate_lab::workers::{Command, GhostGrasp, Job, NotSent, Notice, Refusal, SceneAccuracyJob, SimWorker, Snapshot};
+use palpate_lab::workers::{Command, GhostGrasp, Job, NotSent, Notice, Refusal, SimWorker, Snapshot};
 use palpate_sim::gripper::Auto;
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::{PoseSpread, Scene};
@@ -32,10 +32,6 @@ pub enum SimulationAction {
     SetGhost(bool),
     /// Measure cost and influence of the scene's effects.
     MeasureEffects,
-    /// Measure what accuracy costs in the scene.
-    MeasureAccuracy,
-    /// Cancel that measurement.
-    StopMeasuringAccuracy,
     /// Grasp the scene refused last, or the present one, with the convex hull of its object.
     UseHull,
     /// Set the factor on all lengths of the object.
@@ -50,7 +46,6 @@ pub enum SimulationAction {
 pub(in crate::app) struct SimulationFeature {
     worker: SimWorker,
     effects: Job<Scene, Explanation>,
-    scene_accuracy: SceneAccuracyJob,
     stored_accuracy: Option<AccuracyStudy>,
     scene: Scene,
     traces: TraceHistory,
@@ -67,16 +62,10 @@ pub(in crate::app) struct SimulationFeature {
 }
 
 impl SimulationFeature {
-    pub(in crate::app) fn new(
-        worker: SimWorker,
-        effects: Job<Scene, Explanation>,
-        scene_accuracy: SceneAccuracyJob,
-        scene: Scene,
-    ) -> Self {
+    pub(in crate::app) fn new(worker: SimWorker, effects: Job<Scene, Explanation>, scene: Scene) -> Self {
         Self {
             worker,
             effects,
-            scene_accuracy,
             stored_accuracy: stored_accuracy().ok().map(|stored| stored.result),
             scene,
             traces: TraceHistory::default(),
@@ -96,11 +85,6 @@ impl SimulationFeature {
     /// Measurement of the effects of a scene.
     pub(in crate::app) fn effects(&self) -> &Job<Scene, Explanation> {
         &self.effects
-    }
-
-    /// Measurement of what accuracy costs in a scene.
-    pub(in crate::app) fn scene_accuracy(&self) -> &SceneAccuracyJob {
-        &self.scene_accuracy
     }
 
     /// Stored study of what accuracy costs.
@@ -167,11 +151,6 @@ impl SimulationFeature {
                 self.send(Command::SetGhost(ghost), notices);
             }
             SimulationAction::MeasureEffects => _ = self.effects.start(self.scene.clone()),
-            SimulationAction::MeasureAccuracy => {
-                self.scene_accuracy.give_up();
-                self.scene_accuracy.ask(Box::new(self.scene.clone()));
-            }
-            SimulationAction::StopMeasuringAccuracy => self.scene_accuracy.give_up(),
             SimulationAction::UseHull => {
                 let mut scene = self.refused.take().unwrap_or_else(|| self.scene.clone());
                 scene.object.collision = CollisionShape::Hull;

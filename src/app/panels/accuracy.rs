@@ -1,5 +1,4 @@
-//! What accuracy costs: the picture of the stored study, or the same measured for the scene in the hand. Each point is a
-//! setting; a click adopts it.
+//! What accuracy costs: the picture of the stored study. Each point is a setting; a click adopts it.
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
@@ -12,21 +11,18 @@ use palpate_geometry::units::three_digits;
 use palpate_lab::study::accuracy::{
     AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, Spread, accuracy_plot,
 };
-use palpate_lab::workers::SceneAccuracyState;
 use palpate_sim::scene::Scene;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let group = SceneGroup::of(context.scene.holds_object());
-    let own = context.scene_accuracy.view().filter(|view| is_like(&view.scene, context.scene));
-    let measured = match own.as_deref().map(|view| &view.state) {
-        Some(SceneAccuracyState::Ready(study)) => Some(study.as_ref()),
-        _ => None,
-    };
-    measure_ui(ui, context, own.as_deref().map(|view| &view.state), actions);
-    let Some(study) = measured.or(context.stored_accuracy) else {
-        ui.weak("The stored study cannot be read; measure this scene instead.");
+    let Some(study) = context.stored_accuracy else {
+        ui.weak("The stored study cannot be read.");
         return;
     };
+    let held = if context.scene.holds_object() { "fixed" } else { "free" };
+    let (shapes, poses) = (study.objects.len(), study.poses);
+    ui.weak(format!("stored study: {held} objects, {shapes} shapes, {poses} poses"))
+        .on_hover_text("palpate study accuracy; palpate help accuracy has its tables");
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let plot = accuracy_plot(study, group);
         let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
@@ -49,44 +45,6 @@ const FRONT_HEIGHT: f32 = 62.0;
 const LEAST_HEIGHT: f32 = 130.0;
 /// Height from which on points have labels.
 const ROOM_FOR_LABELS: f32 = 200.0;
-
-/// True for scenes that differ in accuracy alone: what was measured for one holds for the other.
-fn is_like(measured: &Scene, scene: &Scene) -> bool {
-    Scene { solver: scene.solver.clone(), ..measured.clone() } == *scene
-}
-
-/// Origin of the picture, and the button that measures.
-fn measure_ui(ui: &mut Ui, context: &PanelContext<'_>, state: Option<&SceneAccuracyState>, actions: &mut Actions) {
-    ui.horizontal_wrapped(|ui| match state {
-        Some(SceneAccuracyState::Measuring(done, of)) => {
-            ui.weak(if *of == 0 { "measuring ..".to_owned() } else { format!("measuring .. {done} of {of}") });
-            if ui.button("Stop").on_hover_text("Stop measuring").clicked() {
-                actions.push(SimulationAction::StopMeasuringAccuracy);
-            }
-        }
-        Some(SceneAccuracyState::Ready(_)) => {
-            ui.weak("this scene, one grasp per setting");
-            if ui.button("Measure again").clicked() {
-                actions.push(SimulationAction::MeasureAccuracy);
-            }
-        }
-        Some(SceneAccuracyState::Failed(cause)) => {
-            ui.label(RichText::new(cause.to_string()).color(colour(context.view.theme.colours().error)));
-        }
-        Some(SceneAccuracyState::Stopped) | None => {
-            if let Some(study) = context.stored_accuracy {
-                let held = if context.scene.holds_object() { "fixed" } else { "free" };
-                let (shapes, poses) = (study.objects.len(), study.poses);
-                ui.weak(format!("stored study: {held} objects, {shapes} shapes, {poses} poses"))
-                    .on_hover_text("palpate study accuracy; palpate help accuracy has its tables");
-            }
-            let hover = "Grasp this scene at every setting, in the background (seconds)";
-            if ui.button("Measure this scene").on_hover_text(hover).clicked() {
-                actions.push(SimulationAction::MeasureAccuracy);
-            }
-        }
-    });
-}
 
 /// All settings with their cost in this group.
 fn settings(study: &AccuracyStudy, group: SceneGroup) -> impl Iterator<Item = (&AccuracySetting, &GroupCost)> {
@@ -162,7 +120,7 @@ fn about_ui(ui: &mut Ui, setting: &AccuracySetting, cost: &GroupCost) {
     ui.label(RichText::new(setting.on_command_line()).small().monospace());
     let range = |spread: Spread, factor: f64, unit: &str| {
         let [low, median, high] = [spread.low, spread.median, spread.high].map(|v| three_digits(factor * v));
-        if cost.grasps == 1 { format!("{median} {unit}") } else { format!("{median} {unit} ({low} to {high})") }
+        format!("{median} {unit} ({low} to {high})")
     };
     small(ui, format!("CPU {}", range(cost.cpu_ms, 1.0, "ms")));
     let errors = [range(cost.curvature_per_m, 1e3, "1/km"), range(cost.force_n, 1e3, "mN")];

@@ -26,8 +26,6 @@
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
 //! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
 //!
-//! "accuracy-study" measures what each setting of accuracy costs in a scene.
-//!
 //! The thread "label" handles labels, "library" search and edits of all trials. Both show changes by other programs.
 //! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
 //!
@@ -60,7 +58,6 @@ mod open_trial;
 mod pace;
 mod portraits;
 mod refined_run;
-mod scene_accuracy;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
@@ -97,7 +94,6 @@ pub use messages::{
 pub use object_search::NUMBERED_OBJECTS;
 pub use open_trial::{OpenRequest, open_trial_job};
 pub use portraits::{PORTRAIT_SIDE, portrait_job};
-pub use scene_accuracy::{SceneAccuracyJob, SceneAccuracyState, SceneAccuracyView};
 pub use sim::SimWorker;
 pub use study_runner::{
     DrawFigure, StudyEnd, StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner,

@@ -36,15 +36,14 @@ const ASTRAY_M: f64 = 5e-3;
 /// Tolerance of truths with a finer model, whose errors of motion count little beside those of the model.
 const FINER_MODEL: Accuracy = Accuracy::Tolerance(1e-5);
 
-/// Grasps a scene at every setting, and compares each with its truth; `None` if cancelled. `done` gets the number of
-/// finished settings.
+/// Grasps a scene at every setting, and compares each with its truth; `None` if cancelled.
 pub(super) fn measure_scene(
     scene: &Scene,
-    object: Option<&ObjectModel>,
+    object: &ObjectModel,
     settings: &[AccuracySetting],
     cancelled: &dyn Fn() -> bool,
-    done: &dyn Fn(usize),
 ) -> Result<Option<Vec<GraspSample>>, SceneError> {
+    let object = Some(object);
     let mut truths: BTreeMap<&[&str], SimulatedTrial> = BTreeMap::new();
     let mut samples = Vec::new();
     for setting in settings {
@@ -63,7 +62,6 @@ pub(super) fn measure_scene(
             sound: trial.data.quality.is_sound(),
             astray_m: astray(&trial, truth),
         });
-        done(samples.len());
     }
     Ok(Some(samples))
 }

@@ -152,7 +152,7 @@ impl AccuracyPlan {
                     let Some((model, sampler)) = objects.get(object) else { return Ok(None) };
                     let mut scene = sampler.draw(Some(model), *seed).0;
                     scene.set_object_fixed(*fixed);
-                    measure_scene(&scene, Some(model), &self.settings, &cancelled, &|_| ())?.map(UnitResult::Grasps)
+                    measure_scene(&scene, model, &self.settings, &cancelled)?.map(UnitResult::Grasps)
                 }
                 Work::Recognition(setting) => match &bench {
                     Some(bench) => bench.level(setting, how.cancelled)?.map(UnitResult::Recognition),
@@ -200,23 +200,6 @@ impl AccuracyPlan {
             groups: SceneGroup::ALL.into_iter().filter_map(|group| GroupCost::new(group, samples)).collect(),
         };
         self.settings.iter().zip(samples).map(row).collect()
-    }
-
-    /// Measures one scene as it is, in place of the plan's objects and poses; `None` if cancelled. `progress` gets each
-    /// finished setting.
-    pub fn run_scene(
-        &self,
-        scene: &Scene,
-        object: Option<&ObjectModel>,
-        how: &Measuring<'_>,
-    ) -> Result<Option<AccuracyStudy>, SceneError> {
-        let kind = SceneKind { fixed: scene.holds_object(), mesh: object.is_some_and(has_mesh) };
-        let cancelled = || how.cancelled.load(Ordering::Relaxed);
-        let done = |count: usize| (how.progress)(count, self.settings.len());
-        let Some(samples) = measure_scene(scene, object, &self.settings, &cancelled, &done)? else { return Ok(None) };
-        let samples: Vec<_> = samples.into_iter().map(|sample| vec![(kind, sample)]).collect();
-        let objects = vec![object.map_or_else(|| "empty".to_owned(), |object| object.name.clone())];
-        Ok(Some(AccuracyStudy { objects, poses: 1, rows: self.rows(&samples), recognition: Vec::new() }))
     }
 }
 

@@ -172,14 +172,6 @@ impl AccuracyPlan {
         (plan.recognition.train_grasps, plan.recognition.test_grasps) = (8, 8);
         plan
     }
-
-    /// All settings, for one scene and without recognition.
-    pub fn of_one_scene() -> Self {
-        let mut plan = Self::quick();
-        plan.settings.retain(|setting| setting.family.is_of_motion());
-        (plan.poses, plan.recognition.settings) = (1, Vec::new());
-        plan
-    }
 }
 
 /// The slowest fixed steps.
@@ -264,6 +256,6 @@ mod tests {
         for (n, one) in settings.iter().enumerate() {
             assert!(settings[..n].iter().all(|other| (other.family, &other.name) != (one.family, &one.name)));
         }
-        assert!(AccuracyPlan::quick().settings.len() > 18 && AccuracyPlan::of_one_scene().settings.len() > 12);
+        assert!(AccuracyPlan::quick().settings.len() > 18);
     }
 }
