@@ -13,7 +13,7 @@
 //! |---|---|---|
 //! | base | `theme.rs` `icons.rs` `viewport.rs` `frame_rate.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
 //! | messages | `notices.rs` | messages to the user |
-//! | source | `view_source.rs` `files.rs` | source shown, file dialogs |
+//! | source | `view_source.rs` `files.rs` | source shown, questions of the file dialog |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
 //! | inspect | `features/inspect.rs` | stored trials that are open or compared |
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
@@ -26,7 +26,7 @@
 //! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | panels | `panels/` `bars/` `keys/` | one file per panel |
-//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter/` | panels beside each other; command palette; file dialog inside the window; presenter mode |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter/` | panels beside each other; command palette; file dialog; presenter mode |
 //! | workbench | `workbench.rs` | owner of all features |
 //! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |

@@ -122,7 +122,6 @@ fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, Of
     let view = ViewState { theme: window.theme, ..ViewState::default() };
     let setup = WorkbenchSetup {
         playing: false,
-        system_dialogs: false,
         render_state: Some(&state),
         cleared: true,
         ..WorkbenchSetup::new(window.scene.clone(), window.store.clone(), view, wake)

@@ -1,9 +1,9 @@
-//! File dialog inside the window, where the system has none: a path, and the files of its folder.
+//! File dialog, inside the window: a path, and the files of its folder. It needs nothing of the desktop.
 
 use crate::app::files::{Answer, Question, Wording};
 use crate::app::widgets::{failure_ui, text_field, wrapped};
 use egui::{Button, Id, Key, Modal, RichText, ScrollArea, Ui};
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 
 /// An open dialog.
 pub(super) struct PathDialog {
@@ -51,7 +51,7 @@ impl PathDialog {
             let room = ui.ctx().content_rect().size();
             ui.set_width((room.x - 60.0).min(560.0));
             ui.heading(wording.title);
-            wrapped(ui, RichText::new("The system has no file dialog: write or paste a path.").small().weak());
+            wrapped(ui, RichText::new("Write or paste a path, or choose from its folder.").small().weak());
             let field = text_field(&mut self.path, Id::unique("path of a file")).hint_text("path of a file");
             let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path"));
@@ -122,7 +122,7 @@ impl PathDialog {
             }
         });
         if let Some(path) = chosen {
-            let name = wording.name.as_deref().filter(|_| path.as_os_str().to_string_lossy().ends_with('/'));
+            let name = wording.name.as_deref().filter(|_| path.as_os_str().to_string_lossy().ends_with(is_separator));
             self.path = path.join(name.unwrap_or_default()).to_string_lossy().into_owned();
             (self.refused, self.replaced, self.fresh) = (None, None, true);
             if name.is_none() && !path.is_dir() {
@@ -169,7 +169,7 @@ fn from_home(text: &str) -> PathBuf {
 /// Folder of a path, and the name after it.
 fn split(path: &str) -> (PathBuf, String) {
     let path = from_home(path.trim());
-    if path.as_os_str().to_string_lossy().ends_with('/') || path.is_dir() {
+    if path.as_os_str().to_string_lossy().ends_with(is_separator) || path.is_dir() {
         return (path, String::new());
     }
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

@@ -71,8 +71,6 @@ pub struct WorkbenchSetup<'a> {
     pub playing: bool,
     /// Requests a redraw; called from other threads.
     pub wake: Wake,
-    /// File dialogs of the system are used where there are any; otherwise those inside the window.
-    pub system_dialogs: bool,
     /// Device of the 3-D view; the rest works without.
     pub render_state: Option<&'a egui_wgpu::RenderState>,
     /// Each frame begins in the background colour of the theme, which then need not be painted: fills of the whole window take
@@ -98,7 +96,6 @@ impl WorkbenchSetup<'_> {
             },
             playing: true,
             wake,
-            system_dialogs: true,
             render_state: None,
             cleared: false,
         }
@@ -212,7 +209,7 @@ impl Workbench {
             tools,
             studies,
             presenter: PresenterFeature::default(),
-            files: FileFeature::new(wake, setup.system_dialogs),
+            files: FileFeature::new(wake),
             path_dialog: None,
             thumbnails,
             driver: adapter.as_ref().map(describe_adapter),
@@ -302,7 +299,7 @@ impl Workbench {
         for action in actions {
             self.apply(&ctx, action);
         }
-        self.ask_inside(&ctx);
+        self.ask_for_file(&ctx);
     }
 
     /// Draws presenter mode.
@@ -400,8 +397,8 @@ impl Workbench {
         }
     }
 
-    /// Draws the file dialog inside the window, while there is one.
-    fn ask_inside(&mut self, ctx: &egui::Context) {
+    /// Draws the file dialog, while there is one.
+    fn ask_for_file(&mut self, ctx: &egui::Context) {
         if let Some(question) = self.files.take_question() {
             self.path_dialog = Some(PathDialog::new(question, &self.files.folder()));
         }

@@ -56,7 +56,6 @@ const HOMES: &[(&str, &[&str])] = &[
             "src/lab/study",
         ],
     ),
-    ("rfd", &["src/app/files.rs"]),
     ("rusqlite", &["src/store"]),
     ("ruzstd", &["src/lab/exchange/mcap/reader.rs"]),
     ("safetensors", &["src/learn/tensor_file.rs"]),

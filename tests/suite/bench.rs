@@ -101,7 +101,6 @@ impl Bench {
                         fit: Arc::clone(&fit),
                         models: path.with_file_name("models"),
                     },
-                    system_dialogs: false,
                     playing: false,
                     wake: Arc::new(move || {
                         // The test may have stopped listening.

@@ -126,7 +126,7 @@ fn keys_without_effect_say_why() {
 }
 
 #[test]
-fn files_are_saved_and_opened_where_the_system_has_no_dialog() {
+fn files_are_saved_and_opened_by_the_dialog() {
     let folder = tempfile::tempdir().unwrap();
     let mut bench = window([1280.0, 820.0]);
     let write = |bench: &mut Bench, path: &str| {

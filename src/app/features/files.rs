@@ -2,7 +2,7 @@
 
 use crate::app::export::{ExportRequest, RunningExport};
 use crate::app::features::simulation::SimulationFeature;
-use crate::app::files::{Answer, Question, ask};
+use crate::app::files::{Answer, Question};
 use crate::app::notices::Notices;
 use palpate_lab::inspection::FigureOptions;
 use palpate_lab::workers::Wake;
@@ -10,7 +10,6 @@ use palpate_sim::scene::Scene;
 use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// Action on files. Each opens a file dialog.
 #[derive(Clone, Debug)]
@@ -33,12 +32,10 @@ pub enum FileAction {
 
 /// State of files in the window.
 pub(in crate::app) struct FileFeature {
-    answers: (Sender<Answer>, Receiver<Answer>),
     wake: Wake,
-    /// File dialogs of the system are tried first.
-    system_dialogs: bool,
-    /// File to ask for inside the window.
-    inside: Option<Question>,
+    /// File to ask for.
+    question: Option<Question>,
+    answer: Option<Answer>,
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
     /// Exports that are being written.
@@ -46,13 +43,13 @@ pub(in crate::app) struct FileFeature {
 }
 
 impl FileFeature {
-    pub(in crate::app) fn new(wake: Wake, system_dialogs: bool) -> Self {
-        Self { answers: channel(), wake, system_dialogs, inside: None, folder: None, running: Vec::new() }
+    pub(in crate::app) fn new(wake: Wake) -> Self {
+        Self { wake, question: None, answer: None, folder: None, running: Vec::new() }
     }
 
-    /// File that is to be asked for inside the window now.
+    /// File that is to be asked for now.
     pub(in crate::app) fn take_question(&mut self) -> Option<Question> {
-        self.inside.take()
+        self.question.take()
     }
 
     /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
@@ -61,14 +58,13 @@ impl FileFeature {
         self.folder.clone().filter(|folder| folder.is_dir()).or_else(home).unwrap_or_default()
     }
 
-    /// Takes in the answer of a dialog inside the window.
-    pub(in crate::app) fn answer(&self, answer: Answer) {
-        // The channel is our own.
-        let _sent = self.answers.0.send(answer);
+    /// Takes in the answer of the dialog.
+    pub(in crate::app) fn answer(&mut self, answer: Answer) {
+        self.answer = Some(answer);
     }
 
     pub(in crate::app) fn apply(&mut self, action: FileAction, simulation: &SimulationFeature) {
-        let question = match action {
+        self.question = Some(match action {
             FileAction::Open => Question::Object,
             FileAction::SaveScene => Question::SaveScene(Box::new(simulation.scene().clone())),
             FileAction::SaveSceneAs(scene) => Question::SaveScene(scene),
@@ -77,35 +73,24 @@ impl FileFeature {
             | FileAction::ExportFigure(_)
             | FileAction::ExportStudyFigure
             | FileAction::ExportTrials => return,
-        };
-        self.ask(question);
+        });
     }
 
     /// Asks where to write this.
     pub(in crate::app) fn export(&mut self, request: ExportRequest) {
-        self.ask(Question::Export(Box::new(request)));
+        self.question = Some(Question::Export(Box::new(request)));
     }
 
-    fn ask(&mut self, question: Question) {
-        if !self.system_dialogs {
-            self.inside = Some(question);
-            return;
-        }
-        let wake = Arc::clone(&self.wake);
-        ask(question, &self.answers.0, move || wake());
-    }
-
-    /// Takes in answers of dialogs and dropped files since the last frame.
+    /// Takes in the answer of the dialog and dropped files since the last frame.
     pub(in crate::app) fn gather(
         &mut self,
         ctx: &egui::Context,
         simulation: &mut SimulationFeature,
         notices: &mut Notices,
     ) {
-        for answer in self.answers.1.try_iter().collect::<Vec<_>>() {
-            if let Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _) = &answer {
-                self.folder = path.parent().map(Path::to_owned);
-            }
+        if let Some(answer) = self.answer.take() {
+            let (Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _)) = &answer;
+            self.folder = path.parent().map(Path::to_owned);
             match answer {
                 Answer::Open(path) => simulation.open(&path.to_string_lossy(), notices),
                 Answer::SaveScene(path, scene) => save_scene(&path, &scene, notices),
@@ -113,10 +98,6 @@ impl FileFeature {
                     Ok(running) => self.running.push(running),
                     Err(error) => notices.error(format!("Cannot export: {error}")),
                 },
-                Answer::AskInside(question) => {
-                    self.system_dialogs = false;
-                    self.inside = Some(question);
-                }
             }
             ctx.request_repaint();
         }
