@@ -89,7 +89,7 @@
 //! | a filter or column of the trial library | `src/store/library/`, its option in `src/cli/trials/selection.rs` |
 //! | an edit of many trials | `src/store/labels/edit.rs` and `src/store/label_repository.rs` |
 //! | a format of exported trials | `src/store/trial_export.rs` |
-//! | a table of the store | a step in `src/store/schema.rs` and a repository beside it |
+//! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
 //! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
 //! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
 //! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |

@@ -240,13 +240,13 @@ fn unsuitable_data_are_refused_with_a_reason() {
 }
 
 #[test]
-fn methods_say_whether_they_need_size_and_shape() {
+fn methods_of_two_stages_need_size_and_shape() {
     let mut bare = made_up(6, 10);
     bare.labels.classes.iter_mut().for_each(|class| (class.size, class.shape) = (None, None));
     for method in &METHODS {
-        assert_eq!(method.needs_properties, method.recipe.is_some_and(|recipe| recipe().two_stages), "{}", method.key);
+        let two_stages = method.recipe.is_some_and(|recipe| recipe().two_stages);
         let refused = method.train(&bare, &quick(1)).err();
-        assert_eq!(matches!(refused, Some(LearnError::NoProperties { .. })), method.needs_properties, "{}", method.key);
+        assert_eq!(matches!(refused, Some(LearnError::NoProperties { .. })), two_stages, "{}", method.key);
     }
 }
 

@@ -41,8 +41,6 @@ pub struct Method {
     pub kind: MethodKind,
     /// One-line description.
     pub about: &'static str,
-    /// True if it learns sizes and shapes, so that data without them are refused.
-    pub needs_properties: bool,
     /// Default settings; networks only.
     pub recipe: Option<fn() -> Recipe>,
     /// Fits a recogniser to data.
@@ -60,7 +58,6 @@ macro_rules! network {
             title: $title,
             kind: MethodKind::$kind,
             about: $about,
-            needs_properties: $recipe.two_stages,
             recipe: Some(|| $recipe),
             fit: |data, fitting| network::fit(data, $recipe.adjusted(fitting)?, $title, fitting),
             load: network::load,
@@ -76,7 +73,6 @@ macro_rules! baseline {
             title: $title,
             kind: MethodKind::$kind,
             about: $about,
-            needs_properties: false,
             recipe: None,
             fit: |data, fitting| Ok(Box::new($fit(&*fitting.joined(data)?, fitting)?)),
             load: |card, arrays| Ok(Box::new(<$type>::load(card, arrays)?)),

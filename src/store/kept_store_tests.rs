@@ -4,6 +4,7 @@
 
 use super::*;
 use crate::labels::Flag;
+use palpate_tactile::trial::{Trial, TrialData};
 use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -135,7 +136,8 @@ fn it_is_exported_with_the_same_numbers() -> Outcome {
         assert!((mean - expected).abs() < 1e-3 * expected, "column {column}: {mean}, not {expected}");
     }
 
-    let trial = store.load(1)?.into_simulated().ok_or("simulated")?;
+    let Trial { header, data: TrialData::Simulated(data) } = store.load(1)? else { panic!("simulated") };
+    let trial = Trial { header, data };
     let scene = &trial.header.scene;
     let layout = SensorLayout::named("C1+F")?;
     let sensors = Sensors::new(&layout, &scene.gripper, SignalDefinition::Contact)?;

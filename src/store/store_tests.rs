@@ -27,7 +27,7 @@ fn a_trial_survives_storing() -> Result<(), StoreError> {
     let mut store = Store::open(&folder.path().join("new/trials.sqlite"))?;
     let trial = trial(u64::MAX);
     let id = store.insert(&trial)?.id();
-    assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
+    assert!(store.load(id)? == trial.clone().into());
     let rows = store.list(false)?;
     assert_eq!((rows.len(), rows[0].samples, rows[0].state.as_str()), (1, 90, "complete"));
     Ok(())
@@ -44,7 +44,7 @@ fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
     }
     assert_eq!(store.list(false)?[0].state, "recording");
     store.finish(id, &trial.data.quality, &trial.header)?;
-    assert!(store.load(id)?.into_simulated().as_ref() == Some(&trial));
+    assert!(store.load(id)? == trial.clone().into());
     Ok(())
 }
 

@@ -254,14 +254,6 @@ impl Trial {
             TrialData::Recorded(_) | TrialData::Imported(_) => None,
         }
     }
-
-    /// The trial, where it is simulated.
-    pub fn into_simulated(self) -> Option<SimulatedTrial> {
-        match self.data {
-            TrialData::Simulated(data) => Some(Trial { header: self.header, data }),
-            TrialData::Recorded(_) | TrialData::Imported(_) => None,
-        }
-    }
 }
 
 impl SimulatedTrial {

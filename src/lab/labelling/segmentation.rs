@@ -142,7 +142,8 @@ impl Segmenter {
     }
 
     /// True during a grasp.
-    pub fn in_grasp(&self) -> bool {
+    #[cfg(test)]
+    pub(super) fn in_grasp(&self) -> bool {
         self.grasp.is_some()
     }
 

@@ -9,6 +9,8 @@
 use super::gates;
 use super::gemm::{Matrix, multiply};
 use super::lstm::{LiveLstm, LiveState, LstmGradients, LstmWeights, LstmWorkspace};
+use crate::arrays::Arrays;
+use crate::model::LoadError;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -222,6 +224,22 @@ impl MacroLayer {
     pub fn from_values(shape: MacroShape, values: Vec<f32>) -> Option<Self> {
         let fits = values.len() == shape.parameters() && values.iter().all(|v| v.is_finite());
         fits.then(|| Self { blocks: shape.blocks(), shape, values })
+    }
+
+    /// Restores a layer from the arrays of a model file, which begin with its name.
+    pub(super) fn load(shape: &MacroShape, name: &str, arrays: &Arrays) -> Result<Self, LoadError> {
+        let mut values = Vec::new();
+        for block in shape.blocks() {
+            values.extend(arrays.f32s(&format!("{name}.{}", block.name), &block.shape)?);
+        }
+        Self::from_values(shape.clone(), values).ok_or(LoadError::Card { part: "the shape of the network" })
+    }
+
+    /// Adds the layer to the arrays of a model file.
+    pub(super) fn save(&self, name: &str, arrays: &mut Arrays) {
+        for block in &self.blocks {
+            arrays.put(format!("{name}.{}", block.name), &block.shape, self.values[block.place.clone()].to_vec());
+        }
     }
 
     /// Adds inputs with zero weights.

@@ -133,15 +133,10 @@ fn read_layer(
     inputs: usize,
     groups: &[usize],
 ) -> Result<MacroLayer, LoadError> {
-    let refused = LoadError::Card { part: "the shape of the network" };
     if !shape.fits(inputs, groups) || shape.with_prior {
-        return Err(refused);
+        return Err(LoadError::Card { part: "the shape of the network" });
     }
-    let mut values = Vec::new();
-    for block in shape.blocks() {
-        values.extend(arrays.f32s(&format!("{name}.{}", block.name), &block.shape)?);
-    }
-    MacroLayer::from_values(shape.clone(), values).ok_or(refused)
+    MacroLayer::load(shape, name, arrays)
 }
 
 /// Scores after the last step of a sequence; `None` for an empty one.
@@ -311,10 +306,7 @@ impl Recogniser for PaperNetwork {
         let mut arrays = Arrays::default();
         let layers = [self.stage_one.as_ref(), Some(&self.stage_two)];
         for (name, layer) in STAGES.into_iter().zip(layers).filter_map(|(name, layer)| Some((name, layer?))) {
-            for block in layer.shape().blocks() {
-                let values = layer.values()[block.place.clone()].to_vec();
-                arrays.put(format!("{name}.{}", block.name), &block.shape, values);
-            }
+            layer.save(name, &mut arrays);
         }
         arrays
     }

@@ -174,13 +174,7 @@ fn read_network(
     if !valid {
         return Err(LoadError::Card { part: "the shape of the network" });
     }
-    let mut values = Vec::new();
-    for block in shape.blocks() {
-        values.extend(arrays.f32s(&format!("{name}.{}", block.name), &block.shape)?);
-    }
-    let layer = MacroLayer::from_values(shape.clone(), values);
-    let layer = layer.ok_or(LoadError::Card { part: "the shape of the network" })?;
-    Ok(Calibrated { layer, temperatures: card.temperatures.clone() })
+    Ok(Calibrated { layer: MacroLayer::load(shape, name, arrays)?, temperatures: card.temperatures.clone() })
 }
 
 /// Indices of the grasps for stage one and for stage two.
@@ -433,10 +427,7 @@ impl Recogniser for TactileNetwork {
         let mut arrays = Arrays::default();
         let stages = [("stage_one", self.stage_one.as_ref()), ("stage_two", Some(&self.stage_two))];
         for (name, network) in stages.into_iter().filter_map(|(name, network)| Some((name, network?))) {
-            for block in network.shape().blocks() {
-                let values = &network.layer.values()[block.place.clone()];
-                arrays.put(format!("{name}.{}", block.name), &block.shape, values.to_vec());
-            }
+            network.layer.save(name, &mut arrays);
         }
         arrays
     }

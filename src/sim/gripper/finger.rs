@@ -110,11 +110,6 @@ impl Finger {
         self.damping_time * self.joint_stiffness()
     }
 
-    /// Arc length of joint `i` (0-based) from the palm (m).
-    pub fn joint_position(&self, i: usize) -> f64 {
-        (i as f64 + 0.5) * self.segment_length()
-    }
-
     /// Lengths of the N + 1 rigid segments (m): half, N - 1 whole, half.
     pub fn segment_lengths(&self) -> impl Iterator<Item = f64> + use<> {
         let (n, whole) = (self.joints, self.segment_length());

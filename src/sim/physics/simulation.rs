@@ -305,7 +305,8 @@ impl Simulation {
 
     /// Deepest compression of any pad contact spring (m) and the largest ratio of friction to mu times normal force
     /// over loaded contacts, in the last step.
-    pub fn contact_extremes(&self) -> (f64, f64) {
+    #[cfg(test)]
+    pub(super) fn contact_extremes(&self) -> (f64, f64) {
         let mut extremes = (0.0f64, 0.0f64);
         for contact in &self.workspace.contacts {
             let (normal, tangential) = contact.force(self.workspace.step);

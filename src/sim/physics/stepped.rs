@@ -131,7 +131,8 @@ impl SteppedScene {
     }
 
     /// Length of a finger (m).
-    pub fn finger_length(&self) -> f64 {
+    #[cfg(test)]
+    pub(super) fn finger_length(&self) -> f64 {
         self.model.chain.lengths.iter().sum()
     }
 
@@ -153,11 +154,6 @@ impl SteppedScene {
     /// The object's centre of mass in the gripper frame (m).
     pub fn object_centre(&self) -> DVec3 {
         self.state.body.position
-    }
-
-    /// Moves the object, as if it had been put down elsewhere (m).
-    pub fn shift_object(&mut self, by: DVec3) {
-        self.state.body.position += by;
     }
 
     /// Linear and angular velocity of a free object in the gripper frame (m/s, rad/s); zero otherwise.

@@ -40,7 +40,7 @@ pub use report::{
 };
 pub(in crate::study) use stored::sections;
 pub use stored::stored_report;
-pub use study::{PaperStudy, is_current, run_study};
+pub use study::{PaperStudy, is_current, run_study, study_fingerprint};
 
 /// All studies of the paper, in the order of its figures.
 pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[

@@ -103,7 +103,7 @@ impl<S: Study> PaperStudy for S {
 }
 
 /// Fingerprint of a plan and of all methods that a study fits with it: results with another one are out of date.
-fn study_fingerprint(study: &dyn PaperStudy, plan: &StudyPlan) -> String {
+pub fn study_fingerprint(study: &dyn PaperStudy, plan: &StudyPlan) -> String {
     let units = study.units(plan).join("\n");
     format!("{:016x}", palpate_sim::fingerprint([plan.header().to_string().as_bytes(), units.as_bytes()]))
 }
