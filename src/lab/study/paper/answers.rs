@@ -47,14 +47,14 @@ pub(super) struct ModelCost {
 /// A model's answers, or the reason why it could not be fitted to these data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Judged {
+pub(super) enum TestAnswers {
     /// It answered.
     Answers(ModelAnswers),
     /// It could not be fitted.
     NotFitted(String),
 }
 
-impl Judged {
+impl TestAnswers {
     /// The answers, where there are some.
     pub(super) fn answers(&self) -> Option<&ModelAnswers> {
         match self {
@@ -113,10 +113,22 @@ impl StudyBench<'_> {
     }
 
     /// Fits a method to training grasps and judges it on test grasps.
-    pub(super) fn judge(&self, method: &Method, [train, test]: &[Dataset; 2]) -> Result<Judged, StudyError> {
+    pub(super) fn judge(&self, method: &Method, sets: &[Dataset; 2]) -> Result<TestAnswers, StudyError> {
+        self.judged_model(method, sets).map(|(_, answers)| answers)
+    }
+
+    /// The same with the model; without one where it cannot be fitted to these grasps.
+    pub(super) fn judged_model(
+        &self,
+        method: &Method,
+        [train, test]: &[Dataset; 2],
+    ) -> Result<(Option<Model>, TestAnswers), StudyError> {
         match self.fit(method, train) {
-            Ok(model) => Ok(Judged::Answers(judge(&model, test))),
-            Err(StudyError::Fit { cause, .. }) => Ok(Judged::NotFitted(cause.to_string())),
+            Ok(model) => {
+                let answers = TestAnswers::Answers(judge(&model, test));
+                Ok((Some(model), answers))
+            }
+            Err(StudyError::Fit { cause, .. }) => Ok((None, TestAnswers::NotFitted(cause.to_string()))),
             Err(other) => Err(other),
         }
     }

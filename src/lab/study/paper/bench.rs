@@ -111,7 +111,7 @@ impl<'a> StudyBench<'a> {
     }
 
     /// An error once the study is to stop.
-    pub(super) fn go_on(&self) -> Result<(), StudyError> {
+    pub(super) fn check_stop(&self) -> Result<(), StudyError> {
         if self.is_cancelled() { Err(StudyError::Stopped) } else { Ok(()) }
     }
 

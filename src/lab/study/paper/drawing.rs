@@ -14,12 +14,12 @@ const F1: &str = "F1";
 
 /// Row of a table.
 #[derive(Clone, Copy)]
-pub(super) struct Line<'a> {
+pub(super) struct TableLine<'a> {
     pub(super) table: &'a StudyTable,
     pub(super) row: usize,
 }
 
-impl<'a> Line<'a> {
+impl<'a> TableLine<'a> {
     /// Text in a column.
     pub(super) fn text(self, column: &str) -> &'a str {
         self.table.text(self.row, column)
@@ -69,19 +69,19 @@ pub(super) fn lines(colour: usize, bold: bool) -> DataSeries {
 /// Places of rows along an axis.
 pub(super) enum Along<'a> {
     /// Named rows from top to bottom.
-    Rows(&'a dyn Fn(Line<'_>) -> String),
+    Rows(&'a dyn Fn(TableLine<'_>) -> String),
     /// Named columns below a title.
-    Columns(&'a str, &'a dyn Fn(Line<'_>) -> String),
+    Columns(&'a str, &'a dyn Fn(TableLine<'_>) -> String),
     /// Numbers.
-    Axis(&'a dyn Fn(&[Line<'_>]) -> PlotAxis, &'a dyn Fn(Line<'_>) -> f64),
+    Axis(&'a dyn Fn(&[TableLine<'_>]) -> PlotAxis, &'a dyn Fn(TableLine<'_>) -> f64),
 }
 
 /// Figure of the macro F1 of the rows of a table, by facets.
 pub(super) struct Facets<'a> {
     /// Title of the plot of a row.
-    pub(super) plot: &'a dyn Fn(Line<'_>) -> String,
+    pub(super) plot: &'a dyn Fn(TableLine<'_>) -> String,
     /// Name of the series of a row.
-    pub(super) series: &'a dyn Fn(Line<'_>) -> String,
+    pub(super) series: &'a dyn Fn(TableLine<'_>) -> String,
     /// Its place.
     pub(super) along: Along<'a>,
     /// Shift of the first series, and from one to the next.
@@ -145,18 +145,22 @@ impl<'a> LinkedPlots<'a> {
     }
 
     /// All rows.
-    pub(super) fn lines(&self) -> impl Iterator<Item = Line<'a>> + use<'a> {
+    pub(super) fn lines(&self) -> impl Iterator<Item = TableLine<'a>> + use<'a> {
         let table = self.table;
-        (0..table.rows.len()).map(move |row| Line { table, row })
+        (0..table.rows.len()).map(move |row| TableLine { table, row })
     }
 
     /// Rows with certain texts in some columns.
-    pub(super) fn lines_with(&self, wanted: &[(&str, &str)]) -> Vec<Line<'a>> {
+    pub(super) fn lines_with(&self, wanted: &[(&str, &str)]) -> Vec<TableLine<'a>> {
         self.lines().filter(|line| wanted.iter().all(|(column, text)| line.text(column) == *text)).collect()
     }
 
     /// Adds a series to the last plot, unless it has no point.
-    pub(super) fn series(&mut self, mut series: DataSeries, points: impl IntoIterator<Item = (Line<'a>, DataPoint)>) {
+    pub(super) fn series(
+        &mut self,
+        mut series: DataSeries,
+        points: impl IntoIterator<Item = (TableLine<'a>, DataPoint)>,
+    ) {
         let Some((plot, before)) = self.plots.split_last_mut() else { return };
         if self.named_once && before.iter().flat_map(|plot| &plot.series).any(|own| own.name == series.name) {
             series.name.clear();

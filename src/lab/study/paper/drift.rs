@@ -1,10 +1,10 @@
 //! Sensors that drift (section VI): gains and zeros that differ between training and test, with and without a zero taken before
 //! contact, and hysteresis that the training has not seen.
 
-use super::answers::{Judged, ModelAnswers, PARTS, TestPart, judge, usual_grasps};
+use super::answers::{ModelAnswers, PARTS, TestAnswers, TestPart, judge, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::claims::{Claim, Rule};
 use super::drawing::{F1_PERCENT, LinkedPlots};
-use super::judging::{Claim, Rule};
 use super::report::{Agreement, Cell, Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport};
 use super::rows::{Factor, Fit, Kind, Row, compare, described, find, pooled, unique};
 use super::study::Study;
@@ -227,18 +227,18 @@ impl Study for Drift {
             let read = |data: Dataset| if reading == Reading::Zeroed { zeroed(&data) } else { data };
             let model = bench.fit(method, &read(train))?;
             for (kind, level) in conditions() {
-                bench.go_on()?;
+                bench.check_stop()?;
                 let test = drifted(&test, &ranges, kind, level, plan.seed);
                 answers.push((condition(kind, level), judge(&model, &read(test))));
             }
         }
-        bench.go_on()?;
+        bench.check_stop()?;
         Ok(answers)
     }
 
     fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Answers)>) -> StudyReport {
         let mut rows: Vec<Row<Drifted>> = pooled(found.into_iter().flat_map(|(fit, answers)| {
-            let judged = |(condition, own)| (fit.kind.with((fit.kind.factor, condition)), Judged::Answers(own));
+            let judged = |(condition, own)| (fit.kind.with((fit.kind.factor, condition)), TestAnswers::Answers(own));
             answers.into_iter().map(judged).collect::<Vec<_>>()
         }));
         compare(&mut rows, |kind| {

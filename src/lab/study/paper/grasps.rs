@@ -5,8 +5,8 @@
 
 use super::answers::{Pool, SHOWN, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
-use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
-use super::judging::{ALL_GAIN, Claim, Rule};
+use super::claims::{ALL_GAIN, Claim, Rule};
+use super::drawing::{Along, Facets, LinkedPlots, TableLine, lines};
 use super::plan::DataWanted;
 use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
 use super::rows::{Fit, Kind, Row, crossed, gains_over, grouped, unique};
@@ -205,9 +205,9 @@ impl Study for Grasps {
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
-        let named = |line: Line<'_>| format!("{}, {}", line.text("model"), line.text("combined by"));
+        let named = |line: TableLine<'_>| format!("{}, {}", line.text("model"), line.text("combined by"));
         let series = LinkedPlots::of(report, "grasps").map_or(0, |figure| unique(figure.lines().map(named)).len());
-        let axis = |lines: &[Line<'_>]| {
+        let axis = |lines: &[TableLine<'_>]| {
             let most = lines.iter().map(|line| line.value("grasps")).fold(0.0, f64::max);
             PlotAxis::count("grasps of the object", most as usize)
         };

@@ -1,9 +1,9 @@
 //! Sensor layouts (Fig. 5a): which are enough.
 
-use super::answers::{Judged, PARTS, TestPart, usual_grasps};
+use super::answers::{PARTS, TestAnswers, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::claims::{Claim, Rule};
 use super::drawing::{Along, Facets};
-use super::judging::{Claim, Rule};
 use super::report::{Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
 use super::rows::{Factor, Fit, Kind, Row, by_model, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
@@ -70,7 +70,7 @@ impl Factor for Signals {
 
 impl Study for Layouts {
     type Cell = Fit<Signals>;
-    type Found = Judged;
+    type Found = TestAnswers;
 
     const CARD: StudyCard = StudyCard {
         key: "layouts",
@@ -95,7 +95,7 @@ impl Study for Layouts {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Judged, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
         let mut wanted = usual_grasps(bench.plan(), kind.sensors);
         (wanted.view.layout, wanted.view.signals) = (kind.factor.layout.clone(), kind.factor.definition);
         let sets = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;
@@ -106,7 +106,7 @@ impl Study for Layouts {
         bench.judge(kind.method, &sets)
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Judged)>) -> StudyReport {
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
         let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
         compare(&mut rows, |kind| Some(kind.with(Signals::of(SIMPLEST, SignalDefinition::Parts))));
         let title = format!("Sensor layouts, {}; differences to {SIMPLEST}", plan.described());

@@ -1,7 +1,7 @@
 //! The paper's studies: each figure of its section V, and two of its future work, from one command each; and what
 //! recognition reaches beyond the paper.
 //!
-//! A [`Study`](study::Study) is a grid of cells. A cell takes a data set from the [`StudyBench`]; what is found is kept, so that a
+//! A `Study` is a grid of cells. A cell takes a data set from the [`StudyBench`]; what is found is kept, so that a
 //! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a [`StudyReport`]: tables, and
 //! a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
 //!
@@ -9,13 +9,13 @@
 
 mod answers;
 mod bench;
+mod claims;
 mod drawing;
 mod drift;
 mod emulated_grasps;
 mod folder;
 mod grasps;
 mod in_short;
-mod judging;
 mod layouts;
 mod modality;
 mod models;

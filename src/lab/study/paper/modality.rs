@@ -1,9 +1,9 @@
 //! Curvature, pressure, and both (Fig. 5b to 5d).
 
-use super::answers::{Judged, PARTS, TestPart, usual_grasps};
+use super::answers::{PARTS, TestAnswers, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::claims::{ALL_GAIN, Claim, Rule};
 use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::judging::{ALL_GAIN, Claim, Rule};
 use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
 use super::rows::{Factor, Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
@@ -90,7 +90,7 @@ fn with_modality(data: &Dataset, modality: &str) -> Result<Dataset, StudyError> 
 
 impl Study for Modality {
     type Cell = Fit<Pattern>;
-    type Found = Judged;
+    type Found = TestAnswers;
 
     const CARD: StudyCard = StudyCard {
         key: "modality",
@@ -111,7 +111,7 @@ impl Study for Modality {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Judged, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
         let mut wanted = usual_grasps(bench.plan(), kind.sensors);
         wanted.view.layout = kind.factor.layout.to_owned();
         let [train, test] = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;
@@ -119,7 +119,7 @@ impl Study for Modality {
         bench.judge(kind.method, &[with_modality(&train, modality)?, with_modality(&test, modality)?])
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Judged)>) -> StudyReport {
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
         let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
         compare(&mut rows, |kind| Some(kind.with(WHOLE)));
         let title = format!("Modalities, {}; differences to both modalities of whole fingers", plan.described());

@@ -1,9 +1,9 @@
 //! All methods side by side (Fig. 7): scores, paired differences, and what a model costs.
 
-use super::answers::{Judged, ModelAnswers, ModelCost, TRAIN, TestPart, usual_grasps};
+use super::answers::{ModelAnswers, ModelCost, TRAIN, TestAnswers, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
-use super::drawing::{F1_PERCENT, Facets, Line, dots};
-use super::judging::{ALL_GAIN, Claim, Rule, negated};
+use super::claims::{ALL_GAIN, Claim, Rule, negated};
+use super::drawing::{F1_PERCENT, Facets, TableLine, dots};
 use super::report::{Agreement, ClaimNumber, Column, Finding, LinkedFigure, StudyReport};
 use super::rows::{Factor, Fit, Gains, Kind, Row, compare, crossed, described, grouped, pooled, unique};
 use super::study::Study;
@@ -61,7 +61,7 @@ fn grasps(kind: &Kind<Balance>) -> String {
 
 impl Study for Models {
     type Cell = Fit<Balance>;
-    type Found = Judged;
+    type Found = TestAnswers;
 
     const CARD: StudyCard = StudyCard {
         key: "models",
@@ -83,7 +83,7 @@ impl Study for Models {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Judged, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
         let (plan, is_imbalanced) = (bench.plan(), kind.factor == Balance::Imbalanced);
         let train = if is_imbalanced { TRAIN * 55 / 50 } else { TRAIN };
         let part = TestPart { train, ..TestPart::usual(plan, *part) };
@@ -95,7 +95,7 @@ impl Study for Models {
         bench.judge(kind.method, &[train, test])
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Judged)>) -> StudyReport {
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
         let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
         let papers = papers_model();
         for rows in rows.chunk_by_mut(|a, b| grasps(&a.kind) == grasps(&b.kind)) {
@@ -127,8 +127,8 @@ impl Study for Models {
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
-        let plot = |line: Line<'_>| line.text("grasps").to_owned();
-        let series = |line: Line<'_>| line.text("kind").to_owned();
+        let plot = |line: TableLine<'_>| line.text("grasps").to_owned();
+        let series = |line: TableLine<'_>| line.text("kind").to_owned();
         let facets = Facets { plot: &plot, series: &series, size: [1080, 900], ..Facets::USUAL };
         let Some(mut figure) = facets.plots(report, "models") else { return Vec::new() };
         figure.plots.push(Plot {
@@ -160,21 +160,21 @@ fn kind_name(kind: MethodKind) -> &'static str {
 
 /// Mean over the parts; none where a part has none.
 fn mean(row: &Row<Balance>, pick: impl Fn(&ModelAnswers) -> Option<f64>) -> Option<f64> {
-    let values: Option<Vec<f64>> = row.parts.iter().filter_map(Judged::answers).map(pick).collect();
+    let values: Option<Vec<f64>> = row.parts.iter().filter_map(TestAnswers::answers).map(pick).collect();
     let values = values.filter(|values| !values.is_empty())?;
     Some(values.iter().sum::<f64>() / values.len() as f64)
 }
 
 /// Cost of the model of the first part, whose size stands for all.
 fn first(row: &Row<Balance>) -> Option<&ModelCost> {
-    Some(&row.parts.iter().find_map(Judged::answers)?.cost)
+    Some(&row.parts.iter().find_map(TestAnswers::answers)?.cost)
 }
 
 /// Reason why it could not be fitted, where it could not.
 fn remark(row: &Row<Balance>) -> &str {
     let mut reasons = row.parts.iter().filter_map(|part| match part {
-        Judged::NotFitted(reason) => Some(reason.as_str()),
-        Judged::Answers(_) => None,
+        TestAnswers::NotFitted(reason) => Some(reason.as_str()),
+        TestAnswers::Answers(_) => None,
     });
     reasons.next().unwrap_or_default()
 }

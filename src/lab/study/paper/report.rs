@@ -505,7 +505,7 @@ mod tests {
         };
         let two = finding(vec![of(0.0, 0.2), of(-0.1, 0.1)]);
         let strips: Vec<String> = two.strips().map(|(_, strip)| strip.to_string()).collect();
-        assert_eq!(strips, ["········│───────●───────", "────────●───────········"]);
+        assert_eq!(strips, ["········│──────●────────", "────────●───────········"]);
         assert_eq!((two.measured[0].shown(), two.left_out()), ("+10.0 (+0.0 to +20.0) points".to_owned(), None));
         let many = finding(vec![of(0.0, 0.2); 13]);
         assert_eq!(

@@ -1,7 +1,7 @@
 //! Studies that cross factors: fits of methods to grasps read by sensors, pooled over parts into rows, and compared in pairs.
 
 use super::StudyPlan;
-use super::answers::{Judged, PARTS, Pool};
+use super::answers::{PARTS, Pool, TestAnswers};
 use super::report::{Column, PERCENT, TableRows};
 use super::study::StudyCell;
 use palpate_learn::metrics::{Interval, holm};
@@ -99,7 +99,7 @@ pub(super) fn crossed<F: Clone>(
 /// Answers of one kind of fits, pooled over parts.
 pub(super) struct Row<F> {
     pub(super) kind: Kind<F>,
-    pub(super) parts: Vec<Judged>,
+    pub(super) parts: Vec<TestAnswers>,
     pub(super) pool: Pool,
     pub(super) f1: Option<Interval>,
     pub(super) accuracy: Option<Interval>,
@@ -137,9 +137,9 @@ impl<F> Row<F> {
 }
 
 /// The answers of all kinds of fits, in the order in which the kinds first came.
-pub(super) fn pooled<F: PartialEq>(answers: impl IntoIterator<Item = (Kind<F>, Judged)>) -> Vec<Row<F>> {
-    let row = |(kind, parts): (Kind<F>, Vec<Judged>)| {
-        let pool = Pool::of(parts.iter().filter_map(Judged::answers));
+pub(super) fn pooled<F: PartialEq>(answers: impl IntoIterator<Item = (Kind<F>, TestAnswers)>) -> Vec<Row<F>> {
+    let row = |(kind, parts): (Kind<F>, Vec<TestAnswers>)| {
+        let pool = Pool::of(parts.iter().filter_map(TestAnswers::answers));
         Row { parts, ..Row::of_pool(kind, pool) }
     };
     grouped(answers).into_iter().map(row).collect()
@@ -164,7 +164,7 @@ pub(super) fn unique<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
 
 /// Descriptions of the data behind rows.
 pub(super) fn described<F>(rows: &[Row<F>]) -> Vec<String> {
-    let answers = rows.iter().flat_map(|row| &row.parts).filter_map(Judged::answers);
+    let answers = rows.iter().flat_map(|row| &row.parts).filter_map(TestAnswers::answers);
     unique(answers.map(|answers| answers.data.clone()))
 }
 

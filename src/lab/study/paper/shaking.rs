@@ -1,10 +1,10 @@
 //! A hand that shakes what it holds (section VII, future work): what inertia adds to the recognition of the objects, and
 //! whether it tells apart objects that differ in nothing but their mass.
 
-use super::answers::{Judged, TestPart};
+use super::answers::{TestAnswers, TestPart};
 use super::bench::{StudyBench, StudyError};
+use super::claims::{Claim, Rule};
 use super::drawing::{Along, Facets};
-use super::judging::{Claim, Rule};
 use super::plan::DataWanted;
 use super::report::{Agreement, Column, Finding, LinkedFigure, POINTS, StudyReport};
 use super::rows::{Kind, Row, find, pooled, unique};
@@ -109,7 +109,7 @@ fn grasps(bench: &StudyBench<'_>, Case(kind): &Case) -> Result<Dataset, StudyErr
 
 impl Study for Shaken {
     type Cell = Case;
-    type Found = Vec<Judged>;
+    type Found = Vec<TestAnswers>;
 
     const CARD: StudyCard = StudyCard {
         key: "shaking",
@@ -136,7 +136,7 @@ impl Study for Shaken {
         cases
     }
 
-    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Vec<Judged>, StudyError> {
+    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Vec<TestAnswers>, StudyError> {
         let (plan, data) = (bench.plan(), grasps(bench, case)?);
         let of_part = |part| {
             let all = TestPart { train: usize::MAX, ..TestPart::usual(plan, part) };
@@ -145,10 +145,10 @@ impl Study for Shaken {
         (0..TestPart::usual(plan, 0).of).map(of_part).collect()
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Case, Vec<Judged>)>) -> StudyReport {
+    fn report(plan: &StudyPlan, found: Vec<(Case, Vec<TestAnswers>)>) -> StudyReport {
         let data = unique(found.iter().filter_map(|(Case(kind), parts)| {
             let (set, motion) = kind.factor;
-            Some(format!("{set}, {}: {}", motion.name, parts.iter().find_map(Judged::answers)?.data))
+            Some(format!("{set}, {}: {}", motion.name, parts.iter().find_map(TestAnswers::answers)?.data))
         }));
         let answers = found.into_iter().flat_map(|(Case(kind), parts)| parts.into_iter().map(move |own| (kind, own)));
         let mut rows = pooled(answers);

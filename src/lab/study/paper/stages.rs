@@ -4,10 +4,10 @@
 //! trained on the other half, for which stage one's probabilities are further channels, constant over a grasp. In place of
 //! them it gets nothing (uniform probabilities), one of both, or the true size and shape.
 
-use super::answers::{Judged, TestPart, judge, usual_grasps};
+use super::answers::{TestAnswers, TestPart, usual_grasps};
 use super::bench::{StudyBench, StudyError};
+use super::claims::{ALL_GAIN, Claim, Rule};
 use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::judging::{ALL_GAIN, Claim, Rule};
 use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
 use super::rows::{Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
 use super::study::Study;
@@ -67,8 +67,8 @@ const NEAR: f64 = 0.05;
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct StagesResult {
     /// Of sizes and of shapes.
-    stage_one: [Judged; 2],
-    stage_two: Vec<(String, Judged)>,
+    stage_one: [TestAnswers; 2],
+    stage_two: Vec<(String, TestAnswers)>,
 }
 
 /// The data set with sizes, or with shapes, as its classes.
@@ -144,19 +144,10 @@ impl Study for Stages {
         let usual = usual_grasps(plan, kind.sensors);
         let [train, test] = bench.split(usual, method, TestPart::usual(plan, *part))?;
         let [first, second] = halves(&train, plan.seed)?;
-        // Without a model where it cannot be fitted to these grasps.
-        let first_stage = |property: usize| -> Result<(Option<Model>, Judged), StudyError> {
+        let first_stage = |property: usize| {
             let pair = of_property(&first, property).zip(of_property(&test, property));
             let no_properties = || StudyError::Missing("a size and a shape of every object".to_owned());
-            let (first, test) = pair.ok_or_else(no_properties)?;
-            match bench.fit(method, &first) {
-                Ok(model) => {
-                    let judged = Judged::Answers(judge(&model, &test));
-                    Ok((Some(model), judged))
-                }
-                Err(StudyError::Fit { cause, .. }) => Ok((None, Judged::NotFitted(cause.to_string()))),
-                Err(other) => Err(other),
-            }
+            pair.ok_or_else(no_properties).and_then(|(train, test)| bench.judged_model(method, &[train, test]))
         };
         let ((sizes, of_size), (shapes, of_shape)) = (first_stage(0)?, first_stage(1)?);
         let (stage_one, mut stage_two) = ([of_size, of_shape], Vec::new());

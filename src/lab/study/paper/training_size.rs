@@ -1,9 +1,9 @@
 //! How many grasps a model has to learn from (Fig. 6c).
 
-use super::answers::{Judged, TestPart};
+use super::answers::{TestAnswers, TestPart};
 use super::bench::{StudyBench, StudyError};
-use super::drawing::{Along, Facets, Line, LinkedPlots, lines};
-use super::judging::{Claim, Rule, named_gains};
+use super::claims::{Claim, Rule, named_gains};
+use super::drawing::{Along, Facets, LinkedPlots, TableLine, lines};
 use super::report::{
     Agreement, ClaimNumber, Column, Finding, LinkedFigure, POINTS, StudyReport, StudyTable, TableRows,
 };
@@ -60,7 +60,7 @@ fn most(kind: &Kind<usize>, is_first: bool) -> usize {
 
 impl Study for TrainingSize {
     type Cell = Fit<usize>;
-    type Found = Judged;
+    type Found = TestAnswers;
 
     const CARD: StudyCard = StudyCard {
         key: "training-size",
@@ -81,7 +81,7 @@ impl Study for TrainingSize {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Judged, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
         let plan = bench.plan();
         let wanted = plan.wanted(plan.grasps(MOST + TEST, 40), kind.sensors);
         let of = plan.pick((MOST + TEST) / TEST, 2, 3);
@@ -89,7 +89,7 @@ impl Study for TrainingSize {
         bench.judge(kind.method, &sets)
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Judged)>) -> StudyReport {
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
         let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
         let kinds: Vec<Kind<usize>> = rows.iter().map(|row| row.kind).collect();
         compare(&mut rows, |kind| {
@@ -114,7 +114,7 @@ impl Study for TrainingSize {
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
-        let axis = |_: &[Line<'_>]| PlotAxis::logarithmic("training grasps of each object");
+        let axis = |_: &[TableLine<'_>]| PlotAxis::logarithmic("training grasps of each object");
         let figure = Facets {
             along: Along::Axis(&axis, &|line| line.value("training grasps")),
             look: &|model, colour| lines(colour, model == PAPERS_MODEL),
@@ -126,7 +126,7 @@ impl Study for TrainingSize {
         let least = LinkedPlots::of(report, "training-size-least");
         let least = least.map_or_else(Vec::new, |least| least.lines_with(&[("model", PAPERS_MODEL)]));
         for plot in plots {
-            let of_sensors = |line: &&Line<'_>| plot.title == format!("{} sensors", line.text("sensors"));
+            let of_sensors = |line: &&TableLine<'_>| plot.title == format!("{} sensors", line.text("sensors"));
             let Some(line) = least.iter().find(of_sensors) else { continue };
             let [at, largest] = ["for that of the largest", "largest"].map(|column| line.value(column));
             let text = if at < largest {

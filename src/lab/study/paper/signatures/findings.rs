@@ -1,6 +1,6 @@
 //! The sentences of section V-A beside our numbers.
 
-use super::super::judging::Claim;
+use super::super::claims::Claim;
 use super::super::report::{Agreement, ClaimNumber, Finding, PERCENT};
 use super::bodies::Summary;
 use super::{DEFAULT, Found, PAPER};

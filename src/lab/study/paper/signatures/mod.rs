@@ -184,7 +184,7 @@ fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Found, StudyEr
         .collect();
     let mut found = Found { data: data.about.described(), ..Found::default() };
     for example in &data.examples {
-        bench.go_on()?;
+        bench.check_stop()?;
         let class = &data.labels.classes[example.class];
         let course = Course::of(&data.channels, &example.grasp);
         let course = course.ok_or_else(|| {
@@ -268,7 +268,7 @@ impl Study for TactileSignatures {
                 Found { varied: varied.take_while(|_| !bench.is_cancelled()).collect(), ..Found::default() }
             }
         };
-        bench.go_on()?;
+        bench.check_stop()?;
         Ok(found)
     }
 
