@@ -1,19 +1,17 @@
-//! Files out of the window: figures, the 3-D view and trials, written by a thread of their own.
+//! Files out of the window: figures, the 3-D view and trials, written beside the window.
 
 use palpate_geometry::drawing::{DrawList, Figure};
 use palpate_geometry::palette::Theme;
 use palpate_lab::exchange::{ExchangeError, write_trials};
 use palpate_lab::inspection::OpenOptions;
-use palpate_lab::workers::Wake;
+use palpate_lab::workers::{Job, Newer, Wake};
 use palpate_render::{
     DriverChoice, FigureError, Gpu, GpuError, Picture, PictureError, Renderer, figure_picture, figure_svg,
 };
 use palpate_store::{FileKind, Store, StoreError, write_whole};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// Something to be written to a file. The extension of the file chooses the format.
 #[derive(Clone, Debug)]
@@ -60,30 +58,29 @@ pub enum FileExportError {
     /// The trials cannot be written.
     #[error(transparent)]
     Trials(#[from] ExchangeError),
-    /// The thread ended without an answer.
-    #[error("the export ended with an internal error")]
-    Ended,
 }
 
 impl ExportRequest {
     /// Writes it; the file appears whole or not at all. `stop` ends an export of trials.
-    pub fn write(self, path: &Path, stop: &AtomicBool) -> Result<(), FileExportError> {
+    pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<(), FileExportError> {
         let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
         let is = |wanted: FileKind| kind == Some(wanted);
         let unknown = |known: &'static str| FileExportError::UnknownFormat { path: path.to_owned(), known };
         let bytes = match self {
-            Self::Figure(figure, theme, size) if is(FileKind::Svg) => figure_svg(&figure, theme, size)?.into_bytes(),
-            Self::Figure(figure, theme, size) if is(FileKind::Png) => figure_picture(&figure, theme, size)?.to_png()?,
+            Self::Figure(figure, theme, size) if is(FileKind::Svg) => figure_svg(figure, *theme, *size)?.into_bytes(),
+            Self::Figure(figure, theme, size) if is(FileKind::Png) => {
+                figure_picture(figure, *theme, *size)?.to_png()?
+            }
             Self::Figure(..) => return Err(unknown("an .svg or a .png file")),
             Self::View3d(list, size) if is(FileKind::Png) => {
                 let gpu = Gpu::headless(DriverChoice::Any)?;
                 let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
-                Picture::draw(&gpu, &mut renderer, &list, size.map(|side| 2 * side), 2.0)?.to_png()?
+                Picture::draw(&gpu, &mut renderer, list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
             Self::View3d(..) => return Err(unknown("a .png file")),
             Self::Trials(store, ids, options) => {
-                let store = Store::open(&store)?;
-                write_trials(&store, &ids, &options, path, &mut |_, _| !stop.load(Ordering::Relaxed))?;
+                let store = Store::open(store)?;
+                write_trials(&store, ids, options, path, &mut |_, _| !stop.load(Ordering::Relaxed))?;
                 return Ok(());
             }
         };
@@ -92,67 +89,32 @@ impl ExportRequest {
     }
 }
 
-/// An export that runs in a thread. Dropping it ends an export of trials, which then leaves no file.
-#[derive(Debug)]
-pub struct RunningExport {
-    path: PathBuf,
-    stop: Arc<AtomicBool>,
-    outcome: Receiver<Result<(), FileExportError>>,
-}
-
-impl RunningExport {
-    /// Starts the thread; it calls `wake` at its end.
-    pub fn start(request: ExportRequest, path: PathBuf, wake: Wake) -> std::io::Result<Self> {
-        let (sender, outcome) = channel();
-        let stop = Arc::new(AtomicBool::new(false));
-        let (target, stopped) = (path.clone(), Arc::clone(&stop));
-        std::thread::Builder::new().name("export".to_owned()).spawn(move || {
-            // Nobody listens any more where the window was closed.
-            let _heard = sender.send(request.write(&target, &stopped));
-            wake();
-        })?;
-        Ok(Self { path, stop, outcome })
-    }
-
-    /// The file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The outcome, once; none while it runs.
-    pub fn outcome(&self) -> Option<Result<(), FileExportError>> {
-        match self.outcome.try_recv() {
-            Ok(outcome) => Some(outcome),
-            Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => Some(Err(FileExportError::Ended)),
-        }
-    }
-}
-
-impl Drop for RunningExport {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
+/// The job that writes files. One that is stopped leaves no file.
+pub(super) fn export_job(wake: Wake) -> Job<(PathBuf, ExportRequest), ()> {
+    Job::new("export", Newer::Waits, wake, |(path, request): &(PathBuf, ExportRequest), run| {
+        Ok(Some(request.write(path, run.stop())?))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+    use std::sync::mpsc::channel;
     use std::time::Duration;
 
     #[test]
-    fn a_figure_is_written_by_a_thread_in_the_format_of_its_file() {
+    fn a_figure_is_written_by_a_job_in_the_format_of_its_file() {
         let folder = tempfile::tempdir().expect("a folder");
+        let (sender, woken) = channel();
+        let exports = export_job(Arc::new(move || {
+            let _heard = sender.send(());
+        }));
         for (name, begin) in [("a.svg", &b"<svg"[..]), ("a.PNG", b"\x89PNG")] {
             let path = folder.path().join(name);
-            let (sender, woken) = channel();
-            let wake: Wake = Arc::new(move || {
-                let _heard = sender.send(());
-            });
-            let request = ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100]);
-            let running = RunningExport::start(request, path.clone(), wake).expect("starts");
+            exports.start((path.clone(), ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100])));
             woken.recv_timeout(Duration::from_secs(60)).expect("ends");
-            assert!(running.outcome().is_some_and(|outcome| outcome.is_ok()));
+            assert!(exports.take().iter().all(|ended| ended.command.0 == path && ended.outcome.is_ok()));
             assert!(std::fs::read(&path).expect("written").starts_with(begin));
         }
         let stop = AtomicBool::new(false);

@@ -76,7 +76,7 @@ mod workbench;
 pub use actions::{Action, Actions};
 pub use context::PanelContext;
 pub use derived::Derivation;
-pub use export::{ExportRequest, FileExportError, RunningExport};
+pub use export::{ExportRequest, FileExportError};
 pub use features::files::FileAction;
 pub use features::gripper::GripperAction;
 pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};

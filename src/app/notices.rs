@@ -4,6 +4,7 @@
 use crate::app::theme::colour;
 use egui::{Frame, Label, Margin, Panel, RichText, Ui};
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_lab::workers::Notice;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -103,6 +104,20 @@ impl Notices {
         self.messages.push_back(text);
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
+        }
+    }
+
+    /// Shows a notice of a thread.
+    pub(super) fn show(&mut self, notice: Notice) {
+        match notice {
+            Notice::Info(text) => self.info(text),
+            Notice::Warning(text) => self.warning(text),
+            Notice::Failed(text) => self.error(text),
+            Notice::SceneRefused(refusal) => self.error(refusal.cause),
+            Notice::Stored(id) => self.info(format!("Trial {id} stored.")),
+            Notice::Known(id) => self.info(format!("Not stored again: trial {id} is the same grasp.")),
+            Notice::Kept(id) => self.info(format!("Trial {id} of the demo log is the same grasp: kept in the store.")),
+            Notice::Logged(..) => {}
         }
     }
 

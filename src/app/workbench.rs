@@ -38,8 +38,8 @@ use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::inspection::{FigureOptions, OpenTrial, PhaseSpan, comparison_figure};
 use palpate_lab::workers::{
     Command, Explain, Explainer, GhostGrasp, GripperSetup, GripperView, GripperWorker, LabelCommand, LabelView,
-    LabellingAction, LibraryView, MeasuredAccuracy, SimWorker, SimWorkerSetup, Snapshot, Wake, effects_job,
-    examine_port, explain_scene, fit_trials, open_trial_job, start_labeller, start_librarian,
+    LabelWorker, LabellingAction, LibraryView, LibraryWorker, MeasuredAccuracy, SimWorker, SimWorkerSetup, Snapshot,
+    Wake, effects_job, examine_port, explain_scene, fit_trials, open_trial_job,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
@@ -153,11 +153,11 @@ impl Workbench {
             Err(cause) => (Models::default(), Some(cause)),
         };
         // Before the other threads, so that it opens the store first and can report what an update did to the file.
-        let labeller =
-            start_labeller(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
-        let labelling = LabellingFeature::new(labeller, store.clone());
-        let librarian =
-            start_librarian(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the trial library"))?;
+        let labels =
+            LabelWorker::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
+        let labelling = LabellingFeature::new(labels, store.clone());
+        let library =
+            LibraryWorker::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the trial library"))?;
         let worker = SimWorker::start(SimWorkerSetup {
             scene: scene.clone(),
             sensors: view.sensors.clone(),
@@ -203,7 +203,7 @@ impl Workbench {
             simulation,
             gripper: GripperFeature::new(gripper, scene),
             labelling,
-            library: LibraryFeature::new(librarian),
+            library: LibraryFeature::new(library),
             recognition,
             inspect,
             tools,
@@ -337,7 +337,7 @@ impl Workbench {
             accuracy: self.simulation.worker().accuracy(),
             ghost: self.simulation.ghost(&self.view),
             gripper: self.gripper.worker().view(),
-            labels: self.labelling.labeller().view(),
+            labels: self.labelling.worker().view(),
             library: self.library.view(),
         }
     }
@@ -476,7 +476,7 @@ impl Workbench {
         recognition.gather(&mut Recognisers { simulation, gripper, tools, inspect }, view, notices);
         files.gather(ctx, simulation, notices);
         thumbnails.gather(ctx, &view.recent);
-        let labels = labelling.labeller().view();
+        let labels = labelling.worker().view();
         if labels.as_ref().map(Arc::as_ptr) != self.labels_seen.as_ref().map(Arc::as_ptr) {
             if let Some(labels) = &labels {
                 inspect.labels_changed(labels);

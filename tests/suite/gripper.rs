@@ -103,7 +103,7 @@ impl Desk {
     }
 
     pub(crate) fn command(&self, command: GripperCommand) {
-        self.worker.command(command);
+        self.worker.send(command);
     }
 
     /// Waits until everything stands as wanted.

@@ -39,7 +39,7 @@ fn a_stored_grasp_opens_as_it_was_live() {
     };
     let worker = SimWorker::start(setup).unwrap();
     for command in [Command::SetSpeed(64.0), Command::Play] {
-        worker.send(command).unwrap();
+        worker.send(command);
     }
     let (mut rows, mut stored): (Vec<TraceRow>, Vec<i64>) = (Vec::new(), Vec::new());
     let finished = || worker.snapshot().filter(|snapshot| snapshot.status.finished).map(|snapshot| snapshot.grasp);

@@ -1,15 +1,14 @@
 //! Files: opening, dropping and saving, and pictures of the 3-D view.
 
-use crate::app::export::{ExportRequest, RunningExport};
+use crate::app::export::{ExportRequest, export_job};
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::files::{Answer, Question};
 use crate::app::notices::Notices;
 use palpate_lab::inspection::FigureOptions;
-use palpate_lab::workers::Wake;
+use palpate_lab::workers::{Job, Wake};
 use palpate_sim::scene::Scene;
 use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Action on files. Each opens a file dialog.
 #[derive(Clone, Debug)]
@@ -32,19 +31,17 @@ pub enum FileAction {
 
 /// State of files in the window.
 pub(in crate::app) struct FileFeature {
-    wake: Wake,
     /// File to ask for.
     question: Option<Question>,
     answer: Option<Answer>,
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
-    /// Exports that are being written.
-    running: Vec<RunningExport>,
+    exports: Job<(PathBuf, ExportRequest), ()>,
 }
 
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake) -> Self {
-        Self { wake, question: None, answer: None, folder: None, running: Vec::new() }
+        Self { question: None, answer: None, folder: None, exports: export_job(wake) }
     }
 
     /// File that is to be asked for now.
@@ -94,24 +91,16 @@ impl FileFeature {
             match answer {
                 Answer::Open(path) => simulation.open(&path.to_string_lossy(), notices),
                 Answer::SaveScene(path, scene) => save_scene(&path, &scene, notices),
-                Answer::Export(path, request) => match RunningExport::start(*request, path, Arc::clone(&self.wake)) {
-                    Ok(running) => self.running.push(running),
-                    Err(error) => notices.error(format!("Cannot export: {error}")),
-                },
+                Answer::Export(path, request) => _ = self.exports.start((path, *request)),
             }
             ctx.request_repaint();
         }
-        self.running.retain(|running| match running.outcome() {
-            None => true,
-            Some(Ok(())) => {
-                notices.info(format!("Saved as {}.", running.path().display()));
-                false
+        for ended in self.exports.take() {
+            match ended.outcome {
+                Ok(_written) => notices.info(format!("Saved as {}.", ended.command.0.display())),
+                Err(cause) => notices.error(cause.to_string()),
             }
-            Some(Err(cause)) => {
-                notices.error(cause.to_string());
-                false
-            }
-        });
+        }
         for file in ctx.input(|i| i.raw.dropped_files.clone()) {
             simulation.open(&file.path().to_string_lossy(), notices);
         }

@@ -1,13 +1,13 @@
 //! The real gripper: its thread and its traces, and the simulation that closes its fingers with it.
 
-use crate::app::features::simulation::{SimulationFeature, show_notice};
+use crate::app::features::simulation::SimulationFeature;
 use crate::app::features::view::ViewState;
 use crate::app::notices::Notices;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
-use palpate_lab::workers::{Command, GripperCommand, GripperWorker, Notice, TrialView};
+use palpate_lab::workers::{Command, GripperCommand, GripperWorker, TrialView};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -73,7 +73,7 @@ impl GripperFeature {
     ) {
         if self.scene != *simulation.scene() {
             self.scene = simulation.scene().clone();
-            self.worker.command(GripperCommand::SetScene(Box::new(self.scene.clone())));
+            self.worker.send(GripperCommand::SetScene(Box::new(self.scene.clone())));
         }
         if self.worker.take_rows_lost() {
             self.traces.clear();
@@ -81,8 +81,7 @@ impl GripperFeature {
         for row in self.worker.rows() {
             self.traces.push(&row);
         }
-        let news: Vec<Notice> = self.worker.notices().collect();
-        news.into_iter().for_each(|notice| show_notice(notice, notices));
+        self.worker.notices().for_each(|notice| notices.show(notice));
         let Some(gripper) = self.worker.view() else { return };
         if self.connected != gripper.is_connected() {
             self.connected = gripper.is_connected();
@@ -108,10 +107,10 @@ impl GripperFeature {
                 if let GripperCommand::Connect(Some(port)) = &command {
                     view.port = Some(port.clone());
                 }
-                self.worker.command(command);
+                self.worker.send(command);
             }
             GripperAction::ToggleConnection => {
-                self.worker.command(match self.connected {
+                self.worker.send(match self.connected {
                     true => GripperCommand::Disconnect,
                     false => GripperCommand::Connect(view.port.clone()),
                 });
@@ -125,7 +124,7 @@ impl GripperFeature {
             GripperAction::ToggleWatch => {
                 let watching = self.worker.view().is_some_and(|gripper| gripper.watching.is_some());
                 let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
-                self.worker.command(GripperCommand::Watch((!watching).then_some(request)));
+                self.worker.send(GripperCommand::Watch((!watching).then_some(request)));
                 let state = if watching { "press R to record" } else { "detected automatically" };
                 notices.info(format!("Trials: {state}."));
             }
@@ -148,7 +147,7 @@ impl GripperFeature {
     /// Vents the fingers, where a board is connected.
     pub(in crate::app) fn stop(&self) {
         if self.connected {
-            self.worker.command(GripperCommand::Vent);
+            self.worker.send(GripperCommand::Vent);
         }
     }
 

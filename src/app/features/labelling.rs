@@ -7,7 +7,7 @@ use crate::app::features::view::ViewState;
 use crate::app::modes::mode::Mode;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{
-    Command, GripperCommand, GripperView, LabelCommand, LabelView, Labeller, LabellingAction, LabellingEffect,
+    Command, GripperCommand, GripperView, LabelCommand, LabelView, LabelWorker, LabellingAction, LabellingEffect,
     LabellingSession, SessionContext, TrialInSight,
 };
 use palpate_tactile::trial::TrialId;
@@ -15,20 +15,20 @@ use std::path::PathBuf;
 
 /// State of labelling in the window.
 pub(in crate::app) struct LabellingFeature {
-    labeller: Labeller,
+    labels: LabelWorker,
     session: LabellingSession,
     /// Stored trial that is shown because the card asks about it.
     shown: Option<TrialId>,
 }
 
 impl LabellingFeature {
-    pub(in crate::app) fn new(labeller: Labeller, store: PathBuf) -> Self {
-        labeller.ask(LabelCommand::Refresh);
-        Self { labeller, session: LabellingSession::new(store), shown: None }
+    pub(in crate::app) fn new(labels: LabelWorker, store: PathBuf) -> Self {
+        labels.send(LabelCommand::Refresh);
+        Self { labels, session: LabellingSession::new(store), shown: None }
     }
 
-    pub(in crate::app) fn labeller(&self) -> &Labeller {
-        &self.labeller
+    pub(in crate::app) fn worker(&self) -> &LabelWorker {
+        &self.labels
     }
 
     pub(in crate::app) fn session(&self) -> &LabellingSession {
@@ -37,7 +37,7 @@ impl LabellingFeature {
 
     /// Reads the store again.
     pub(in crate::app) fn refresh(&self) {
-        self.labeller.ask(LabelCommand::Refresh);
+        self.labels.send(LabelCommand::Refresh);
     }
 
     /// True while the model's prediction is hidden.
@@ -47,7 +47,7 @@ impl LabellingFeature {
         labels: Option<&LabelView>,
         view: &ViewState,
     ) -> bool {
-        self.session.hides_prediction(&context(&self.labeller, gripper, labels, view))
+        self.session.hides_prediction(&context(&self.labels, gripper, labels, view))
     }
 
     /// Updates the session with gripper and labels. Returns how the stored trial that the card asks about comes into sight.
@@ -58,13 +58,14 @@ impl LabellingFeature {
         view: &mut ViewState,
         notices: &mut Notices,
     ) -> Option<InspectAction> {
-        let (seen, labels) = (gripper.worker().view(), self.labeller.view());
-        let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
+        let (seen, labels) = (gripper.worker().view(), self.labels.view());
+        let now = context(&self.labels, seen.as_deref(), labels.as_deref(), view);
         let effects = self.session.observe(&now);
         let next = self.session.next_known_object(&now);
         let in_sight = self.session.in_sight(&now);
         gripper.keep_trial_in_sight(in_sight == TrialInSight::Last);
         self.carry_out(effects, gripper, view, notices);
+        self.labels.notices().for_each(|notice| notices.show(notice));
         // The simulation shows the next object of the plan.
         if let Some(next) = next.filter(|name| *name != simulation.scene().object.source) {
             simulation.open(&next, notices);
@@ -89,8 +90,8 @@ impl LabellingFeature {
         view: &mut ViewState,
         notices: &mut Notices,
     ) {
-        let (seen, labels) = (gripper.worker().view(), self.labeller.view());
-        let now = context(&self.labeller, seen.as_deref(), labels.as_deref(), view);
+        let (seen, labels) = (gripper.worker().view(), self.labels.view());
+        let now = context(&self.labels, seen.as_deref(), labels.as_deref(), view);
         let effects = self.session.apply(action, &now);
         self.carry_out(effects, gripper, view, notices);
     }
@@ -104,25 +105,23 @@ impl LabellingFeature {
     ) {
         for effect in effects {
             match effect {
-                LabellingEffect::Edit(command) => self.labeller.ask(command),
+                LabellingEffect::Edit(command) => _ = self.labels.send(command),
                 LabellingEffect::BeginTrial(request) => {
-                    let number = gripper.worker().command(GripperCommand::Begin(request));
+                    let number = gripper.worker().send(GripperCommand::Begin(request));
                     self.session.trial_requested(number);
                 }
                 LabellingEffect::DiscardRunning => {
-                    gripper.worker().command(GripperCommand::Discard);
+                    gripper.worker().send(GripperCommand::Discard);
                 }
                 LabellingEffect::SetBlind(blind) => view.blind = blind,
                 LabellingEffect::Inform(text) => notices.info(text),
-                LabellingEffect::Warn(text) => notices.warning(text),
-                LabellingEffect::Fail(cause) => notices.error(cause),
             }
         }
     }
 }
 
 fn context<'a>(
-    labeller: &Labeller,
+    worker: &LabelWorker,
     gripper: Option<&'a GripperView>,
     labels: Option<&'a LabelView>,
     view: &ViewState,
@@ -130,7 +129,7 @@ fn context<'a>(
     SessionContext {
         gripper,
         labels,
-        settled: labeller.is_settled(),
+        settled: worker.is_settled(),
         labelling: view.mode == Mode::Label,
         blind: view.blind,
         control: view.control,

@@ -1,8 +1,8 @@
-//! The trial library in the window: its query and the selection of trials; hands edits to the [`Librarian`].
+//! The trial library in the window: its query and the selection of trials; hands edits to the [`LibraryWorker`].
 
 use crate::app::features::inspect::InspectAction;
 use crate::app::notices::Notices;
-use palpate_lab::workers::{LabelOutcome, Librarian, LibraryCommand, LibraryView};
+use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialQuery};
 use palpate_tactile::trial::TrialId;
@@ -111,28 +111,26 @@ impl LibrarySelection {
 
 /// State of the library in the window.
 pub(in crate::app) struct LibraryFeature {
-    librarian: Librarian,
+    worker: LibraryWorker,
     selection: LibrarySelection,
     /// Trials at the last look.
     seen: Option<Arc<[Arc<LibraryTrial>]>>,
-    /// Outcomes up to this number have been shown.
-    reported: u64,
     /// Trial kept last.
     kept: Option<TrialId>,
 }
 
 impl LibraryFeature {
-    pub(in crate::app) fn new(librarian: Librarian) -> Self {
-        Self { librarian, selection: LibrarySelection::default(), seen: None, reported: 0, kept: None }
+    pub(in crate::app) fn new(worker: LibraryWorker) -> Self {
+        Self { worker, selection: LibrarySelection::default(), seen: None, kept: None }
     }
 
     pub(in crate::app) fn view(&self) -> Option<Arc<LibraryView>> {
-        self.librarian.view()
+        self.worker.view()
     }
 
     /// Changes a trial.
     pub(in crate::app) fn edit(&self, id: TrialId, edit: TrialEdit) {
-        self.librarian.ask(LibraryCommand::Edit(vec![id], edit));
+        self.worker.send(LibraryCommand::Edit(vec![id], edit));
     }
 
     /// Trial that was moved from the demo log to the store last.
@@ -146,20 +144,12 @@ impl LibraryFeature {
 
     /// Shows outcomes, and forgets trials that are gone.
     pub(in crate::app) fn gather(&mut self, notices: &mut Notices) {
-        let Some(view) = self.librarian.view() else { return };
+        let Some(view) = self.worker.view() else { return };
         if self.seen.as_ref().is_none_or(|seen| !Arc::ptr_eq(seen, &view.found)) {
             self.selection.look(&view.found);
             self.seen = Some(Arc::clone(&view.found));
         }
-        let before = self.reported;
-        for (number, outcome) in view.outcomes.iter().filter(|(number, _)| *number > before) {
-            match outcome {
-                LabelOutcome::Done(text) => notices.info(text.clone()),
-                LabelOutcome::Warning(text) => notices.warning(text.clone()),
-                LabelOutcome::Failed(cause) => notices.error(cause.to_string()),
-            }
-            self.reported = *number;
-        }
+        self.worker.notices().for_each(|notice| notices.show(notice));
     }
 
     /// Applies an action; what follows for the inspection.
@@ -169,16 +159,16 @@ impl LibraryFeature {
         let selected: Vec<TrialId> = self.selection.selected.iter().copied().collect();
         match action {
             // The first answer is on its way.
-            LibraryAction::Find(query) if query == self.selection.query && !self.librarian.is_settled() => {}
+            LibraryAction::Find(query) if query == self.selection.query && !self.worker.is_settled() => {}
             LibraryAction::Find(query) => {
                 self.selection.query = query.clone();
-                self.librarian.ask(LibraryCommand::Find(query));
+                self.worker.send(LibraryCommand::Find(query));
             }
             LibraryAction::FocusSearch(typed) => {
                 self.selection.focus_search = true;
                 if !typed.is_empty() {
                     self.selection.query.search.push_str(&typed);
-                    self.librarian.ask(LibraryCommand::Find(self.selection.query.clone()));
+                    self.worker.send(LibraryCommand::Find(self.selection.query.clone()));
                 }
             }
             LibraryAction::SearchFocused => self.selection.focus_search = false,
@@ -187,17 +177,17 @@ impl LibraryFeature {
             LibraryAction::SelectAll => {
                 self.selection.selected = found.iter().map(|trial| trial.row.id).collect();
             }
-            LibraryAction::Draw(ids) => self.librarian.ask(LibraryCommand::Draw(ids)),
+            LibraryAction::Draw(ids) => _ = self.worker.send(LibraryCommand::Draw(ids)),
             LibraryAction::Edit(edit) => {
                 if !self.selection.selected.is_empty() {
-                    self.librarian.ask(LibraryCommand::Edit(selected, edit));
+                    self.worker.send(LibraryCommand::Edit(selected, edit));
                 }
             }
             LibraryAction::Keep(id) => {
                 self.edit(id, TrialEdit::Keep);
                 self.kept = Some(id);
             }
-            LibraryAction::Export => self.librarian.ask(LibraryCommand::Export(selected)),
+            LibraryAction::Export => _ = self.worker.send(LibraryCommand::Export(selected)),
             LibraryAction::Open => return self.selection.cursor.map(InspectAction::Open).into_iter().collect(),
             LibraryAction::Pin => return selected.into_iter().map(InspectAction::Pin).collect(),
         }

@@ -105,12 +105,12 @@ impl RecognitionFeature {
     ) {
         match action {
             RecognitionAction::SetThreshold(threshold) => {
-                on.gripper.worker().command(GripperCommand::SetThreshold(threshold));
+                on.gripper.worker().send(GripperCommand::SetThreshold(threshold));
                 on.simulation.send(Command::SetThreshold(threshold), notices);
             }
             RecognitionAction::NextObject => match view.source {
                 ViewSource::Gripper => {
-                    on.gripper.worker().command(GripperCommand::AnotherObject);
+                    on.gripper.worker().send(GripperCommand::AnotherObject);
                 }
                 ViewSource::Simulation | ViewSource::Trial => on.simulation.open_next(notices),
             },
@@ -165,7 +165,7 @@ impl RecognitionFeature {
     fn use_for_gripper(&mut self, model: Option<Arc<Model>>, on: &mut Recognisers<'_>) {
         self.models = self.models.clone().with_real(model.clone());
         on.inspect.set_models(self.models.clone());
-        on.gripper.worker().command(GripperCommand::SetModel(model));
+        on.gripper.worker().send(GripperCommand::SetModel(model));
     }
 
     /// Uses a model from a file for the real gripper from now on.

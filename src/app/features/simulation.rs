@@ -6,7 +6,7 @@ use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::study::Explanation;
 use palpate_lab::study::accuracy::{AccuracyStudy, stored_accuracy};
-use palpate_lab::workers::{Command, GhostGrasp, Job, NotSent, Notice, Refusal, SimWorker, Snapshot};
+use palpate_lab::workers::{Command, GhostGrasp, Job, Notice, Refusal, SimWorker, Snapshot};
 use palpate_sim::gripper::Auto;
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::{PoseSpread, Scene};
@@ -49,8 +49,6 @@ pub(in crate::app) struct SimulationFeature {
     stored_accuracy: Option<AccuracyStudy>,
     scene: Scene,
     traces: TraceHistory,
-    /// The busy worker has not taken the scene yet.
-    unsent: bool,
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
     shuffled: ShuffledObjects,
@@ -69,7 +67,6 @@ impl SimulationFeature {
             stored_accuracy: stored_accuracy().ok().map(|stored| stored.result),
             scene,
             traces: TraceHistory::default(),
-            unsent: false,
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
             changes: SceneChanges::default(),
@@ -127,13 +124,10 @@ impl SimulationFeature {
                 Notice::Logged(id, place) => self.last_trial = Some((id, place)),
                 Notice::Stored(id) | Notice::Known(id) | Notice::Kept(id) => {
                     self.last_trial = Some((id, TrialPlace::Store));
-                    show_notice(notice, notices);
+                    notices.show(notice);
                 }
-                other => show_notice(other, notices),
+                other => notices.show(other),
             }
-        }
-        if self.unsent {
-            self.send_scene();
         }
         if let Some(snapshot) = self.worker.snapshot() {
             self.traces.forget_before(snapshot.scene_since);
@@ -173,8 +167,9 @@ impl SimulationFeature {
     }
 
     pub(in crate::app) fn send(&mut self, command: Command, notices: &mut Notices) {
-        if let Err(cause) = self.worker.send(command) {
-            notices.warning(cause.to_string());
+        self.worker.send(command);
+        if self.worker.has_ended() {
+            notices.warning("the simulation has stopped; restart Palpate");
         }
     }
 
@@ -231,17 +226,13 @@ impl SimulationFeature {
     pub(in crate::app) fn use_scene(&mut self, scene: Scene) {
         self.scene = scene;
         self.effects.stop();
-        self.send_scene();
+        self.worker.send(Command::SetScene(Box::new(self.scene.clone())));
     }
 
     fn take_back(&mut self, scene: Scene, done: &str, notices: &mut Notices) {
         let object = object_title(&scene.object.source);
         self.use_scene(scene);
         notices.info(format!("{done}: {object}."));
-    }
-
-    fn send_scene(&mut self) {
-        self.unsent = self.worker.send(Command::SetScene(Box::new(self.scene.clone()))) == Err(NotSent::Busy);
     }
 
     /// Shows the scene that stays, unless the user has set another one since.
@@ -315,19 +306,5 @@ impl SceneChanges {
         let scene = self.after.pop()?;
         self.before.push(now.clone());
         Some(scene)
-    }
-}
-
-/// Shows a notice of a gripper's thread.
-pub(in crate::app) fn show_notice(notice: Notice, notices: &mut Notices) {
-    match notice {
-        Notice::Info(text) => notices.info(text),
-        Notice::Warning(text) => notices.warning(text),
-        Notice::Failed(text) => notices.error(text),
-        Notice::SceneRefused(refusal) => notices.error(refusal.cause),
-        Notice::Stored(id) => notices.info(format!("Trial {id} stored.")),
-        Notice::Known(id) => notices.info(format!("Not stored again: trial {id} is the same grasp.")),
-        Notice::Kept(id) => notices.info(format!("Trial {id} of the demo log is the same grasp: kept in the store.")),
-        Notice::Logged(..) => {}
     }
 }

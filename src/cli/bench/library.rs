@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::super::terminal::{note, say, say_json, table};
-use palpate_lab::workers::{Librarian, LibraryCommand, LibraryView, start_librarian};
+use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::run::SimRun;
 use palpate_sim::scene::{PRESETS, Scene};
@@ -38,7 +38,7 @@ struct Waited {
 
 /// The service and the calls of its `wake`.
 struct Bench {
-    librarian: Librarian,
+    library: LibraryWorker,
     woken: Receiver<()>,
 }
 
@@ -49,18 +49,18 @@ impl Bench {
             // Calls after the end of the bench are for nobody.
             let _heard = calls.send(());
         });
-        Ok(Self { librarian: start_librarian(path.to_owned(), wake)?, woken })
+        Ok(Self { library: LibraryWorker::start(path.to_owned(), wake)?, woken })
     }
 
     /// Time from a command to a view that shows what was wanted (ms).
     fn wait(&self, command: LibraryCommand, wanted: impl Fn(&LibraryView) -> bool) -> Result<f64, Failure> {
         let asked = Instant::now();
-        self.librarian.ask(command);
+        self.library.send(command);
         self.until(asked, wanted)
     }
 
     fn until(&self, asked: Instant, wanted: impl Fn(&LibraryView) -> bool) -> Result<f64, Failure> {
-        while !(self.librarian.is_settled() && self.librarian.view().is_some_and(|view| wanted(&view))) {
+        while !(self.library.is_settled() && self.library.view().is_some_and(|view| wanted(&view))) {
             self.woken.recv_timeout(PATIENCE)?;
         }
         Ok(1e3 * asked.elapsed().as_secs_f64())
@@ -124,7 +124,7 @@ fn measure(path: &Path, trials: u32, runs: usize) -> Result<(Vec<Waited>, Option
         "scroll: a page at a random place",
         of(&|run| {
             let asked = Instant::now();
-            let view = bench.librarian.view().ok_or("no view")?;
+            let view = bench.library.view().ok_or("no view")?;
             let from = scattered(run) % (view.found.len() - PAGE);
             let shown: Vec<String> = view.found[from..from + PAGE].iter().map(|trial| shown_text(trial)).collect();
             std::hint::black_box(shown);
@@ -134,7 +134,7 @@ fn measure(path: &Path, trials: u32, runs: usize) -> Result<(Vec<Waited>, Option
     let mut drawn = 0;
     let mut pictures = Vec::new();
     for run in 0..runs.min(WITH_FRAMES as usize / PAGE) {
-        let view = bench.librarian.view().ok_or("no view")?;
+        let view = bench.library.view().ok_or("no view")?;
         let from = run * PAGE;
         let page: Vec<TrialId> = view.found[from..from + PAGE].iter().map(|trial| trial.row.id).collect();
         drawn += PAGE;
@@ -172,7 +172,7 @@ fn shown_text(trial: &palpate_store::LibraryTrial) -> String {
 fn edits(bench: &Bench, runs: usize) -> Result<Vec<f64>, Failure> {
     (0..runs)
         .map(|run| {
-            let view = bench.librarian.view().ok_or("no view")?;
+            let view = bench.library.view().ok_or("no view")?;
             let from = scattered(run) % (view.found.len() - BULK + 1);
             let ids: Vec<TrialId> = view.found[from..from + BULK].iter().map(|trial| trial.row.id).collect();
             let tag = format!("bulk{run}");

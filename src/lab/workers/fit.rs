@@ -1,6 +1,6 @@
 //! Fit of the simulated finger to recorded trials, beside the window.
 
-use super::job::{Job, JobFailure, Newer};
+use super::job::{Job, JobError, Newer};
 use super::messages::Wake;
 use crate::study::{FingerFit, FitWatch, MOST_STEPS, RecordedGrasps, fit_finger_watched};
 use palpate_sim::scene::Scene;
@@ -23,10 +23,10 @@ pub struct FittedFinger {
 }
 
 /// Function that fits the finger to trials of a store, such as [`fit_trials`].
-pub type FitTrials = Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, JobFailure> + Send + Sync>;
+pub type FitTrials = Arc<dyn Fn(&Path, &[TrialId], &FitWatch<'_>) -> Result<FittedFinger, JobError> + Send + Sync>;
 
 /// Reads trials with the newest calibrations of their parts and fits the finger to them.
-pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, JobFailure> {
+pub fn fit_trials(store: &Path, trials: &[TrialId], watch: &FitWatch<'_>) -> Result<FittedFinger, JobError> {
     let store = Store::open(store)?;
     let mut recorded = RecordedGrasps::default();
     for id in trials {

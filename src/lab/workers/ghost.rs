@@ -1,11 +1,10 @@
 //! Ghost: the grasp computed by the other engine, for comparison.
 
 use super::job::{Job, Newer};
-use super::messages::Wake;
+use super::messages::{GhostGrasp, Wake};
 use crate::grasping::prepare;
-use palpate_sim::frame::Frame;
 use palpate_sim::objects::ObjectModel;
-use palpate_sim::scene::{EngineKind, Scene};
+use palpate_sim::scene::Scene;
 use std::sync::Arc;
 
 /// Grasp to be computed.
@@ -15,25 +14,6 @@ pub(super) struct GhostRequest {
     /// The scene, with the engine of the ghost.
     pub(super) scene: Scene,
     pub(super) object: Option<Arc<ObjectModel>>,
-}
-
-/// The whole of one grasp as another engine computes it.
-#[derive(Debug)]
-pub struct GhostGrasp {
-    /// The grasp it belongs to, as in [`super::TraceRow::grasp`].
-    pub grasp: u64,
-    /// What computed it.
-    pub engine: EngineKind,
-    /// Its samples, the state before the first step included.
-    pub frames: Vec<Frame>,
-}
-
-impl GhostGrasp {
-    /// The sample at a time (s), or the last one before.
-    pub fn at(&self, t: f64) -> Option<&Frame> {
-        let after = self.frames.partition_point(|frame| frame.t <= t + 1e-9);
-        after.checked_sub(1).and_then(|k| self.frames.get(k))
-    }
 }
 
 /// The job; without a ghost nothing else changes.

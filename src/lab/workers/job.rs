@@ -4,7 +4,6 @@
 use super::messages::Wake;
 use std::collections::VecDeque;
 use std::error::Error;
-use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,6 +12,8 @@ use std::time::{Duration, Instant};
 
 /// Least time between two calls of `wake` for progress.
 const BETWEEN: Duration = Duration::from_millis(30);
+/// Failure after a panic.
+const PANIC: &str = "stopped because of a fault in the program; report what you did";
 
 /// What a command does to those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +24,10 @@ pub enum Newer {
     Waits,
 }
 
-/// Cause of a failed command.
-#[derive(Clone, Debug)]
-pub struct JobFailure(Arc<dyn Error + Send + Sync>);
+/// Error of the work.
+pub type JobError = Box<dyn Error + Send + Sync>;
+/// The same, to be kept and shown.
+pub type JobFailure = Arc<dyn Error + Send + Sync>;
 
 /// Progress of a command.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,7 +67,7 @@ pub struct JobRun<'a> {
     report: &'a (dyn Fn(JobProgress) + Sync),
 }
 
-type Work<C, O> = dyn FnMut(&C, &JobRun<'_>) -> Result<Option<O>, JobFailure> + Send;
+type Work<C, O> = dyn FnMut(&C, &JobRun<'_>) -> Result<Option<O>, JobError> + Send;
 
 /// Work beside the window: commands `C` in, outcomes `O` out. Dropping it stops the work and ends the thread.
 pub struct Job<C, O> {
@@ -100,7 +102,7 @@ impl<C: Send + Sync + 'static, O: Send + Sync + 'static> Job<C, O> {
         name: &'static str,
         newer: Newer,
         wake: Wake,
-        work: impl FnMut(&C, &JobRun<'_>) -> Result<Option<O>, JobFailure> + Send + 'static,
+        work: impl FnMut(&C, &JobRun<'_>) -> Result<Option<O>, JobError> + Send + 'static,
     ) -> Self {
         let state = State {
             started: 0,
@@ -197,7 +199,7 @@ impl<C: Send + Sync, O: Send + Sync> Shared<C, O> {
             let report = |progress| self.report(progress);
             let run = JobRun { stop: &now.stop, report: &report };
             let outcome = catch_unwind(AssertUnwindSafe(|| work(&now.command, &run)));
-            match self.end(outcome.unwrap_or_else(|_panic| Err(Panicked.into()))) {
+            match self.end(outcome.unwrap_or_else(|_panic| Err(PANIC.into()))) {
                 Some(next) => now = next,
                 None => return,
             }
@@ -216,12 +218,12 @@ impl<C: Send + Sync, O: Send + Sync> Shared<C, O> {
     }
 
     /// Takes in the outcome of the running command; returns the next one.
-    fn end(&self, outcome: Result<Option<O>, JobFailure>) -> Option<RunningJob<C>> {
+    fn end(&self, outcome: Result<Option<O>, JobError>) -> Option<RunningJob<C>> {
         let mut state = locked(&self.state);
         let RunningJob { number, command, stop, .. } = state.running.take()?;
         let stopped = stop.load(Ordering::Relaxed);
         if let Some(outcome) = outcome.transpose().filter(|outcome| outcome.is_ok() || !stopped) {
-            let ended = EndedJob { number, command, outcome: outcome.map(Arc::new) };
+            let ended = EndedJob { number, command, outcome: outcome.map(Arc::new).map_err(JobFailure::from) };
             if self.newer == Newer::Replaces {
                 state.ended.clear();
             }
@@ -281,29 +283,6 @@ impl JobRun<'_> {
 /// Threads for work beside the window and a simulation (1).
 pub(super) fn spare_threads() -> usize {
     std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1))
-}
-
-#[derive(Debug, thiserror::Error)]
-#[error("stopped because of a fault in the program; report what you did")]
-struct Panicked;
-
-impl JobFailure {
-    /// The cause, where it is of this type.
-    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
-        self.0.downcast_ref()
-    }
-}
-
-impl fmt::Display for JobFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl<E: Error + Send + Sync + 'static> From<E> for JobFailure {
-    fn from(cause: E) -> Self {
-        Self(Arc::new(cause))
-    }
 }
 
 impl<C> Clone for RunningJob<C> {
@@ -406,7 +385,7 @@ mod tests {
         let (job, woken) = counter(Newer::Replaces);
         job.start(7);
         let failure = settled(&job, &woken).expect("ended").expect_err("seven fails");
-        assert!(failure.cause::<std::fmt::Error>().is_some());
+        assert!(failure.downcast_ref::<std::fmt::Error>().is_some());
         job.start(13);
         let failure = settled(&job, &woken).expect("ended").expect_err("thirteen panics");
         assert!(failure.to_string().contains("a fault in the program") && job.outcome().is_none());

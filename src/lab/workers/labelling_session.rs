@@ -8,7 +8,7 @@
 //! ```
 
 use super::gripper::GripperView;
-use super::labeller::{LabelCommand, LabelOutcome, LabelView};
+use super::label_worker::{LabelCommand, LabelView};
 use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -84,10 +84,6 @@ pub enum LabellingEffect {
     SetBlind(bool),
     /// Show a message.
     Inform(String),
-    /// Show a warning.
-    Warn(String),
-    /// Show an error.
-    Fail(String),
 }
 
 /// Trial that the plots show.
@@ -248,8 +244,6 @@ pub struct LabellingSession {
     ended: Option<TrialId>,
     /// Command by which the last trial was requested, by its number.
     requested_by: u64,
-    /// Outcomes of label commands up to this number have been shown.
-    reported: u64,
 }
 
 impl LabellingSession {
@@ -296,15 +290,6 @@ impl LabellingSession {
                 }
             }
             self.recording = recording;
-        }
-        let before = self.reported;
-        for (number, outcome) in now.labels.iter().flat_map(|labels| &labels.outcomes).filter(|(n, _)| *n > before) {
-            self.reported = *number;
-            effects.push(match outcome {
-                LabelOutcome::Done(text) => LabellingEffect::Inform(text.clone()),
-                LabelOutcome::Warning(text) => LabellingEffect::Warn(text.clone()),
-                LabelOutcome::Failed(cause) => LabellingEffect::Fail(cause.to_string()),
-            });
         }
         effects
     }

@@ -8,7 +8,7 @@ use glam::DVec3;
 use palpate_learn::Models;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
-use palpate_sim::scene::{Accuracy, Scene};
+use palpate_sim::scene::{Accuracy, EngineKind, Scene};
 use palpate_store::TrialPlace;
 use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
@@ -58,8 +58,6 @@ pub enum Command {
     ComputeAgain,
     /// Pull the object with this force (N, world axes); zero releases it.
     Pull(DVec3),
-    /// End the thread.
-    Quit,
 }
 
 /// Notice of a thread to the user.
@@ -92,17 +90,6 @@ pub struct Refusal {
     pub kept: Scene,
     /// Cause, in a sentence for the user.
     pub cause: String,
-}
-
-/// Reason why a command was not sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NotSent {
-    /// Too many are waiting.
-    #[error("the simulation is busy; try again in a moment")]
-    Busy,
-    /// The thread has ended.
-    #[error("the simulation has stopped; restart Palpate")]
-    Gone,
 }
 
 /// One sample for plots.
@@ -148,6 +135,25 @@ pub struct MeasuredAccuracy {
     pub scene: Scene,
     /// CPU time, and the estimated error.
     pub cost: AccuracyCost,
+}
+
+/// The whole of one grasp as another engine computes it.
+#[derive(Debug)]
+pub struct GhostGrasp {
+    /// The grasp it belongs to, as in [`TraceRow::grasp`].
+    pub grasp: u64,
+    /// What computed it.
+    pub engine: EngineKind,
+    /// Its samples, the state before the first step included.
+    pub frames: Vec<Frame>,
+}
+
+impl GhostGrasp {
+    /// The sample at a time (s), or the last one before.
+    pub fn at(&self, t: f64) -> Option<&Frame> {
+        let after = self.frames.partition_point(|frame| frame.t <= t + 1e-9);
+        after.checked_sub(1).and_then(|k| self.frames.get(k))
+    }
 }
 
 /// Description of the held object.
@@ -250,6 +256,10 @@ pub struct Snapshot {
     pub identification: Option<Arc<IdentificationView>>,
     /// Reason why the model recognises nothing in this scene.
     pub recognition_off: Option<Arc<str>>,
+    /// Cost and error of the accuracy of the last measured scene.
+    pub accuracy: Option<Arc<MeasuredAccuracy>>,
+    /// The newest grasp that the other engine has computed; its number tells which.
+    pub ghost: Option<Arc<GhostGrasp>>,
 }
 
 impl Snapshot {

@@ -3,12 +3,17 @@
 //!
 //! ```text
 //!  UI                         "sim"                          "recorder"
-//!  Command ----bounded--->    runs the grasp, keeps pace     
+//!  Command -------------->    runs the grasp, keeps pace     
 //!  <--newest Snapshot-----    recognises, publishes          writes the store
 //!  <--every TraceRow------    derives         frames ----->  a chunk each second
 //!  <--Notice--------------                    <------------  Notice
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
+//!
+//! A [`Worker`] owns something for as long as the window is open: the simulated gripper, the link to the real gripper's
+//! board ("gripper", shared by live view, trials, recognition and calibrations), the labels ("label"), or all trials
+//! ("library"). Both of the last show changes by other programs. Commands go in; the newest view, trace rows and notices
+//! come out; a panic becomes a notice.
 //!
 //! A [`Job`] is work beside the window with a beginning and an end: a command in, progress, then an outcome or a failure
 //! out. Its thread runs while there is something to do. A newer command replaces the older ones, or waits for them.
@@ -26,15 +31,12 @@
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
 //! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
 //!
-//! The thread "label" handles labels, "library" search and edits of all trials. Both show changes by other programs.
-//! A thread "gripper" owns the link to the real gripper's board: live view, trials, recognition and calibrations share it.
 //!
 //! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
 //! their order and none is lost.
 
 mod accuracy_job;
 mod advice;
-mod background_job;
 mod check_job;
 mod class_training;
 mod current;
@@ -45,16 +47,17 @@ mod ghost;
 mod gripper;
 mod held_object;
 mod job;
-mod labeller;
+mod label_worker;
 mod labelling_session;
 mod latest;
-mod librarian;
-mod listener;
+mod library_worker;
+mod live_recognition;
 #[cfg(test)]
-mod listener_tests;
+mod live_recognition_tests;
 mod messages;
 mod object_search;
 mod open_trial;
+mod own_store;
 mod pace;
 mod portraits;
 mod refined_run;
@@ -65,31 +68,30 @@ mod simulation_session;
 mod study_runner;
 mod training;
 mod why;
+mod worker;
 
 pub use advice::advice_job;
-pub use background_job::BackgroundJob;
 pub use class_training::{TeachRequest, class_training_job};
 pub use doctor::{DiagnosticsReport, Examine, ExamineRequest, doctor_job, examine_port};
 pub use effects::{Explain, effects_job, explain_scene};
 pub use fit::{FitTrials, FittedFinger, fit_job, fit_trials, recorded_trials_job};
-pub use ghost::GhostGrasp;
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
     CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
     RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
 };
-pub use job::{EndedJob, Job, JobFailure, JobProgress, JobRun, Newer, RunningJob};
-pub use labeller::{LabelCommand, LabelError, LabelOutcome, LabelView, Labeller, start_labeller};
+pub use job::{EndedJob, Job, JobError, JobFailure, JobProgress, JobRun, Newer, RunningJob};
+pub use label_worker::{LabelCommand, LabelView, LabelWorker};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
     parse_tags,
 };
 pub use latest::Latest;
-pub use librarian::{Librarian, LibraryCommand, LibraryView, start_librarian};
-pub use listener::THRESHOLDS;
+pub use library_worker::{LibraryCommand, LibraryView, LibraryWorker};
+pub use live_recognition::THRESHOLDS;
 pub use messages::{
-    Checking, Command, FinishedGrasp, MeasuredAccuracy, NotSent, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
-    Status, TraceRow, Wake,
+    Checking, Command, FinishedGrasp, GhostGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup,
+    Snapshot, Status, TraceRow, Wake,
 };
 pub use object_search::NUMBERED_OBJECTS;
 pub use open_trial::{OpenRequest, open_trial_job};
@@ -103,3 +105,4 @@ pub use training::{
     FinishedTraining, TrainRequest, TrainedModel, TrainingData, load_model_job, training_data_job, training_job,
 };
 pub use why::{ExplainRequest, Explainer};
+pub use worker::Worker;

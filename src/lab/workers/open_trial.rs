@@ -2,7 +2,7 @@
 
 use super::job::{Job, Newer};
 use super::messages::Wake;
-use crate::inspection::{OpenOptions, OpenTrial, OpenTrialError};
+use crate::inspection::{OpenOptions, OpenTrial};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ pub fn open_trial_job(store: PathBuf, wake: Wake) -> Job<OpenRequest, OpenTrial>
             Some(reader) => reader,
             None if !store.exists() => {
                 let nothing = StoreError::NoTrial { id: *id, hint: ": the store is empty" };
-                return Err(OpenTrialError::from(nothing).into());
+                return Err(nothing.into());
             }
             empty @ None => empty.insert(Store::open(&store)?),
         };

@@ -1,7 +1,7 @@
 //! Studies of the paper beside the window, on its store. Their files lie in folders beside the store; the command line
 //! continues them there, and is continued.
 
-use super::job::{Job, JobFailure, JobRun, Newer, spare_threads};
+use super::job::{Job, JobError, JobFailure, JobRun, Newer, spare_threads};
 use super::messages::Wake;
 use crate::study::paper::{
     LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyFolder, StudyPlan, StudyProgress,
@@ -69,11 +69,6 @@ pub struct StudyEnd {
     pub files: StudyFilesByKey,
 }
 
-/// There is no such study.
-#[derive(Debug, thiserror::Error)]
-#[error("there is no study \"{0}\"")]
-struct UnknownStudy(String);
-
 /// Draws a figure as SVG.
 pub type DrawFigure = Arc<dyn Fn(&LinkedFigure) -> std::io::Result<String> + Send + Sync>;
 
@@ -94,8 +89,8 @@ pub fn study_files_job(store: PathBuf, wake: Wake) -> Job<(), StudyFilesByKey> {
 }
 
 /// Runs a study to its end; false where it was stopped.
-fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<'_>) -> Result<bool, JobFailure> {
-    let study = paper_study(&request.key).ok_or_else(|| UnknownStudy(request.key.clone()))?;
+fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<'_>) -> Result<bool, JobError> {
+    let study = paper_study(&request.key).ok_or_else(|| format!("there is no study \"{}\"", request.key))?;
     let (folder, key) = (StudyFolder::beside(store, request.size), study.card().key);
     if request.anew {
         folder.forget_units(key)?;
@@ -117,9 +112,9 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
 
 /// True where the finished units of a study are of another version or plan: it has to begin anew.
 pub fn has_other_units(failure: &JobFailure) -> bool {
-    let results = match failure.cause() {
+    let results = match failure.downcast_ref() {
         Some(StudyError::Results(results)) => Some(results),
-        _ => failure.cause(),
+        _ => failure.downcast_ref(),
     };
     matches!(results, Some(ResultFileError::Other { .. }))
 }

@@ -1,14 +1,14 @@
 //! Training on labelled trials of the real gripper, beside the window: listing what there is, training a recogniser and
 //! saving it to a file, loading such a file.
 
-use super::job::{Job, JobFailure, JobRun, Newer};
+use super::job::{Job, JobError, JobRun, Newer};
 use super::messages::Wake;
 use crate::datasets::{SavedModel, make_models_folder, new_model_path, save_model, saved_models};
 use crate::study::{
     JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage, labelled_classes,
 };
 use palpate_learn::{Method, Model, ModelError, method};
-use palpate_store::Store;
+use palpate_store::{Store, StoreError};
 use palpate_tactile::{Channel, SignalDefinition, whole_fingers};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -48,7 +48,7 @@ pub struct FinishedTraining {
 #[derive(Clone, Debug)]
 pub struct TrainingData {
     /// Labelled trials of each object, or why they cannot be counted.
-    pub classes: Result<Vec<LabelledClass>, JobFailure>,
+    pub classes: Result<Vec<LabelledClass>, Arc<StoreError>>,
     /// Saved models, newest first.
     pub models: Vec<SavedModel>,
 }
@@ -56,7 +56,7 @@ pub struct TrainingData {
 /// The job that lists labelled trials and saved models.
 pub fn training_data_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<(), TrainingData> {
     Job::new("training-data", Newer::Replaces, wake, move |(), _run| {
-        let classes = Store::open(&store).and_then(|store| labelled_classes(&store)).map_err(JobFailure::from);
+        let classes = Store::open(&store).and_then(|store| labelled_classes(&store)).map_err(Arc::new);
         Ok(Some(TrainingData { classes, models: saved_models(&models) }))
     })
 }
@@ -101,7 +101,7 @@ impl TrainedModel {
     }
 
     /// Saves a model under a new name in the folder `models`.
-    pub(super) fn save(model: Model, models: &Path, name: &str, store: &Store) -> Result<Self, JobFailure> {
+    pub(super) fn save(model: Model, models: &Path, name: &str, store: &Store) -> Result<Self, JobError> {
         let path = new_model_path(models, name, &store.now()?);
         make_models_folder(models)?;
         save_model(&model, &path)?;

@@ -70,8 +70,6 @@ pub enum GripperCommand {
     Calibrate(CalibrationCommand),
     /// Crosstalk test.
     Crosstalk(CrosstalkCommand),
-    /// End the thread.
-    Quit,
 }
 
 /// The newest reading, raw and converted.

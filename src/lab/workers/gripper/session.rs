@@ -15,13 +15,14 @@ use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
-use crate::workers::listener::Listener;
-use crate::workers::{Latest, Notice, TraceRow, Wake};
+use crate::workers::live_recognition::LiveRecognition;
+use crate::workers::own_store::OwnStore;
+use crate::workers::worker::{Inbox, Publisher};
+use crate::workers::{Notice, TraceRow};
 use palpate_device::doctor::CrosstalkSession;
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
 use palpate_sim::scene::Scene;
-use palpate_store::{Store, StoreError};
 use palpate_tactile::Channel;
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::{Drift, Readout};
@@ -30,8 +31,7 @@ use palpate_tactile::{SignalDefinition, whole_fingers};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Longest wait for readings before commands are handled; also the timing error of line pressure.
@@ -40,23 +40,6 @@ const PATIENCE: Duration = Duration::from_millis(10);
 const RETRY: Duration = Duration::from_secs(1);
 /// Shortest interval between two views.
 const CALM: Duration = Duration::from_millis(33);
-
-/// Channels to the window.
-pub(super) struct Outlets {
-    pub(super) view: Arc<Latest<GripperView>>,
-    pub(super) rows: SyncSender<TraceRow>,
-    pub(super) rows_lost: Arc<AtomicBool>,
-    pub(super) notices: Sender<Notice>,
-    pub(super) wake: Wake,
-}
-
-impl Outlets {
-    fn notify(&self, notice: Notice) {
-        // The window may be closed.
-        let _sent = self.notices.send(notice);
-        (self.wake)();
-    }
-}
 
 /// Open connection to a board.
 struct Connection {
@@ -77,12 +60,11 @@ struct Connection {
 
 /// State of the thread.
 pub(super) struct GripperSession {
-    outlets: Outlets,
+    publisher: Publisher<GripperView>,
     listen: Listen,
-    path: PathBuf,
-    store: Option<Store>,
+    store: OwnStore,
     scene: Scene,
-    listener: Option<Listener>,
+    recognition: Option<LiveRecognition>,
     model: Option<String>,
     grasps: u32,
     ports: Vec<PortInfo>,
@@ -118,27 +100,20 @@ pub(super) struct GripperSession {
 }
 
 impl GripperSession {
-    pub(super) fn new(setup: GripperSetup, outlets: Outlets) -> Self {
+    pub(super) fn new(setup: GripperSetup, publisher: Publisher<GripperView>) -> Self {
         let GripperSetup { scene, store, model, grasps, listen, wake: _ } = setup;
         let (sender, recorded) = channel();
         let recorder = Recorder::start(store.clone(), move |notice| {
             // The thread may have ended; the trial is safe.
             let _sent = sender.send(notice);
         });
-        let recorder = match recorder {
-            Ok(recorder) => Some(recorder),
-            Err(error) => {
-                outlets.notify(Notice::Failed(format!("trials cannot be stored: {error}")));
-                None
-            }
-        };
+        let recorder = publisher.or_notice("trials cannot be stored", recorder);
         let mut session = Self {
-            outlets,
+            publisher,
             listen,
-            path: store,
-            store: None,
+            store: OwnStore::new(store),
             scene,
-            listener: None,
+            recognition: None,
             model: None,
             grasps,
             ports: Vec::new(),
@@ -169,34 +144,11 @@ impl GripperSession {
         session
     }
 
-    /// Runs until [`GripperCommand::Quit`].
-    pub(super) fn run(mut self, inbox: &Receiver<GripperCommand>) {
+    /// Runs until the window is closed.
+    pub(super) fn run(mut self, inbox: &Inbox<GripperCommand>) {
         self.publish();
-        loop {
-            let command = match &self.connection {
-                Some(_) => match inbox.try_recv() {
-                    Ok(command) => Some(command),
-                    Err(TryRecvError::Empty) => None,
-                    Err(TryRecvError::Disconnected) => break,
-                },
-                None if self.retried.is_some() => match inbox.recv_timeout(RETRY) {
-                    Ok(command) => Some(command),
-                    Err(RecvTimeoutError::Timeout) => None,
-                    Err(RecvTimeoutError::Disconnected) => break,
-                },
-                // The recorder still has to report the end of a trial.
-                None if !self.ending.is_empty() => match inbox.recv_timeout(PATIENCE) {
-                    Ok(command) => Some(command),
-                    Err(RecvTimeoutError::Timeout) => None,
-                    Err(RecvTimeoutError::Disconnected) => break,
-                },
-                None => match inbox.recv() {
-                    Ok(command) => Some(command),
-                    Err(_closed) => break,
-                },
-            };
+        while let Ok(command) = inbox.next(self.patience()) {
             match command {
-                Some(GripperCommand::Quit) => break,
                 Some(command) => {
                     // Observations are internal, not commands of the window.
                     self.handled += u64::from(!matches!(command, GripperCommand::Observe(_)));
@@ -216,6 +168,17 @@ impl GripperSession {
         self.take_recorded();
     }
 
+    /// Time to wait for a command; `None` until one comes.
+    fn patience(&self) -> Option<Duration> {
+        match &self.connection {
+            // The wait is for events of the link.
+            Some(_) => Some(Duration::ZERO),
+            None if self.retried.is_some() => Some(RETRY),
+            // The recorder still has to report the end of a trial.
+            None => (!self.ending.is_empty()).then_some(PATIENCE),
+        }
+    }
+
     fn handle(&mut self, command: GripperCommand) {
         match command {
             GripperCommand::ListPorts => self.ports = list_ports(),
@@ -229,8 +192,8 @@ impl GripperSession {
             GripperCommand::SetScene(scene) => self.scene = *scene,
             GripperCommand::SetModel(model) => self.set_model(model),
             GripperCommand::SetThreshold(threshold) => {
-                if let Some(listener) = &mut self.listener {
-                    listener.set_threshold(threshold);
+                if let Some(recognition) = &mut self.recognition {
+                    recognition.set_threshold(threshold);
                 }
             }
             GripperCommand::AnotherObject => self.start_over(),
@@ -246,7 +209,6 @@ impl GripperSession {
             }
             GripperCommand::Calibrate(command) => self.calibrate(&command),
             GripperCommand::Crosstalk(command) => self.look_for_crosstalk(command),
-            GripperCommand::Quit => {}
         }
     }
 
@@ -257,7 +219,7 @@ impl GripperSession {
                 self.retried = Some(port.map(Path::to_owned));
                 refused.text.push_str("; retrying each second");
             }
-            self.outlets.notify(Notice::Failed(refused.text.clone()));
+            self.publisher.notify(Notice::Failed(refused.text.clone()));
             self.refused = Some(refused);
             self.ports = list_ports();
         }
@@ -334,7 +296,7 @@ impl GripperSession {
             let why =
                 self.connection.as_ref().map(|c| c.gripper.stream().status().state.sentence()).unwrap_or_default();
             self.disconnect(&why);
-            self.outlets.notify(Notice::Warning(why.clone()));
+            self.publisher.notify(Notice::Warning(why.clone()));
             self.refused = Some(why.into());
             self.publish();
         } else if self.published.elapsed() >= CALM || self.connection.is_none() {
@@ -404,12 +366,9 @@ impl GripperSession {
     fn plot(&self, rows: Vec<Row>) {
         let (grasp, from_s) = self.stretch;
         let rolling = self.recording.is_none();
-        let answer = self.listener.as_ref().and_then(Listener::view);
+        let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
         for row in rows {
-            let row = TraceRow::placed(row, grasp, from_s, rolling, answer.clone());
-            if let Err(TrySendError::Full(_)) = self.outlets.rows.try_send(row) {
-                self.outlets.rows_lost.store(true, Ordering::Relaxed);
-            }
+            self.publisher.row(TraceRow::placed(row, grasp, from_s, rolling, answer.clone()));
         }
     }
 
@@ -434,7 +393,7 @@ impl GripperSession {
         };
         let trial =
             self.recording.as_ref().zip(connection).map(|(recording, c)| self.trial_view(recording, c.gripper.now_s()));
-        self.outlets.view.publish(Arc::new(GripperView {
+        self.publisher.publish(GripperView {
             revision: self.revision,
             handled: self.handled,
             link,
@@ -448,21 +407,12 @@ impl GripperSession {
             watching: self.watching.clone(),
             ended: self.ended.clone(),
             grasp: self.stretch.0,
-            identification: self.listener.as_ref().and_then(Listener::view),
-            recognition_off: self.listener.as_ref().and_then(Listener::why_off),
+            identification: self.recognition.as_ref().and_then(LiveRecognition::view),
+            recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
             model: self.model.clone(),
             calibration: Some(Arc::new(calibration)),
             crosstalk: Some(Arc::new(crosstalk)),
             console: connection.map(|c| c.gripper.stream().console()).unwrap_or_default().into(),
-        }));
-        (self.outlets.wake)();
-    }
-}
-
-/// The store, opened when it is first needed.
-fn open<'a>(store: &'a mut Option<Store>, path: &Path) -> Result<&'a mut Store, StoreError> {
-    match store {
-        Some(store) => Ok(store),
-        empty @ None => Ok(empty.insert(Store::open(path)?)),
+        });
     }
 }

@@ -3,8 +3,7 @@
 use super::*;
 use crate::grasping::GraspStage;
 use crate::labelling::Disagreement;
-use crate::workers::{EndedTrial, LabelError, TrialView};
-use palpate_store::ExportError;
+use crate::workers::{EndedTrial, TrialView};
 use palpate_store::labels::LabelPlan;
 use std::sync::Arc;
 
@@ -255,25 +254,4 @@ fn a_prediction_is_hidden_until_the_label_is_given() {
     assert!(!session.hides_prediction(&now(&idle, &labelled)));
     assert!(!session.hides_prediction(&SessionContext { blind: false, ..now(&during, &labelled) }));
     assert!(!session.hides_prediction(&SessionContext { labelling: false, ..now(&during, &labelled) }));
-}
-
-#[test]
-fn outcomes_are_reported_once() {
-    let mut session = LabellingSession::default();
-    let failure = Arc::new(LabelError::from(ExportError::Nothing));
-    let text = |text: &str| text.to_owned();
-    let outcomes = vec![
-        (1, LabelOutcome::Warning(text("updated"))),
-        (2, LabelOutcome::Done(text("done"))),
-        (3, LabelOutcome::Failed(Arc::clone(&failure))),
-    ];
-    let (gripper, labels) = (GripperView::default(), LabelView { outcomes, ..LabelView::default() });
-    let effects = session.observe(&now(&gripper, &labels));
-    let expected = [
-        LabellingEffect::Warn(text("updated")),
-        LabellingEffect::Inform(text("done")),
-        LabellingEffect::Fail(failure.to_string()),
-    ];
-    assert_eq!(effects, expected);
-    assert!(session.observe(&now(&gripper, &labels)).is_empty());
 }

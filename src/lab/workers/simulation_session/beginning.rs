@@ -3,7 +3,7 @@
 use super::super::current::Current;
 use super::super::ghost::GhostRequest;
 use super::super::held_object::{LoadedObject, card_of, stamp_of};
-use super::super::listener::Listener;
+use super::super::live_recognition::LiveRecognition;
 use super::super::messages::Notice;
 use super::super::pace::Pace;
 use super::super::refined_run::RefinedRun;
@@ -16,7 +16,6 @@ use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 impl Session {
     /// Begins with the scene that was asked for or, where that cannot be had, with an empty hand.
@@ -33,8 +32,8 @@ impl Session {
     pub(super) fn begin_round(&mut self) {
         self.status.grasp_of_round = 0;
         self.choose_model();
-        if let Some(listener) = &mut self.listener {
-            listener.start_over();
+        if let Some(recognition) = &mut self.recognition {
+            recognition.start_over();
         }
         self.begin_grasp();
     }
@@ -42,13 +41,14 @@ impl Session {
     /// The model of such grasps listens.
     fn choose_model(&mut self) {
         let model = self.models.of(Shipped::simulated(self.nominal.holds_object()));
-        let listens = |model: &Arc<Model>| self.listener.as_ref().is_some_and(|listener| listener.follows(model));
+        let listens =
+            |model: &Arc<Model>| self.recognition.as_ref().is_some_and(|recognition| recognition.follows(model));
         if model.is_some_and(listens) {
             return;
         }
-        self.listener = model.map(|model| Listener::new(Arc::clone(model), self.status.grasps));
-        if let (Some(listener), Some(threshold)) = (&mut self.listener, self.threshold) {
-            listener.set_threshold(threshold);
+        self.recognition = model.map(|model| LiveRecognition::new(Arc::clone(model), self.status.grasps));
+        if let (Some(recognition), Some(threshold)) = (&mut self.recognition, self.threshold) {
+            recognition.set_threshold(threshold);
         }
     }
 
@@ -57,7 +57,7 @@ impl Session {
         self.next_grasp_at = None;
         if let Err(cause) = self.load_object(&self.nominal.clone()) {
             // The file has changed for the worse since; the object as it was will do.
-            self.outlets.notify(Notice::Failed(cause.to_string()));
+            self.publisher.notify(Notice::Failed(cause.to_string()));
         }
         let model = self.object.as_ref().and_then(|object| object.model.clone());
         self.status.finished = false;
@@ -75,7 +75,7 @@ impl Session {
             let released = before.map(|current| current.frame.as_ref());
             let drawn = sampler.draw_after(model.as_deref(), self.poses_drawn, released).0;
             after = before.filter(|_| sampler.is_left(&drawn)).and_then(|current| current.run.header().identity());
-            let last = self.listener.as_ref().and_then(Listener::last);
+            let last = self.recognition.as_ref().and_then(LiveRecognition::last);
             let guided = before.zip(last).and_then(|(current, last)| {
                 self.advisor.next(&last, [current.scene.as_ref(), &drawn], sampler, model.as_deref())
             });
@@ -84,7 +84,8 @@ impl Session {
         } else {
             (self.nominal.clone(), 0)
         };
-        let more = self.listener.as_ref().map(|listener| listener.channels_on(&scene.gripper)).unwrap_or_default();
+        let more =
+            self.recognition.as_ref().map(|recognition| recognition.channels_on(&scene.gripper)).unwrap_or_default();
         let signals = self.sensors.signals;
         let reader = self.sensors.shown().and_then(|layout| {
             let plotted = layout.channels(&scene.gripper, signals)?.len();
@@ -92,7 +93,7 @@ impl Session {
         });
         let (reader, plotted) = match reader {
             Ok(reader) => reader,
-            Err(error) => return self.outlets.notify(Notice::Failed(error.to_string())),
+            Err(error) => return self.publisher.notify(Notice::Failed(error.to_string())),
         };
         if let Some(accuracy_job) = self.accuracy_job.as_mut().filter(|_| !again) {
             accuracy_job.measure(&scene, model.clone());
@@ -100,20 +101,20 @@ impl Session {
         let mut run = prepare(&scene, model.as_deref(), seed);
         run.set_after(after);
         let mut begun = run.begun();
-        begun.header.earlier = self.listener.as_ref().and_then(Listener::earlier);
+        begun.header.earlier = self.recognition.as_ref().and_then(LiveRecognition::earlier);
         if !again {
             for warning in &begun.header.warnings {
-                self.outlets.notify(Notice::Warning(warning.clone()));
+                self.publisher.notify(Notice::Warning(warning.clone()));
             }
         }
         if let (Some(place), Some(recorder)) = (self.status.recording, &self.recorder) {
             recorder.begin(place, begun.clone());
             self.recorder_busy = true;
         }
-        if let Some(warning) = self.listener.as_mut().and_then(|listener| {
-            listener.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
+        if let Some(warning) = self.recognition.as_mut().and_then(|recognition| {
+            recognition.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
         }) {
-            self.outlets.notify(Notice::Warning(warning));
+            self.publisher.notify(Notice::Warning(warning));
         }
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
@@ -145,12 +146,12 @@ impl Session {
 
     /// The other engine computes the same grasp, where a ghost is wanted.
     pub(super) fn begin_ghost(&mut self) {
-        self.outlets.ghost.stop();
+        self.ghost.stop();
         if let Some(current) = self.current.as_ref().filter(|_| self.ghost_wanted) {
             let object = self.object.as_ref().and_then(|object| object.model.clone());
             let mut scene = Scene::clone(&current.scene);
             scene.solver.engine = scene.solver.engine.other();
-            self.outlets.ghost.start(GhostRequest { grasp: self.grasp, scene, object });
+            self.ghost.start(GhostRequest { grasp: self.grasp, scene, object });
         }
     }
 
@@ -164,9 +165,10 @@ impl Session {
         }
         self.status.loading = Some(source.clone());
         self.publish();
-        self.outlets.loading.store(true, Ordering::Relaxed);
+        // Loading a large file cannot be interrupted; a window that closes does not wait for it.
+        self.publisher.set_detached(true);
         let loaded = scene.load_object();
-        self.outlets.loading.store(false, Ordering::Relaxed);
+        self.publisher.set_detached(false);
         self.status.loading = None;
         self.publish();
         let model = loaded?.map(Arc::new);

@@ -29,8 +29,14 @@ impl Session {
         }
     }
 
-    /// Takes in the result of a check, where there is a new one of the last finished grasp.
-    pub(super) fn take_check(&mut self) {
+    /// Takes in what the jobs have found.
+    pub(super) fn take_results(&mut self) {
+        let measured = self.measured.get();
+        let is_new = measured.as_ref().map(Arc::as_ptr) != self.accuracy.as_ref().map(Arc::as_ptr);
+        if is_new | !self.ghost.take().is_empty() {
+            self.accuracy = measured;
+            self.publish();
+        }
         let settled = self.checker.is_settled();
         // A check that failed leaves the grasp as it is.
         for result in self.checker.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
@@ -83,7 +89,7 @@ impl Session {
             let frame = Some(Arc::new(frame.clone()));
             // The recogniser has answered to the first computation only.
             let row = TraceRow { grasp, rolling: false, t, line_bar, values, errors, frame, answer: None };
-            self.outlets.send(row);
+            self.publisher.row(row);
         }
         if let Some(frame) = trial.frames().last() {
             current.frame = Arc::new(frame.clone());

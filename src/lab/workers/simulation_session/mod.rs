@@ -6,16 +6,17 @@ mod checks;
 use super::accuracy_job::AccuracyJob;
 use super::check_job::{CheckRequest, CheckResult, Subject, check_job};
 use super::current::Current;
-use super::ghost::{GhostGrasp, GhostRequest};
+use super::ghost::{GhostRequest, ghost_job};
 use super::held_object::LoadedObject;
 use super::job::Job;
 use super::latest::Latest;
-use super::listener::Listener;
+use super::live_recognition::LiveRecognition;
 use super::messages::{
-    Command, FinishedGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot, Status, TraceRow,
-    Wake,
+    Command, FinishedGrasp, GhostGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
+    Status, TraceRow,
 };
 use super::pace::Pace;
+use super::worker::{Inbox, Publisher, WorkerEnds};
 use crate::datasets::SensorView;
 use crate::grasping::{Advisor, EndState, FrameReader, GraspSummary};
 use crate::recording::{Recorder, RecorderNotice};
@@ -25,57 +26,30 @@ use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
 /// Pause between two grasps of a round at speed one or slower; played faster, it is shorter too.
 const BETWEEN_GRASPS: Duration = Duration::from_millis(600);
 /// Longest time spent stepping before something is published.
 const BUDGET: Duration = Duration::from_millis(12);
-/// Pause between two looks at a check that is running.
-const CHECK_AGAIN: Duration = Duration::from_millis(20);
 /// Being later than this counts as unable to keep up: the clock is set anew instead of being chased.
 const LATEST: f64 = 0.25;
 
-/// Channels to the window.
-pub(super) struct Outlets {
-    pub(super) snapshots: Arc<Latest<Snapshot>>,
-    pub(super) accuracy: Arc<Latest<MeasuredAccuracy>>,
-    pub(super) rows: SyncSender<TraceRow>,
-    pub(super) rows_lost: Arc<AtomicBool>,
-    pub(super) loading: Arc<AtomicBool>,
-    pub(super) notices: Sender<Notice>,
-    pub(super) ghost: Arc<Job<GhostRequest, GhostGrasp>>,
-    pub(super) wake: Wake,
-}
-
-impl Outlets {
-    /// Sends a row, or notes that one was lost where the window takes none.
-    fn send(&self, row: TraceRow) {
-        if let Err(TrySendError::Full(_)) = self.rows.try_send(row) {
-            self.rows_lost.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn notify(&self, notice: Notice) {
-        // The window may be closed.
-        let _sent = self.notices.send(notice);
-        (self.wake)();
-    }
-}
-
 /// State of the thread.
 pub(super) struct Session {
-    outlets: Outlets,
+    publisher: Publisher<Snapshot>,
     recorder: Option<Recorder>,
     /// Absent where its thread could not be started.
     accuracy_job: Option<AccuracyJob>,
+    /// Its newest result, and the one that is shown.
+    measured: Arc<Latest<MeasuredAccuracy>>,
+    accuracy: Option<Arc<MeasuredAccuracy>>,
     checker: Job<CheckRequest, CheckResult>,
+    ghost: Job<GhostRequest, GhostGrasp>,
     /// The last finished grasp, where it can be computed again.
     subject: Option<Subject>,
     models: Models,
-    listener: Option<Listener>,
+    recognition: Option<LiveRecognition>,
     /// Probability from which a class counts as certain, in place of the model's own.
     threshold: Option<f64>,
     /// The first grasp of each object has a random pose too.
@@ -108,11 +82,11 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Runs until [`Command::Quit`].
-    pub(super) fn run(setup: SimWorkerSetup, outlets: Outlets, inbox: &Receiver<Command>) {
-        let recorder_outlets = (outlets.notices.clone(), Arc::clone(&outlets.wake));
+    /// Runs until the window is closed.
+    pub(super) fn run(setup: SimWorkerSetup, publisher: Publisher<Snapshot>, inbox: &Inbox<Command>) {
+        let notifier = publisher.notifier.clone();
         let recorder = Recorder::start(setup.store, move |notice| {
-            let notice = match notice {
+            notifier.notify(match notice {
                 RecorderNotice::Stored(id) => Notice::Stored(id),
                 RecorderNotice::Known(id) => Notice::Known(id),
                 RecorderNotice::Kept(id) => Notice::Kept(id),
@@ -121,27 +95,22 @@ impl Session {
                 RecorderNotice::Failed(text) => Notice::Failed(text),
                 // Only the real gripper's trials say so.
                 RecorderNotice::Begun(_) | RecorderNotice::Recorded(_) | RecorderNotice::Discarded(_) => return,
-            };
-            let _sent = recorder_outlets.0.send(notice);
-            (recorder_outlets.1)();
+            });
         });
-        let recorder = match recorder {
-            Ok(recorder) => Some(recorder),
-            Err(error) => {
-                outlets.notify(Notice::Failed(format!("trials cannot be stored: {error}")));
-                None
-            }
-        };
-        let accuracy_job = AccuracyJob::start(Arc::clone(&outlets.accuracy), Arc::clone(&outlets.wake)).ok();
-        let checker = check_job(Arc::clone(&outlets.wake));
+        let recorder = publisher.or_notice("trials cannot be stored", recorder);
+        let measured = Arc::new(Latest::default());
+        let accuracy_job = AccuracyJob::start(Arc::clone(&measured), inbox.waker()).ok();
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
             accuracy_job,
-            checker,
+            measured,
+            accuracy: None,
+            checker: check_job(inbox.waker()),
+            ghost: ghost_job(inbox.waker()),
             subject: None,
             models: setup.models,
-            listener: None,
+            recognition: None,
             threshold: None,
             first_drawn: false,
             sensors: setup.sensors,
@@ -169,46 +138,30 @@ impl Session {
             recorder_busy: false,
             ghost_wanted: false,
             advisor: Advisor::default(),
-            outlets,
+            publisher,
         };
         session.begin_somehow();
-        while session.wait_and_handle(inbox) {
+        while session.wait_and_handle(inbox).is_ok() {
             session.advance();
         }
         session.drop_recording();
     }
 
-    /// Waits until something is due or a command comes; false at the end.
-    fn wait_and_handle(&mut self, inbox: &Receiver<Command>) -> bool {
-        let first = match self.time_to_wait() {
-            Some(wait) => match inbox.recv_timeout(wait) {
-                Ok(command) => Some(command),
-                Err(RecvTimeoutError::Timeout) => None,
-                Err(RecvTimeoutError::Disconnected) => return false,
-            },
-            None => match inbox.recv() {
-                Ok(command) => Some(command),
-                Err(_closed) => return false,
-            },
-        };
-        let waiting: Vec<Command> = first.into_iter().chain(inbox.try_iter()).collect();
+    /// Waits until something is due or a command comes; an error at the end.
+    fn wait_and_handle(&mut self, inbox: &Inbox<Command>) -> Result<(), WorkerEnds> {
+        let (mut waiting, mut next) = (Vec::new(), inbox.next(self.time_to_grasp()));
+        while let Ok(Some(command)) = next {
+            waiting.push(command);
+            next = inbox.next(Some(Duration::ZERO));
+        }
         // Of several scenes in a row only the last matters: sliders send many.
-        let last_scene = waiting.iter().rposition(|c| matches!(c, Command::SetScene(_)));
+        let last_scene = waiting.iter().rposition(|command| matches!(command, Command::SetScene(_)));
         for (k, command) in waiting.into_iter().enumerate() {
-            match command {
-                Command::Quit => return false,
-                Command::SetScene(_) if Some(k) != last_scene => {}
-                other => self.handle(other),
+            if last_scene == Some(k) || !matches!(command, Command::SetScene(_)) {
+                self.handle(command);
             }
         }
-        true
-    }
-
-    /// Time until something is due; `None` until the next command.
-    fn time_to_wait(&self) -> Option<Duration> {
-        let due = self.time_to_grasp();
-        let busy = self.status.checking.map(|_| CHECK_AGAIN);
-        due.into_iter().chain(busy).min()
+        next.map(|_nothing| ())
     }
 
     /// Time until the simulation goes on; `None` while it is paused.
@@ -261,15 +214,15 @@ impl Session {
             }
             Command::SetGrasps(grasps) => {
                 self.status.grasps = grasps.max(1);
-                if let Some(listener) = &mut self.listener {
-                    listener.set_most_grasps(self.status.grasps);
+                if let Some(recognition) = &mut self.recognition {
+                    recognition.set_most_grasps(self.status.grasps);
                 }
                 self.reconsider();
             }
             Command::SetThreshold(threshold) => {
                 self.threshold = Some(threshold);
-                if let Some(listener) = &mut self.listener {
-                    listener.set_threshold(threshold);
+                if let Some(recognition) = &mut self.recognition {
+                    recognition.set_threshold(threshold);
                 }
                 self.reconsider();
             }
@@ -312,7 +265,6 @@ impl Session {
                 self.ghost_wanted = wanted;
                 self.begin_ghost();
             }
-            Command::Quit => {}
         }
         self.publish();
     }
@@ -331,8 +283,8 @@ impl Session {
         self.last = None;
         self.begin_check(None);
         self.scene_since = self.grasp + 1;
-        if let Some(listener) = &mut self.listener {
-            listener.another_scene();
+        if let Some(recognition) = &mut self.recognition {
+            recognition.another_scene();
         }
         self.sampler = None;
         self.own_pose_done = self.first_drawn;
@@ -346,12 +298,12 @@ impl Session {
 
     fn refuse(&self, refused: Scene, cause: &ObjectError) {
         let refusal = Refusal { refused, kept: self.nominal.clone(), cause: cause.to_string() };
-        self.outlets.notify(Notice::SceneRefused(Box::new(refusal)));
+        self.publisher.notify(Notice::SceneRefused(Box::new(refusal)));
     }
 
     /// Takes all samples that are due, within the budget.
     fn advance(&mut self) {
-        self.take_check();
+        self.take_results();
         if !self.status.playing {
             return;
         }
@@ -397,8 +349,8 @@ impl Session {
         }
         let read = current.reader.sensors().read(&frame);
         let row = FrameReader::row_of(&frame, &read);
-        if let Some(listener) = &mut self.listener {
-            listener.push(row.t_s, &row);
+        if let Some(recognition) = &mut self.recognition {
+            recognition.push(row.t_s, &row);
         }
         let plotted = self.channels.len();
         let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
@@ -413,9 +365,9 @@ impl Session {
             values: row.values[..plotted].into(),
             errors,
             frame: Some(frame),
-            answer: self.listener.as_ref().and_then(Listener::view),
+            answer: self.recognition.as_ref().and_then(LiveRecognition::view),
         };
-        self.outlets.send(row);
+        self.publisher.row(row);
     }
 
     fn end_grasp(&mut self) {
@@ -423,7 +375,7 @@ impl Session {
         current.ended = true;
         let trial = current.run.finish(&current.scene);
         for warning in trial.header.warnings.iter().skip(current.warned) {
-            self.outlets.notify(Notice::Warning(warning.clone()));
+            self.publisher.notify(Notice::Warning(warning.clone()));
         }
         let recorded = self.recorder_busy;
         if recorded && let Some(recorder) = &self.recorder {
@@ -445,8 +397,8 @@ impl Session {
         self.begin_check(Some(subject).filter(|_| repeatable));
         self.status.actual_speed = 0.0;
         if trial.data.quality.finite {
-            if let Some(listener) = &mut self.listener {
-                listener.end_grasp();
+            if let Some(recognition) = &mut self.recognition {
+                recognition.end_grasp();
             }
             let pause = BETWEEN_GRASPS.div_f64(self.status.target_speed.max(1.0));
             self.next_grasp_at = Some(Instant::now() + pause);
@@ -459,7 +411,7 @@ impl Session {
 
     /// Between two grasps: is another one needed?
     fn reconsider(&mut self) {
-        let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
+        let decided = self.recognition.as_ref().is_some_and(|recognition| recognition.decision().is_some());
         if self.next_grasp_at.is_some() && (decided || self.status.grasp_of_round >= self.status.grasps) {
             self.end_round();
         }
@@ -467,7 +419,7 @@ impl Session {
 
     /// Continues a round that has ended, where a raised threshold asks for it.
     fn grasp_once_more(&mut self) {
-        if self.status.finished && self.listener.as_mut().is_some_and(Listener::go_on) {
+        if self.status.finished && self.recognition.as_mut().is_some_and(LiveRecognition::go_on) {
             self.status.playing = true;
             self.begin_grasp();
         }
@@ -490,9 +442,9 @@ impl Session {
     }
 
     fn publish(&mut self) {
-        let Some(current) = &self.current else { return (self.outlets.wake)() };
+        let Some(current) = &self.current else { return self.publisher.wake() };
         self.revision += 1;
-        self.outlets.snapshots.publish(Arc::new(Snapshot {
+        self.publisher.publish(Snapshot {
             revision: self.revision,
             grasp: self.grasp,
             scene_since: self.scene_since,
@@ -504,9 +456,10 @@ impl Session {
             frame: Arc::clone(&current.frame),
             status: self.status.clone(),
             last: self.last.clone(),
-            identification: self.listener.as_ref().and_then(Listener::view),
-            recognition_off: self.listener.as_ref().and_then(Listener::why_off),
-        }));
-        (self.outlets.wake)();
+            identification: self.recognition.as_ref().and_then(LiveRecognition::view),
+            recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
+            accuracy: self.accuracy.clone(),
+            ghost: self.ghost.outcome(),
+        });
     }
 }

@@ -1,6 +1,6 @@
 //! Adapting to the gripper by a close of its empty hand: a trial is recorded, and its readings become calibrations.
 
-use super::{GripperSession, open};
+use super::GripperSession;
 use crate::grasping::{AdaptError, Adaptation, AdaptedSensor};
 use crate::recording::TrialRequest;
 use crate::workers::Notice;
@@ -23,7 +23,7 @@ impl GripperSession {
             return;
         }
         let scene = self.scene.clone();
-        let adapted = open(&mut self.store, &self.path).map_err(AdaptError::from).and_then(|store: &mut Store| {
+        let adapted = self.store.open().map_err(AdaptError::from).and_then(|store: &mut Store| {
             let adaptation = Adaptation::from_close(store, id, &scene, [None; 2], false)?;
             adaptation.keep(store)?;
             Ok(adaptation)
@@ -31,10 +31,10 @@ impl GripperSession {
         match adapted {
             Ok(adaptation) => {
                 self.read_calibrations();
-                adaptation.warnings.iter().for_each(|text| self.outlets.notify(Notice::Warning(text.clone())));
-                self.outlets.notify(notice_of(&adaptation));
+                adaptation.warnings.iter().for_each(|text| self.publisher.notify(Notice::Warning(text.clone())));
+                self.publisher.notify(notice_of(&adaptation));
             }
-            Err(cause) => self.outlets.notify(Notice::Failed(format!("not adapted: {cause}"))),
+            Err(cause) => self.publisher.notify(Notice::Failed(format!("not adapted: {cause}"))),
         }
     }
 }

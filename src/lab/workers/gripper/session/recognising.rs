@@ -3,7 +3,7 @@
 use super::GripperSession;
 use crate::grasping::Row;
 use crate::workers::Notice;
-use crate::workers::listener::Listener;
+use crate::workers::live_recognition::LiveRecognition;
 use palpate_learn::Model;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
@@ -13,17 +13,17 @@ impl GripperSession {
 
     pub(super) fn set_model(&mut self, model: Option<Arc<Model>>) {
         self.model = model.as_ref().map(|model| model.card.method.clone());
-        self.listener = model.map(|model| Listener::new(model, self.grasps));
+        self.recognition = model.map(|model| LiveRecognition::new(model, self.grasps));
     }
 
     pub(super) fn start_over(&mut self) {
-        if let Some(listener) = &mut self.listener {
-            listener.start_over();
+        if let Some(recognition) = &mut self.recognition {
+            recognition.start_over();
         }
     }
 
     pub(super) fn begin_recognition(&mut self) {
-        let (Some(listener), Some(connection)) = (&mut self.listener, &self.connection) else { return };
+        let (Some(recognition), Some(connection)) = (&mut self.recognition, &self.connection) else { return };
         // The empty hand that calibrates the sensors.
         if self.adapting {
             return;
@@ -32,17 +32,17 @@ impl GripperSession {
         let calibrated = connection.readout.channels();
         let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
         let columns = columns.map(|(place, channel)| (place, channel.name()));
-        if let Some(warning) = listener.begin_grasp(columns, place) {
-            self.outlets.notify(Notice::Warning(warning));
+        if let Some(warning) = recognition.begin_grasp(columns, place) {
+            self.publisher.notify(Notice::Warning(warning));
         }
     }
 
     /// Passes a row to the model, from the closing on.
     pub(super) fn recognise(&mut self, row: &Row) {
-        let (Some(listener), Some(recording)) = (&mut self.listener, &self.recording) else { return };
+        let (Some(recognition), Some(recording)) = (&mut self.recognition, &self.recording) else { return };
         let since = recording.controller().closing_s().map(|closing_s| row.t_s - closing_s);
         if let Some(t) = since.filter(|t| *t >= 0.0) {
-            listener.push(t, row);
+            recognition.push(t, row);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Sensors of the session: calibrations of the parts, running calibrations, zeros and the crosstalk test.
 
-use super::{Connection, GripperSession, open};
+use super::{Connection, GripperSession};
 use crate::gripper::Gripper;
 use crate::recording::REST_S;
 use crate::workers::Notice;
@@ -22,7 +22,7 @@ impl GripperSession {
     pub(super) fn read_calibrations(&mut self) {
         let Some(connection) = &self.connection else { return };
         let board = connection.board.clone();
-        let read = open(&mut self.store, &self.path).and_then(|store| {
+        let read = self.store.open().and_then(|store| {
             let tare = store.calibrations().tare()?;
             Ok((store.calibrations().serving(None, &[])?, tare.map(|tare| tare.zero)))
         });
@@ -61,7 +61,7 @@ impl GripperSession {
     pub(super) fn tare(&mut self) {
         if self.recording.is_some() {
             let text = "not tared: a trial is running; its zeros are taken before it closes";
-            return self.outlets.notify(Notice::Warning(text.to_owned()));
+            return self.publisher.notify(Notice::Warning(text.to_owned()));
         }
         // The zero is stored for the present calibrations, so they are read first.
         self.read_calibrations();
@@ -78,9 +78,9 @@ impl GripperSession {
             Ok(zero) if zero != Zero::default() => zero,
             Ok(_) => {
                 let text = "not tared: no calibrated sensor has been read yet";
-                return self.outlets.notify(Notice::Warning(text.to_owned()));
+                return self.publisher.notify(Notice::Warning(text.to_owned()));
             }
-            Err(unrest) => return self.outlets.notify(Notice::Warning(format!("not tared: {unrest}"))),
+            Err(unrest) => return self.publisher.notify(Notice::Warning(format!("not tared: {unrest}"))),
         };
         connection.set_zero(zero);
         let far: Vec<String> = connection
@@ -90,15 +90,15 @@ impl GripperSession {
             .filter_map(Drift::remark)
             .collect();
         for text in far {
-            self.outlets.notify(Notice::Warning(text));
+            self.publisher.notify(Notice::Warning(text));
         }
-        let stored = open(&mut self.store, &self.path).and_then(|store| store.calibrations().add_tare(&zero));
+        let stored = self.store.open().and_then(|store| store.calibrations().add_tare(&zero));
         match stored {
             Ok(_) => {
-                self.outlets.notify(Notice::Info("Tared.".to_owned()));
+                self.publisher.notify(Notice::Info("Tared.".to_owned()));
             }
             Err(cause) => {
-                self.outlets
+                self.publisher
                     .notify(Notice::Failed(format!("Tare not saved: it applies until you disconnect: {cause}")));
             }
         }
@@ -111,7 +111,7 @@ impl GripperSession {
             CalibrationCommand::Begin(plan) => self.begin_calibration(plan),
             CalibrationCommand::Stop => self.end_calibration(None),
             CalibrationCommand::Keep => {
-                let kept = match (&self.calibrating, open(&mut self.store, &self.path)) {
+                let kept = match (&self.calibrating, self.store.open()) {
                     (None, _) => return,
                     (Some(calibrating), Ok(store)) => calibrating.keep(store),
                     (Some(_), Err(cause)) => Some(Err(Arc::new(cause).into())),
@@ -123,12 +123,12 @@ impl GripperSession {
             }
             CalibrationCommand::EmptyClose => {
                 let Some(calibrating) = &mut self.calibrating else { return };
-                match open(&mut self.store, &self.path).and_then(|store| store.calibrations().serving(None, &[])) {
+                match self.store.open().and_then(|store| store.calibrations().serving(None, &[])) {
                     Ok(serving) => {
                         calibrating.set_serving(serving.calibrations);
                         calibrating.handle(command);
                     }
-                    Err(cause) => self.outlets.notify(Notice::Warning(cause.to_string())),
+                    Err(cause) => self.publisher.notify(Notice::Warning(cause.to_string())),
                 }
             }
             CalibrationCommand::Take(_) | CalibrationCommand::Skip | CalibrationCommand::Undo => {
@@ -166,7 +166,7 @@ impl GripperSession {
         }
         self.refused = None;
         if let Err(refused) = self.open_stream(port) {
-            self.outlets.notify(Notice::Failed(refused.text.clone()));
+            self.publisher.notify(Notice::Failed(refused.text.clone()));
             self.refused = Some(refused.clone());
             return Err(refused.into());
         }

@@ -6,7 +6,7 @@ use crate::labelling::SegmentEvent;
 use crate::recording::{BoardTrialRecording, RecorderNotice, TrialRequest};
 use crate::workers::Notice;
 use crate::workers::gripper::messages::{EndedTrial, TrialView};
-use crate::workers::listener::Listener;
+use crate::workers::live_recognition::LiveRecognition;
 use palpate_sim::gripper::Phase;
 use palpate_store::labels::cadence_line;
 use palpate_tactile::board::Reading;
@@ -47,15 +47,15 @@ impl GripperSession {
 
     pub(super) fn vent(&mut self) {
         let Some(connection) = &mut self.connection else {
-            return self.outlets.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
+            return self.publisher.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
         let sent = connection.gripper.vent();
         match sent {
-            Err(error) => self.outlets.notify(Notice::Failed(format!("{error}: vent at the control box"))),
-            Ok(()) if connection.board.firmware.is_none() => self.outlets.notify(Notice::Warning(
+            Err(error) => self.publisher.notify(Notice::Failed(format!("{error}: vent at the control box"))),
+            Ok(()) if connection.board.firmware.is_none() => self.publisher.notify(Notice::Warning(
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
-            Ok(()) => self.outlets.notify(Notice::Warning("Vent sent.".to_owned())),
+            Ok(()) => self.publisher.notify(Notice::Warning("Vent sent.".to_owned())),
         }
         if let (Some(_), Some(recorder)) = (&self.recording, &self.recorder) {
             recorder.interrupted("vented by the user");
@@ -85,7 +85,7 @@ impl GripperSession {
     pub(super) fn end_aborted(&mut self) {
         let cause = self.recording.as_ref().and_then(|recording| recording.controller().abort_cause());
         let Some(cause) = cause else { return };
-        self.outlets.notify(Notice::Warning(format!("trial ended and fingers told to vent: {cause}")));
+        self.publisher.notify(Notice::Warning(format!("trial ended and fingers told to vent: {cause}")));
         self.end(false, None);
     }
 
@@ -104,8 +104,8 @@ impl GripperSession {
             }
             Phase::Hold => {}
             Phase::Release => {
-                if let Some(listener) = &mut self.listener {
-                    listener.end_grasp();
+                if let Some(recognition) = &mut self.recognition {
+                    recognition.end_grasp();
                 }
             }
         }
@@ -117,18 +117,18 @@ impl GripperSession {
     pub(super) fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
         self.end(false, None);
         if let Some(occupied) = self.occupied() {
-            return self.outlets.notify(Notice::Warning(format!("trial not started: {occupied}")));
+            return self.publisher.notify(Notice::Warning(format!("trial not started: {occupied}")));
         }
         let Some(connection) = &mut self.connection else {
             let text = "no board is connected: connect the gripper first";
-            return self.outlets.notify(Notice::Warning(text.to_owned()));
+            return self.publisher.notify(Notice::Warning(text.to_owned()));
         };
         if connection.latest.is_none() {
             let text = format!("nothing is recorded yet: {}", connection.gripper.stream().status().state.sentence());
-            return self.outlets.notify(Notice::Warning(text));
+            return self.publisher.notify(Notice::Warning(text));
         }
         let Some(recorder) = &self.recorder else {
-            return self.outlets.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
+            return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
         let recording = BoardTrialRecording::begin(
@@ -143,7 +143,7 @@ impl GripperSession {
         self.recording = Some(recording);
         self.recording_id = None;
         self.begun += 1;
-        let decided = self.listener.as_ref().is_some_and(|listener| listener.decision().is_some());
+        let decided = self.recognition.as_ref().is_some_and(|recognition| recognition.decision().is_some());
         if !adds || decided {
             self.start_over();
         }
@@ -157,7 +157,7 @@ impl GripperSession {
                 RecorderNotice::Recorded(trial) => {
                     let Some((request, discarded)) = self.ending.pop_front() else { continue };
                     if !discarded {
-                        self.outlets.notify(Notice::Stored(trial.id));
+                        self.publisher.notify(Notice::Stored(trial.id));
                     }
                     self.adapt_to(trial.id, discarded);
                     let cadence = cadence_line(&trial.about.course.cadence);
@@ -165,7 +165,7 @@ impl GripperSession {
                     self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
                     self.publish();
                 }
-                RecorderNotice::Warning(text) => self.outlets.notify(Notice::Warning(text)),
+                RecorderNotice::Warning(text) => self.publisher.notify(Notice::Warning(text)),
                 RecorderNotice::Failed(cause) => self.stop_recording(&cause),
                 RecorderNotice::Stored(_)
                 | RecorderNotice::Known(_)
@@ -180,16 +180,16 @@ impl GripperSession {
     fn stop_recording(&mut self, cause: &str) {
         self.adapting = false;
         if self.ending.pop_front().is_some() {
-            return self.outlets.notify(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
+            return self.publisher.notify(Notice::Failed(format!("the end of the trial was not stored: {cause}")));
         }
         let driven = self.recording.take().is_some_and(|recording| recording.is_driven());
         let vented = self.connection.as_mut().filter(|_| driven).map(|connection| connection.gripper.vent());
         if let Some(Err(error)) = vented {
-            self.outlets.notify(Notice::Failed(format!("{error}; the board vents within a second")));
+            self.publisher.notify(Notice::Failed(format!("{error}; the board vents within a second")));
         }
         self.start_over();
         self.begin_stretch(0.0);
-        self.outlets.notify(Notice::Failed(format!("recording stopped: {cause}")));
+        self.publisher.notify(Notice::Failed(format!("recording stopped: {cause}")));
     }
 
     /// Ends the trial that is recorded, if any. The recorder reports the result.
@@ -200,16 +200,16 @@ impl GripperSession {
         }
         let (Some(connection), Some(recorder)) = (&mut self.connection, &self.recorder) else { return };
         let adds = recording.request().adds;
-        if let Some(listener) = &mut self.listener {
+        if let Some(recognition) = &mut self.recognition {
             if discarded && !adds {
-                listener.start_over();
+                recognition.start_over();
             } else {
-                listener.end_grasp();
+                recognition.end_grasp();
             }
         }
         // A guess that adds to earlier grasps says nothing of this trial alone.
         let alone = !discarded && !adds && recording.controller().closing_s().is_some();
-        let guess = self.listener.as_ref().filter(|_| alone).and_then(Listener::guess);
+        let guess = self.recognition.as_ref().filter(|_| alone).and_then(LiveRecognition::guess);
         let guess = self.model.clone().zip(guess);
         self.ending.push_back((recording.request().clone(), discarded));
         recording.finish(recorder, &mut connection.gripper, discarded, guess);

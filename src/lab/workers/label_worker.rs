@@ -1,18 +1,18 @@
-//! Label service: a thread "label" that owns the store, handles commands and publishes labels, plan and journal. The
+//! Label worker: a thread "label" that owns the store, handles commands and publishes labels, plan and journal. The
 //! window never waits for the disk.
 
-use super::background_job::{BackgroundJob, Outlet};
-use super::messages::Wake;
+use super::job::JobError;
+use super::messages::{Notice, Wake};
+use super::own_store::OwnStore;
+use super::worker::Worker;
 use crate::labelling::{Disagreement, disagreements};
 use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, PlanError, Progress};
 use palpate_store::{ExportError, Exported, JournalEntry, LabelRevision, Store, StoreError, export_labelled};
 use palpate_tactile::trial::TrialId;
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Duration;
 
-/// Command to the label service.
+/// Command to the label worker.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LabelCommand {
     /// Read the store again.
@@ -41,28 +41,6 @@ pub enum LabelCommand {
     Export(PathBuf),
 }
 
-/// Error of a label command.
-#[derive(Debug, thiserror::Error)]
-pub enum LabelError {
-    /// The store failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The export failed.
-    #[error(transparent)]
-    Export(#[from] ExportError),
-}
-
-/// Outcome of a label command, for a notice.
-#[derive(Clone, Debug)]
-pub enum LabelOutcome {
-    /// It is done, in a sentence.
-    Done(String),
-    /// Warning from opening the store.
-    Warning(String),
-    /// It failed.
-    Failed(Arc<LabelError>),
-}
-
 /// Contents of the store, for display.
 #[derive(Clone, Debug, Default)]
 pub struct LabelView {
@@ -76,8 +54,6 @@ pub struct LabelView {
     pub disagreements: Vec<Disagreement>,
     /// Last changes, newest first.
     pub journal: Vec<JournalEntry>,
-    /// Outcomes of commands, oldest first, numbered.
-    pub outcomes: Vec<(u64, LabelOutcome)>,
 }
 
 impl LabelView {
@@ -96,72 +72,52 @@ impl LabelView {
 pub(super) const GLANCE: Duration = Duration::from_millis(250);
 /// Number of journal entries shown.
 const ENTRIES: usize = 60;
-/// Outcomes kept for a slow window.
-const OUTCOMES: usize = 16;
+/// Handle of the thread.
+pub type LabelWorker = Worker<LabelCommand, LabelView>;
 
-/// The handle.
-pub type Labeller = BackgroundJob<LabelCommand, LabelView>;
-
-/// Starts the thread on a store, which is opened when it is first needed.
-pub fn start_labeller(path: PathBuf, wake: Wake) -> std::io::Result<Labeller> {
-    let mut service = LabelService { path, store: None, seen: None, outcomes: VecDeque::new(), number: 0 };
-    BackgroundJob::spawn_idling("label", wake, move |command, _stop, outlet: &Outlet<LabelView>| {
-        match command.map(|command| service.handle(&command)) {
-            None if !service.has_changed() => return Some(GLANCE),
-            None => {}
-            Some(Ok(text)) => text.into_iter().for_each(|text| service.report(LabelOutcome::Done(text))),
-            Some(Err(cause)) => service.report(LabelOutcome::Failed(Arc::new(cause))),
-        }
-        let view = service.view().unwrap_or_else(|cause| {
-            service.report(LabelOutcome::Failed(Arc::new(cause.into())));
-            LabelView { outcomes: service.outcomes.iter().cloned().collect(), ..LabelView::default() }
-        });
-        outlet.publish(view);
-        Some(GLANCE)
-    })
+impl LabelWorker {
+    /// Starts the thread on a store, which is opened when it is first needed.
+    pub fn start(path: PathBuf, wake: Wake) -> std::io::Result<Self> {
+        Self::spawn("label", "the label service", wake, move |inbox, publisher| {
+            let mut service = LabelService { store: OwnStore::new(path), seen: None };
+            let mut patience = None;
+            while let Ok(command) = inbox.next(patience) {
+                patience = Some(GLANCE);
+                let mut notices = Vec::new();
+                match command.map(|command| service.handle(&command)) {
+                    None if !service.has_changed() => continue,
+                    None => {}
+                    Some(Ok(text)) => notices.extend(text.map(Notice::Info)),
+                    Some(Err(cause)) => notices.push(Notice::Failed(cause.to_string())),
+                }
+                let view = service.view().unwrap_or_else(|cause| {
+                    notices.push(Notice::Failed(cause.to_string()));
+                    LabelView::default()
+                });
+                publisher.publish_with(view, service.store.warnings.drain(..).map(Notice::Warning).chain(notices));
+            }
+        })
+    }
 }
 
 /// State of the thread.
 struct LabelService {
-    path: PathBuf,
-    store: Option<Store>,
+    store: OwnStore,
     /// What the view shows, as [`palpate_store::LabelRepository::revision`] counts.
     seen: Option<LabelRevision>,
-    outcomes: VecDeque<(u64, LabelOutcome)>,
-    number: u64,
 }
 
 impl LabelService {
-    fn store(&mut self) -> Result<&mut Store, StoreError> {
-        let store = match self.store.take() {
-            Some(store) => store,
-            None => {
-                let store = Store::open(&self.path)?;
-                store.warnings().iter().for_each(|warning| self.report(LabelOutcome::Warning(warning.clone())));
-                store
-            }
-        };
-        Ok(self.store.insert(store))
-    }
-
-    fn report(&mut self, outcome: LabelOutcome) {
-        self.number += 1;
-        self.outcomes.push_back((self.number, outcome));
-        if self.outcomes.len() > OUTCOMES {
-            self.outcomes.pop_front();
-        }
-    }
-
     /// True when another program or thread has changed what the view shows.
     fn has_changed(&mut self) -> bool {
-        let revision = self.store.as_ref().map(|store| store.labels().revision());
+        let revision = self.store.opened().map(|store| store.labels().revision());
         // A store that cannot be read just now can be read at the next glance.
         revision.and_then(Result::ok).is_some_and(|revision| self.seen.as_ref() != Some(&revision))
     }
 
     /// Handles a command; returns its outcome where it is worth a notice.
-    fn handle(&mut self, command: &LabelCommand) -> Result<Option<String>, LabelError> {
-        let store = self.store()?;
+    fn handle(&mut self, command: &LabelCommand) -> Result<Option<String>, JobError> {
+        let store = self.store.open()?;
         let undone = |entry: JournalEntry| format!("undone: {}", entry.sentence());
         let redone = |entry: JournalEntry| format!("redone: {}", entry.restored());
         let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
@@ -186,8 +142,7 @@ impl LabelService {
     }
 
     fn view(&mut self) -> Result<LabelView, StoreError> {
-        let outcomes = self.outcomes.iter().cloned().collect();
-        let store = self.store()?;
+        let store = self.store.open()?;
         let seen = store.labels().revision()?;
         let mut trials = store.labels().trials()?;
         let progress = store.labels().plan()?.progress(&trials);
@@ -196,7 +151,7 @@ impl LabelService {
         let next = progress.next(last);
         let journal = store.journal().entries(ENTRIES)?;
         self.seen = Some(seen);
-        Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal, outcomes })
+        Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal })
     }
 }
 
@@ -220,12 +175,19 @@ fn change_plan(
 
 #[cfg(test)]
 mod tests {
-    use super::super::background_job::watch::{until, waker};
+    use super::super::job::watch::{until, waker};
+    use super::super::worker::watch::{shown, told};
     use super::*;
     use palpate_sim::scene::Scene;
     use palpate_store::BoardInfo;
     use palpate_store::labels::shown_title;
     use palpate_tactile::trial::TrialHeader;
+    use std::sync::mpsc::Receiver;
+
+    /// Waits for a notice that meets a condition.
+    fn told_of(labels: &LabelWorker, woken: &Receiver<()>, wanted: impl Fn(&Notice) -> bool) {
+        while !wanted(&told(labels, woken)) {}
+    }
 
     fn recorded(store: &mut Store) -> TrialId {
         let header = TrialHeader::new("", Scene::default());
@@ -241,41 +203,32 @@ mod tests {
         let mut store = Store::open(&path).expect("opens");
         let ids = [recorded(&mut store), recorded(&mut store)];
         let (wake, woken) = waker();
-        let labeller = start_labeller(path, wake).expect("starts");
-        labeller.ask(LabelCommand::Refresh);
-        let first = until(&labeller, &woken, |view| view.trials.len() == 2);
+        let labels = LabelWorker::start(path, wake).expect("starts");
+        labels.send(LabelCommand::Refresh);
+        let first = shown(&labels, &woken, |view| view.trials.len() == 2);
         assert_eq!((first.unlabelled().map(|trial| trial.id), first.progress.done()), (Some(ids[1]), 0));
         let next = first.next.clone().expect("all is to be done").object;
-        labeller.ask(LabelCommand::Label(ids[1], next.clone()));
-        let labelled = until(&labeller, &woken, |view| view.progress.done() == 1);
+        labels.send(LabelCommand::Label(ids[1], next.clone()));
+        let labelled = shown(&labels, &woken, |view| view.progress.done() == 1);
         assert_eq!(labelled.unlabelled().map(|trial| trial.id), Some(ids[0]));
         assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next.clone()), "never twice in a row");
-        labeller.ask(LabelCommand::Discard(ids[0]));
-        until(&labeller, &woken, |view| view.unlabelled().is_none());
+        labels.send(LabelCommand::Discard(ids[0]));
+        shown(&labels, &woken, |view| view.unlabelled().is_none());
         for _ in 0..2 {
-            labeller.ask(LabelCommand::Undo);
+            labels.send(LabelCommand::Undo);
         }
-        labeller.ask(LabelCommand::Redo);
-        let is_done = |view: &LabelView, begin: &str, end: &str| {
-            let is = |outcome: &LabelOutcome| matches!(outcome, LabelOutcome::Done(text) if text.starts_with(begin) && text.ends_with(end));
-            view.outcomes.iter().any(|(_, outcome)| is(outcome))
-        };
-        until(&labeller, &woken, |view| {
-            is_done(view, "redone: ", &format!("label unlabelled -> {}", shown_title(&next)))
-        });
-        labeller.ask(LabelCommand::Undo);
-        let back = until(&labeller, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
-        assert!(is_done(&back, "undone: ", ""));
-        labeller.ask(LabelCommand::Want("mug".to_owned(), 3));
-        until(&labeller, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
-        labeller.ask(LabelCommand::Want("mug".to_owned(), 0));
-        let failures = |view: &LabelView| {
-            view.outcomes.iter().filter(|(_, outcome)| matches!(outcome, LabelOutcome::Failed(_))).count()
-        };
-        until(&labeller, &woken, |view| failures(view) == 1);
-        labeller.ask(LabelCommand::Label(99, "mug".to_owned()));
-        let refused = until(&labeller, &woken, |view| failures(view) == 2);
-        assert!(format!("{:?}", refused.outcomes).contains("99"), "{:?}", refused.outcomes);
+        labels.send(LabelCommand::Redo);
+        let is_done = |begin: &'static str, end: String| move |notice: &Notice| matches!(notice, Notice::Info(text) if text.starts_with(begin) && text.ends_with(&end));
+        told_of(&labels, &woken, is_done("redone: ", format!("label unlabelled -> {}", shown_title(&next))));
+        labels.send(LabelCommand::Undo);
+        shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
+        told_of(&labels, &woken, is_done("undone: ", String::new()));
+        labels.send(LabelCommand::Want("mug".to_owned(), 3));
+        shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
+        labels.send(LabelCommand::Want("mug".to_owned(), 0));
+        told_of(&labels, &woken, |notice| matches!(notice, Notice::Failed(_)));
+        labels.send(LabelCommand::Label(99, "mug".to_owned()));
+        told_of(&labels, &woken, |notice| matches!(notice, Notice::Failed(text) if text.contains("99")));
     }
 
     #[test]
@@ -284,17 +237,17 @@ mod tests {
         let path = folder.path().join("s.sqlite");
         let mut theirs = Store::open(&path).expect("opens");
         let (wake, woken) = waker();
-        let labeller = start_labeller(path, wake).expect("starts");
-        labeller.ask(LabelCommand::Refresh);
-        until(&labeller, &woken, |view| view.trials.is_empty());
+        let labels = LabelWorker::start(path, wake).expect("starts");
+        labels.send(LabelCommand::Refresh);
+        shown(&labels, &woken, |view| view.trials.is_empty());
         let id = recorded(&mut theirs);
-        until(&labeller, &woken, |view| view.unlabelled().is_some_and(|trial| trial.id == id));
+        shown(&labels, &woken, |view| view.unlabelled().is_some_and(|trial| trial.id == id));
         theirs.labels().set_label(id, "mug").expect("labels");
-        let labelled = until(&labeller, &woken, |view| view.unlabelled().is_none());
+        let labelled = shown(&labels, &woken, |view| view.unlabelled().is_none());
         assert_eq!(labelled.journal[0].sentence(), format!("trial {id}: label unlabelled -> mug"));
         theirs.delete(&[id]).expect("discards");
-        until(&labeller, &woken, |view| view.trials.iter().all(|trial| trial.discarded));
+        shown(&labels, &woken, |view| view.trials.iter().all(|trial| trial.discarded));
         theirs.purge().expect("purges");
-        until(&labeller, &woken, |view| view.trials.is_empty());
+        shown(&labels, &woken, |view| view.trials.is_empty());
     }
 }

@@ -1,10 +1,12 @@
-//! Library service: a thread "library" that reads all trials, finds those that match a query, edits and exports them. It
+//! Library worker: a thread "library" that reads all trials, finds those that match a query, edits and exports them. It
 //! notices what other threads and programs change. The window never waits for the disk.
 
-use super::background_job::{BackgroundJob, Outlet};
-use super::labeller::{GLANCE, LabelError, LabelOutcome};
+use super::job::JobError;
+use super::label_worker::GLANCE;
 use super::labelling_session::new_export_folder;
-use super::messages::Wake;
+use super::messages::{Notice, Wake};
+use super::own_store::OwnStore;
+use super::worker::Worker;
 use crate::labelling::stored_sparkline;
 use palpate_store::labels::{Sparkline, TrialEdit};
 use palpate_store::{
@@ -12,13 +14,12 @@ use palpate_store::{
 };
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{SensorLayout, SignalDefinition};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Command to the library service.
+/// Command to the library worker.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LibraryCommand {
     /// Show the trials that match.
@@ -46,8 +47,6 @@ pub struct LibraryView {
     pub days: [String; 2],
     /// Sparklines made so far, of trials in sight.
     pub sparklines: Arc<BTreeMap<TrialId, Sparkline>>,
-    /// Outcomes of commands, oldest first, numbered.
-    pub outcomes: Vec<(u64, LabelOutcome)>,
 }
 
 /// Trials read at a time while the store is opened: a few milliseconds each time.
@@ -56,45 +55,41 @@ const PORTION: usize = 2000;
 const SPARKLINES: usize = 2000;
 /// Sparklines made between two pictures of the window.
 const AT_ONCE: usize = 4;
-/// Outcomes kept for a slow window.
-const OUTCOMES: usize = 16;
 /// Channels of exported simulated trials, as on the command line.
 const EXPORT_LAYOUT: &str = "C1";
 
-/// The handle.
-pub type Librarian = BackgroundJob<LibraryCommand, LibraryView>;
+/// Handle of the thread.
+pub type LibraryWorker = Worker<LibraryCommand, LibraryView>;
 
-/// Starts the thread on a store, which is opened with the first command.
-pub fn start_librarian(path: PathBuf, wake: Wake) -> std::io::Result<Librarian> {
-    let mut service = Service::new(path);
-    BackgroundJob::spawn_idling("library", wake, move |command, stop, outlet| {
-        let told = command.is_some();
-        match service.work(command, stop) {
-            Ok(changed) => {
-                service.trouble = None;
-                if told || changed {
-                    service.publish(outlet);
-                }
-                service.patience()
-            }
-            Err(cause) => {
+impl LibraryWorker {
+    /// Starts the thread on a store, which is opened with the first command.
+    pub fn start(path: PathBuf, wake: Wake) -> std::io::Result<Self> {
+        Self::spawn("library", "the trial library", wake, move |inbox, publisher| {
+            let (mut store, mut service) = (OwnStore::new(path), LibraryService::default());
+            let (mut patience, mut trouble) = (None, None);
+            while let Ok(command) = inbox.next(patience) {
+                let (told, mut notices) = (command.is_some(), Vec::new());
+                let is_ending = || publisher.is_ending();
+                let opened = store.open().map_err(JobError::from);
+                let worked = opened.and_then(|store| service.work(store, command, &mut notices, &is_ending));
+                let cause = worked.as_ref().err().map(ToString::to_string);
                 // Trouble that lasts is reported once.
-                let text = Some(cause.to_string());
-                if told || service.trouble != text {
-                    service.trouble = text;
-                    service.report(LabelOutcome::Failed(Arc::new(cause)));
-                    service.publish(outlet);
+                let is_new = cause.is_some() && (told || cause != trouble);
+                notices.extend(cause.clone().filter(|_| is_new).map(Notice::Failed));
+                trouble = cause;
+                if is_new || worked.is_ok_and(|changed| told || changed) {
+                    let warnings = store.warnings.drain(..).map(Notice::Warning);
+                    publisher.publish_with(service.view.clone(), warnings.chain(notices));
                 }
-                service.store.is_some().then_some(GLANCE)
+                patience = store.opened().map(|_store| if service.is_busy() { Duration::ZERO } else { GLANCE });
             }
-        }
-    })
+        })
+    }
 }
 
 /// State of the thread.
-struct Service {
-    path: PathBuf,
-    store: Option<Store>,
+#[derive(Default)]
+struct LibraryService {
     library: Library,
     /// As [`Store::data_version`] counts.
     version: i64,
@@ -103,68 +98,22 @@ struct Service {
     undrawn: Vec<TrialId>,
     /// Trials that were still being recorded when their sparkline was made.
     growing: Vec<TrialId>,
-    /// Why the last work failed.
-    trouble: Option<String>,
-    outcomes: VecDeque<(u64, LabelOutcome)>,
-    number: u64,
 }
 
-impl Service {
-    fn new(path: PathBuf) -> Self {
-        Self {
-            path,
-            store: None,
-            library: Library::default(),
-            version: 0,
-            view: LibraryView::default(),
-            undrawn: Vec::new(),
-            growing: Vec::new(),
-            trouble: None,
-            outcomes: VecDeque::new(),
-            number: 0,
-        }
-    }
-
-    /// How long to wait for a command: not at all while something is left to do.
-    fn patience(&self) -> Option<Duration> {
-        let busy = self.store.is_some() && (!self.library.is_complete() || !self.undrawn.is_empty());
-        self.store.is_some().then_some(if busy { Duration::ZERO } else { GLANCE })
-    }
-
-    fn report(&mut self, outcome: LabelOutcome) {
-        self.number += 1;
-        self.outcomes.push_back((self.number, outcome));
-        if self.outcomes.len() > OUTCOMES {
-            self.outcomes.pop_front();
-        }
-    }
-
-    fn publish(&mut self, outlet: &Outlet<LibraryView>) {
-        self.view.outcomes = self.outcomes.iter().cloned().collect();
-        outlet.publish(self.view.clone());
+impl LibraryService {
+    /// True while something is left to do.
+    fn is_busy(&self) -> bool {
+        !self.library.is_complete() || !self.undrawn.is_empty()
     }
 
     /// Handles a command, or does what is left to do; true where the view has changed.
-    fn work(&mut self, command: Option<LibraryCommand>, stop: &AtomicBool) -> Result<bool, LabelError> {
-        let store = match self.store.take() {
-            Some(store) => store,
-            None => {
-                let store = Store::open(&self.path)?;
-                store.warnings().iter().for_each(|warning| self.report(LabelOutcome::Warning(warning.clone())));
-                store
-            }
-        };
-        let worked = self.work_on(&store, command, stop);
-        self.store = Some(store);
-        worked
-    }
-
-    fn work_on(
+    fn work(
         &mut self,
         store: &Store,
         command: Option<LibraryCommand>,
-        stop: &AtomicBool,
-    ) -> Result<bool, LabelError> {
+        notices: &mut Vec<Notice>,
+        is_ending: &dyn Fn() -> bool,
+    ) -> Result<bool, JobError> {
         match command {
             Some(LibraryCommand::Find(query)) => {
                 self.view.query = query;
@@ -183,11 +132,11 @@ impl Service {
                 }
                 let undo = if edit == TrialEdit::Discard { "; Ctrl+Z brings them back" } else { "" };
                 let done = format!("{}{undo}", edited?.sentence(&edit));
-                self.report(LabelOutcome::Done(done));
+                notices.push(Notice::Info(done));
             }
             Some(LibraryCommand::Export(ids)) => {
-                let done = self.exported(store, &ids, stop)?;
-                self.report(LabelOutcome::Done(done));
+                let done = self.exported(store, &ids, is_ending)?;
+                notices.push(Notice::Info(done));
             }
             None => {
                 let drawn = self.draw(store);
@@ -243,7 +192,7 @@ impl Service {
         true
     }
 
-    fn exported(&self, store: &Store, ids: &[TrialId], stop: &AtomicBool) -> Result<String, ExportError> {
+    fn exported(&self, store: &Store, ids: &[TrialId], is_ending: &dyn Fn() -> bool) -> Result<String, ExportError> {
         let signals = SignalDefinition::Parts;
         let layout = SensorLayout::named(EXPORT_LAYOUT)?.shown(signals);
         let folder = new_export_folder(store.path());
@@ -251,7 +200,7 @@ impl Service {
         let sound: Vec<TrialId> = ids.iter().filter(is_sound).copied().collect();
         let (mut written, mut damaged) = (0, 0);
         for id in &sound {
-            if stop.load(Ordering::Relaxed) {
+            if is_ending() {
                 break;
             }
             match export_trial(store, *id, &folder, (&layout, signals)) {
@@ -269,7 +218,8 @@ impl Service {
 
 #[cfg(test)]
 mod tests {
-    use super::super::background_job::watch::{until, waker};
+    use super::super::job::watch::waker;
+    use super::super::worker::watch::{shown, told};
     use super::*;
     use palpate_sim::scene::Scene;
     use palpate_store::{BoardInfo, Shown};
@@ -293,15 +243,15 @@ mod tests {
         let id = theirs.begin(&trial)?;
         theirs.append(id, &frames[..60])?;
         let (wake, woken) = waker();
-        let librarian = start_librarian(path, wake)?;
-        librarian.ask(LibraryCommand::Find(TrialQuery::default()));
-        librarian.ask(LibraryCommand::Draw(vec![id]));
-        let begun = until(&librarian, &woken, |view| view.sparklines.contains_key(&id)).sparklines[&id].clone();
+        let library = LibraryWorker::start(path, wake)?;
+        library.send(LibraryCommand::Find(TrialQuery::default()));
+        library.send(LibraryCommand::Draw(vec![id]));
+        let begun = shown(&library, &woken, |view| view.sparklines.contains_key(&id)).sparklines[&id].clone();
         theirs.append(id, &frames[60..])?;
         theirs.finish(id, &trial.data.quality, &trial.header)?;
         let whole = stored_sparkline(&theirs, id)?;
         assert_ne!(begun, whole);
-        until(&librarian, &woken, |view| view.sparklines[&id] == whole);
+        shown(&library, &woken, |view| view.sparklines[&id] == whole);
         Ok(())
     }
 
@@ -316,32 +266,31 @@ mod tests {
         let mut theirs = Store::open(&path).expect("opens");
         let (lemon, mug) = (record(&mut theirs, "lemon"), record(&mut theirs, "mug"));
         let (wake, woken) = waker();
-        let librarian = start_librarian(path, wake).expect("starts");
-        librarian.ask(LibraryCommand::Find(TrialQuery::default()));
-        until(&librarian, &woken, |view| ids(view) == [mug, lemon] && view.complete);
+        let library = LibraryWorker::start(path, wake).expect("starts");
+        library.send(LibraryCommand::Find(TrialQuery::default()));
+        shown(&library, &woken, |view| ids(view) == [mug, lemon] && view.complete);
         let search = |text: &str| LibraryCommand::Find(TrialQuery { search: text.to_owned(), ..TrialQuery::default() });
-        librarian.ask(search("lemon"));
-        until(&librarian, &woken, |view| ids(view) == [lemon]);
+        library.send(search("lemon"));
+        shown(&library, &woken, |view| ids(view) == [lemon]);
         // Another program records and discards: nobody asks.
         let third = record(&mut theirs, "lemon");
-        until(&librarian, &woken, |view| ids(view) == [third, lemon]);
+        shown(&library, &woken, |view| ids(view) == [third, lemon]);
         theirs.delete(&[lemon]).expect("discards");
-        until(&librarian, &woken, |view| ids(view) == [third] && view.counts.discarded == 1);
+        shown(&library, &woken, |view| ids(view) == [third] && view.counts.discarded == 1);
         theirs.journal().undo().expect("brings it back");
-        until(&librarian, &woken, |view| ids(view) == [third, lemon]);
+        shown(&library, &woken, |view| ids(view) == [third, lemon]);
         // Our own edits are there at once, and one undo elsewhere takes both back.
-        librarian.ask(LibraryCommand::Edit(vec![lemon, third], TrialEdit::Tag(vec!["wet".to_owned()])));
+        library.send(LibraryCommand::Edit(vec![lemon, third], TrialEdit::Tag(vec!["wet".to_owned()])));
         let tagged = |view: &LibraryView| view.counts.tags == [("wet".to_owned(), 2)];
-        let view = until(&librarian, &woken, tagged);
-        assert!(matches!(&view.outcomes[..], [(1, LabelOutcome::Done(text))] if text == "2 trials tagged wet"));
+        shown(&library, &woken, tagged);
+        assert_eq!(told(&library, &woken), Notice::Info("2 trials tagged wet".to_owned()));
         theirs.journal().undo().expect("takes both back");
-        until(&librarian, &woken, |view| view.counts.tags.is_empty());
-        librarian.ask(LibraryCommand::Edit(vec![lemon, 99], TrialEdit::Discard));
-        let refused = until(&librarian, &woken, |view| view.outcomes.len() == 2);
-        assert!(matches!(&refused.outcomes[1], (2, LabelOutcome::Failed(cause)) if cause.to_string().contains("99")));
+        shown(&library, &woken, |view| view.counts.tags.is_empty());
+        library.send(LibraryCommand::Edit(vec![lemon, 99], TrialEdit::Discard));
+        assert!(matches!(told(&library, &woken), Notice::Failed(text) if text.contains("99")));
         let discarded = TrialQuery { shown: Shown::Discarded, ..TrialQuery::default() };
-        librarian.ask(LibraryCommand::Find(discarded));
-        until(&librarian, &woken, |view| view.query.shown == Shown::Discarded && view.found.is_empty());
+        library.send(LibraryCommand::Find(discarded));
+        shown(&library, &woken, |view| view.query.shown == Shown::Discarded && view.found.is_empty());
     }
 
     #[test]
@@ -351,17 +300,15 @@ mod tests {
         let kept = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/suite/data/store.sqlite");
         std::fs::copy(kept, &path).expect("copies");
         let (wake, woken) = waker();
-        let librarian = start_librarian(path, wake).expect("starts");
-        librarian.ask(LibraryCommand::Find(TrialQuery::default()));
-        librarian.ask(LibraryCommand::Draw((1..=99).collect()));
+        let library = LibraryWorker::start(path, wake).expect("starts");
+        library.send(LibraryCommand::Find(TrialQuery::default()));
+        library.send(LibraryCommand::Draw((1..=99).collect()));
         // A trial that does not exist or cannot be read has an empty one.
-        let view = until(&librarian, &woken, |view| view.sparklines.len() == 99);
+        let view = shown(&library, &woken, |view| view.sparklines.len() == 99);
         let drawn = |id: TrialId| view.sparklines[&id].iter().all(|finger| finger.iter().any(Option::is_some));
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
-        librarian.ask(LibraryCommand::Export(vec![1, 2, 4]));
-        let view = until(&librarian, &woken, |view| view.outcomes.len() == 1);
-        let done = |text: &str| text.starts_with("3 of 3 trials exported");
-        assert!(matches!(&view.outcomes[0], (1, LabelOutcome::Done(text)) if done(text)), "{:?}", view.outcomes);
+        library.send(LibraryCommand::Export(vec![1, 2, 4]));
+        assert!(matches!(told(&library, &woken), Notice::Info(text) if text.starts_with("3 of 3 trials exported")));
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export").join(name).is_file(), "{name}");
         }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub const THRESHOLDS: RangeInclusive<f64> = 0.5..=0.999;
 
 /// Live recogniser of successive grasps.
-pub(super) struct Listener {
+pub(super) struct LiveRecognition {
     identification: Identification,
     rule: StopRule,
     /// Reason why it is off in this scene.
@@ -23,7 +23,7 @@ pub(super) struct Listener {
     view: Arc<IdentificationView>,
 }
 
-impl Listener {
+impl LiveRecognition {
     /// Stops as the model's card says, but after at most so many grasps.
     pub(super) fn new(model: Arc<Model>, most_grasps: u32) -> Self {
         let rule = StopRule { most_grasps: most_grasps as usize, ..model.card.stop };
