@@ -175,7 +175,7 @@ fn change_plan(
 
 #[cfg(test)]
 mod tests {
-    use super::super::job::watch::{until, waker};
+    use super::super::job::watch::waker;
     use super::super::worker::watch::{shown, told};
     use super::*;
     use palpate_sim::scene::Scene;
