@@ -3,8 +3,8 @@
 //! # Packages, lowest first
 //!
 //! A package uses only those that its row names; the compiler and a test check it. Each package lists its own modules
-//! the same way. `most lines` is its budget of production lines: neither blank, nor comments, nor tests. A test counts
-//! them. A budget is lowered whenever code goes; it is raised only by a commit that gives the reason.
+//! the same way. `most lines` is its budget of production lines: neither blank, nor comments, nor of tests or
+//! examples. A test counts them. A budget is lowered when code goes; it is raised only by a commit that gives the reason.
 //!
 //! | package | folder | holds | uses | most lines |
 //! |---|---|---|---|---|

@@ -174,16 +174,15 @@ fn production_lines(text: &str) -> usize {
     count
 }
 
-/// Production lines of a package, with its macros and without its files of tests.
+/// Production lines of a package, with its macros and without its tests and examples.
 fn lines_of(package: &str) -> usize {
     let (top, mut files) = (root().join(folder(package)), BTreeMap::new());
     gather(&top, &top, skipped(package), &mut files);
-    let is_test = |file: &str| {
-        file.ends_with("_tests.rs")
-            || format!("/{file}").ends_with("/tests.rs")
-            || format!("/{file}").contains("/tests/")
+    let is_other = |file: &str| {
+        let file = format!("/{file}");
+        file.ends_with("_tests.rs") || ["/tests.rs", "/tests/", "/examples/"].iter().any(|part| file.contains(part))
     };
-    files.iter().filter(|(file, _)| !is_test(file)).map(|(_, text)| production_lines(text)).sum()
+    files.iter().filter(|(file, _)| !is_other(file)).map(|(_, text)| production_lines(text)).sum()
 }
 
 #[test]

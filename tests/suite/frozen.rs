@@ -14,7 +14,7 @@ use crate::program::{palpate, ran, run};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{Advisor, RecognisedGrasp};
 use palpate_lab::study::accuracy::{AccuracyPlan, SettingFamily};
-use palpate_lab::study::paper::{Cell, StudyReport};
+use palpate_lab::study::paper::{Agreement, Cell, StudyReport};
 use palpate_lab::study::{Measuring, StoredStudy};
 use palpate_learn::{Pmf, Shipped};
 use palpate_sim::fingerprint;
@@ -28,35 +28,9 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Keys of JSON whose values differ from run to run.
-const UNREPEATABLE: &[&str] = &[
-    "at",
-    "bytes",
-    "cost",
-    "cost_share",
-    "cpu_hours",
-    "cpu_ms",
-    "cpu_ms_least",
-    "cpu_ms_median",
-    "cpu_s",
-    "created",
-    "deleted",
-    "load_cpu_ms",
-    "local",
-    "moved",
-    "offsets",
-    "p50_ms",
-    "p95_ms",
-    "program",
-    "seconds",
-    "step_us",
-    "taken",
-    "threads",
-    "times_real_time",
-    "train_cpu_s",
-    "trial_uid",
-    "uid",
-    "us_per_step",
-];
+const UNREPEATABLE: &str = "at bytes cost cost_share cpu_hours cpu_ms cpu_ms_least cpu_ms_median cpu_s created deleted load_cpu_ms \
+     local moved offsets p50_ms p95_ms program seconds step_us taken threads times_real_time train_cpu_s \
+     trial_uid uid us_per_step";
 /// Beginning of a command line in a frozen text.
 const PROMPT: &str = "$ palpate ";
 /// Stands for the repository in a command line.
@@ -67,10 +41,13 @@ const MOST: usize = 30;
 const LINE: usize = 150;
 
 /// True on machines of the kind that the numbers were frozen on.
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
 fn is_of_the_kind() -> bool {
-    #[cfg(all(target_arch = "x86_64", target_os = "linux"))]
-    return is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("avx512f");
-    #[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("avx512f")
+}
+
+#[cfg(not(all(target_arch = "x86_64", target_os = "linux")))]
+fn is_of_the_kind() -> bool {
     false
 }
 
@@ -116,10 +93,11 @@ fn masked(value: &mut Value) {
     match value {
         Value::Object(fields) => {
             if fields.get("check").is_some_and(|check| check == "modem-manager") {
-                return *value = "# of the machine".into();
+                *value = "# of the machine".into();
+                return;
             }
             for (key, value) in fields.iter_mut().filter(|(_, value)| !value.is_null()) {
-                if UNREPEATABLE.contains(&key.as_str()) { *value = "#".into() } else { masked(value) }
+                if UNREPEATABLE.split(' ').any(|own| own == key) { *value = "#".into() } else { masked(value) }
             }
         }
         Value::Array(values) => values.iter_mut().for_each(masked),
@@ -132,18 +110,18 @@ fn digest(bytes: &[u8]) -> String {
     format!("{:016x}", fingerprint([bytes]))
 }
 
-/// JSON for reading: what fits into a line stands in one. Of lists longer than `most`, the first elements stand, and a
+/// JSON for reading: what fits into a line stands in one. Of long lists, the first elements stand, and a
 /// digest of all.
-fn shown(value: &Value, indent: usize, most: usize, out: &mut String) {
+fn shown(value: &Value, indent: usize, out: &mut String) {
     let (line, pad) = (value.to_string(), " ".repeat(indent + 2));
     match value {
-        Value::Array(values) if values.len() > most || line.len() > LINE => {
-            let stand = if values.len() > most { 3 } else { values.len() };
+        Value::Array(values) if values.len() > MOST || line.len() > LINE => {
+            let stand = if values.len() > MOST { 3 } else { values.len() };
             let between = if values.iter().all(Value::is_number) { " ".to_owned() } else { format!("\n{pad}") };
             out.push('[');
             for value in &values[..stand] {
                 out.push_str(&between);
-                shown(value, indent + 2, most, out);
+                shown(value, indent + 2, out);
             }
             if stand < values.len() {
                 write!(out, "{between}.. {} in all, digest: {}", values.len(), digest(line.as_bytes())).unwrap();
@@ -155,7 +133,7 @@ fn shown(value: &Value, indent: usize, most: usize, out: &mut String) {
             out.push('{');
             for (key, value) in fields {
                 write!(out, "\n{pad}{key:?}: ").unwrap();
-                shown(value, indent + 2, most, out);
+                shown(value, indent + 2, out);
             }
             write!(out, "\n{}}}", &pad[2..]).unwrap();
         }
@@ -167,7 +145,7 @@ fn shown(value: &Value, indent: usize, most: usize, out: &mut String) {
 pub(crate) fn pretty(mut value: Value) -> String {
     let mut text = String::new();
     masked(&mut value);
-    shown(&value, 0, MOST, &mut text);
+    shown(&value, 0, &mut text);
     text + "\n"
 }
 
@@ -251,7 +229,7 @@ impl<'a> Fields<'a> {
 
     /// A whole number of so many bytes.
     fn number(&mut self, bytes: usize) -> usize {
-        self.bytes(bytes).iter().rev().fold(0, |sum, byte| sum << 8 | usize::from(*byte))
+        self.bytes(bytes).iter().rev().fold(0, |sum, byte| (sum << 8) | usize::from(*byte))
     }
 
     fn text(&mut self) -> String {
@@ -422,7 +400,7 @@ fn answers(store: &Store) -> String {
     text
 }
 
-/// A study of the paper for reading, without times.
+/// A study of the paper for reading, without times and numbers of trials.
 pub(crate) fn study(stored: &StoredStudy<StudyReport>) -> String {
     let mut report = stored.clone();
     let mut text = String::new();
@@ -433,11 +411,13 @@ pub(crate) fn study(stored: &StoredStudy<StudyReport>) -> String {
                 table.rows.iter_mut().for_each(|row| row.cells[at] = Cell::text("#"));
             }
         }
+        // Numbers of trials depend on threads: how many there are stands.
+        table.rows.iter_mut().for_each(|row| row.trials = vec![row.trials.len() as TrialId]);
     }
-    let mut value = serde_json::to_value(&report).unwrap();
-    masked(&mut value);
-    shown(&value, 0, usize::MAX, &mut text);
-    format!("\n## {}\n{text}\n", stored.command)
+    for finding in report.result.findings.iter_mut().filter(|finding| finding.found.starts_with("CPU time")) {
+        (finding.found, finding.verdict) = ("#".to_owned(), Agreement::NotMeasured);
+    }
+    format!("\n## {}\n{text}{}", stored.command, pretty(serde_json::to_value(&report).unwrap()))
 }
 
 /// The accuracy study with a setting of each family but the dearest, and trained on the cheapest.
