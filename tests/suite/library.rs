@@ -262,6 +262,7 @@ fn keys_walk_through_the_library_and_open_trials() {
     bench.until_shown(true, "1 selected");
     press(&mut bench, Modifiers::NONE, Key::Enter);
     bench.harness.get_by_label("This trial").click();
+    bench.harness.step();
     bench.until_shown(true, "Phases");
     press(&mut bench, Modifiers::NONE, Key::Delete);
     bench.until_told("1 trial discarded");
