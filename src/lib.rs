@@ -11,7 +11,7 @@
 //! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | | 2450 |
 //! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` | 9500 |
 //! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | frames or counts in, channels out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3100 |
-//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | | 8750 |
+//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | | 8800 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5400 |
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5250 |
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25800 |

@@ -173,12 +173,13 @@ fn edits(bench: &Bench, runs: usize) -> Result<Vec<f64>, Failure> {
     (0..runs)
         .map(|run| {
             let view = bench.library.view().ok_or("no view")?;
-            let from = scattered(run) % (view.found.len() - BULK + 1);
-            let ids: Vec<TrialId> = view.found[from..from + BULK].iter().map(|trial| trial.row.id).collect();
+            let bulk = BULK.min(view.found.len());
+            let from = scattered(run) % (view.found.len() - bulk + 1);
+            let ids: Vec<TrialId> = view.found[from..from + bulk].iter().map(|trial| trial.row.id).collect();
             let tag = format!("bulk{run}");
             let tagged = {
                 let tag = tag.clone();
-                move |view: &LibraryView| view.counts.tags.iter().any(|(name, count)| *name == tag && *count == BULK)
+                move |view: &LibraryView| view.counts.tags.iter().any(|(name, count)| *name == tag && *count == bulk)
             };
             bench.wait(LibraryCommand::Edit(ids, TrialEdit::Tag(vec![tag])), tagged)
         })
