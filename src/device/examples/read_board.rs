@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     println!("{:9.3} s  {}", reading.t_s, counts.collect::<Vec<_>>().join("  "));
                 }
                 DecodedEvent::Gap(gap) => {
-                    println!("nothing from {:.3} s to {:.3} s: {}", gap.from_s, gap.to_s, gap.cause)
+                    println!("nothing from {:.3} s to {:.3} s: {}", gap.from_s, gap.to_s, gap.cause);
                 }
                 DecodedEvent::Reply(_) => {}
             }

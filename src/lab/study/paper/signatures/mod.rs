@@ -324,7 +324,7 @@ fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
         Column("held", "grasps", &|own| own.summary.grasps.into()),
         Column("lost", "grasps", &|own| own.found.lost.into()),
     ];
-    let statistics = statistics.iter().map(|(name, unit, cell)| Column(*name, *unit, cell));
+    let statistics = statistics.iter().map(|(name, unit, cell)| Column(name, unit, cell));
     let columns: Vec<Column<'_, Measured>> = own.into_iter().chain(statistics).collect();
     let title =
         format!("Sentences of section V-A in numbers, preset {}; rates as shares of that before contact", plan.preset);
