@@ -44,6 +44,8 @@ pub(super) fn job_ui<C, O>(
     controls: impl FnOnce(&mut Ui, &mut Actions),
     result: impl FnOnce(&mut Ui, &O, &mut Actions),
 ) {
+    // Read first: a job that ends meanwhile shows its outcome in the next frame, not beside its progress.
+    let last = job.last();
     match job.running() {
         Some(running) => {
             if progress_ui(ui, &running.progress, None, hint) {
@@ -52,7 +54,7 @@ pub(super) fn job_ui<C, O>(
         }
         None => controls(ui, actions),
     }
-    match job.last().map(|ended| ended.outcome) {
+    match last.map(|ended| ended.outcome) {
         Some(Ok(outcome)) => result(ui, &outcome, actions),
         Some(Err(cause)) => failure_ui(ui, cause),
         None => {}

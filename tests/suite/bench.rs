@@ -158,6 +158,8 @@ impl Bench {
 
     /// Draws until something is on the screen, or is there no more.
     pub(crate) fn until_shown(&mut self, shown: bool, text: &str) {
+        // What has just been clicked or told takes effect here.
+        self.harness.step();
         for _ in 0..MOST_WAKES {
             if self.harness.query_all_by_label_contains(text).next().is_some() == shown {
                 return;

@@ -25,6 +25,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
             return crosstalk_running_ui(ui, crosstalk, running, actions);
         }
+        // Read first, as in `job_ui`.
+        let last = doctor.last();
         match doctor.running() {
             Some(running) => {
                 let remark = "Now bend each finger and press each pad.";
@@ -37,7 +39,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         if let Some((crosstalk, ended)) = crosstalk.and_then(|view| Some((view, view.ended.as_ref()?))) {
             crosstalk_ended_ui(ui, crosstalk, ended);
         }
-        match doctor.last().map(|ended| ended.outcome) {
+        match last.map(|ended| ended.outcome) {
             Some(Ok(report)) => examination_ui(ui, context.view.theme, &report),
             Some(Err(cause)) => failure_ui(ui, cause),
             None => {
