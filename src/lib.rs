@@ -34,24 +34,55 @@
 //! | Which grasp comes next? | [`palpate_lab::grasping::Advisor`] |
 //! | Where does a model learn a new object? | [`palpate_lab::grasping::Lessons`] |
 //!
-//! # The tour
+//! # Four roads through the code
 //!
-//! The [`manual`] has a chapter for each topic of `palpate help`, among them [`manual::contributing`]. To understand a
-//! grasp, read in this order:
+//! Read them in order, each from its first row to its last. The [`manual`] has a chapter for each topic of
+//! `palpate help`, among them [`manual::contributing`].
 //!
-//! 1. [`palpate_sim::scene::Scene`]: every setting; [`palpate_sim::objects::load`]: the object.
-//! 2. [`palpate_sim::gripper`]: finger and pad; [`palpate_sim::physics`]: their motion, one file per effect.
-//! 3. [`palpate_lab::gripper::Gripper`]: events out, line pressure in; simulated, serial or replayed.
-//! 4. [`palpate_lab::grasping::GraspController`]: rest, close, hold, release; [`palpate_lab::grasping::grasp`] runs a
-//!    simulated grasp to its end and returns a [`palpate_tactile::trial::Trial`].
-//! 5. [`palpate_tactile::Sensors`]: channels of a frame; [`palpate_tactile::calibration`]: channels of a board's counts.
-//! 6. [`palpate_learn`]: a PMF over classes; [`palpate_lab::grasping::Identification`]: grasps until certain.
-//! 7. [`palpate_lab::recording`]: the recorder thread; [`palpate_store::Store`]: trials on disk;
-//!    [`palpate_lab::labelling`]: flags and segmentation.
-//! 8. [`palpate_lab::picture::Stage`]: scene and frame to a [`palpate_geometry::drawing::DrawList`], which
-//!    [`palpate_render::Renderer`] draws.
-//! 9. [`palpate_lab::workers::SimWorker`] and [`palpate_lab::workers::GripperWorker`]: the threads of the simulated and
-//!    the real gripper; [`app::Workbench`] shows both.
+//! ## From a scene to pixels
+//!
+//! | step | what happens |
+//! |---|---|
+//! | [`palpate_sim::scene::Scene`] | every setting of a grasp; a TOML file |
+//! | [`palpate_sim::objects::load`] | the object: mesh, mass, distance grid |
+//! | [`palpate_sim::gripper`], [`palpate_sim::physics`] | finger and pad, and their motion; one file per effect |
+//! | [`palpate_lab::gripper::Gripper`] | events out, line pressure in: here the simulated one |
+//! | [`palpate_lab::grasping::GraspController`] | rest, close, hold, release; [`palpate_lab::grasping::grasp`] runs them to the end |
+//! | [`palpate_lab::workers::SimWorker`] | the thread that publishes the newest frame |
+//! | [`palpate_lab::picture::Stage`] | scene and frame to a [`palpate_geometry::drawing::DrawList`] |
+//! | [`palpate_render::Renderer`] | the list to pixels, for [`app::Workbench`], files and tests alike |
+//!
+//! ## From a byte to a plot
+//!
+//! | step | what happens |
+//! |---|---|
+//! | [`palpate_device::serial::SerialLink`] | bytes of the port, with the times at which they came |
+//! | [`palpate_device::protocol::Decoder`] | bytes to readings, gaps, replies |
+//! | [`palpate_lab::gripper::SerialGripper`] | the same events as those of the simulated gripper |
+//! | [`palpate_tactile::calibration::Readout`] | counts of a reading to curvature and force |
+//! | [`palpate_lab::grasping::Row`] | one value per channel, for plots and recognisers |
+//! | [`palpate_lab::workers::GripperWorker`] | the thread that publishes rows, which `src/app/traces.rs` keeps and `src/app/plots` draws |
+//!
+//! ## From a trial to a figure
+//!
+//! | step | what happens |
+//! |---|---|
+//! | [`palpate_lab::recording::Recorder`] | frames, or bytes and readings, into the store while the grasp runs |
+//! | [`palpate_store::Store`] | trials on disk; [`palpate_lab::labelling`]: flags, and where a grasp begins and ends |
+//! | [`palpate_tactile::Sensors`] | channels of a frame, derived when the trial is read |
+//! | [`palpate_lab::inspection::OpenTrial`] | a trial opened: channels, phases, answers over time |
+//! | [`palpate_lab::inspection::comparison_figure`] | trials as a figure, which [`palpate_render::figure_svg`] and the window draw |
+//!
+//! ## From a study to a claim
+//!
+//! | step | what happens |
+//! |---|---|
+//! | [`palpate_lab::grasping::collect()`], [`palpate_lab::datasets`] | grasps: simulated for the study, or chosen from a store |
+//! | [`palpate_lab::study::paper::StudyPlan`] | the cells to measure: sensors, layouts, methods, parts |
+//! | [`palpate_learn::METHODS`], [`palpate_learn::evaluation`] | a recogniser fitted on some grasps and judged on others |
+//! | [`palpate_lab::study::paper::PaperStudy`] | rows, tables, figures and claims of what was measured |
+//! | [`palpate_lab::study::paper::Finding`] | a claim: a sentence of the paper, a verdict, the intervals that decide |
+//! | `assets/studies`, [`palpate_lab::study::generated_sections`] | stored results, and the tables that the manual prints of them |
 //!
 //! # Programs to begin with
 //!
