@@ -48,6 +48,13 @@ impl Drop for Emulator {
 fn on_emulator(folder: &Path, emulate: &[&str], arguments: &[&str]) -> (Emulator, Ran) {
     finished(&TOO_BUSY, || {
         let emulator = Emulator::start(folder, emulate);
+        // An attempt before this one may have stored a trial.
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("trials.sqlite")) {
+                std::fs::remove_file(path).unwrap();
+            }
+        }
         let mut command = palpate(&folder.join("trials.sqlite"));
         command.args(arguments).arg("--port").arg(&emulator.port);
         (emulator, command)

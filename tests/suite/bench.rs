@@ -180,6 +180,12 @@ impl Bench {
         panic!("\"{text}\" was never said: {:?}", self.workbench().messages());
     }
 
+    /// The window, drawn until its layout stands still: axes of plots have their width in the second frame.
+    pub(crate) fn picture(&mut self) -> image::RgbaImage {
+        self.harness.run_steps(2);
+        self.harness.render().unwrap()
+    }
+
     /// Waits until something has happened, and draws.
     pub(crate) fn wait(&mut self) {
         self.woken.recv_timeout(Duration::from_secs(600)).expect("something goes on");

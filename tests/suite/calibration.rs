@@ -565,7 +565,7 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "kOhm flat");
     bench.until_shown(true, "counts, settled");
     assert!(bench.harness.query_by_label("Empty close").is_none(), "a strip has no such zero");
-    compare("calibration_done", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
+    compare("calibration_done", &bench.picture(), "the CPU renderer of the tests");
     bench.harness.get_by_label("Save").click();
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
@@ -589,7 +589,7 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "0 counts, settled");
     // A plot knows the width of its labels after it has been drawn.
     bench.harness.run_steps(4);
-    compare("calibration_pad", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
+    compare("calibration_pad", &bench.picture(), "the CPU renderer of the tests");
     bench.harness.get_by_label("Save").click();
     bench.harness.step();
     bench.until_shown(true, "version 1 of \"P3\", the right pad");

@@ -127,7 +127,7 @@ fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
         // Below stand the ports of whatever computer this is.
         bench.harness.run_steps(3);
         bench.harness.run_steps(3);
-        let picture = image::imageops::crop_imm(&bench.harness.render().unwrap(), 0, 0, 320, 204).to_image();
+        let picture = image::imageops::crop_imm(&bench.picture(), 0, 0, 320, 204).to_image();
         bench.harness.get_by_label("Copy the command for the port").click();
         bench.harness.step();
         assert!(has_copied(&bench, "sudo usermod -aG dialout $USER"));
@@ -201,7 +201,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         // The buttons move with the texts above them.
         bench.harness.hover_at(egui::Pos2::ZERO);
         bench.harness.run_steps(3);
-        pictures.push(bench.harness.render().unwrap());
+        pictures.push(bench.picture());
         bench.harness.get_by_label("Skip").click();
         bench.harness.step();
         bench.until_shown(true, "sensor 4 of 4");
@@ -212,7 +212,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         assert!(bench.harness.query_by_label_contains("STOP").is_none());
         bench.harness.hover_at(egui::Pos2::ZERO);
         bench.harness.run_steps(3);
-        pictures.push(bench.harness.render().unwrap());
+        pictures.push(bench.picture());
         pictures
     });
     for (k, name) in ["doctor_crosstalk", "doctor_crosstalk_found"].into_iter().enumerate() {
@@ -231,7 +231,7 @@ fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
         for _ in 0..20 {
             bench.wait();
         }
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("gap", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
@@ -303,7 +303,7 @@ fn wiring_and_sketch_come_with_the_program() {
         bench.harness.step();
         assert!(has_copied(&bench, "palpate doctor --sketch due_gripper"));
         bench.harness.run_steps(4);
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("doctor_wiring", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
@@ -331,7 +331,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         assert!(bench.harness.query_by_label("crosstalk: ok").is_some());
         // Which button the pointer is on is known a frame later.
         bench.harness.run_steps(3);
-        let good = bench.harness.render().unwrap();
+        let good = bench.picture();
         *seen.lock().unwrap() = troubled();
         bench.harness.get_by_label("Port").focus();
         bench.harness.step();
@@ -348,7 +348,7 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         bench.until_shown(true, "then stopped");
         assert!(bench.harness.query_by_label("lines: FAILED").is_some());
         bench.harness.run_steps(3);
-        let wrong = bench.harness.render().unwrap();
+        let wrong = bench.picture();
         bench.harness.get_by_label("Copy the command for modem-manager").click();
         bench.harness.step();
         assert!(has_copied(&bench, "77-palpate.rules"));
@@ -455,7 +455,7 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
         assert!(bench.harness.query_by_label("filling time: 0.0180 to 0.102").is_some());
         // Without the list, in which the time stands.
         let top = bench.harness.get_by_label("Fitted to trials 3, 4").rect().top() as u32;
-        let picture = bench.harness.render().unwrap();
+        let picture = bench.picture();
         let picture = image::imageops::crop_imm(&picture, 0, top, picture.width(), picture.height() - top).to_image();
         press(&mut bench, "Use this finger");
         let scene = bench.until(|s| s.scene.gripper.finger.bending_stiffness == 3.36e-3).scene.clone();

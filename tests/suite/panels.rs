@@ -66,7 +66,7 @@ fn every_panel_in_both_themes() {
                 }
                 _ => {}
             }
-            bench.harness.render().unwrap()
+            bench.picture()
         });
         side_by_side(&dark, &light)
     };
@@ -110,7 +110,7 @@ fn shown_light(theme: Theme, iterations: u32) -> (Bench, RgbaImage) {
     bench.tell(Command::SetSpeed(64.0));
     bench.tell(Command::Play);
     bench.until(|s| s.status.finished && s.status.checking.is_none());
-    let picture = bench.harness.render().unwrap();
+    let picture = bench.picture();
     (bench, picture)
 }
 
@@ -255,7 +255,7 @@ fn fingers_are_let_bend_sideways() {
         let (finger, pad) = (&bent.scene.gripper.finger, &bent.scene.gripper.pad);
         assert_eq!(finger.sideways, finger.of_solid_section(pad.thickness));
         bench.harness.run_steps(3);
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("scene_sideways", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
@@ -340,7 +340,7 @@ fn error_bands_are_drawn_about_the_traces() {
         bench.tell(Command::SetErrorBand(true));
         bench.until(|s| s.status.error_band);
         bench.advance_to(2.6);
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("panel_force_band", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
@@ -431,7 +431,7 @@ fn the_picture_of_what_accuracy_costs_shows_the_setting_under_the_pointer() {
         let mut bench = bench(BenchSetup { theme, size: [520.0, 420.0], panel: Some(panel), ..BenchSetup::default() });
         bench.harness.run_steps(3);
         point_at(&mut bench, "solver.engine=rapier");
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("panel_accuracy_wide", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
@@ -445,7 +445,7 @@ fn effects_are_unfolded_in_both_themes() {
         bench.until_effects_are_measured();
         bench.harness.get_by_label("about support").click();
         bench.harness.run_steps(2);
-        bench.harness.render().unwrap()
+        bench.picture()
     });
     compare("effects_unfolded", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }

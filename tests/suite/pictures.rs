@@ -250,7 +250,7 @@ fn the_window_in_both_themes_and_small() {
             bench.tell(ViewAction::ShowKeys(true));
             bench.harness.run_steps(3);
         }
-        compare(name, &bench.harness.render().unwrap(), &by);
+        compare(name, &bench.picture(), &by);
     }
 }
 
@@ -270,6 +270,6 @@ fn stored_trials_are_compared_in_both_themes() {
         bench.until_shown(true, "0 of 3 trials");
         // What is computed in the background is done.
         bench.harness.run_steps(8);
-        compare(name, &bench.harness.render().unwrap(), &by);
+        compare(name, &bench.picture(), &by);
     }
 }

@@ -123,7 +123,7 @@ fn the_panel_in_every_state_and_both_themes() {
             let mut bench = alone(theme);
             reach(&mut bench);
             bench.harness.run_steps(3);
-            bench.harness.render().unwrap()
+            bench.picture()
         });
         let mut pair = RgbaImage::new(dark.width() + light.width(), dark.height());
         image::imageops::replace(&mut pair, &dark, 0, 0);

@@ -204,7 +204,7 @@ fn the_mode_is_drawn_in_both_themes_and_small() {
         bench.tell(ViewAction::ShowPanel("study-figure"));
         bench.until_shown(true, "Claims of the paper: ");
         bench.harness.run_steps(8);
-        let picture: RgbaImage = bench.harness.render().unwrap();
+        let picture: RgbaImage = bench.picture();
         assert_eq!([picture.width() as f32, picture.height() as f32], size);
         if std::env::var_os("UPDATE_SCREENSHOTS").is_some() {
             let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("screenshots/failed");

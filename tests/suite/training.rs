@@ -209,7 +209,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         let confused = |text: &str| bench.harness.query_by_label_contains(text).is_some();
         assert!(confused("lemon predicted as tomato") || confused("tomato predicted as lemon"));
         // Without the list of files, in whose names the time stands.
-        let picture = bench.harness.render().unwrap();
+        let picture = bench.picture();
         let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32 - 8;
         let picture = image::imageops::crop_imm(&picture, 0, 0, picture.width(), end.min(picture.height())).to_image();
         assert!(bench.harness.get_by_label("the shipped model is in use").accesskit_node().is_disabled());

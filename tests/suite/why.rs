@@ -103,7 +103,7 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     assert!(bench.harness.query_by_label_contains("appears when a grasp ends: press play").is_some());
     run_out(&mut bench);
     bench.until_shown(true, "Trial 1, Lemon, sim, distance 0.00, same readings");
-    compare("why_found", &bench.harness.render().unwrap(), "the CPU renderer of the tests");
+    compare("why_found", &bench.picture(), "the CPU renderer of the tests");
     // The model weighs the pads alone: curvature counts nothing, in no phase.
     for label in ["left curvature: 0 points", "left curvature, hold: 0 points", "pre-shaping: "] {
         assert!(bench.harness.query_all_by_label_contains(label).next().is_some(), "no {label}");
