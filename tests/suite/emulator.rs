@@ -347,21 +347,25 @@ fn a_host_drives_the_fingers_through_a_programme() {
 #[test]
 fn a_command_that_drives_a_silent_board_vents_it_and_fails() {
     let folder = tempfile::tempdir().unwrap();
-    let (emulated, ran) = finished(&TOO_BUSY[..2], || {
-        // An earlier one was killed.
-        let _old = std::fs::remove_file(folder.path().join("port"));
-        let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--faults", "silent@3/60"]);
-        let mut command = palpate(&folder.path().join("trials.sqlite"));
-        command.args(["record", "--drive", "--port"]).arg(emulated.port());
-        (emulated, command)
-    });
+    let attempt = || {
+        let (emulated, ran) = finished(&TOO_BUSY[..2], || {
+            // An earlier one was killed.
+            let _old = std::fs::remove_file(folder.path().join("port"));
+            let emulated = Emulated::new(folder.path(), &["--grasp-every", "0", "--faults", "silent@3/60"]);
+            let mut command = palpate(&folder.path().join("trials.sqlite"));
+            command.args(["record", "--drive", "--port"]).arg(emulated.port());
+            (emulated, command)
+        });
+        let bars = std::fs::read_to_string(folder.path().join("sent.txt")).unwrap();
+        let bars = bars.lines().filter_map(|line| line.split_once(",p_bar:")?.1.split(',').next()?.parse().ok());
+        (emulated, ran, bars.fold(0.0, f32::max))
+    };
+    // On a busy machine the command may come when the board is silent already.
+    let (emulated, ran, most) =
+        std::iter::repeat_with(attempt).take(10).find(|(_, _, most)| *most > 0.0).expect("in time");
     assert!(ran.code == Some(1) && ran.err.contains("no readable line came from the board for 0."), "{ran:?}");
     assert!(ran.err.contains("palpate doctor") && ran.out.contains("flagged"), "{ran:?}");
-    let bars = std::fs::read_to_string(folder.path().join("sent.txt")).unwrap();
-    let bars: Vec<f32> =
-        bars.lines().filter_map(|line| line.split_once(",p_bar:")?.1.split(',').next()?.parse().ok()).collect();
-    let most = bars.iter().copied().fold(0.0, f32::max);
-    assert!(most > 0.0 && most < 1.0, "not to the end of the programme: {most}");
+    assert!(most < 1.0, "not to the end of the programme: {most}");
     assert!(!emulated.end().iter().any(|event| event["event"] == "watchdog"), "it was told to vent");
 }
 

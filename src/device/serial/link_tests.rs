@@ -126,6 +126,7 @@ fn a_thousand_readings_a_second_with_eight_channels_all_arrive() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("due");
     let mut emulated = emulated(&path);
+    emulated.board.set_timeout(HANG).expect("waits for a reader that is late");
     let link = SerialLink::open(&options(&path)).expect("opens");
     let count = 1500;
     let writer = std::thread::spawn(move || {

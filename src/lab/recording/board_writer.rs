@@ -214,7 +214,9 @@ impl BoardWriter {
             warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
         }
         let Cadence { lost, gaps, restarts, .. } = *cadence;
-        if restarts > 0 {
+        // Whether readings came after the restart that ended a grasp depends on when it was vented.
+        let is_said = self.interruptions.iter().any(|cause| cause.contains("restarted"));
+        if restarts > 0 && !is_said {
             warnings.push(format!(
                 "the board restarted {restarts} time(s), and what it took meanwhile is missing: check its supply and its cable"
             ));
