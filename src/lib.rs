@@ -123,7 +123,7 @@
 //! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
 //! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
 //! | work beside the window | a function in `src/lab/workers/` that returns a `Job`, and the feature that owns it |
-//! | a study | a file in `src/lab/study/`, and its command in `src/cli/study/` |
+//! | a study | an `Experiment` in a file of `src/lab/study/`, and its arguments in `src/cli/study/` |
 //! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
 //! | a look of surfaces | `src/geometry/finish.rs`, and how it answers to light in `src/render/passes/solid.rs` |

@@ -31,7 +31,7 @@ pub(super) struct CollectArguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Collect only part K of N, for several machines; `palpate trials merge` joins the stores.
-    #[arg(long, value_name = "K/N", value_parser = parse_shard)]
+    #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Number of threads (default: one per core). The data do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -41,14 +41,6 @@ pub(super) struct CollectArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn parse_shard(text: &str) -> Result<Shard, String> {
-    let parsed = || {
-        let (number, of) = text.split_once('/')?;
-        Shard::new(number.parse().ok()?, of.parse().ok()?)
-    };
-    parsed().ok_or_else(|| "write K/N with K from 1 to N, as in 3/8".to_owned())
 }
 
 /// Output of `--json`.

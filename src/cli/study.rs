@@ -2,7 +2,8 @@
 
 mod accuracy;
 mod effects;
-mod files;
+mod merge;
+mod output;
 mod paper;
 mod stability;
 
@@ -32,6 +33,8 @@ enum Study {
     Effects(effects::EffectsArguments),
     /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
+    /// Join the parts of a study that `--shard` measured on several machines.
+    Merge(merge::MergeArguments),
     /// Studies of the paper.
     #[command(flatten)]
     Paper(paper::PaperCommand),
@@ -42,6 +45,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Accuracy(arguments) => accuracy::run(arguments),
         Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
+        Study::Merge(arguments) => merge::run(arguments),
         Study::Paper(command) => paper::run(command, store),
     }
 }

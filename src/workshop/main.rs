@@ -24,7 +24,7 @@ mod tools;
 use clap::{Parser, Subcommand};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::{ColouredPart, Finish, MassProperties, Primitive, TriMesh, mass_properties, write_obj};
-use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
+use palpate_lab::study::accuracy::stored_accuracy;
 use palpate_lab::study::generated_sections;
 use palpate_learn::Shipped;
 use palpate_render::figure_svg;
@@ -170,9 +170,6 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-/// Size of the stored picture, as `palpate study accuracy` draws it (points).
-const FIGURE_SIZE: [u32; 2] = [960, 860];
-
 fn shipped(any_gripper: bool, fixed: bool) -> Shipped {
     if any_gripper { Shipped::AnyGripper } else { Shipped::simulated(fixed) }
 }
@@ -186,7 +183,9 @@ fn write_tables() -> Result<(), Failure> {
         report(format_args!("{} in {}", section.name, section.document));
     }
     let picture = "assets/studies/accuracy.svg";
-    std::fs::write(picture, figure_svg(&accuracy_figure(&stored_accuracy()?), Theme::Light, FIGURE_SIZE)?)?;
+    let stored = stored_accuracy()?;
+    let linked = stored.result.figure().with_note(&stored.plain_origin());
+    std::fs::write(picture, figure_svg(&linked.figure, Theme::Light, linked.size)?)?;
     report(format_args!("{picture}"));
     Ok(())
 }

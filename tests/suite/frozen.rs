@@ -13,9 +13,9 @@ use crate::calibration::{capture, parts};
 use crate::program::{palpate, ran, run};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{Advisor, RecognisedGrasp};
-use palpate_lab::study::accuracy::{AccuracyPlan, SettingFamily};
+use palpate_lab::study::accuracy::{AccuracyExperiment, AccuracyPlan, SettingFamily};
 use palpate_lab::study::paper::{Agreement, Cell, StudyReport};
-use palpate_lab::study::{Measuring, StoredStudy};
+use palpate_lab::study::{Measuring, StoredStudy, run_experiment};
 use palpate_learn::{Pmf, Shipped};
 use palpate_sim::fingerprint;
 use palpate_store::{Store, TrialRow, encode_frames};
@@ -439,9 +439,8 @@ fn accuracy_plan() -> AccuracyPlan {
 fn studies_of_the_physics_are_as_they_were() {
     let folder = tempfile::tempdir().unwrap();
     play(folder.path(), "studies_physics");
-    let plan = accuracy_plan();
-    let mut file = plan.open(&folder.path().join("accuracy.jsonl")).unwrap();
+    let study = AccuracyExperiment::new(accuracy_plan()).unwrap();
     let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| () };
-    let accuracy = plan.run(&mut file, &how).unwrap().unwrap();
+    let accuracy = run_experiment(&study, &how, None).unwrap().unwrap().result;
     compare_numbers("studies_accuracy", &pretty(serde_json::to_value(&accuracy).unwrap()));
 }

@@ -1,15 +1,16 @@
 //! Stored results of studies, and the tables and pictures that are made from them.
 
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::accuracy::{accuracy_figure, stored_accuracy};
+use palpate_lab::grasping::Shard;
+use palpate_lab::study::accuracy::stored_accuracy;
 use palpate_lab::study::paper::{
     Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
-    StudyRow, StudySize, StudyStep, StudyWork, is_current, run_study, stored_report, study_fingerprint,
+    StudyRow, StudySize, StudyStep, StudyWork, is_current, paper_study, stored_report, study_fingerprint,
 };
-use palpate_lab::study::{StoredStudy, generated_sections, program};
+use palpate_lab::study::{StoredStudy, generated_sections, merged_units, program};
 use palpate_render::figure_svg;
 use palpate_store::Store;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 type TestResult = Result<(), Box<dyn std::error::Error>>;
@@ -40,7 +41,9 @@ fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult 
 #[test]
 fn the_stored_picture_is_that_of_the_stored_result() -> TestResult {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/studies/accuracy.svg");
-    let drawn = figure_svg(&accuracy_figure(&stored_accuracy()?), Theme::Light, [960, 860])?;
+    let stored = stored_accuracy()?;
+    let linked = stored.result.figure().with_note(&stored.plain_origin());
+    let drawn = figure_svg(&linked.figure, Theme::Light, linked.size)?;
     assert!(std::fs::read_to_string(path)? == drawn, "run `palpate study accuracy --out assets/studies` again");
     Ok(())
 }
@@ -62,7 +65,65 @@ fn sample(
     let store = Store::open(&folder.join("store.sqlite")).expect("opens");
     let work = StudyWork { threads, cancelled: &cancelled, progress: &progress };
     let results = stop_after.map(|_| folder.join(format!("{}.jsonl", study.card().key)));
-    run_study(study, &StudyBench::new(store, &plan, work), results.as_deref())
+    study.run(&StudyBench::new(store, &plan, work), results.as_deref())
+}
+
+/// Lines of finished units without the CPU time that each took.
+fn without_cpu_time(text: &str) -> String {
+    let line = |line: &str| match line.split_once("\"cpu_s\":") {
+        Some((before, after)) => format!("{before}{}\n", after.split_once(',').map_or("", |(_, rest)| rest)),
+        None => format!("{line}\n"),
+    };
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn eight_parts_of_a_study_merge_into_the_file_of_one_machine() -> TestResult {
+    let folder = tempfile::tempdir()?;
+    let study = paper_study("grasps").expect("a study");
+    let plan = StudyPlan::of_size(StudySize::Sample { objects: 3, trials: 6 });
+    let cancelled = AtomicBool::new(false);
+    // Each machine has a store of its own.
+    let machine = |name: &str, progress: &(dyn Fn(StudyProgress) + Sync), run: &dyn Fn(&StudyBench<'_>, &Path)| {
+        let store = Store::open(&folder.path().join(format!("{name}.sqlite"))).expect("opens");
+        let work = StudyWork { threads: 1, cancelled: &cancelled, progress };
+        let file = folder.path().join(format!("{name}.jsonl"));
+        run(&StudyBench::new(store, &plan, work), &file);
+        file
+    };
+    let whole = |bench: &StudyBench<'_>, file: &Path| {
+        let stored = study.run(bench, Some(file)).expect("runs").expect("finished");
+        std::fs::write(file.with_extension("json"), serde_json::to_string(&stored.result).expect("writes"))
+            .expect("writes");
+    };
+    let one = machine("one", &|_| (), &whole);
+    let parts: Vec<PathBuf> = (1..=8)
+        .map(|number| {
+            let shard: Shard = format!("{number}/8").parse().expect("a part");
+            let part = |bench: &StudyBench<'_>, file: &Path| {
+                assert!(study.run_part(bench, file, shard).expect("runs").expect("finished") <= 1);
+            };
+            machine(&format!("part{number}"), &|_| (), &part)
+        })
+        .collect();
+    let (merged, units) = merged_units(&parts)?;
+    assert_eq!(units, study.units(&plan).len());
+    // The CPU time of a unit is that of the part that measured it; all else is the same, byte for byte.
+    assert_eq!(without_cpu_time(&merged), without_cpu_time(&merged_units(&[one])?.0));
+    let file = folder.path().join("merged.jsonl");
+    std::fs::write(&file, &merged)?;
+    let nothing_left = |progress: StudyProgress| assert_eq!(progress.done, progress.of);
+    machine("merged", &nothing_left, &whole);
+    let result = |name: &str| std::fs::read_to_string(folder.path().join(name));
+    assert!(result("merged.json")? == result("one.json")?);
+    // Parts whose stores number the same grasps otherwise do not fit together.
+    let (text, trials) = (std::fs::read_to_string(&parts[1])?, "\"trials\":{\"");
+    let (before, after) = text.rsplit_once(trials).ok_or("the end of a part")?;
+    let (name, rest) = after.split_once("\":\"").ok_or("a number")?;
+    std::fs::write(&parts[1], format!("{before}{trials}{name}\":\"0{rest}"))?;
+    let refused = merged_units(&parts).expect_err("other numbers").to_string();
+    assert!(refused.contains("part2.jsonl") && refused.contains("copies of one store"), "{refused}");
+    Ok(())
 }
 
 /// The tables without columns of CPU times, which differ from run to run.

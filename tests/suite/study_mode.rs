@@ -9,8 +9,8 @@ use palpate::app::{Mode, StudyAction, ViewAction};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StudyFolder, StudyPlan, StudyReport, StudySize, StudyTable,
-    paper_study, study_fingerprint,
+    Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StudyPlan, StudyReport, StudySize, StudyTable, paper_study,
+    study_fingerprint,
 };
 use palpate_lab::workers::StudyRequest;
 use palpate_learn::metrics::Interval;
@@ -80,7 +80,7 @@ pub(crate) fn scripted_result(store: &mut Store) {
     let mut stored = StoredStudy::new("palpate study models --quick", 0.25, report);
     // Programs of other versions have the same picture.
     stored.program = "0.0.0, physics 0".to_owned();
-    let folder = StudyFolder::beside(store.path(), StudySize::Quick);
+    let folder = StudySize::Quick.folder(store.path());
     std::fs::create_dir_all(folder.path()).expect("makes the folder");
     stored.write(&folder.path().join("models.json")).expect("writes");
 }
@@ -133,7 +133,7 @@ fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     bench.until_told("Study finished: ");
     bench.until_shown(true, "A short form: do not quote its numbers.");
     // The same files as those of the command line.
-    let folder = StudyFolder::beside(bench.store().path(), SAMPLE);
+    let folder = SAMPLE.folder(bench.store().path());
     let stored = folder.read("models").unwrap().expect("a result");
     assert!(stored.result.tables.iter().any(|table| table.rows.iter().any(|row| !row.trials.is_empty())));
     assert!(folder.has_begun("models") && folder.path().join("models.svg").is_file());
@@ -178,7 +178,7 @@ fn findings_are_told_by_words_and_rows_open_trials() {
 #[test]
 fn units_of_another_plan_are_forgotten_on_request() {
     let fill = |store: &mut Store| {
-        let folder = StudyFolder::beside(store.path(), SAMPLE);
+        let folder = SAMPLE.folder(store.path());
         std::fs::create_dir_all(folder.path()).unwrap();
         std::fs::write(folder.units("models"), "{\"study\":\"models\",\"program\":\"0\",\"plan\":null}\n").unwrap();
     };

@@ -1,25 +1,16 @@
 //! The paper's studies: one subcommand for each, from the table of studies, and `all`.
 
-use super::super::Failure;
-use super::super::interrupt::stop_flag;
 use super::super::learning::{QueryArguments, parse_sensors};
-use super::super::output::file_or_folder;
-use super::super::setup::open_store;
-use super::super::terminal::{note, say, say_json, table};
-use super::files::note_stopped;
+use super::super::prelude::*;
+use super::output::{BAR, StudyOutput, note_part, note_stopped};
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
-use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::DatasetQuery;
-use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
-    Cell, Finding, PAPER_STUDIES, PaperStudy, STUDY_PRESET, StudyBench, StudyCard, StudyColumn, StudyFolder, StudyPlan,
-    StudyProgress, StudyReport, StudyRow, StudySize, StudyStep, StudyTable, StudyWork, paper_study, run_study,
+    PAPER_STUDIES, STUDY_PRESET, StudyBench, StudyCard, StudyPlan, StudyProgress, StudySize, StudyStep, StudyWork,
+    paper_study,
 };
-use palpate_render::figure_svg;
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// Arguments of every study of the paper.
 #[derive(Clone, Debug, clap::Args)]
@@ -35,16 +26,8 @@ pub(super) struct PaperArguments {
     /// Random seed of fits and splits.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder for results, which the same command continues, tables (CSV) and figures (SVG) (default: palpate-studies,
-    /// with --quick palpate-studies-quick).
-    #[arg(long, value_name = "DIR", value_parser = file_or_folder(&[]))]
-    out: Option<PathBuf>,
-    /// Number of threads (default: one per core). The results do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
-    /// Print one JSON object instead of tables.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: StudyOutput,
 }
 
 /// A study by its key, or all of them.
@@ -130,112 +113,49 @@ impl PaperArguments {
         };
         StudyPlan { preset, sensors, query, seed: self.seed, ..usual }
     }
-
-    fn folder(&self) -> StudyFolder {
-        let named = || PathBuf::from(format!("palpate-studies{}", if self.quick { "-quick" } else { "" }));
-        StudyFolder::new(self.out.clone().unwrap_or_else(named))
-    }
 }
 
 pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Failure> {
     let PaperCommand { key, arguments } = command;
     let studies = PAPER_STUDIES.iter().filter(|study| key.as_ref().is_none_or(|key| study.card().key == key));
-    let (plan, folder) = (arguments.plan(), arguments.folder());
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let stop = stop_flag()?;
-    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template("{msg} {bar:40} {pos}/{len} {eta} left")?);
-    let progress = |progress: StudyProgress| {
-        let what = match progress.step {
-            StudyStep::Collecting => "collecting",
-            StudyStep::Measuring => "measuring",
-        };
-        bar.set_message(what);
-        bar.set_length(progress.of as u64);
-        bar.set_position(progress.done as u64);
+    let (plan, output) = (arguments.plan(), &arguments.output);
+    let folder = output.folder(arguments.quick);
+    let (stop, bar) = (stop_flag()?, Progress::new(BAR));
+    let progress = |StudyProgress { step, done, of }: StudyProgress| {
+        bar.0.set_message(if step == StudyStep::Collecting { "collecting" } else { "measuring" });
+        bar.show(done, of);
     };
-    let threads = arguments.threads.map_or_else(cores, usize::from);
-    let bench =
-        StudyBench::new(open_store(store)?, &plan, StudyWork { threads, cancelled: &stop, progress: &progress });
-    let mut reports = Vec::new();
+    let work = StudyWork { threads: output.threads(), cancelled: &stop, progress: &progress };
+    let bench = StudyBench::new(open_store(store)?, &plan, work);
+    let mut reports = BTreeMap::new();
     for study in studies {
-        let key = study.card().key;
-        bar.reset();
-        let outcome = run_study(*study, &bench, Some(&folder.units(key)));
-        bar.finish_and_clear();
+        let StudyCard { key, title, .. } = study.card();
+        bar.0.reset();
+        if let Some(shard) = output.shard {
+            let part = folder.part(key, shard);
+            let outcome = study.run_part(&bench, &part, shard);
+            bar.0.finish_and_clear();
+            let units = outcome?;
+            note_part(key, &part, units);
+            if units.is_none() {
+                return Ok(());
+            }
+            continue;
+        }
+        let outcome = study.run(&bench, Some(&folder.units(key)));
+        bar.0.finish_and_clear();
         let Some(stored) = outcome? else {
-            note_stopped(&format!("a part of {key}"));
+            note_stopped(key);
             return Ok(());
         };
-        let written = write(*study, &stored, &folder)?;
-        if arguments.json {
-            reports.push((key, stored));
-        } else {
-            print(*study, &stored, arguments.quick)?;
-            say(format!("\n{}. {written}\n", stored.cpu_time()))?;
-        }
+        let title = format!("{title} ({})", study.card().origin());
+        let (shown, figures) = (&stored.result, study.figures(&stored.result));
+        output.show(&folder, (key, &title, arguments.quick), &stored, shown, figures)?;
+        reports.insert(key, stored);
     }
-    match (reports.as_slice(), key) {
-        ([(_, only)], Some(_)) => say_json(only),
-        ([], _) => Ok(()),
-        (several, _) => say_json(&several.iter().map(|(key, stored)| (*key, stored)).collect::<BTreeMap<_, _>>()),
-    }
-}
-
-/// Writes a study's result, its tables and figures; returns a sentence that names the files.
-fn write(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, folder: &StudyFolder) -> Result<String, Failure> {
-    let names = folder.write(study, stored, &|linked| {
-        figure_svg(&linked.figure, Theme::Light, linked.size).map_err(std::io::Error::other)
-    })?;
-    Ok(format!("Written to {}: {}", folder.path().display(), names.join(", ")))
-}
-
-fn print(study: &dyn PaperStudy, stored: &StoredStudy<StudyReport>, quick: bool) -> Result<(), Failure> {
-    let card = study.card();
-    say(format!("{} ({})", card.title, card.origin()))?;
-    for line in &stored.result.data {
-        say(format!("  {line}"))?;
-    }
-    for table in &stored.result.tables {
-        print_table(table)?;
-    }
-    stored.result.findings.iter().try_for_each(print_finding)?;
-    if quick {
-        note("a quick study: do not quote its numbers");
-    }
-    Ok(())
-}
-
-/// A claim, the verdict, and the numbers around the line that decides.
-fn print_finding(finding: &Finding) -> Result<(), Failure> {
-    say(format!("\n[{}] {}: {}", finding.verdict.name(), finding.section, finding.claim))?;
-    say(format!("  {}", finding.found))?;
-    let rows: Vec<Vec<String>> = finding
-        .strips()
-        .map(|(own, strip)| {
-            let line = Cell::Number(own.line).shown(&own.unit);
-            vec![format!("  {}", own.what), own.shown(), line, strip.to_string()]
-        })
-        .collect();
-    if !rows.is_empty() {
-        table(&["  measured", "value", "line", "around the line"], &rows)?;
-    }
-    finding.left_out().map_or(Ok(()), |more| say(format!("  {more}")))?;
-    say(format!("  {}", finding.why))
-}
-
-/// Rows of long tables that are printed; the files have all.
-const MOST_ROWS: usize = 60;
-
-fn print_table(of: &StudyTable) -> Result<(), Failure> {
-    say(format!("\n{}", of.title))?;
-    let header: Vec<String> = of.columns.iter().map(StudyColumn::titled).collect();
-    let row = |row: &StudyRow| -> Vec<String> {
-        row.cells.iter().zip(&of.columns).map(|(cell, column)| cell.shown(&column.unit)).collect()
-    };
-    let rows: Vec<Vec<String>> = of.rows.iter().take(MOST_ROWS).map(row).collect();
-    table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows)?;
-    match of.rows.len().saturating_sub(MOST_ROWS) {
-        0 => Ok(()),
-        more => say(format!("and {more} more rows in {}.csv", of.name)),
+    match (key, reports.values().next()) {
+        _ if !output.json || output.shard.is_some() => Ok(()),
+        (Some(_), Some(only)) => say_json(only),
+        _ => say_json(&reports),
     }
 }

@@ -53,6 +53,31 @@ impl Shard {
     pub fn new(number: u32, of: u32) -> Option<Self> {
         (1..=of).contains(&number).then_some(Self { number, of })
     }
+
+    /// True for the units of this part, by their place in the whole work.
+    pub(crate) fn has(self, place: usize) -> bool {
+        place % self.of as usize + 1 == self.number as usize
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// A text that names no part.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("write K/N with K from 1 to N, as in 3/8")]
+pub struct NoShard;
+
+impl std::str::FromStr for Shard {
+    type Err = NoShard;
+
+    fn from_str(text: &str) -> Result<Self, NoShard> {
+        let parsed = text.split_once('/').and_then(|(number, of)| Self::new(number.parse().ok()?, of.parse().ok()?));
+        parsed.ok_or(NoShard)
+    }
 }
 
 /// Result of a collection.
@@ -163,7 +188,7 @@ impl CollectionPlan {
         let all = self.objects.iter().enumerate().flat_map(|(object, name)| {
             (0..u64::from(self.trials)).map(move |number| Task { object, number, seed: self.seed_of(name, number) })
         });
-        let ours = |(k, _): &(usize, Task)| k % self.shard.of as usize + 1 == self.shard.number as usize;
+        let ours = |(k, _): &(usize, Task)| self.shard.has(*k);
         all.enumerate().filter(ours).map(|(_, task)| task).collect()
     }
 

@@ -25,7 +25,8 @@ pub use agreement::{
 };
 pub(crate) use collect::SUCCESSION;
 pub use collect::{
-    CollectionError, CollectionPlan, CollectionProgress, CollectionReport, ReadyCollection, Shard, all_objects, collect,
+    CollectionError, CollectionPlan, CollectionProgress, CollectionReport, NoShard, ReadyCollection, Shard,
+    all_objects, collect,
 };
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};

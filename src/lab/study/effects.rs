@@ -5,7 +5,9 @@
 //! other in one thread. The fastest of each kind counts, because other load on the machine only adds time. Differences
 //! are taken over all samples and both fingers.
 
-use crate::grasping::{ErrorNorms, GraspSummary, prepare};
+use super::frame::Measuring;
+use super::timed_grasp::timed_grasp;
+use crate::grasping::{ErrorNorms, GraspSummary};
 use palpate_geometry::units::three_digits;
 use palpate_sim::frame::{Plan, PlannedEffect};
 use palpate_sim::objects::ObjectModel;
@@ -15,7 +17,7 @@ use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, SignalDefinition};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Effects of a scene, with their cost and influence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -105,24 +107,15 @@ const NOISE: f64 = 0.03;
 /// Duration above which a trial counts as long (s).
 const LONG: f64 = 10.0;
 
-/// Settings of the measurement.
-pub struct Measuring<'a> {
-    /// Number of threads.
-    pub threads: usize,
-    /// Flag that cancels the measurement.
-    pub cancelled: &'a AtomicBool,
-    /// Receives the number of measured effects and the number of all.
-    pub progress: &'a (dyn Fn(usize, usize) + Sync),
-}
-
 /// Explains every effect of a scene; `None` when cancelled.
 pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measuring<'_>) -> Option<Explanation> {
-    let (base, cpu_s) = run(scene, object, how.cancelled)?;
+    let stopped = || how.cancelled.load(Ordering::Relaxed);
+    let (base, cpu_s) = timed_grasp(scene, object, &stopped)?;
     let base = GraspOutcome::new(scene, base);
     let done = AtomicUsize::new(0);
     (how.progress)(0, Effect::ALL.len());
     let one = |effect: &Effect| {
-        let explained = explain_one(scene, object, &base, *effect, how.cancelled)?;
+        let explained = explain_one(scene, object, &base, *effect, &stopped)?;
         (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, Effect::ALL.len());
         Some(explained)
     };
@@ -146,7 +139,7 @@ fn explain_one(
     object: Option<&ObjectModel>,
     base: &GraspOutcome,
     effect: Effect,
-    cancelled: &AtomicBool,
+    stopped: &dyn Fn() -> bool,
 ) -> Option<ExplainedEffect> {
     let plan = &base.trial.data.plan;
     let planned = plan.effects.iter().find(|planned| planned.name == effect.name())?.clone();
@@ -155,8 +148,8 @@ fn explain_one(
     let (mut here, mut there) = (f64::INFINITY, f64::INFINITY);
     let mut other = None;
     for _ in 0..pairs {
-        here = here.min(run(scene, object, cancelled)?.1);
-        let (trial, seconds) = run(&other_scene, object, cancelled)?;
+        here = here.min(timed_grasp(scene, object, stopped)?.1);
+        let (trial, seconds) = timed_grasp(&other_scene, object, stopped)?;
         there = there.min(seconds);
         other = Some(trial);
     }
@@ -176,23 +169,6 @@ pub(super) fn flipped(scene: &Scene, plan: &Plan, effect: Effect) -> Scene {
     let mut scene = scene.clone();
     scene.effects.set(effect, if plan.is_on(effect.name()) { Setting::Off } else { Setting::On });
     scene
-}
-
-/// Runs a whole trial and returns it with its CPU time (s); `None` when cancelled.
-pub(super) fn run(
-    scene: &Scene,
-    object: Option<&ObjectModel>,
-    cancelled: &AtomicBool,
-) -> Option<(SimulatedTrial, f64)> {
-    let start = cpu_time::ThreadTime::now();
-    let mut run = prepare(scene, object, 0);
-    while run.next_frame().is_some() {
-        if cancelled.load(Ordering::Relaxed) {
-            return None;
-        }
-    }
-    let seconds = start.elapsed().as_secs_f64();
-    Some((run.finish(scene), seconds))
 }
 
 /// Trial with the time of its first contact (s).
@@ -223,6 +199,7 @@ mod tests {
     use super::*;
     use palpate_geometry::Primitive;
     use palpate_sim::scene::Accuracy;
+    use std::sync::atomic::AtomicBool;
 
     fn explained(scene: &Scene, object: Option<&ObjectModel>) -> Explanation {
         let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| {} };

@@ -1,25 +1,17 @@
 //! Sections of the manual and the README that are written from stored results of studies.
 
-use super::accuracy::{accuracy_tables, stored_accuracy};
-use super::effect_audit::{AuditReport, audit_table, stored_effects};
+use super::accuracy::{AccuracyExperiment, stored_accuracy};
+use super::effect_audit::{EffectAudit, stored_effects};
+use super::frame::{Experiment, GeneratedSection, StoredStudy};
 use super::shipped::shipped_text;
-use super::stored_study::{GeneratedSection, StoredStudy};
-use super::{paper, peer_costs, stability};
+use super::{paper, stability};
 use palpate_learn::METHODS;
 
 /// All generated sections; a test checks that the documents hold them, and
 /// `cargo run -p palpate-workshop -- tables` writes them.
 pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
-    let accuracy = GeneratedSection {
-        document: "assets/help/accuracy.md",
-        name: "accuracy study",
-        text: accuracy_tables(&stored_accuracy()?),
-    };
-    let effects = GeneratedSection {
-        document: "assets/help/effects.md",
-        name: "effects",
-        text: effects_text(&stored_effects()?),
-    };
+    let accuracy = section::<AccuracyExperiment>("assets/help/accuracy.md", "accuracy study", &stored_accuracy()?);
+    let effects = section::<EffectAudit>("assets/help/effects.md", "effects", &stored_effects()?);
     let shipped =
         GeneratedSection { document: "assets/help/recognition.md", name: "shipped model", text: shipped_text() };
     let deviations =
@@ -29,7 +21,6 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
         stability::sections()?,
         paper::sections()?,
         paper::sections_in_short()?,
-        peer_costs::sections()?,
     ]
     .concat())
 }
@@ -50,12 +41,13 @@ fn deviations_text() -> String {
     lines.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-fn effects_text(stored: &StoredStudy<AuditReport>) -> String {
-    let AuditReport { scenes, missed, within_noise, .. } = stored.result;
-    format!(
-        "{}\n\nWith all effects on at once the change is seen in {missed} of {scenes} scenes; in {within_noise} more it is as \
-         large, but within the noise. CPU time: with the effect over that without it, median. {}.",
-        audit_table(&stored.result),
-        stored.origin()
-    )
+/// A section with all tables of a study.
+fn section<E: Experiment>(
+    document: &'static str,
+    name: &'static str,
+    stored: &StoredStudy<E::Report>,
+) -> GeneratedSection {
+    let shown = E::shown(&stored.result);
+    let text = format!("{}\n\n{}", shown.data.join(" "), shown.markdown(&stored.origin()));
+    GeneratedSection { document, name, text }
 }

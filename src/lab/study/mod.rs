@@ -6,17 +6,15 @@ mod comparison;
 mod effect_audit;
 mod effects;
 mod finger_fit;
+mod frame;
 mod generated;
 mod labelled_training;
 mod network_cost;
 pub mod paper;
-mod peer_costs;
 mod physics_cost;
-mod result_file;
 mod search;
 mod shipped;
 pub mod stability;
-mod stored_study;
 mod timed_grasp;
 
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
@@ -24,13 +22,16 @@ pub use comparison::{
     Compared, Comparison, ComparisonError, ComparisonRow, Controls, Difference, MethodResult, compare, in_table_order,
 };
 pub use effect_audit::{
-    AuditError, AuditPlan, AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectSize, SEEN, audit_effects,
-    audit_figure, audit_table, stored_effects,
+    AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectSize, SEEN, SceneNumber, stored_effects,
 };
-pub use effects::{EffectChange, ExplainedEffect, Explanation, Measuring, explain_effects};
+pub use effects::{EffectChange, ExplainedEffect, Explanation, explain_effects};
 pub use finger_fit::{
     Course, Estimate, FingerFit, FingerFitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
     RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+};
+pub use frame::{
+    Experiment, GeneratedSection, Measuring, ResultFile, ResultFileError, StoredStudy, StudyCell, StudyCommand,
+    TrialNumbers, markdown_table, merged_units, program, run_experiment, run_part,
 };
 pub use generated::generated_sections;
 pub use labelled_training::{
@@ -39,6 +40,4 @@ pub use labelled_training::{
 };
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
-pub use result_file::{ResultFile, ResultFileError, program};
 pub use search::{SearchError, SearchRow, search};
-pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, markdown_table};

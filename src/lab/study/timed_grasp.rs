@@ -1,7 +1,8 @@
 //! One grasp with its CPU time, and the reference grasp that errors are measured against.
 
 use crate::grasping::prepare;
-use palpate_sim::objects::ObjectModel;
+use palpate_sim::objects::{ObjectError, ObjectModel};
+use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Accuracy, EngineKind, Integrator, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 
@@ -24,6 +25,15 @@ pub(super) fn timed_grasp(
     }
     let cpu_s = start.elapsed().as_secs_f64();
     Some((run.finish(scene), cpu_s))
+}
+
+/// An object of a scene by its name, with its poses; none for the empty hand.
+pub(super) fn posed_object(scene: &Scene, name: &str) -> Result<Option<(ObjectModel, PoseSampler)>, ObjectError> {
+    let mut scene = scene.clone();
+    name.clone_into(&mut scene.object.source);
+    let object = scene.load_object()?;
+    let sampler = PoseSampler::new(&scene, object.as_ref());
+    Ok(object.map(|object| (object, sampler)))
 }
 
 /// The scene, computed so finely that its error does not count.

@@ -4,8 +4,8 @@
 use super::job::{Job, JobError, JobFailure, JobRun, Newer, spare_threads};
 use super::messages::Wake;
 use crate::study::paper::{
-    LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyFolder, StudyPlan, StudyProgress,
-    StudyReport, StudySize, StudyStep, StudyWork, is_current, paper_study, run_study, stored_report,
+    LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport, StudySize,
+    StudyStep, StudyWork, is_current, paper_study, stored_report,
 };
 use crate::study::{ResultFileError, StoredStudy, program};
 use palpate_store::Store;
@@ -91,7 +91,7 @@ pub fn study_files_job(store: PathBuf, wake: Wake) -> Job<(), StudyFilesByKey> {
 /// Runs a study to its end; false where it was stopped.
 fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<'_>) -> Result<bool, JobError> {
     let study = paper_study(&request.key).ok_or_else(|| format!("there is no study \"{}\"", request.key))?;
-    let (folder, key) = (StudyFolder::beside(store, request.size), study.card().key);
+    let (folder, key) = (request.size.folder(store), study.card().key);
     if request.anew {
         folder.forget_units(key)?;
     }
@@ -105,8 +105,8 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
     };
     let work = StudyWork { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
     let bench = StudyBench::new(Store::open(store)?, &plan, work);
-    let Some(stored) = run_study(study, &bench, Some(&folder.units(key)))? else { return Ok(false) };
-    folder.write(study, &stored, draw.as_ref())?;
+    let Some(stored) = study.run(&bench, Some(&folder.units(key)))? else { return Ok(false) };
+    folder.write(key, &stored, &stored.result.tables, study.figures(&stored.result), draw.as_ref())?;
     Ok(true)
 }
 
@@ -128,7 +128,7 @@ fn files_of(store: &Path, study: &dyn PaperStudy, program: &str) -> StudyFiles {
     let key = study.card().key;
     let mut files = StudyFiles::default();
     for size in [StudySize::Full, StudySize::Quick, StudySize::Sample { objects: 0, trials: 0 }] {
-        let folder = StudyFolder::beside(store, size);
+        let folder = size.folder(store);
         match folder.read(key) {
             Ok(Some(stored)) => files.results.push(shown(study, StudyOrigin::Run(size), stored, program)),
             Ok(None) if folder.has_begun(key) => files.begun.push(size),
@@ -207,7 +207,7 @@ mod tests {
         let result = &end.files["models"].results[0];
         assert!(end.finished && result.origin.is_like(StudyOrigin::Run(size)));
         assert!(!result.figures.is_empty() && result.current);
-        let files = StudyFolder::beside(&store, size);
+        let files = size.folder(&store);
         for name in ["models.json", "models.jsonl", "models.csv", "models.svg"] {
             assert!(files.path().join(name).is_file(), "{name}");
         }

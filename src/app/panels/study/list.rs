@@ -7,7 +7,7 @@ use crate::app::theme::{accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::Rgb;
-use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudyFolder, StudySize};
+use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudySize};
 use palpate_lab::workers::{JobProgress, StudyFiles, StudyOrigin, StudyRequest, has_other_units};
 use palpate_store::Store;
 
@@ -162,7 +162,7 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions:
 /// Command that runs the study in the same files.
 fn command(context: &PanelContext<'_>, card: &StudyCard) -> String {
     let store = context.studies.store();
-    let folder = StudyFolder::beside(store, StudySize::Quick);
+    let folder = StudySize::Quick.folder(store);
     let own = if store == Store::default_path() { String::new() } else { format!(" --store \"{}\"", store.display()) };
     format!("palpate study {} --quick{own} --out \"{}\"", card.key, folder.path().display())
 }

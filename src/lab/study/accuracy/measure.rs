@@ -2,6 +2,7 @@
 
 use super::plan::{AccuracySetting, SettingFamily};
 use crate::grasping::ErrorNorms;
+use crate::study::frame::StudyError;
 use crate::study::timed_grasp::{timed_grasp, truth_of};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::ObjectModel;
@@ -9,6 +10,7 @@ use palpate_sim::scene::{Accuracy, Scene, SceneError};
 use palpate_tactile::trial::SimulatedTrial;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// One grasp at one setting.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,26 +38,22 @@ const ASTRAY_M: f64 = 5e-3;
 /// Tolerance of truths with a finer model, whose errors of motion count little beside those of the model.
 const FINER_MODEL: Accuracy = Accuracy::Tolerance(1e-5);
 
-/// Grasps a scene at every setting, and compares each with its truth; `None` if cancelled.
+/// Grasps a scene at every setting, and compares each with its truth.
 pub(super) fn measure_scene(
     scene: &Scene,
     object: &ObjectModel,
     settings: &[AccuracySetting],
-    cancelled: &dyn Fn() -> bool,
-) -> Result<Option<Vec<GraspSample>>, SceneError> {
-    let object = Some(object);
+    stopped: &dyn Fn() -> bool,
+) -> Result<Vec<GraspSample>, StudyError> {
+    let grasped = |scene: &Scene| timed_grasp(scene, Some(object), stopped).ok_or(StudyError::Stopped);
     let mut truths: BTreeMap<&[&str], SimulatedTrial> = BTreeMap::new();
     let mut samples = Vec::new();
     for setting in settings {
-        let finer = setting.family.finer_model();
-        if !truths.contains_key(finer) {
-            let Some((truth, _)) = timed_grasp(&truth_for(scene, setting.family)?, object, cancelled) else {
-                return Ok(None);
-            };
-            truths.insert(finer, truth);
-        }
-        let Some(truth) = truths.get(finer) else { continue };
-        let Some((trial, cpu_s)) = timed_grasp(&setting.adopted(scene)?, object, cancelled) else { return Ok(None) };
+        let truth = match truths.entry(setting.family.finer_model()) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(missing) => missing.insert(grasped(&truth_for(scene, setting.family)?)?.0),
+        };
+        let (trial, cpu_s) = grasped(&setting.adopted(scene)?)?;
         samples.push(GraspSample {
             cpu_ms: cpu_s * 1e3,
             error: ErrorNorms::of_whole_fingers(&trial, truth),
@@ -63,7 +61,7 @@ pub(super) fn measure_scene(
             astray_m: astray(&trial, truth),
         });
     }
-    Ok(Some(samples))
+    Ok(samples)
 }
 
 fn truth_for(scene: &Scene, family: SettingFamily) -> Result<Scene, SceneError> {

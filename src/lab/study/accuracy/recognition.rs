@@ -5,19 +5,20 @@
 //! trees find the object before any finger has touched it: a forest trained and tested on reference grasps then scores twice
 //! as much as one trained on standard grasps, and neither number means anything.
 
-use super::AccuracyStudyError;
 use super::plan::{AccuracySetting, RecognitionPlan};
-use super::report::{MethodScore, RecognitionRow, rounded};
-use crate::datasets::{SensorView, labels_of_catalogue, sequence_of};
-use crate::study::timed_grasp::timed_grasp;
+use super::report::{MethodScore, RecognitionRow};
+use crate::datasets::{DatasetError, SensorView, labels_of_catalogue, sequence_of};
+use crate::study::frame::{StudyError, rounded};
+use crate::study::paper::Pool;
+use crate::study::timed_grasp::{posed_object, timed_grasp};
 use palpate_learn::evaluation::answer;
-use palpate_learn::metrics::{Bootstrap, Confusion, Interval};
-use palpate_learn::{Dataset, Example, Fitting, Labels, method};
-use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
+use palpate_learn::metrics::Interval;
+use palpate_learn::{Dataset, Example, Fitting, Labels, LearnError, method};
+use palpate_sim::objects::{BuiltIn, EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_tactile::model::SensorModel;
-use rayon::iter::{IntoParallelIterator as _, IntoParallelRefIterator as _, ParallelIterator as _};
+use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -36,18 +37,9 @@ pub(super) struct LevelAnswers {
     decided: BTreeMap<String, Vec<usize>>,
 }
 
-/// How many test grasps there are, and what they cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct TestGrasps {
-    test_grasps: usize,
-    left_out: usize,
-    /// CPU time of all (s).
-    pub(super) cpu_s: f64,
-}
-
 /// Objects with their poses, and the test grasps.
-pub(super) struct RecognitionBench<'a> {
-    plan: &'a RecognitionPlan,
+pub(super) struct RecognitionBench {
+    plan: RecognitionPlan,
     objects: Vec<(ObjectModel, PoseSampler)>,
     labels: Labels,
     test: Dataset,
@@ -57,54 +49,26 @@ pub(super) struct RecognitionBench<'a> {
 const TRAIN_SEEDS: u64 = 1;
 const TEST_SEEDS: u64 = 1_000_001;
 
-impl<'a> RecognitionBench<'a> {
-    /// Loads the objects and computes the test grasps, in parallel; `None` if cancelled.
-    pub(super) fn new(
-        plan: &'a RecognitionPlan,
-        cancelled: &AtomicBool,
-    ) -> Result<Option<(Self, TestGrasps)>, AccuracyStudyError> {
+impl RecognitionBench {
+    /// Loads the objects and computes the test grasps.
+    pub(super) fn new(plan: RecognitionPlan, stop: &AtomicBool) -> Result<Self, StudyError> {
         let base = Scene {
             pose: PosePreset::named(&plan.preset).map(|preset| preset.poses()).unwrap_or_default(),
             ..Scene::default()
         };
-        let load = |name: &String| -> Result<Option<(ObjectModel, PoseSampler)>, ObjectError> {
-            let mut scene = base.clone();
-            scene.object.source.clone_from(name);
-            let object = scene.load_object()?;
-            let sampler = PoseSampler::new(&scene, object.as_ref());
-            Ok(object.map(|object| (object, sampler)))
-        };
-        let names: Vec<String> = catalogue().iter().map(|built_in| built_in.name.clone()).collect();
-        let objects = names.par_iter().map(load).collect::<Result<Vec<_>, ObjectError>>()?;
+        let load = |built_in: &BuiltIn| posed_object(&base, &built_in.name).transpose();
+        let objects = catalogue().iter().filter_map(load).collect::<Result<_, ObjectError>>()?;
         let mut labels = labels_of_catalogue();
         labels.classes.retain(|class| class.name != EMPTY);
-        let objects = objects.into_iter().flatten().collect();
         let mut bench = Self { plan, objects, labels, test: Dataset::default() };
-        let cancelled = || cancelled.load(Ordering::Relaxed);
-        let of_object = |object: usize| bench.grasps_of(object, &plan.test, TEST_SEEDS, plan.test_grasps, &cancelled);
-        let parts = (0..bench.objects.len()).into_par_iter().map(of_object);
-        let Some(parts) = parts.collect::<Result<Option<Vec<Grasps>>, AccuracyStudyError>>()? else { return Ok(None) };
-        let (test, cpu_ms, left_out) = bench.dataset(parts);
-        let made = TestGrasps { test_grasps: test.examples.len(), left_out, cpu_s: 1e-3 * cpu_ms.iter().sum::<f64>() };
-        bench.test = test;
-        Ok(Some((bench, made)))
+        let RecognitionPlan { test, test_grasps, .. } = bench.plan.clone();
+        bench.test = bench.grasps(&test, TEST_SEEDS, test_grasps, stop)?.0;
+        Ok(bench)
     }
 
-    /// Trains on grasps of a setting, and answers all test grasps; `None` if cancelled.
-    pub(super) fn level(
-        &self,
-        setting: &AccuracySetting,
-        cancelled: &AtomicBool,
-    ) -> Result<Option<LevelAnswers>, AccuracyStudyError> {
-        let stopped = || cancelled.load(Ordering::Relaxed);
-        let mut parts = Vec::new();
-        for object in 0..self.objects.len() {
-            match self.grasps_of(object, setting, TRAIN_SEEDS, self.plan.train_grasps, &stopped)? {
-                Some(part) => parts.push(part),
-                None => return Ok(None),
-            }
-        }
-        let (train, mut cpu_ms, left_out) = self.dataset(parts);
+    /// Trains on grasps of a setting, and answers all test grasps.
+    pub(super) fn level(&self, setting: &AccuracySetting, stop: &AtomicBool) -> Result<LevelAnswers, StudyError> {
+        let (train, mut cpu_ms, left_out) = self.grasps(setting, TRAIN_SEEDS, self.plan.train_grasps, stop)?;
         cpu_ms.sort_by(f64::total_cmp);
         let mut decided = BTreeMap::new();
         for key in &self.plan.methods {
@@ -113,113 +77,81 @@ impl<'a> RecognitionBench<'a> {
             if method.recipe.is_some() {
                 settings.insert("epochs".to_owned(), self.plan.epochs.into());
             }
-            let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &|_| (), stop: cancelled };
-            let recogniser = match (method.fit)(&train, &fitting) {
-                Err(_) if stopped() => return Ok(None),
-                outcome => outcome.map_err(|cause| AccuracyStudyError::Fit { method: method.key, cause })?,
-            };
+            let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &|_| (), stop };
+            let recogniser = (method.fit)(&train, &fitting).map_err(|cause| match cause {
+                LearnError::Stopped => StudyError::Stopped,
+                cause => StudyError::Fit { method: key.clone(), cause },
+            })?;
             let answers = answer(recogniser.as_ref(), &self.test);
             decided.insert(key.clone(), answers.verdicts.iter().map(|verdict| verdict.pmf.top().0).collect());
         }
-        Ok(Some(LevelAnswers {
+        Ok(LevelAnswers {
             cpu_ms: rounded(cpu_ms.get(cpu_ms.len() / 2).copied().unwrap_or_default()),
             grasps: train.examples.len(),
             left_out,
             truth: self.test.truth(),
             decided,
-        }))
+        })
     }
 
-    fn grasps_of(
+    /// Grasps of all objects at a setting, all CPU times (ms), and the number of grasps left out.
+    fn grasps(
         &self,
-        object: usize,
         setting: &AccuracySetting,
         first_seed: u64,
         count: u64,
-        cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Grasps>, AccuracyStudyError> {
-        let (model, sampler) = &self.objects[object];
+        stop: &AtomicBool,
+    ) -> Result<(Dataset, Vec<f64>, usize), StudyError> {
         let view = SensorView { sensors: SensorModel::PhysicalLike, ..SensorView::default() };
-        let mut grasps = Grasps::default();
-        let class = self.labels.class(&model.name);
-        for seed in first_seed..first_seed + count {
-            let scene = setting.adopted(&sampler.draw(Some(model), seed).0)?;
-            let Some((mut trial, cpu_s)) = timed_grasp(&scene, Some(model), cancelled) else { return Ok(None) };
-            // Seeds the noise of the sensors, too.
-            trial.header.seed = seed;
-            grasps.cpu_ms.push(cpu_s * 1e3);
-            let (Some(class), true) = (class, trial.data.quality.is_sound()) else {
-                grasps.left_out += 1;
-                continue;
-            };
-            let signals = view.signals(&trial).map_err(|cause| AccuracyStudyError::Layout { cause })?;
-            grasps.channels.clone_from(&signals.channels);
-            let grasp = Arc::new(sequence_of(&signals));
-            grasps.examples.push(Example {
-                id: seed as i64,
-                class,
-                content: grasp.content(),
-                grasp,
-                ..Example::default()
-            });
-        }
-        Ok(Some(grasps))
-    }
-
-    /// One data set, all CPU times (ms), and the number of grasps left out.
-    fn dataset(&self, parts: Vec<Grasps>) -> (Dataset, Vec<f64>, usize) {
         let mut data = Dataset { labels: self.labels.clone(), ..Dataset::default() };
         let (mut cpu_ms, mut left_out) = (Vec::new(), 0);
-        for part in parts {
-            data.examples.extend(part.examples);
-            if !part.channels.is_empty() {
-                data.channels = part.channels;
+        for (model, sampler) in &self.objects {
+            let class = self.labels.class(&model.name);
+            for seed in first_seed..first_seed + count {
+                let scene = setting.adopted(&sampler.draw(Some(model), seed).0)?;
+                let grasped = timed_grasp(&scene, Some(model), &|| stop.load(Ordering::Relaxed));
+                let (mut trial, cpu_s) = grasped.ok_or(StudyError::Stopped)?;
+                // Seeds the noise of the sensors, too.
+                trial.header.seed = seed;
+                cpu_ms.push(cpu_s * 1e3);
+                let (Some(class), true) = (class, trial.data.quality.is_sound()) else {
+                    left_out += 1;
+                    continue;
+                };
+                let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
+                data.channels.clone_from(&signals.channels);
+                let grasp = Arc::new(sequence_of(&signals));
+                let (id, content) = (seed as i64, grasp.content());
+                data.examples.push(Example { id, class, content, grasp, ..Example::default() });
             }
-            cpu_ms.extend(part.cpu_ms);
-            left_out += part.left_out;
         }
-        (data, cpu_ms, left_out)
+        Ok((data, cpu_ms, left_out))
     }
 }
 
-/// Grasps of one object.
-#[derive(Default)]
-struct Grasps {
-    channels: Vec<String>,
-    examples: Vec<Example>,
-    cpu_ms: Vec<f64>,
-    left_out: usize,
-}
-
-/// Scores of every setting, beside those of the last, which is trained on reference grasps.
-pub(super) fn scores(levels: &[(&AccuracySetting, &LevelAnswers)], reference: &LevelAnswers) -> Vec<RecognitionRow> {
-    let classes = reference.truth.iter().max().map_or(0, |most| most + 1);
+/// Scores of every setting, beside those of grasps of the reference.
+pub(super) fn scores(levels: &[(AccuracySetting, LevelAnswers)], reference: &LevelAnswers) -> Vec<RecognitionRow> {
     let truth = &reference.truth;
-    let f1 = |decided: &[usize], trials: &[usize]| {
-        Confusion::from_pairs(classes, trials.iter().map(|k| (truth[*k], decided.get(*k).copied())))?.macro_f1()
+    let classes: Vec<String> = (0..=truth.iter().max().copied().unwrap_or(0)).map(|class| class.to_string()).collect();
+    let pool = |decided: &[usize]| {
+        let decisions = truth.iter().zip(decided).enumerate();
+        Pool::of_decisions(&classes, decisions.map(|(trial, (truth, decided))| (trial as TrialId, *truth, *decided)))
     };
-    let bootstrap = Bootstrap { resamples: 1000, seed: 0 };
-    let score = |method: &String, decided: &Vec<usize>| {
-        let beside = reference.decided.get(method)?;
-        let short = |interval: Interval| Interval {
-            estimate: rounded(interval.estimate),
-            low: rounded(interval.low),
-            high: rounded(interval.high),
-        };
-        Some(MethodScore {
-            method: method.clone(),
-            f1: short(bootstrap.interval(truth, |trials| f1(decided, trials))?),
-            gain: short(bootstrap.difference(truth, |trials| f1(decided, trials), |trials| f1(beside, trials))?),
-        })
+    let short = |Interval { estimate, low, high }: Interval| Interval {
+        estimate: rounded(estimate),
+        low: rounded(low),
+        high: rounded(high),
     };
-    levels
-        .iter()
-        .map(|(setting, level)| RecognitionRow {
-            setting: (*setting).clone(),
-            cpu_ms: level.cpu_ms,
-            grasps: level.grasps,
-            left_out: level.left_out,
-            scores: level.decided.iter().filter_map(|(method, decided)| score(method, decided)).collect(),
-        })
-        .collect()
+    let score = |(method, decided): (&String, &Vec<usize>)| {
+        let (own, beside) = (pool(decided), pool(reference.decided.get(method)?));
+        Some(MethodScore { method: method.clone(), f1: short(own.f1()?), gain: short(own.against(&beside)?.f1) })
+    };
+    let row = |(setting, level): &(AccuracySetting, LevelAnswers)| RecognitionRow {
+        setting: setting.clone(),
+        cpu_ms: level.cpu_ms,
+        grasps: level.grasps,
+        left_out: level.left_out,
+        scores: level.decided.iter().filter_map(score).collect(),
+    };
+    levels.iter().map(row).collect()
 }

@@ -2,6 +2,7 @@
 
 use super::measure::GraspSample;
 use super::plan::{AccuracySetting, SettingFamily};
+use crate::study::frame::rounded;
 use palpate_learn::metrics::Interval;
 use serde::{Deserialize, Serialize};
 
@@ -141,11 +142,6 @@ impl Spread {
         };
         Self { low: at(0.25), median: at(0.5), high: at(0.75) }
     }
-}
-
-/// Three digits of a number, which is all that a stored result is good for.
-pub(super) fn rounded(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// Recognition by models trained on grasps of one setting and tested on reference grasps.

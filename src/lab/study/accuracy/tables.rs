@@ -1,114 +1,87 @@
-//! Tables of the manual, written from the stored result.
+//! The result in tables, for the terminal, the manual and other programs.
 
-use super::plan::SettingFamily;
-use super::report::{AccuracyStudy, GroupCost, SceneGroup};
-use crate::study::stored_study::{StoredStudy, markdown_table};
-use palpate_geometry::units::three_digits;
-use palpate_learn::method;
+use super::plan::{AccuracySetting, SettingFamily};
+use super::report::{AccuracyStudy, GroupCost, MethodScore, RecognitionRow, SceneGroup};
+use crate::study::frame::{Cell, Column, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
+use palpate_learn::metrics::Interval;
 
-/// Tables of cost and error for free and fixed objects and by kind of object, and of recognition, in Markdown.
-pub fn accuracy_tables(stored: &StoredStudy<AccuracyStudy>) -> String {
-    let study = &stored.result;
-    let mut parts = vec![format!(
-        "Medians over {} shapes ({}) in {} poses each: CPU time of a grasp, error of curvature and force (RMS over the \
-         grasp), and the share of grasps that fail: they report a fault, or the object ends more than 5 mm away. * marks \
-         the front: nothing cheaper is as accurate. From {}.",
-        study.objects.len(),
-        study.objects.join(", "),
-        study.poses,
-        stored.origin()
-    )];
-    for group in [SceneGroup::Free, SceneGroup::Fixed] {
-        parts.push(format!("## Cost and error, {} objects", group.title()));
-        parts.push(settings_table(study, group));
+/// Cost and error of a setting in a kind of scene.
+struct CostRow<'a> {
+    setting: &'a AccuracySetting,
+    cost: &'a GroupCost,
+    /// True where nothing cheaper is as accurate.
+    in_front: bool,
+}
+
+impl AccuracyStudy {
+    /// Tables of cost and error for free and fixed objects and by kind of object, and of recognition.
+    pub(super) fn shown(&self) -> StudyReport {
+        let (free, fixed) = ([SceneGroup::Free], [SceneGroup::Fixed]);
+        let kinds = &SceneGroup::ALL[2..];
+        let mut tables = vec![
+            self.costs("accuracy-free", "Cost and error, free objects", &free, &SettingFamily::ALL),
+            self.costs("accuracy-fixed", "Cost and error, fixed objects", &fixed, &SettingFamily::ALL),
+            self.costs("accuracy-kinds", "Tolerances by kind of object", kinds, &[SettingFamily::Tolerance]),
+        ];
+        let mut data = vec![format!(
+            "Medians over {} shapes ({}) in {} poses each: CPU time of a grasp, error of curvature (with quartiles) and force \
+             (RMS over the grasp), and the share of grasps that fail: they report a fault, or the object ends more than 5 mm \
+             away. * marks the front: nothing cheaper is as accurate.",
+            self.objects.len(),
+            self.objects.join(", "),
+            self.poses,
+        )];
+        if !self.recognition.is_empty() {
+            let knee = match self.knee() {
+                Some(row) => format!("The knee is {} ({}).", row.setting.name, row.setting.family.title()),
+                None => "No setting is as good as the reference for every method.".to_owned(),
+            };
+            data.push(format!(
+                "Models are trained on grasps of each setting and tested on reference grasps of other poses, through \
+                 physical-like sensors. Macro F1 after one grasp, and the difference from training on reference grasps. {knee}"
+            ));
+            tables.push(self.recognition_table());
+        }
+        StudyReport::new(data, tables, Vec::new())
     }
-    parts.push("## Tolerances by kind of object".to_owned());
-    parts.push(kinds_table(study));
-    if !study.recognition.is_empty() {
-        parts.push("## What it is worth: recognition".to_owned());
-        parts.push(recognition_text(study));
-        parts.push(recognition_table(study));
+
+    fn costs(&self, name: &str, title: &str, groups: &[SceneGroup], families: &[SettingFamily]) -> StudyTable {
+        let of_group = |group: &SceneGroup| {
+            let (group, front) = (*group, self.front(*group));
+            let settings = families.iter().flat_map(move |family| self.family(*family, group));
+            let in_front = move |setting| front.iter().any(|(own, _)| *own == setting);
+            settings.map(move |(setting, cost)| CostRow { setting, cost, in_front: in_front(setting) })
+        };
+        let rows: Vec<CostRow<'_>> = groups.iter().flat_map(of_group).collect();
+        TableRows::new(name, title, &rows).columns(&[
+            Column("objects", "", &|row| row.cost.group.title().into()),
+            Column("family", "", &|row| row.setting.family.title().into()),
+            Column("setting", "", &|row| {
+                format!("{}{}", row.setting.name, if row.setting.is_default() { ", default" } else { "" }).into()
+            }),
+            Column("CPU", "ms", &|row| Some(row.cost.cpu_ms.median).into()),
+            Column("curvature", "1/km", &|row| {
+                let [low, estimate, high] = <[f64; 3]>::from(row.cost.curvature_per_m).map(|error| 1e3 * error);
+                Cell::Interval(Interval { estimate, low, high })
+            }),
+            Column("force", "mN", &|row| Some(1e3 * row.cost.force_n.median).into()),
+            Column("failed", PERCENT, &|row| Some(row.cost.failed as f64 / row.cost.grasps.max(1) as f64).into()),
+            Column("front", "", &|row| if row.in_front { "*" } else { "" }.into()),
+            Column("options", "", &|row| row.setting.on_command_line().into()),
+        ])
     }
-    parts.join("\n\n")
-}
 
-fn numbers(cost: &GroupCost) -> [String; 4] {
-    let failed = 100.0 * cost.failed as f64 / cost.grasps.max(1) as f64;
-    [
-        three_digits(cost.cpu_ms.median),
-        three_digits(1e3 * cost.curvature_per_m.median),
-        three_digits(1e3 * cost.force_n.median),
-        if cost.failed == 0 { "0".to_owned() } else { format!("{failed:.1}") },
-    ]
-}
-
-fn settings_table(study: &AccuracyStudy, group: SceneGroup) -> String {
-    let front: Vec<_> = study.front(group).into_iter().map(|(setting, _)| setting).collect();
-    let rows: Vec<Vec<String>> = SettingFamily::ALL
-        .into_iter()
-        .flat_map(|family| study.family(family, group))
-        .map(|(setting, cost)| {
-            let star = if front.contains(&setting) { " *" } else { "" };
-            let default = if setting.is_default() { ", default" } else { "" };
-            let name = format!("{}{default}{star}", setting.name);
-            [vec![setting.family.title().to_owned(), name], numbers(cost).to_vec()].concat()
-        })
-        .collect();
-    markdown_table(&["family", "setting", "CPU ms", "curvature 1/km", "force mN", "failed %"], &rows)
-}
-
-fn kinds_table(study: &AccuracyStudy) -> String {
-    let groups =
-        [SceneGroup::FreePrimitives, SceneGroup::FreeMeshes, SceneGroup::FixedPrimitives, SceneGroup::FixedMeshes];
-    let rows: Vec<Vec<String>> = groups
-        .into_iter()
-        .flat_map(|group| study.family(SettingFamily::Tolerance, group).map(move |row| (group, row)))
-        .map(|(group, (setting, cost))| {
-            let quartiles = [cost.curvature_per_m.low, cost.curvature_per_m.high].map(|q| three_digits(1e3 * q));
-            let [cpu, curvature, force, failed] = numbers(cost);
-            let curvature = format!("{curvature} ({})", quartiles.join(" to "));
-            vec![group.title().to_owned(), setting.name.clone(), cpu, curvature, force, failed]
-        })
-        .collect();
-    markdown_table(&["kind", "tolerance", "CPU ms", "curvature 1/km (quartiles)", "force mN", "failed %"], &rows)
-}
-
-fn recognition_text(study: &AccuracyStudy) -> String {
-    let knee = match study.knee() {
-        Some(row) => format!("The knee is {} ({}).", row.setting.name, row.setting.family.title()),
-        None => "No setting is as good as the reference for every method.".to_owned(),
-    };
-    format!(
-        "Models are trained on grasps of each setting and tested on reference grasps of other poses, through \
-         physical-like sensors. Macro F1 (%) after one grasp; in brackets the difference from training on \
-         reference grasps, with its 95 % interval. {knee}"
-    )
-}
-
-fn recognition_table(study: &AccuracyStudy) -> String {
-    let keys: Vec<&str> =
-        study.recognition.first().map(|row| row.scores.iter().map(|s| s.method.as_str()).collect()).unwrap_or_default();
-    let mut header = vec!["family", "setting", "CPU ms", "left out"];
-    header.extend(keys.iter().map(|key| method(key).map_or(*key, |method| method.title)));
-    let rows: Vec<Vec<String>> = study
-        .recognition
-        .iter()
-        .map(|row| {
-            let mut cells = vec![
-                row.setting.family.title().to_owned(),
-                row.setting.name.clone(),
-                three_digits(row.cpu_ms),
-                row.left_out.to_string(),
-            ];
-            cells.extend(keys.iter().map(|key| {
-                let percent = |share: f64| format!("{:+.1}", 100.0 * share);
-                row.scores.iter().find(|score| score.method == *key).map_or(String::new(), |score| {
-                    let (f1, gain) = (100.0 * score.f1.estimate, score.gain);
-                    format!("{f1:.1} ({}, {} to {})", percent(gain.estimate), percent(gain.low), percent(gain.high))
-                })
-            }));
-            cells
-        })
-        .collect();
-    markdown_table(&header, &rows)
+    fn recognition_table(&self) -> StudyTable {
+        let mut rows: Vec<(&RecognitionRow, &MethodScore)> = Vec::new();
+        self.recognition.iter().for_each(|row| rows.extend(row.scores.iter().map(|score| (row, score))));
+        TableRows::new("accuracy-recognition", "What it is worth: recognition", &rows).columns(&[
+            Column("family", "", &|(row, _)| row.setting.family.title().into()),
+            Column("setting", "", &|(row, _)| row.setting.name.as_str().into()),
+            Column("CPU", "ms", &|(row, _)| Some(row.cpu_ms).into()),
+            Column("left out", "grasps", &|(row, _)| row.left_out.into()),
+            Column("method", "", &|(_, score)| score.method.as_str().into()),
+            Column("F1", PERCENT, &|(_, score)| Some(score.f1).into()),
+            Column("difference", POINTS, &|(_, score)| Some(score.gain).into()),
+        ])
+    }
 }

@@ -11,10 +11,11 @@
 mod report;
 mod scenes;
 
-pub use report::{AuditReport, AuditRow, audit_figure, audit_table, stored_effects};
+pub use report::{AuditReport, AuditRow, stored_effects};
 
-use super::effects::{Measuring, flipped, run};
-use super::result_file::{ResultFile, ResultFileError};
+use super::effects::flipped;
+use super::frame::{Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyReport};
+use super::timed_grasp::timed_grasp;
 use crate::grasping::ErrorNorms;
 use palpate_sim::frame::Plan;
 use palpate_sim::objects::{ObjectError, ObjectModel};
@@ -23,15 +24,13 @@ use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, SignalDefinition};
 use scenes::{Drawn, ObjectShelf};
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Settings of an audit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AuditPlan {
-    /// Random scenes.
-    pub scenes: u32,
-    /// Seed of the scenes.
-    pub seed: u64,
+/// An audit of random scenes.
+pub struct EffectAudit {
+    scenes: u32,
+    seed: u64,
+    shelf: ObjectShelf,
 }
 
 /// Difference of two trials: root mean squares over all samples of both fingers.
@@ -104,36 +103,75 @@ pub struct AuditedEffect {
     pub cost: Option<f64>,
 }
 
-/// Computes the random scenes that are missing in a file of results; true when all are there.
-pub fn audit_effects(
-    plan: AuditPlan,
-    results: &mut ResultFile<AuditedScene>,
-    how: &Measuring<'_>,
-) -> Result<bool, AuditError> {
-    let shelf = ObjectShelf::load()?;
-    let units: Vec<(String, u32)> = (0..plan.scenes).map(|index| (format!("scene {index:04}"), index)).collect();
-    let work = |index: &u32| Ok::<_, AuditError>(audit_one(&shelf.draw(plan.seed, *index), how.cancelled));
-    results.complete(&units, how, work)
+/// A random scene by its number.
+#[derive(Clone, Copy)]
+pub struct SceneNumber(u32);
+
+impl StudyCell for SceneNumber {
+    fn name(&self) -> String {
+        format!("scene {:04}", self.0)
+    }
 }
 
-/// Error of an audit.
-#[derive(Debug, thiserror::Error)]
-pub enum AuditError {
-    /// A built-in object cannot be loaded.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// The results cannot be kept.
-    #[error(transparent)]
-    Results(#[from] ResultFileError),
+impl EffectAudit {
+    /// Random scenes of the full form.
+    pub const SCENES: u32 = 500;
+
+    /// An audit of so many random scenes of a seed.
+    pub fn new(scenes: u32, seed: u64) -> Result<Self, ObjectError> {
+        Ok(Self { scenes, seed, shelf: ObjectShelf::load()? })
+    }
+}
+
+impl Experiment for EffectAudit {
+    type Cell = SceneNumber;
+    type Found = AuditedScene;
+    type Report = AuditReport;
+
+    fn key(&self) -> &'static str {
+        "effects"
+    }
+
+    /// More scenes of the same seed continue from fewer.
+    fn header(&self) -> serde_json::Value {
+        self.seed.into()
+    }
+
+    fn command(&self) -> StudyCommand {
+        StudyCommand::new(self.key())
+            .option("scenes", (self.scenes != Self::SCENES).then_some(self.scenes))
+            .option("seed", (self.seed != 1).then_some(self.seed))
+    }
+
+    fn grid(&self) -> Vec<SceneNumber> {
+        (0..self.scenes).map(SceneNumber).collect()
+    }
+
+    fn measure(&self, SceneNumber(number): &SceneNumber, stop: &AtomicBool) -> Result<AuditedScene, StudyError> {
+        audit_one(&self.shelf.draw(self.seed, *number), stop).ok_or(StudyError::Stopped)
+    }
+
+    fn report(&self, found: Vec<(SceneNumber, AuditedScene)>) -> AuditReport {
+        AuditReport::new(found.iter().map(|(_, scene)| scene))
+    }
+
+    fn shown(report: &AuditReport) -> StudyReport {
+        report.shown()
+    }
+
+    fn figures(report: &AuditReport) -> Vec<LinkedFigure> {
+        vec![report.figure()]
+    }
 }
 
 fn audit_one(drawn: &Drawn, cancelled: &AtomicBool) -> Option<AuditedScene> {
     let Drawn { scene, object, settings } = drawn;
     let object = object.as_ref();
     let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact);
-    let (base, cpu_s) = run(scene, object, cancelled)?;
+    let stopped = || cancelled.load(Ordering::Relaxed);
+    let (base, cpu_s) = timed_grasp(scene, object, &stopped)?;
     let change = |other: &Scene, object: Option<&ObjectModel>| {
-        let (trial, cpu_s) = run(other, object, cancelled)?;
+        let (trial, cpu_s) = timed_grasp(other, object, &stopped)?;
         Some((EffectSize::between(&trial, &base, &sensors), cpu_s))
     };
     let mut refined = scene.clone();
@@ -194,15 +232,9 @@ mod tests {
 
     #[test]
     fn an_audit_repeats_and_flips_every_possible_effect() -> TestResult {
-        let plan = AuditPlan { scenes: 3, seed: 5 };
-        let audited = || -> Result<ResultFile<AuditedScene>, AuditError> {
-            let mut results = ResultFile::in_memory();
-            let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| {} };
-            assert!(audit_effects(plan, &mut results, &how)?);
-            Ok(results)
-        };
-        let (one, other) = (audited()?, audited()?);
-        for (scene, again) in one.units().values().zip(other.units().values()) {
+        let (audit, stop) = (EffectAudit::new(3, 5)?, AtomicBool::new(false));
+        let audited = || audit.grid().iter().map(|cell| audit.measure(cell, &stop)).collect::<Result<Vec<_>, _>>();
+        for (scene, again) in audited()?.iter().zip(&audited()?) {
             assert_eq!((scene.noise, scene.all_on), (again.noise, again.all_on));
             assert_eq!(scene.effects.len(), Effect::ALL.len());
             let flipped = scene.effects.iter().filter(|effect| effect.cost.is_some()).count();

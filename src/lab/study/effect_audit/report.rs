@@ -1,7 +1,7 @@
-//! An audit in numbers: a row per effect, a table for the manual, a figure.
+//! An audit in numbers: a row per effect, its table and its figure.
 
 use super::{AuditedEffect, AuditedScene, EffectSize};
-use crate::study::stored_study::{StoredStudy, markdown_table};
+use crate::study::frame::{Column, LinkedFigure, StoredStudy, StudyReport, TableRows, plots_of, rounded};
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 use palpate_sim::physics::effects::rule_of;
 use palpate_sim::scene::Effect;
@@ -77,6 +77,66 @@ impl AuditReport {
             effects: Effect::ALL.iter().map(|effect| AuditRow::new(*effect, &scenes)).collect(),
         }
     }
+
+    /// The table of effects.
+    pub(super) fn shown(&self) -> StudyReport {
+        let Self { scenes, missed, within_noise, effects } = self;
+        let with_a_rule: Vec<AuditRow> = effects.iter().filter(|row| row.on + row.off > 0).cloned().collect();
+        let table = TableRows::new("effects", "Effects, each flipped", &with_a_rule).columns(&[
+            Column("effect", "", &|row| row.name.as_str().into()),
+            Column("threshold", "", &|row| row.threshold.to_string().into()),
+            Column("on", "", &|row| row.on.into()),
+            Column("of these not seen", "", &|row| row.needless.into()),
+            Column("off", "", &|row| row.off.into()),
+            Column("of these missed", "", &|row| row.missed.into()),
+            Column("within noise", "", &|row| row.within_noise.into()),
+            Column("CPU time", "", &|row| row.cost.into()),
+        ]);
+        let data = [
+            format!(
+                "{scenes} random scenes: with all effects on at once the change is seen in {missed}, and in {within_noise} more it \
+                 is as large, but within the noise."
+            ),
+            "Seen: curvature changes by more than 0.1 1/m or force by more than 10 mN (RMS over the grasp), and by more than twice \
+             what a tenth of the tolerance or a push of the gripper by 10 µm changes."
+                .to_owned(),
+            "CPU time: with the effect over that without it, median.".to_owned(),
+        ];
+        StudyReport::new(data.to_vec(), vec![table], Vec::new())
+    }
+
+    /// Change of each effect against the number of its rule.
+    pub(super) fn figure(&self) -> LinkedFigure {
+        let line = |horizontal: bool, text: &str| ReferenceLine { horizontal, at: 1.0, text: text.to_owned() };
+        let axes = Plot {
+            x: PlotAxis { range: Some([1e-3, 1e3]), ..PlotAxis::logarithmic("number of the rule / threshold") },
+            y: PlotAxis::logarithmic("change / visible change (0.1 1/m, 10 mN)"),
+            references: vec![line(true, "seen"), line(false, "on from here")],
+            ..Plot::default()
+        };
+        let mut marks = Vec::new();
+        for (title, effects) in PLOTS {
+            for (colour, effect) in effects.iter().enumerate() {
+                let Some(row) = self.effects.iter().find(|row| row.name == effect.name()) else { continue };
+                let crosses = DataSeries { colour, marker: Marker::Cross, ..DataSeries::default() };
+                let (line, marker) = (LineStyle::Bold, Marker::Dot);
+                let curve = DataSeries { name: row.name.clone(), line, marker, ..crosses.clone() };
+                let mut mark = |series: &DataSeries, x: f64, y: f64| {
+                    marks.push((title.to_owned(), series.clone(), DataPoint::new(x, y)));
+                };
+                let shown = row.bins.iter().filter(|bin| bin.upper > 0.0);
+                shown.for_each(|bin| mark(&curve, bin.number, bin.upper.max(LEAST_SHOWN)));
+                row.misses.iter().for_each(|[number, change]| mark(&crosses, *number, *change));
+            }
+        }
+        let figure = Figure {
+            title: format!("What auto leaves out: {} random scenes, each effect flipped", self.scenes),
+            columns: 1,
+            plots: plots_of(&axes, marks),
+            note: "90th percentile of the scenes; crosses: missed.".to_owned(),
+        };
+        LinkedFigure::plain("effects", figure)
+    }
 }
 
 impl AuditRow {
@@ -92,7 +152,6 @@ impl AuditRow {
         let large = |(audited, _): &&&(AuditedEffect, EffectSize)| audited.change.of_seen() > 1.0;
         let missed: Vec<_> = off.iter().filter(seen).collect();
         let mut costs: Vec<f64> = on.iter().filter_map(|(audited, _)| audited.cost).collect();
-        let round = |x: f64| format!("{x:.2e}").parse().unwrap_or(x);
         Self {
             name: effect.name().to_owned(),
             threshold,
@@ -101,10 +160,10 @@ impl AuditRow {
             within_noise: off.iter().filter(large).count() - missed.len(),
             on: on.len(),
             needless: on.len() - on.iter().filter(seen).count(),
-            cost: quantile(&mut costs, 0.5).map(round),
+            cost: quantile(&mut costs, 0.5).map(rounded),
             misses: missed
                 .iter()
-                .map(|(audited, _)| [round(audited.number / threshold), round(audited.change.of_seen())])
+                .map(|(audited, _)| [rounded(audited.number / threshold), rounded(audited.change.of_seen())])
                 .collect(),
             bins: (-FARTHEST..=FARTHEST)
                 .filter_map(|power| {
@@ -115,7 +174,7 @@ impl AuditRow {
                     let mut changes: Vec<f64> =
                         all.iter().filter(within).map(|(audited, _)| audited.change.of_seen()).collect();
                     let (median, upper) = (quantile(&mut changes, 0.5)?, quantile(&mut changes, 0.9)?);
-                    let (median, upper) = (round(median), round(upper));
+                    let (median, upper) = (rounded(median), rounded(upper));
                     let bin = AuditBin { number: 2f64.powi(power), count: changes.len(), median, upper };
                     (changes.len() >= LEAST_COUNT).then_some(bin)
                 })
@@ -133,23 +192,6 @@ fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
 /// The stored result.
 pub fn stored_effects() -> Result<StoredStudy<AuditReport>, serde_json::Error> {
     StoredStudy::parse(include_str!("../../../../assets/studies/effects.json"))
-}
-
-/// Table of an audit, in Markdown.
-pub fn audit_table(report: &AuditReport) -> String {
-    let rows: Vec<Vec<String>> = report
-        .effects
-        .iter()
-        .filter(|row| row.on + row.off > 0)
-        .map(|row| {
-            let cost = row.cost.map_or("-".to_owned(), |cost| format!("{cost:.2}"));
-            let counts = [row.on, row.needless, row.off, row.missed, row.within_noise].map(|count| count.to_string());
-            [vec![format!("`{}`", row.name), row.threshold.to_string()], counts.to_vec(), vec![cost]].concat()
-        })
-        .collect();
-    let header =
-        ["effect", "threshold", "on", "of these not seen", "off", "of these missed", "within noise", "CPU time"];
-    markdown_table(&header, &rows)
 }
 
 /// Effects of the two plots of the figure.
@@ -170,48 +212,6 @@ const PLOTS: [(&str, &[Effect]); 2] = [
         ],
     ),
 ];
-
-/// Change of each effect against the number of its rule.
-pub fn audit_figure(stored: &StoredStudy<AuditReport>) -> Figure {
-    let report = &stored.result;
-    Figure {
-        title: format!("What auto leaves out: {} random scenes, each effect flipped", report.scenes),
-        columns: 1,
-        plots: PLOTS.iter().map(|(title, effects)| plot(report, title, effects)).collect(),
-        note: format!("90th percentile of the scenes; crosses: missed. {}", stored.plain_origin()),
-    }
-}
-
-fn plot(report: &AuditReport, title: &str, effects: &[Effect]) -> Plot {
-    let mut series = Vec::new();
-    for (colour, effect) in effects.iter().enumerate() {
-        let Some(row) = report.effects.iter().find(|row| row.name == effect.name()) else { continue };
-        let shown = row.bins.iter().filter(|bin| bin.upper > 0.0);
-        series.push(DataSeries {
-            name: row.name.clone(),
-            colour,
-            line: LineStyle::Bold,
-            marker: Marker::Dot,
-            points: shown.map(|bin| DataPoint::new(bin.number, bin.upper.max(LEAST_SHOWN))).collect(),
-        });
-        series.push(DataSeries {
-            name: String::new(),
-            colour,
-            line: LineStyle::None,
-            marker: Marker::Cross,
-            points: row.misses.iter().map(|[number, change]| DataPoint::new(*number, *change)).collect(),
-        });
-    }
-    let line = |horizontal: bool, text: &str| ReferenceLine { horizontal, at: 1.0, text: text.to_owned() };
-    Plot {
-        title: title.to_owned(),
-        x: PlotAxis { range: Some([1e-3, 1e3]), ..PlotAxis::logarithmic("number of the rule / threshold") },
-        y: PlotAxis::logarithmic("change / visible change (0.1 1/m, 10 mN)"),
-        references: vec![line(true, "seen"), line(false, "on from here")],
-        series,
-        ..Plot::default()
-    }
-}
 
 /// Changes below this share of a visible one are drawn at it.
 const LEAST_SHOWN: f64 = 1e-3;
@@ -239,8 +239,8 @@ mod tests {
         assert_eq!((creep.off, creep.missed, creep.on, creep.needless), (7, 1, 2, 1));
         assert_eq!(creep.bins.len(), 1, "{:?}", creep.bins);
         assert_eq!(creep.misses, [[0.1, 2.0]]);
-        let row = format!("| `creep` | {threshold} | 2 | 1 | 7 | 1 | 0 | 1.10 |");
-        assert!(audit_table(&report).contains(&row), "{}", audit_table(&report));
+        let (_, rows) = report.shown().tables[0].shown();
+        assert_eq!(rows, [["creep", &threshold.to_string(), "2", "1", "7", "1", "0", "1.10"].map(str::to_owned)]);
     }
 
     #[test]

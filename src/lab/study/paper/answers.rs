@@ -1,7 +1,8 @@
 //! Models fitted and judged in a study: their answers to test grasps, with intervals and paired differences.
 
-use super::bench::{StudyBench, StudyError};
+use super::bench::StudyBench;
 use super::plan::{DataWanted, StudyPlan};
+use crate::study::frame::{Cell, PERCENT, StudyError, StudyTable};
 use palpate_learn::evaluation::{Answers, answer};
 use palpate_learn::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, McNemar};
 use palpate_learn::{Dataset, Method, Model, SplitError, SplitPlan};
@@ -187,7 +188,7 @@ fn live_step_us(model: &Model, test: &Dataset) -> Option<f64> {
 
 /// Answers of one kind of model over several test parts, by trial.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Pool {
+pub(in crate::study) struct Pool {
     pub(super) classes: Vec<String>,
     /// Class and decisions of each trial.
     trials: BTreeMap<TrialId, (usize, Vec<usize>)>,
@@ -198,16 +199,19 @@ pub(super) const BOOTSTRAP: Bootstrap = Bootstrap { resamples: 1000, seed: 0 };
 
 /// One kind of model against another on the same trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PairedDifference {
+pub(in crate::study) struct PairedDifference {
     /// Macro F1 of the first minus that of the second.
-    pub(super) f1: Interval,
+    pub(in crate::study) f1: Interval,
     /// Exact McNemar test.
     pub(super) p: f64,
 }
 
 impl Pool {
     /// Decisions on trials: number, class and decision of each.
-    pub(super) fn of_decisions(classes: &[String], all: impl IntoIterator<Item = (TrialId, usize, usize)>) -> Self {
+    pub(in crate::study) fn of_decisions(
+        classes: &[String],
+        all: impl IntoIterator<Item = (TrialId, usize, usize)>,
+    ) -> Self {
         let mut pool = Self { classes: classes.to_vec(), trials: BTreeMap::new() };
         for (trial, truth, decided) in all {
             pool.trials.entry(trial).or_insert((truth, Vec::new())).1.push(decided);
@@ -237,7 +241,7 @@ impl Pool {
     }
 
     /// Macro F1 with its interval, over the classes of the test grasps: a model may know others too.
-    pub(super) fn f1(&self) -> Option<Interval> {
+    pub(in crate::study) fn f1(&self) -> Option<Interval> {
         self.scored(Confusion::f1_over_occurring)
     }
 
@@ -253,7 +257,7 @@ impl Pool {
     }
 
     /// This kind of model against another on the trials that both answered.
-    pub(super) fn against(&self, other: &Self) -> Option<PairedDifference> {
+    pub(in crate::study) fn against(&self, other: &Self) -> Option<PairedDifference> {
         if self.classes != other.classes {
             return None;
         }
@@ -311,6 +315,23 @@ impl Pool {
 
 /// Most trials behind a row of a table.
 pub(super) const SHOWN: usize = 12;
+
+/// Table of confusions, one row for each kind of grasps and pair of classes that occurs.
+pub(super) fn confusion_table(name: &str, title: &str, kinds: &[(&str, &Pool)]) -> StudyTable {
+    let columns = [("grasps", ""), ("true", ""), ("predicted", ""), ("count", "grasps"), ("share", PERCENT)];
+    let mut table = StudyTable::new(name, title, &columns);
+    for (kind, pool) in kinds {
+        let cells = pool.confusions();
+        for ((truth, decided), (count, trials)) in &cells {
+            let of_class: usize = cells.iter().filter(|(cell, _)| cell.0 == *truth).map(|(_, (count, _))| count).sum();
+            let names = [*truth, *decided].map(|class| Cell::text(&pool.classes[class]));
+            let numbers = [*count as f64, *count as f64 / of_class.max(1) as f64].map(Cell::Number);
+            let cells = [vec![Cell::text(*kind)], names.to_vec(), numbers.to_vec()].concat();
+            table.push(cells, trials.clone());
+        }
+    }
+    table
+}
 
 fn confusion(classes: usize, all: &[&(usize, Vec<usize>)], trials: &[usize]) -> Option<Confusion> {
     let pairs = trials.iter().flat_map(|k| all[*k].1.iter().map(|decided| (all[*k].0, Some(*decided))));

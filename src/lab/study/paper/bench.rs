@@ -2,49 +2,16 @@
 
 use super::plan::{DataWanted, StudyPlan};
 use crate::datasets::{DatasetError, DatasetQuery};
-use crate::grasping::{CollectionError, CollectionPlan, collect};
-use crate::study::result_file::ResultFileError;
-use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, SplitError};
+use crate::grasping::{CollectionPlan, collect};
+use crate::study::frame::{Measuring, StudyError, TrialNumbers};
+use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
+use palpate_sim::fingerprint;
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Error of a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// Grasps could not be collected.
-    #[error(transparent)]
-    Collect(#[from] CollectionError),
-    /// Grasps could not be read.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The file of finished units failed.
-    #[error(transparent)]
-    Results(#[from] ResultFileError),
-    /// A method could not be fitted.
-    #[error("{method}: {cause}")]
-    Fit {
-        /// Key of the method.
-        method: String,
-        /// Cause.
-        cause: LearnError,
-    },
-    /// The trials cannot be divided into training and test grasps.
-    #[error(transparent)]
-    Split(#[from] SplitError),
-    /// A preset or method that does not exist.
-    #[error("there is no {0}")]
-    Unknown(String),
-    /// The trials lack something that the study needs.
-    #[error("the study needs {0}")]
-    Missing(String),
-    /// It was stopped; the same plan continues.
-    #[error("stopped")]
-    Stopped,
-}
 
 /// Step of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +51,8 @@ pub struct StudyBench<'a> {
     store: Mutex<Store>,
     /// Data sets read last, newest last.
     read: Mutex<Vec<(DataWanted, Arc<Dataset>)>>,
+    /// Numbers of all trials that were read.
+    trials: Mutex<TrialNumbers>,
 }
 
 /// Data sets kept in memory: as many as are in use at a time.
@@ -92,7 +61,7 @@ const KEPT: usize = 4;
 impl<'a> StudyBench<'a> {
     /// A bench on a store.
     pub fn new(store: Store, plan: &'a StudyPlan, work: StudyWork<'a>) -> Self {
-        Self { plan, work, store: Mutex::new(store), read: Mutex::new(Vec::new()) }
+        Self { plan, work, store: Mutex::new(store), read: Mutex::default(), trials: Mutex::default() }
     }
 
     /// Plan of the study.
@@ -103,6 +72,18 @@ impl<'a> StudyBench<'a> {
     /// Threads, stop flag and progress.
     pub fn work(&self) -> StudyWork<'a> {
         self.work
+    }
+
+    /// Measures units with the threads and the progress of the study.
+    pub(super) fn measuring<T>(&self, measure: impl FnOnce(&Measuring<'_>) -> T) -> T {
+        let StudyWork { threads, cancelled, progress } = self.work;
+        let progress = |done, of| progress(StudyProgress { step: StudyStep::Measuring, done, of });
+        measure(&Measuring { threads, cancelled, progress: &progress })
+    }
+
+    /// Numbers of the trials that were read.
+    pub(super) fn trials(&self) -> TrialNumbers {
+        self.trials.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// True once the study is to stop.
@@ -134,6 +115,12 @@ impl<'a> StudyBench<'a> {
         let most_of_each = Some(query.most_of_each.map_or(wanted.grasps, |most| most.min(wanted.grasps)));
         let query = DatasetQuery { without_empty: true, most_of_each, ..query };
         let data = Arc::new(query.read(&store, &wanted.view, &mut |_, _| ())?);
+        let numbers: Vec<u8> = data.examples.iter().flat_map(|example| example.id.to_le_bytes()).collect();
+        let trials = query.collection.as_deref().unwrap_or("stored trials");
+        self.trials.lock().unwrap_or_else(PoisonError::into_inner).insert(
+            format!("{} of each object, {trials}", wanted.grasps),
+            format!("{:016x}", fingerprint([numbers.as_slice()])),
+        );
         if read.len() == KEPT {
             read.remove(0);
         }

@@ -1,23 +1,12 @@
 //! Sensors that drift (section VI): gains and zeros that differ between training and test, with and without a zero taken before
 //! contact, and hysteresis that the training has not seen.
 
-use super::answers::{ModelAnswers, PARTS, TestAnswers, TestPart, judge, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{Claim, Rule};
-use super::drawing::{F1_PERCENT, LinkedPlots};
-use super::report::{Agreement, Cell, Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport};
-use super::rows::{Factor, Fit, Kind, Row, compare, described, find, pooled, unique};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
+use super::prelude::*;
 use crate::datasets::{SensorView, noise_seed, sequence_of};
-use palpate_geometry::drawing::{DataSeries, LineStyle, Marker, Plot, PlotAxis};
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, Example, Sequence, method};
 use palpate_sim::gripper::Phase;
-use palpate_tactile::model::{PhysicalLike, SensorModel};
+use palpate_tactile::model::PhysicalLike;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::sync::Arc;
 
 pub(super) struct Drift;
 

@@ -1,8 +1,8 @@
 //! Grasps of emulated grippers, each read as after `palpate adapt`: parts that no training saw, through board, line and decoder.
 
-use super::bench::StudyError;
 use crate::datasets::sequence_of;
 use crate::grasping::Adaptation;
+use crate::study::frame::StudyError;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step};
 use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_learn::{Class, DataCard, Dataset, Example, Labels};

@@ -3,22 +3,10 @@
 //! Grasps are combined in two ways: the iterated network is fed with the probabilities of those before, and the product of
 //! experts multiplies the probabilities of each grasp alone.
 
-use super::answers::{Pool, SHOWN, TestPart, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{ALL_GAIN, Claim, Rule};
-use super::drawing::{Along, Facets, LinkedPlots, TableLine, lines};
-use super::plan::DataWanted;
-use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
-use super::rows::{Fit, Kind, Row, crossed, gains_over, grouped, unique};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
+use super::prelude::*;
 use crate::grasping::SUCCESSION;
-use palpate_geometry::drawing::PlotAxis;
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Model, Pmf, StopReason, StopRule};
+use palpate_learn::{StopReason, StopRule};
 use palpate_sim::scene::Between;
-use palpate_tactile::trial::TrialId;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct Grasps;

@@ -1,10 +1,9 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
-use super::report::{StudyColumn, StudyReport, StudyRow, StudyTable};
 use super::stored::stored_report;
 use super::{PaperStudy, grasps, models, recognition};
+use crate::study::frame::{GeneratedSection, StudyReport, StudyTable, markdown_table};
 use crate::study::shipped::shipped_text;
-use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
 use palpate_learn::METHODS;
 
 /// Kinds of grasps of the comparison of methods, and of the study of successive grasps.
@@ -30,26 +29,12 @@ pub(in crate::study) fn sections_in_short() -> Result<Vec<GeneratedSection>, ser
         _ => (none.clone(), shipped_text()),
     };
     let short = [short, beyond.as_ref().map_or_else(String::new, |own| unlabelled_in_short(&own.result))].concat();
-    let beyond = beyond.map_or(none, |own| beyond_the_paper(&own));
+    let beyond = beyond.map_or(none, |own| own.result.markdown(&own.origin()));
     Ok(vec![
         GeneratedSection { document: "assets/help/recognition.md", name: "scores", text },
         GeneratedSection { document: "assets/help/recognition.md", name: "beyond the paper", text: beyond },
         GeneratedSection { document: "README.md", name: "recognition in short", text: short },
     ])
-}
-
-/// The tables of the study of recognition beyond the paper: targets, the next grasp, costs.
-fn beyond_the_paper(stored: &StoredStudy<StudyReport>) -> String {
-    let text = |table: &StudyTable| {
-        let header: Vec<String> = table.columns.iter().map(StudyColumn::titled).collect();
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        let cells =
-            |row: &StudyRow| row.cells.iter().zip(&table.columns).map(|(cell, own)| cell.shown(&own.unit)).collect();
-        let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
-        format!("{}:\n\n{}\n\n", table.title, markdown_table(&header, &rows))
-    };
-    let tables: String = stored.result.tables.iter().map(text).collect();
-    format!("{tables}{}.", stored.origin())
 }
 
 /// A sentence on grippers without labelled grasps.

@@ -1,16 +1,7 @@
 //! Sensor layouts (Fig. 5a): which are enough.
 
-use super::answers::{PARTS, TestAnswers, TestPart, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{Claim, Rule};
-use super::drawing::{Along, Facets};
-use super::report::{Column, Finding, LinkedFigure, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
-use super::rows::{Factor, Fit, Kind, Row, by_model, compare, crossed, described, gains_over, pooled};
-use super::study::Study;
-use super::{StudyCard, StudyPlan, StudySize};
-use palpate_learn::method;
+use super::prelude::*;
 use palpate_sim::gripper::GripperModel;
-use palpate_tactile::model::SensorModel;
 use palpate_tactile::{CATALOGUE, SensorLayout, SignalDefinition};
 
 pub(super) struct Layouts;

@@ -9,19 +9,16 @@
 
 mod answers;
 mod bench;
-mod claims;
-mod drawing;
 mod drift;
 mod emulated_grasps;
-mod folder;
 mod grasps;
 mod in_short;
 mod layouts;
 mod modality;
 mod models;
 mod plan;
+mod prelude;
 mod recognition;
-mod report;
 mod rows;
 mod shaking;
 mod signatures;
@@ -30,17 +27,17 @@ mod stored;
 mod study;
 mod training_size;
 
-pub use bench::{StudyBench, StudyError, StudyProgress, StudyStep, StudyWork};
-pub use folder::StudyFolder;
+pub use super::frame::{
+    Agreement, Cell, ClaimNumber, FigureLink, FigureMark, Finding, IntervalStrip, LinkedFigure, PERCENT, POINTS,
+    StudyColumn, StudyError, StudyFolder, StudyReport, StudyRow, StudyTable,
+};
+pub(in crate::study) use answers::Pool;
+pub use bench::{StudyBench, StudyProgress, StudyStep, StudyWork};
 pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
-pub use report::{
-    Agreement, Cell, ClaimNumber, FigureLink, FigureMark, Finding, IntervalStrip, LinkedFigure, PERCENT, POINTS,
-    StudyColumn, StudyReport, StudyRow, StudyTable,
-};
 pub(in crate::study) use stored::sections;
 pub use stored::stored_report;
-pub use study::{PaperStudy, is_current, run_study, study_fingerprint};
+pub use study::{PaperStudy, is_current, study_fingerprint};
 
 /// All studies of the paper, in the order of its figures.
 pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[

@@ -1,17 +1,6 @@
 //! Curvature, pressure, and both (Fig. 5b to 5d).
 
-use super::answers::{PARTS, TestAnswers, TestPart, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{ALL_GAIN, Claim, Rule};
-use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
-use super::rows::{Factor, Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, Example, Sequence};
-use palpate_tactile::model::SensorModel;
-use std::sync::Arc;
+use super::prelude::*;
 
 pub(super) struct Modality;
 

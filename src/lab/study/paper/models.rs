@@ -1,16 +1,8 @@
 //! All methods side by side (Fig. 7): scores, paired differences, and what a model costs.
 
-use super::answers::{ModelAnswers, ModelCost, TRAIN, TestAnswers, TestPart, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{ALL_GAIN, Claim, Rule, negated};
-use super::drawing::{F1_PERCENT, Facets, TableLine, dots};
-use super::report::{Agreement, ClaimNumber, Column, Finding, LinkedFigure, StudyReport};
-use super::rows::{Factor, Fit, Gains, Kind, Row, compare, crossed, described, grouped, pooled, unique};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
+use super::answers::ModelCost;
+use super::prelude::*;
 use crate::study::comparison::in_table_order;
-use palpate_geometry::drawing::{DataPoint, DataSeries, Plot, PlotAxis};
-use palpate_learn::{Method, MethodKind, method};
 
 pub(super) struct Models;
 

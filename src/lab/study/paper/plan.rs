@@ -1,12 +1,13 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
 use crate::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
-use crate::study::stored_study::StudyCommand;
+use crate::study::frame::{StudyCommand, StudyFolder};
 use palpate_learn::Method;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::model::SensorModel;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Amount of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +24,17 @@ pub enum StudySize {
         /// Grasps of each.
         trials: usize,
     },
+}
+
+impl StudySize {
+    /// Folder beside a store for studies of this size.
+    pub fn folder(self, store: &Path) -> StudyFolder {
+        StudyFolder::new(store.with_file_name(match self {
+            Self::Full => "studies",
+            Self::Quick => "studies-quick",
+            Self::Sample { .. } => "studies-sample",
+        }))
+    }
 }
 
 /// Grasps that a study wants, and the sensors that it reads them through.

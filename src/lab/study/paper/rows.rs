@@ -2,8 +2,7 @@
 
 use super::StudyPlan;
 use super::answers::{PARTS, Pool, TestAnswers};
-use super::report::{Column, PERCENT, TableRows};
-use super::study::StudyCell;
+use crate::study::frame::{Column, Gains, PERCENT, StudyCell, TableRows, grouped, unique};
 use palpate_learn::metrics::{Interval, holm};
 use palpate_learn::{Method, method};
 use palpate_tactile::model::SensorModel;
@@ -145,23 +144,6 @@ pub(super) fn pooled<F: PartialEq>(answers: impl IntoIterator<Item = (Kind<F>, T
     grouped(answers).into_iter().map(row).collect()
 }
 
-/// Values with the same key together, in the order in which the keys first came.
-pub(super) fn grouped<K: PartialEq, V>(all: impl IntoIterator<Item = (K, V)>) -> Vec<(K, Vec<V>)> {
-    let mut groups: Vec<(K, Vec<V>)> = Vec::new();
-    for (key, value) in all {
-        match groups.iter_mut().find(|(own, _)| *own == key) {
-            Some((_, values)) => values.push(value),
-            None => groups.push((key, vec![value])),
-        }
-    }
-    groups
-}
-
-/// Each different value once, in the order in which they first came.
-pub(super) fn unique<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
-    grouped(all.into_iter().map(|value| (value, ()))).into_iter().map(|(value, _)| value).collect()
-}
-
 /// Descriptions of the data behind rows.
 pub(super) fn described<F>(rows: &[Row<F>]) -> Vec<String> {
     let answers = rows.iter().flat_map(|row| &row.parts).filter_map(TestAnswers::answers);
@@ -192,9 +174,6 @@ pub(super) fn compare<F: PartialEq>(rows: &mut [Row<F>], reference: impl Fn(&Kin
         (row.gain, row.p) = (difference.map(|own| own.f1), difference.and_then(|_| corrected.next()));
     }
 }
-
-/// Gains over others, by name.
-pub(super) type Gains = Vec<(String, Interval)>;
 
 /// Gains of macro F1 of rows over others that `others` names, each with its group and its name.
 pub(super) fn gains_over<F: PartialEq>(

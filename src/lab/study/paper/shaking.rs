@@ -1,17 +1,7 @@
 //! A hand that shakes what it holds (section VII, future work): what inertia adds to the recognition of the objects, and
 //! whether it tells apart objects that differ in nothing but their mass.
 
-use super::answers::{TestAnswers, TestPart};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{Claim, Rule};
-use super::drawing::{Along, Facets};
-use super::plan::DataWanted;
-use super::report::{Agreement, Column, Finding, LinkedFigure, POINTS, StudyReport};
-use super::rows::{Kind, Row, find, pooled, unique};
-use super::study::{Study, StudyCell};
-use super::{StudyCard, StudyPlan};
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Class, Dataset, Example, Labels, Method, method};
+use super::prelude::*;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Auto, Scene};
 

@@ -4,17 +4,8 @@
 //! trained on the other half, for which stage one's probabilities are further channels, constant over a grasp. In place of
 //! them it gets nothing (uniform probabilities), one of both, or the true size and shape.
 
-use super::answers::{TestAnswers, TestPart, usual_grasps};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{ALL_GAIN, Claim, Rule};
-use super::drawing::{Along, Facets, confusion_figure, confusion_table};
-use super::report::{Column, Finding, LinkedFigure, PERCENT, StudyReport};
-use super::rows::{Fit, Kind, Row, compare, crossed, described, gains_over, pooled};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
-use palpate_learn::{Class, Dataset, Example, Labels, Model, Pmf, Sequence, SplitPlan};
-use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use super::prelude::*;
+use palpate_learn::SplitPlan;
 
 pub(super) struct Stages;
 

@@ -1,8 +1,9 @@
 //! The paper's claims beside our numbers, from the stored results of its studies.
 
-use super::report::{Cell, ClaimNumber, Finding, IntervalStrip, StudyReport};
 use super::{PAPER_STUDIES, PaperStudy};
-use crate::study::stored_study::{GeneratedSection, StoredStudy, markdown_table};
+use crate::study::frame::{
+    Cell, ClaimNumber, Finding, GeneratedSection, IntervalStrip, StoredStudy, StudyReport, markdown_table,
+};
 
 /// Results of full runs by the key of their study: files of `assets/studies/paper`.
 const STORED: &[(&str, &str)] = &[

@@ -1,33 +1,16 @@
-//! The frame of a study: a grid of cells, what is found in each, and the report on all of it.
-//!
-//! A [`Study`] names its cells, measures one, and turns what was found into rows of tables, claims and figures. The frame runs
-//! the cells in parallel, keeps what is finished, resumes, and counts the time.
+//! A study of the paper: an experiment on grasps of a store.
 
-use super::bench::{StudyBench, StudyError, StudyProgress, StudyStep};
-use super::report::{LinkedFigure, StudyReport};
+use super::bench::StudyBench;
 use super::{StudyCard, StudyPlan};
-use crate::study::effects::Measuring;
-use crate::study::result_file::ResultFile;
-use crate::study::stored_study::StoredStudy;
-use palpate_learn::Method;
+use crate::grasping::Shard;
+use crate::study::frame::{
+    Experiment, LinkedFigure, StoredStudy, StudyCell, StudyCommand, StudyError, StudyReport, TrialNumbers,
+    run_experiment, run_part,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
-
-/// Cell of the grid of a study: the unit of work that is computed at once and kept.
-pub(super) trait StudyCell: Sync {
-    /// Name of its result, different for each cell of a plan.
-    fn name(&self) -> String;
-
-    /// Method that is fitted, on whose version the result depends.
-    fn method(&self) -> Option<&'static Method>;
-
-    /// Name of its result in files: results of another version of the method are others.
-    fn stored_name(&self) -> String {
-        let version = self.method().map(|method| format!(" ({})", method.fingerprint()));
-        self.name() + &version.unwrap_or_default()
-    }
-}
+use std::sync::atomic::AtomicBool;
 
 /// A study as data.
 pub(super) trait Study: Sync {
@@ -52,6 +35,55 @@ pub(super) trait Study: Sync {
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>>;
 }
 
+/// A study on a bench.
+struct OnBench<'a, S> {
+    study: &'a S,
+    bench: &'a StudyBench<'a>,
+}
+
+impl<S: Study> Experiment for OnBench<'_, S> {
+    type Cell = S::Cell;
+    type Found = S::Found;
+    type Report = StudyReport;
+
+    fn key(&self) -> &'static str {
+        S::CARD.key
+    }
+
+    fn header(&self) -> serde_json::Value {
+        self.bench.plan().header()
+    }
+
+    fn command(&self) -> StudyCommand {
+        self.bench.plan().command(self.key())
+    }
+
+    fn grid(&self) -> Vec<S::Cell> {
+        S::grid(self.bench.plan())
+    }
+
+    fn measure(&self, cell: &S::Cell, _stop: &AtomicBool) -> Result<S::Found, StudyError> {
+        S::measure(cell, self.bench)
+    }
+
+    fn trials(&self) -> TrialNumbers {
+        self.bench.trials()
+    }
+
+    fn report(&self, found: Vec<(S::Cell, S::Found)>) -> StudyReport {
+        let plan = self.bench.plan();
+        StudyReport { fingerprint: study_fingerprint(self.study, plan), ..S::report(plan, found) }
+    }
+
+    fn shown(report: &StudyReport) -> StudyReport {
+        report.clone()
+    }
+
+    fn figures(report: &StudyReport) -> Vec<LinkedFigure> {
+        S::figures(report).into_iter().flatten().collect()
+    }
+}
+
 /// A study, whatever its cells are.
 pub trait PaperStudy: Sync {
     /// Name and purpose.
@@ -60,8 +92,11 @@ pub trait PaperStudy: Sync {
     /// Names of the results of all cells.
     fn units(&self, plan: &StudyPlan) -> Vec<String>;
 
-    /// Computes the cells that a file of results lacks, then CPU time (h) and report; none where it was stopped.
-    fn run(&self, bench: &StudyBench<'_>, results: Option<&Path>) -> Result<Option<(f64, StudyReport)>, StudyError>;
+    /// Computes the cells that a file of results lacks, then the result; none where it was stopped.
+    fn run(&self, bench: &StudyBench<'_>, file: Option<&Path>) -> Result<Option<StoredStudy<StudyReport>>, StudyError>;
+
+    /// Computes the cells of a part that its file lacks. Returns their number; none where it was stopped.
+    fn run_part(&self, bench: &StudyBench<'_>, file: &Path, shard: Shard) -> Result<Option<usize>, StudyError>;
 
     /// Figures, drawn from the tables.
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure>;
@@ -76,29 +111,16 @@ impl<S: Study> PaperStudy for S {
         S::grid(plan).iter().map(StudyCell::stored_name).collect()
     }
 
-    fn run(&self, bench: &StudyBench<'_>, results: Option<&Path>) -> Result<Option<(f64, StudyReport)>, StudyError> {
-        let (plan, work) = (bench.plan(), bench.work());
-        let mut file = match results {
-            Some(path) => ResultFile::<S::Found>::open(path, S::CARD.key, &plan.header())?,
-            None => ResultFile::in_memory(),
-        };
-        let progress = |done, of| (work.progress)(StudyProgress { step: StudyStep::Measuring, done, of });
-        let how = Measuring { threads: work.threads, cancelled: work.cancelled, progress: &progress };
-        let cells: Vec<(String, S::Cell)> = S::grid(plan).into_iter().map(|cell| (cell.stored_name(), cell)).collect();
-        file.retain(|unit| cells.iter().any(|(name, _)| name == unit));
-        let measured = |cell: &S::Cell| match S::measure(cell, bench) {
-            Err(StudyError::Stopped) => Ok(None),
-            found => found.map(Some),
-        };
-        if !file.complete(&cells, &how, measured)? {
-            return Ok(None);
-        }
-        let found = cells.into_iter().filter_map(|(name, cell)| Some((cell, file.get(&name)?.clone())));
-        Ok(Some((file.cpu_hours(), S::report(plan, found.collect()))))
+    fn run(&self, bench: &StudyBench<'_>, file: Option<&Path>) -> Result<Option<StoredStudy<StudyReport>>, StudyError> {
+        bench.measuring(|how| run_experiment(&OnBench { study: self, bench }, how, file))
+    }
+
+    fn run_part(&self, bench: &StudyBench<'_>, file: &Path, shard: Shard) -> Result<Option<usize>, StudyError> {
+        bench.measuring(|how| run_part(&OnBench { study: self, bench }, how, file, shard))
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {
-        S::figures(report).into_iter().flatten().collect()
+        OnBench::<S>::figures(report)
     }
 }
 
@@ -116,16 +138,4 @@ const WITH_REMOVED_METHODS: [&str; 2] = ["87c5eb4c37e9b2eb", "48d80c573cbd5b14"]
 pub fn is_current(report: &StudyReport, study: &dyn PaperStudy, plan: &StudyPlan) -> bool {
     let today = study_fingerprint(study, plan);
     report.fingerprint == today || [report.fingerprint.as_str(), &today] == WITH_REMOVED_METHODS
-}
-
-/// Runs a study on a bench; none where it was stopped. A file keeps finished cells: the same plan continues there.
-pub fn run_study(
-    study: &dyn PaperStudy,
-    bench: &StudyBench<'_>,
-    results: Option<&Path>,
-) -> Result<Option<StoredStudy<StudyReport>>, StudyError> {
-    let Some((cpu_hours, report)) = study.run(bench, results)? else { return Ok(None) };
-    let report = StudyReport { fingerprint: study_fingerprint(study, bench.plan()), ..report };
-    let command = bench.plan().command(study.card().key);
-    Ok(Some(StoredStudy::new(command.text(), cpu_hours, report)))
 }

@@ -1,17 +1,6 @@
 //! How many grasps a model has to learn from (Fig. 6c).
 
-use super::answers::{TestAnswers, TestPart};
-use super::bench::{StudyBench, StudyError};
-use super::claims::{Claim, Rule, named_gains};
-use super::drawing::{Along, Facets, LinkedPlots, TableLine, lines};
-use super::report::{
-    Agreement, ClaimNumber, Column, Finding, LinkedFigure, POINTS, StudyReport, StudyTable, TableRows,
-};
-use super::rows::{Factor, Fit, Gains, Kind, Row, by_model, compare, crossed, described, gains_over, grouped, pooled};
-use super::study::Study;
-use super::{StudyCard, StudyPlan};
-use palpate_geometry::drawing::{PlotAxis, ReferenceLine};
-use palpate_learn::{MethodKind, method};
+use super::prelude::*;
 
 pub(super) struct TrainingSize;
 

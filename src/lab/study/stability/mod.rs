@@ -7,8 +7,8 @@
 mod cases;
 mod chatter;
 mod random;
+mod report;
 mod study;
-mod tables;
 
 pub use cases::CASES;
 pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
@@ -16,9 +16,9 @@ pub use random::{
     FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict, SilentShareRow,
 };
 
-pub use study::{CaseSummary, StabilityError, StabilityPlan, StabilityReport, StabilityUnit};
-pub(super) use tables::sections;
-pub use tables::{policy_table, stability_figure, stored_stability};
+pub(super) use report::sections;
+pub use report::{CaseSummary, StabilityReport, stored_stability};
+pub use study::{StabilityCell, StabilityPlan, StabilityUnit};
 
 use palpate_sim::physics::NotFinite;
 use palpate_sim::scene::{Accuracy, Timing};

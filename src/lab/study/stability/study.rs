@@ -2,12 +2,11 @@
 
 use super::chatter::{ChatterRow, ChatterUnit, chatter_table};
 use super::random::{JudgedScene, RandomReport};
-use super::{ACCURACIES, CASES, Case, CaseAccuracy, CaseRow, Measurement, QUICK_ACCURACIES};
-use crate::study::effects::Measuring;
-use crate::study::result_file::{ResultFile, ResultFileError};
-use palpate_sim::objects::ObjectError;
+use super::report::{CaseSummary, StabilityReport};
+use super::{ACCURACIES, CASES, Case, CaseAccuracy, CaseRow, QUICK_ACCURACIES};
+use crate::study::frame::{Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyReport};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// Amount of the study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -34,11 +33,23 @@ const SCENES_AT_ONCE: u64 = 5;
 
 /// A piece of the work.
 #[derive(Clone, Copy, Debug)]
-enum Unit {
+pub enum StabilityCell {
+    /// A hard case at one setting.
     Case(&'static Case, CaseAccuracy),
+    /// Grasps of one object in poses of one preset.
     Chatter(ChatterUnit),
-    /// Scenes from a number on, below another.
+    /// Random scenes from a number on, below another.
     Random(u64, u64),
+}
+
+impl StudyCell for StabilityCell {
+    fn name(&self) -> String {
+        match self {
+            Self::Case(case, setting) => format!("{} at {}", case.name, setting.name()),
+            Self::Chatter(unit) => unit.name(),
+            Self::Random(from, to) => format!("scenes {from} to {}", to - 1),
+        }
+    }
 }
 
 /// Results of a unit.
@@ -53,137 +64,91 @@ pub enum StabilityUnit {
     Random(Vec<JudgedScene>),
 }
 
-/// Error of the study.
-#[derive(Debug, thiserror::Error)]
-pub enum StabilityError {
-    /// An object failed to load.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// The file of results.
-    #[error(transparent)]
-    Results(#[from] ResultFileError),
-}
+impl Experiment for StabilityPlan {
+    type Cell = StabilityCell;
+    type Found = StabilityUnit;
+    type Report = StabilityReport;
 
-/// Results of the study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StabilityReport {
-    /// Hard cases over all settings.
-    pub cases: Vec<CaseSummary>,
-    /// Holds that chatter, by preset and accuracy.
-    pub chatter: Vec<ChatterRow>,
-    /// Random scenes.
-    pub random: RandomReport,
-}
-
-/// A hard case over all settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CaseSummary {
-    /// The case.
-    pub case: String,
-    /// Claim.
-    pub claim: String,
-    /// Settings it was run at.
-    pub settings: usize,
-    /// Of these, settings at which all its limits hold.
-    pub passed: usize,
-    /// The value closest to its limit or farthest beyond it, and its setting; absent where all runs diverged.
-    pub closest: Option<(String, Measurement)>,
-}
-
-impl StabilityPlan {
-    /// Opens the results of the plan in a file, to go on where they stopped.
-    pub fn results(&self, path: &Path) -> Result<ResultFile<StabilityUnit>, ResultFileError> {
-        ResultFile::open(path, "stability", self)
+    fn key(&self) -> &'static str {
+        "stability"
     }
 
-    /// Computes what is missing in the results; true when all is there.
-    pub fn run(&self, results: &mut ResultFile<StabilityUnit>, how: &Measuring<'_>) -> Result<bool, StabilityError> {
-        results.complete(&self.units(), how, |unit| {
-            Ok(Some(match unit {
-                Unit::Case(case, setting) => StabilityUnit::Case(case.run(*setting, self.thorough)),
-                Unit::Chatter(unit) => StabilityUnit::Chatter(unit.run()?),
-                Unit::Random(from, to) => {
-                    StabilityUnit::Random((*from..*to).map(|number| JudgedScene::new(self.seed, number)).collect())
-                }
-            }))
+    fn header(&self) -> serde_json::Value {
+        serde_json::json!(self)
+    }
+
+    fn command(&self) -> StudyCommand {
+        let usual = if self.thorough { Self::FULL } else { Self::QUICK };
+        StudyCommand::new(self.key())
+            .flag("quick", !self.thorough)
+            .option("scenes", (self.scenes != usual.scenes).then_some(self.scenes))
+            .option("grasps", (self.grasps != usual.grasps).then_some(self.grasps))
+            .option("seed", (self.seed != usual.seed).then_some(self.seed))
+    }
+
+    fn grid(&self) -> Vec<StabilityCell> {
+        let accuracies = if self.thorough { &ACCURACIES[..] } else { QUICK_ACCURACIES };
+        let cases = CASES.iter().flat_map(|case| {
+            let settings = case.settings(accuracies, self.thorough).into_iter();
+            settings.map(move |setting| StabilityCell::Case(case, setting))
+        });
+        let chatter = ChatterUnit::all(self.grasps).into_iter().map(StabilityCell::Chatter);
+        let random = (0..self.scenes).step_by(SCENES_AT_ONCE as usize);
+        let random = random.map(|from| StabilityCell::Random(from, (from + SCENES_AT_ONCE).min(self.scenes)));
+        cases.chain(chatter).chain(random).collect()
+    }
+
+    fn measure(&self, cell: &StabilityCell, _stop: &AtomicBool) -> Result<StabilityUnit, StudyError> {
+        Ok(match cell {
+            StabilityCell::Case(case, setting) => StabilityUnit::Case(case.run(*setting, self.thorough)),
+            StabilityCell::Chatter(unit) => StabilityUnit::Chatter(unit.run()?),
+            StabilityCell::Random(from, to) => {
+                StabilityUnit::Random((*from..*to).map(|number| JudgedScene::new(self.seed, number)).collect())
+            }
         })
     }
 
-    /// All rows of the hard cases, in the order of the table.
-    pub fn case_rows(&self, results: &ResultFile<StabilityUnit>) -> Vec<CaseRow> {
-        let row = |name: &String| match results.get(name) {
-            Some(StabilityUnit::Case(row)) => Some(row.clone()),
-            _ => None,
-        };
-        self.units().iter().filter_map(|(name, _)| row(name)).collect()
-    }
-
-    /// Sums up the results that there are.
-    pub fn report(&self, results: &ResultFile<StabilityUnit>) -> StabilityReport {
-        let (mut chatter, mut scenes) = (Vec::new(), Vec::new());
-        for (name, _) in self.units() {
-            match results.get(&name) {
-                Some(StabilityUnit::Chatter(rows)) => chatter.extend(rows.iter().cloned()),
-                Some(StabilityUnit::Random(judged)) => scenes.extend(judged.iter().cloned()),
-                Some(StabilityUnit::Case(_)) | None => {}
+    fn report(&self, found: Vec<(StabilityCell, StabilityUnit)>) -> StabilityReport {
+        let (mut table, mut chatter, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
+        for (_, found) in found {
+            match found {
+                StabilityUnit::Case(row) => table.push(row),
+                StabilityUnit::Chatter(rows) => chatter.extend(rows),
+                StabilityUnit::Random(judged) => scenes.extend(judged),
             }
         }
-        let rows = self.case_rows(results);
         StabilityReport {
-            cases: CASES.iter().map(|case| CaseSummary::new(case, &rows)).collect(),
+            cases: CASES.iter().map(|case| CaseSummary::new(case, &table)).collect(),
             chatter: chatter_table(chatter),
             random: RandomReport::new(self.seed, &scenes),
+            table,
         }
     }
 
-    /// Pieces of the work by name.
-    fn units(&self) -> Vec<(String, Unit)> {
-        let accuracies = if self.thorough { &ACCURACIES[..] } else { QUICK_ACCURACIES };
-        let cases = CASES.iter().flat_map(|case| {
-            let of = move |setting: CaseAccuracy| {
-                (format!("{} at {}", case.name, setting.name()), Unit::Case(case, setting))
-            };
-            case.settings(accuracies, self.thorough).into_iter().map(of)
-        });
-        let chatter = ChatterUnit::all(self.grasps).into_iter().map(|unit| (unit.name(), Unit::Chatter(unit)));
-        let random = (0..self.scenes).step_by(SCENES_AT_ONCE as usize).map(|from| {
-            let to = (from + SCENES_AT_ONCE).min(self.scenes);
-            (format!("scenes {from} to {}", to - 1), Unit::Random(from, to))
-        });
-        cases.chain(chatter).chain(random).collect()
+    fn shown(report: &StabilityReport) -> StudyReport {
+        report.shown()
     }
-}
 
-impl CaseSummary {
-    fn new(case: &Case, rows: &[CaseRow]) -> Self {
-        let own: Vec<&CaseRow> = rows.iter().filter(|row| row.case == case.name).collect();
-        let closest = own.iter().filter_map(|row| Some((row.setting.clone(), row.findings.first()?.clone())));
-        let used = |(_, found): &(String, Measurement)| found.limit.used(found.measured);
-        Self {
-            case: case.name.to_owned(),
-            claim: case.claim.to_owned(),
-            settings: own.len(),
-            passed: own.iter().filter(|row| row.holds).count(),
-            closest: closest.max_by(|a, b| used(a).total_cmp(&used(b))),
-        }
+    fn figures(report: &StabilityReport) -> Vec<LinkedFigure> {
+        vec![report.figure()]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::frame::{Measuring, run_experiment};
     use std::collections::BTreeSet;
-    use std::sync::atomic::AtomicBool;
+    use std::sync::atomic::Ordering;
 
     #[test]
     fn units_have_names_of_their_own_and_cover_the_plan() {
         for plan in [StabilityPlan::QUICK, StabilityPlan::FULL] {
-            let units = plan.units();
-            let names: BTreeSet<&String> = units.iter().map(|(name, _)| name).collect();
-            assert_eq!(names.len(), units.len());
-            let scenes: u64 =
-                units.iter().map(|(_, unit)| if let Unit::Random(from, to) = unit { to - from } else { 0 }).sum();
-            assert_eq!(scenes, plan.scenes);
+            let cells = plan.grid();
+            let names: BTreeSet<String> = cells.iter().map(StudyCell::name).collect();
+            assert_eq!(names.len(), cells.len());
+            let scenes = |cell: &StabilityCell| if let StabilityCell::Random(from, to) = cell { to - from } else { 0 };
+            assert_eq!(cells.iter().map(scenes).sum::<u64>(), plan.scenes);
         }
     }
 
@@ -193,22 +158,17 @@ mod tests {
         let path = folder.path().join("stability.jsonl");
         let plan = StabilityPlan { thorough: false, grasps: 1, scenes: 3, seed: 2 };
         let run = |stop_after: usize, threads: usize| {
-            let mut results = plan.results(&path)?;
             let cancelled = AtomicBool::new(false);
             let progress = |done: usize, _: usize| {
-                cancelled.fetch_or(done >= stop_after, std::sync::atomic::Ordering::Relaxed);
+                cancelled.fetch_or(done >= stop_after, Ordering::Relaxed);
             };
-            let how = Measuring { threads, cancelled: &cancelled, progress: &progress };
-            let whole = plan.run(&mut results, &how)?;
-            Ok::<_, StabilityError>((whole, plan.report(&results)))
+            run_experiment(&plan, &Measuring { threads, cancelled: &cancelled, progress: &progress }, Some(&path))
         };
-        let units = plan.units().len();
-        let (whole, partial) = run(units - 1, 1)?;
-        assert!(!whole && partial.random.scenes == 0 && partial.chatter.len() == 8, "{partial:?}");
-        let (whole, resumed) = run(usize::MAX, 2)?;
-        assert!(whole && resumed.random.scenes == 3);
+        assert!(run(plan.grid().len() - 1, 1)?.is_none());
+        let resumed = run(usize::MAX, 2)?.ok_or("stopped")?.result;
+        assert_eq!(resumed.random.scenes, 3);
         std::fs::remove_file(&path)?;
-        let (_, mut at_once) = run(usize::MAX, 2)?;
+        let mut at_once = run(usize::MAX, 2)?.ok_or("stopped")?.result;
         // Only CPU times differ.
         at_once.random.cpu_s = resumed.random.cpu_s;
         for (row, other) in at_once.chatter.iter_mut().zip(&resumed.chatter) {
@@ -217,6 +177,8 @@ mod tests {
         assert_eq!(at_once, resumed);
         assert!(resumed.cases.iter().all(|case| case.settings > 0 && case.passed <= case.settings));
         assert_eq!(resumed.chatter.iter().map(|row| row.grasps).collect::<Vec<_>>(), [1; 8]);
+        let shown = StabilityPlan::shown(&resumed);
+        assert!(shown.tables.iter().all(|table| !table.rows.is_empty()), "{shown:?}");
         Ok(())
     }
 }

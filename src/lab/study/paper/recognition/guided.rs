@@ -2,21 +2,18 @@
 //! gripper and from those that a guide chooses.
 
 use super::super::answers::BOOTSTRAP;
-use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
-use super::super::report::{Cell, Column, PERCENT, StudyTable, TableRows};
+use super::super::prelude::*;
 use super::questions::{LEARNED, QUESTIONS, Question, UNLABELLED};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::{GripperMove, Guide, KnownTouches, Recompute, Stance, TouchLibrary, grasp_soundly};
-use palpate_learn::{Belief, Dataset, Model, Pmf, Shipped, check_apart, method};
+use palpate_learn::{Shipped, check_apart};
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Faces, PosePreset, Scene};
 use palpate_tactile::trial::SimulatedTrial;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Method of the model that learns here.
 const GUIDED_METHOD: &str = "geometry-trees";

@@ -6,15 +6,9 @@ mod new_objects;
 mod novelty;
 mod questions;
 
-use super::answers::{ModelAnswers, Pool, judge_answers};
-use super::bench::{StudyBench, StudyError};
-use super::drawing::{LinkedPlots, dots, named_rows};
+use super::answers::judge_answers;
 use super::emulated_grasps::EmulatedGrippers;
-use super::plan::StudyPlan;
-use super::report::{Cell, Column, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
-use super::rows::{grouped, unique};
-use super::study::{Study, StudyCell};
-use super::{OWN, StudyCard};
+use super::prelude::*;
 use crate::study::comparison::with_true_size_and_shape;
 use guided::{GuidedCase, GuidedRounds, guided};
 use new_objects::{mean_f1, new_object};
@@ -22,16 +16,11 @@ use novelty::{
     EMULATED_NOVELTY, EmulatedRounds, NOVELTY, NOVELTY_METHOD, NOVELTY_TARGETS, OTHERS, Scored, area, decisions,
     emulated_novelty, novelty,
 };
-use palpate_geometry::drawing::{DataSeries, Marker, Plot, PlotAxis};
 use palpate_learn::evaluation::{answer, rounds};
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Method, Shipped, check_apart, method};
+use palpate_learn::{Shipped, check_apart};
 use palpate_sim::scene::{PosePreset, Scene};
-use palpate_tactile::trial::TrialId;
 pub(super) use questions::UNLABELLED;
 use questions::{JUDGED, Learns, NEW_OBJECTS, QUESTIONS, Question, Reads, TESTED, Targets};
-use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 pub(super) struct Recognition;
 

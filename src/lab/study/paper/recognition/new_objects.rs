@@ -1,13 +1,12 @@
 //! New objects: a model that knows all others is taught each object in turn, from simulated grasps alone.
 
 use super::super::answers::BOOTSTRAP;
-use super::super::bench::{StudyBench, StudyError};
 use super::super::plan::POSES;
+use super::super::prelude::*;
 use super::novelty::Scored;
 use super::questions::{Question, READINGS};
 use super::tested;
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Method, Pmf, check_apart};
+use palpate_learn::check_apart;
 
 /// Grasps of each object by which models learn.
 const GRASPS: usize = 50;

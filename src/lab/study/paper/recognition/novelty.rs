@@ -2,17 +2,13 @@
 //! be higher for the object that was left out.
 
 use super::super::answers::BOOTSTRAP;
-use super::super::bench::{StudyBench, StudyError};
-use super::super::plan::{DataWanted, POSES};
-use super::super::report::{Cell, Column, PERCENT, StudyTable, TableRows};
+use super::super::plan::POSES;
+use super::super::prelude::*;
 use super::questions::QUESTIONS;
 use super::{emulated, tested};
 use crate::grasping::random_shapes;
 use palpate_learn::evaluation::{answer, rounds};
-use palpate_learn::metrics::Interval;
-use palpate_learn::{Belief, Dataset, Example, Method, Model, ModelCard, Pmf, Shipped, check_apart};
-use palpate_tactile::trial::TrialId;
-use serde::{Deserialize, Serialize};
+use palpate_learn::{ModelCard, Shipped, check_apart};
 
 /// Seeds of the random shapes of the class "other", which the encoders have not seen either.
 pub(super) const OTHERS: std::ops::Range<u64> = 20_000..23_000;

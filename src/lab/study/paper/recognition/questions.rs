@@ -1,9 +1,9 @@
 //! What is asked: grasps, sensors, models and targets of each row.
 
-use super::super::plan::{DataWanted, POSES, StudyPlan};
+use super::super::plan::POSES;
+use super::super::prelude::*;
 use palpate_learn::Shipped;
 use palpate_tactile::SignalDefinition;
-use palpate_tactile::model::SensorModel;
 
 /// Seed of the poses of grasps that judge.
 pub(super) const JUDGED: u64 = 8;

@@ -1,6 +1,6 @@
 //! Bodies of known shape and width, grasped centred, and the settings of the gripper that are varied with them.
 
-use super::super::report::PERCENT;
+use super::super::prelude::*;
 use super::course::{Course, Grasped, Signature, median, rank_correlation};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
@@ -10,7 +10,6 @@ use palpate_sim::gripper::TorquePoint;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{NamedScene, Scene};
 use palpate_tactile::SignalDefinition;
-use serde::{Deserialize, Serialize};
 
 /// Words of tables for the shape of a body where the fingers touch it.
 pub(super) const ROUND: &str = "round";

@@ -1,8 +1,6 @@
 //! Numbers of a tactile signature: when contact comes, what bending and pressure do before and after it.
 
-use palpate_learn::Sequence;
-use palpate_tactile::trial::TrialId;
-use serde::{Deserialize, Serialize};
+use super::super::prelude::*;
 
 /// Bending and pressure of a grasp over time, means of both fingers.
 #[derive(Clone, Debug, Default, PartialEq)]

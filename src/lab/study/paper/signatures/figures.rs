@@ -1,11 +1,8 @@
 //! Figures of signatures: curves over time, rates after contact by width, and settings about the paper's scene.
 
-use super::super::drawing::LinkedPlots;
-use super::super::report::{LinkedFigure, StudyReport};
-use super::super::rows::unique;
+use super::super::prelude::*;
 use super::bodies::{FLAT, ROUND, VARIED};
 use super::{BODIES, DEFAULT, PAPER};
-use palpate_geometry::drawing::{DataPoint, DataSeries, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 
 pub(super) fn all(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
     let of = |table: &str, title: &str| {

@@ -1,7 +1,6 @@
 //! The sentences of section V-A beside our numbers.
 
-use super::super::claims::Claim;
-use super::super::report::{Agreement, ClaimNumber, Finding, PERCENT};
+use super::super::prelude::*;
 use super::bodies::Summary;
 use super::{DEFAULT, Found, PAPER};
 

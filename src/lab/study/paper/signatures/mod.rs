@@ -6,24 +6,16 @@ mod course;
 mod figures;
 mod findings;
 
-use super::StudyCard;
-use super::answers::SHOWN;
-use super::bench::{StudyBench, StudyError};
-use super::plan::{DataWanted, StudyPlan};
-use super::report::{Agreement, Cell, Column, LinkedFigure, PERCENT, StudyReport, StudyTable, TableRows};
-use super::study::{Study, StudyCell};
+use super::prelude::*;
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
 use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, Varied, WIDTHS, papers_scene, papers_view};
 use course::{Course, Grasped, Signature, median};
 use findings::{Measured, findings, sentences};
-use palpate_learn::Method;
 use palpate_learn::metrics::Bootstrap;
 use palpate_sim::objects::{ObjectModel, catalogue};
 use palpate_sim::scene::Scene;
-use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::SimulatedTrial;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) struct TactileSignatures;
@@ -73,10 +65,6 @@ enum Grasps {
 impl StudyCell for Unit {
     fn name(&self) -> String {
         format!("{}: {}", self.gripper, self.kind)
-    }
-
-    fn method(&self) -> Option<&'static Method> {
-        None
     }
 }
 

@@ -1,10 +1,12 @@
 //! Files of studies in a folder: finished units, results, tables and figures.
 
-use super::report::{LinkedFigure, StudyReport};
-use super::{PaperStudy, StudySize};
-use crate::study::result_file::ResultFileError;
-use crate::study::stored_study::StoredStudy;
+use super::report::{LinkedFigure, StudyReport, StudyTable};
+use super::result_file::ResultFileError;
+use super::stored_study::StoredStudy;
+use crate::grasping::Shard;
 use palpate_store::{FileKind, write_whole};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -18,15 +20,6 @@ impl StudyFolder {
         Self(path.into())
     }
 
-    /// Folder beside a store for studies of a size.
-    pub fn beside(store: &Path, size: StudySize) -> Self {
-        Self(store.with_file_name(match size {
-            StudySize::Full => "studies",
-            StudySize::Quick => "studies-quick",
-            StudySize::Sample { .. } => "studies-sample",
-        }))
-    }
-
     /// Its path.
     pub fn path(&self) -> &Path {
         &self.0
@@ -35,6 +28,11 @@ impl StudyFolder {
     /// File of finished units of a study.
     pub fn units(&self, key: &str) -> PathBuf {
         self.0.join(format!("{key}.jsonl"))
+    }
+
+    /// File of finished units of a part of a study.
+    pub fn part(&self, key: &str, shard: Shard) -> PathBuf {
+        self.0.join(format!("{key}.{}.jsonl", shard.to_string().replace('/', "-of-")))
     }
 
     fn result(&self, key: &str) -> PathBuf {
@@ -71,13 +69,14 @@ impl StudyFolder {
 
     /// Writes a result, each of its tables (CSV) and each of its figures, which `draw` draws as SVG. Returns the names of
     /// the files.
-    pub fn write(
+    pub fn write<R: Serialize + DeserializeOwned>(
         &self,
-        study: &dyn PaperStudy,
-        stored: &StoredStudy<StudyReport>,
+        key: &str,
+        stored: &StoredStudy<R>,
+        tables: &[StudyTable],
+        figures: impl IntoIterator<Item = LinkedFigure>,
         draw: &dyn Fn(&LinkedFigure) -> io::Result<String>,
     ) -> Result<Vec<String>, ResultFileError> {
-        let key = study.card().key;
         let mut names = vec![format!("{key}.json")];
         stored.write(&self.result(key))?;
         let mut put = |name: String, kind: FileKind, text: io::Result<String>| {
@@ -86,10 +85,10 @@ impl StudyFolder {
             names.push(name);
             written.map_err(|cause| ResultFileError::File { attempt: "write", path, cause })
         };
-        for table in &stored.result.tables {
+        for table in tables {
             put(format!("{}.csv", table.name), FileKind::Csv, Ok(table.csv()))?;
         }
-        for linked in study.figures(&stored.result) {
+        for linked in figures {
             let linked = linked.with_note(&stored.plain_origin());
             put(format!("{}.svg", linked.name), FileKind::Svg, draw(&linked))?;
         }

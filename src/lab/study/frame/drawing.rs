@@ -1,50 +1,49 @@
 //! Figures that studies draw from their tables: plots by a facet, series, and points that lead to rows and their trials.
 
-use super::answers::Pool;
-use super::report::{Cell, FigureLink, FigureMark, LinkedFigure, PERCENT, StudyReport, StudyTable};
-use super::rows::{grouped, unique};
+use super::groups::{grouped, unique};
+use super::report::{FigureLink, FigureMark, LinkedFigure, StudyReport, StudyTable};
 use palpate_geometry::drawing::{
     CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis,
 };
 
 /// Heading of columns of shares in plots.
-pub(super) const F1_PERCENT: &str = "macro F1 (%)";
+pub(in crate::study) const F1_PERCENT: &str = "macro F1 (%)";
 /// Column of shares that facets show.
 const F1: &str = "F1";
 
 /// Row of a table.
 #[derive(Clone, Copy)]
-pub(super) struct TableLine<'a> {
-    pub(super) table: &'a StudyTable,
-    pub(super) row: usize,
+pub(in crate::study) struct TableLine<'a> {
+    pub(in crate::study) table: &'a StudyTable,
+    pub(in crate::study) row: usize,
 }
 
 impl<'a> TableLine<'a> {
     /// Text in a column.
-    pub(super) fn text(self, column: &str) -> &'a str {
+    pub(in crate::study) fn text(self, column: &str) -> &'a str {
         self.table.text(self.row, column)
     }
 
     /// Number in a column; not a number where there is none.
-    pub(super) fn value(self, column: &str) -> f64 {
+    pub(in crate::study) fn value(self, column: &str) -> f64 {
         self.table.cell(self.row, column).value().unwrap_or(f64::NAN)
     }
 
     /// Its point at x: a column in percent with its interval.
-    pub(super) fn percent(self, column: &str, x: f64) -> DataPoint {
+    pub(in crate::study) fn percent(self, column: &str, x: f64) -> DataPoint {
         let spread = self.table.cell(self.row, column).spread().map(|ends| ends.map(|end| 100.0 * end));
         DataPoint { spread, ..DataPoint::new(x, 100.0 * self.value(column)) }
     }
 
     /// The same on its side: the column is x, the row stands at y.
-    pub(super) fn percent_row(self, column: &str, y: f64) -> DataPoint {
+    pub(in crate::study) fn percent_row(self, column: &str, y: f64) -> DataPoint {
         let DataPoint { at: [_, x], spread, .. } = self.percent(column, y);
         DataPoint { spread, ..DataPoint::new(x, y) }
     }
 }
 
 /// Axis of named rows, the first at the top: places 0, -1, -2 and so on.
-pub(super) fn named_rows(names: &[String]) -> PlotAxis {
+pub(in crate::study) fn named_rows(names: &[String]) -> PlotAxis {
     let ticks = names.iter().enumerate().map(|(k, name)| (-(k as f64), name.clone())).collect();
     PlotAxis { ticks, range: Some([0.6 - names.len() as f64, 0.6]), ..PlotAxis::default() }
 }
@@ -56,18 +55,18 @@ fn named_columns(title: &str, names: &[String]) -> PlotAxis {
 }
 
 /// Series of a colour with a dot at each point.
-pub(super) fn dots(colour: usize) -> DataSeries {
+pub(in crate::study) fn dots(colour: usize) -> DataSeries {
     DataSeries { colour, marker: Marker::Dot, ..DataSeries::default() }
 }
 
 /// Series of a colour with a line, bold or thin.
-pub(super) fn lines(colour: usize, bold: bool) -> DataSeries {
+pub(in crate::study) fn lines(colour: usize, bold: bool) -> DataSeries {
     let line = if bold { LineStyle::Bold } else { LineStyle::Thin };
     DataSeries { colour, line, marker: Marker::of_series(colour), ..DataSeries::default() }
 }
 
 /// Places of rows along an axis.
-pub(super) enum Along<'a> {
+pub(in crate::study) enum Along<'a> {
     /// Named rows from top to bottom.
     Rows(&'a dyn Fn(TableLine<'_>) -> String),
     /// Named columns below a title.
@@ -77,29 +76,29 @@ pub(super) enum Along<'a> {
 }
 
 /// Figure of the macro F1 of the rows of a table, by facets.
-pub(super) struct Facets<'a> {
+pub(in crate::study) struct Facets<'a> {
     /// Title of the plot of a row.
-    pub(super) plot: &'a dyn Fn(TableLine<'_>) -> String,
+    pub(in crate::study) plot: &'a dyn Fn(TableLine<'_>) -> String,
     /// Name of the series of a row.
-    pub(super) series: &'a dyn Fn(TableLine<'_>) -> String,
+    pub(in crate::study) series: &'a dyn Fn(TableLine<'_>) -> String,
     /// Its place.
-    pub(super) along: Along<'a>,
+    pub(in crate::study) along: Along<'a>,
     /// Shift of the first series, and from one to the next.
-    pub(super) shift: [f64; 2],
+    pub(in crate::study) shift: [f64; 2],
     /// Look of a series by its name and number.
-    pub(super) look: &'a dyn Fn(&str, usize) -> DataSeries,
+    pub(in crate::study) look: &'a dyn Fn(&str, usize) -> DataSeries,
     /// True where a series is named in its first plot alone.
-    pub(super) named_once: bool,
+    pub(in crate::study) named_once: bool,
     /// Plots in a row.
-    pub(super) columns: usize,
+    pub(in crate::study) columns: usize,
     /// Width and height of files (points).
-    pub(super) size: [u32; 2],
-    pub(super) note: &'a str,
+    pub(in crate::study) size: [u32; 2],
+    pub(in crate::study) note: &'a str,
 }
 
 impl Facets<'_> {
     /// A plot for each sensor model, a row for each method, a colour for each model.
-    pub(super) const USUAL: Facets<'static> = Facets {
+    pub(in crate::study) const USUAL: Facets<'static> = Facets {
         plot: &|line| format!("{} sensors", line.text("sensors")),
         series: &|line| line.text("model").to_owned(),
         along: Along::Rows(&|line| line.text("model").to_owned()),
@@ -112,12 +111,12 @@ impl Facets<'_> {
     };
 
     /// The figure of a table, by the same name; none where the report lacks it.
-    pub(super) fn figure(&self, report: &StudyReport, name: &str) -> Option<LinkedFigure> {
+    pub(in crate::study) fn figure(&self, report: &StudyReport, name: &str) -> Option<LinkedFigure> {
         Some(self.plots(report, name)?.figure(name, self.columns, self.size, self.note))
     }
 
     /// Its plots, to add to.
-    pub(super) fn plots<'a>(&self, report: &'a StudyReport, name: &str) -> Option<LinkedPlots<'a>> {
+    pub(in crate::study) fn plots<'a>(&self, report: &'a StudyReport, name: &str) -> Option<LinkedPlots<'a>> {
         let mut figure = LinkedPlots::of(report, name)?;
         figure.named_once = self.named_once;
         figure.add_facets(self);
@@ -125,13 +124,29 @@ impl Facets<'_> {
     }
 }
 
+/// A series for each look, of the points with it.
+pub(in crate::study) fn series_of(marks: impl IntoIterator<Item = (DataSeries, DataPoint)>) -> Vec<DataSeries> {
+    let series = |(look, points): (DataSeries, Vec<DataPoint>)| DataSeries { points, ..look };
+    grouped(marks).into_iter().map(series).collect()
+}
+
+/// Plots by their titles, each with a series for each look: title, look and point of each mark.
+pub(in crate::study) fn plots_of(
+    axes: &Plot,
+    marks: impl IntoIterator<Item = (String, DataSeries, DataPoint)>,
+) -> Vec<Plot> {
+    let marks = marks.into_iter().map(|(title, look, point)| (title, (look, point)));
+    let plot = |(title, marks): (String, Vec<_>)| Plot { title, series: series_of(marks), ..axes.clone() };
+    grouped(marks).into_iter().map(plot).collect()
+}
+
 /// A figure in the making, whose points lead to the rows of a table.
-pub(super) struct LinkedPlots<'a> {
-    pub(super) plots: Vec<Plot>,
+pub(in crate::study) struct LinkedPlots<'a> {
+    pub(in crate::study) plots: Vec<Plot>,
     /// Title, at first that of the table.
-    pub(super) title: String,
+    pub(in crate::study) title: String,
     /// True where a series is named in its first plot alone.
-    pub(super) named_once: bool,
+    pub(in crate::study) named_once: bool,
     at: usize,
     table: &'a StudyTable,
     links: Vec<FigureLink>,
@@ -139,24 +154,24 @@ pub(super) struct LinkedPlots<'a> {
 
 impl<'a> LinkedPlots<'a> {
     /// A figure of a table; none where the report lacks it.
-    pub(super) fn of(report: &'a StudyReport, table: &str) -> Option<Self> {
+    pub(in crate::study) fn of(report: &'a StudyReport, table: &str) -> Option<Self> {
         let (at, table) = report.table(table)?;
         Some(Self { plots: Vec::new(), title: table.title.clone(), named_once: false, at, table, links: Vec::new() })
     }
 
     /// All rows.
-    pub(super) fn lines(&self) -> impl Iterator<Item = TableLine<'a>> + use<'a> {
+    pub(in crate::study) fn lines(&self) -> impl Iterator<Item = TableLine<'a>> + use<'a> {
         let table = self.table;
         (0..table.rows.len()).map(move |row| TableLine { table, row })
     }
 
     /// Rows with certain texts in some columns.
-    pub(super) fn lines_with(&self, wanted: &[(&str, &str)]) -> Vec<TableLine<'a>> {
+    pub(in crate::study) fn lines_with(&self, wanted: &[(&str, &str)]) -> Vec<TableLine<'a>> {
         self.lines().filter(|line| wanted.iter().all(|(column, text)| line.text(column) == *text)).collect()
     }
 
     /// Adds a series to the last plot, unless it has no point.
-    pub(super) fn series(
+    pub(in crate::study) fn series(
         &mut self,
         mut series: DataSeries,
         points: impl IntoIterator<Item = (TableLine<'a>, DataPoint)>,
@@ -205,31 +220,20 @@ impl<'a> LinkedPlots<'a> {
     }
 
     /// The figure.
-    pub(super) fn figure(self, name: &str, columns: usize, size: [u32; 2], note: impl Into<String>) -> LinkedFigure {
+    pub(in crate::study) fn figure(
+        self,
+        name: &str,
+        columns: usize,
+        size: [u32; 2],
+        note: impl Into<String>,
+    ) -> LinkedFigure {
         let figure = Figure { title: self.title, plots: self.plots, columns, note: note.into() };
         LinkedFigure { name: name.to_owned(), figure, size, links: self.links }
     }
 }
 
-/// Table of confusions, one row for each kind of grasps and pair of classes that occurs.
-pub(super) fn confusion_table(name: &str, title: &str, kinds: &[(&str, &Pool)]) -> StudyTable {
-    let columns = [("grasps", ""), ("true", ""), ("predicted", ""), ("count", "grasps"), ("share", PERCENT)];
-    let mut table = StudyTable::new(name, title, &columns);
-    for (kind, pool) in kinds {
-        let cells = pool.confusions();
-        for ((truth, decided), (count, trials)) in &cells {
-            let of_class: usize = cells.iter().filter(|(cell, _)| cell.0 == *truth).map(|(_, (count, _))| count).sum();
-            let names = [*truth, *decided].map(|class| Cell::text(&pool.classes[class]));
-            let numbers = [*count as f64, *count as f64 / of_class.max(1) as f64].map(Cell::Number);
-            let cells = [vec![Cell::text(*kind)], names.to_vec(), numbers.to_vec()].concat();
-            table.push(cells, trials.clone());
-        }
-    }
-    table
-}
-
 /// Figure of the confusion matrices of a table, those of kinds of grasps that `title` names.
-pub(super) fn confusion_figure(
+pub(in crate::study) fn confusion_figure(
     report: &StudyReport,
     name: &str,
     title: impl Fn(&str) -> Option<String>,

@@ -4,7 +4,6 @@
 //! The file is JSON, a line for what is computed and one for each finished unit. A line that a crash cut off is left out
 //! and computed again. Results that another plan or another physics computed are refused, never mixed.
 
-use super::effects::Measuring;
 use palpate_sim::PHYSICS_VERSION;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -13,7 +12,18 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Threads, stop flag and progress of a measurement.
+#[derive(Clone, Copy)]
+pub struct Measuring<'a> {
+    /// Number of threads.
+    pub threads: usize,
+    /// Flag that stops it.
+    pub cancelled: &'a AtomicBool,
+    /// Receives the number of measured units and the number of all.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+}
 
 /// Finished units of a study by name, in memory and, where it has one, in a file.
 #[derive(Debug)]
@@ -42,6 +52,51 @@ struct Line<U> {
     result: U,
 }
 
+/// Fingerprints of the numbers of trials that units name, by the trials. Numbers differ between stores.
+pub type TrialNumbers = BTreeMap<String, String>;
+
+/// Last line of the file of a part.
+#[derive(Serialize, Deserialize)]
+struct EndOfPart {
+    trials: TrialNumbers,
+}
+
+/// What a merge needs to know of a unit.
+#[derive(Deserialize)]
+struct UnitName {
+    unit: String,
+}
+
+/// Joins files of finished units, parts of one study: the header, then each unit once, in the order of their names. Returns the
+/// text and the number of units.
+pub fn merged_units(files: &[PathBuf]) -> Result<(String, usize), ResultFileError> {
+    let (mut first, mut units, mut numbers) = (None, BTreeMap::new(), TrialNumbers::new());
+    for path in files {
+        let failed = |cause| ResultFileError::File { attempt: "read", path: path.clone(), cause };
+        let text = std::fs::read_to_string(path).map_err(failed)?;
+        let (header, lines) = text.split_once('\n').unwrap_or_default();
+        let own = serde_json::from_str::<Header>(header).map_err(|cause| failed(cause.into()))?;
+        let (known, _) = first.get_or_insert_with(|| (own.clone(), header.to_owned()));
+        if let Some(difference) = known.difference(&own) {
+            return Err(ResultFileError::Other { path: path.clone(), difference });
+        }
+        for line in lines.lines() {
+            if let Ok(UnitName { unit }) = serde_json::from_str(line) {
+                units.entry(unit).or_insert_with(|| line.to_owned());
+            } else if let Ok(EndOfPart { trials }) = serde_json::from_str(line) {
+                for (trials, own) in trials {
+                    if numbers.entry(trials.clone()).or_insert_with(|| own.clone()) != &own {
+                        return Err(ResultFileError::OtherTrials { path: path.clone(), trials });
+                    }
+                }
+            }
+        }
+    }
+    let header = first.map(|(_, header)| header);
+    let lines = header.iter().chain(units.values()).map(|line| format!("{line}\n"));
+    Ok((lines.collect(), units.len()))
+}
+
 /// Error of a result file.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultFileError {
@@ -65,6 +120,18 @@ pub enum ResultFileError {
         path: PathBuf,
         /// What differs.
         difference: String,
+    },
+    /// The parts of a study were measured on differently numbered trials.
+    #[error(
+        "\"{path}\" numbers its trials ({trials}) otherwise than the parts before it: measure all parts on copies of one store \
+         that holds the grasps, or each on an empty store",
+        path = path.display()
+    )]
+    OtherTrials {
+        /// The file.
+        path: PathBuf,
+        /// The trials.
+        trials: String,
     },
     /// A result cannot be written as JSON.
     #[error("a result cannot be written as JSON: {cause}")]
@@ -129,14 +196,21 @@ impl<U: Serialize + DeserializeOwned> ResultFile<U> {
     /// Adds a finished unit, which took `cpu_s` seconds of CPU time, and writes it.
     pub fn add(&mut self, unit: &str, result: U, cpu_s: f64) -> Result<(), ResultFileError> {
         let line = Line { unit: unit.to_owned(), cpu_s, result };
-        if let Some((path, file)) = &mut self.file {
-            let mut text = serde_json::to_string(&line).map_err(|cause| ResultFileError::Unwritable { cause })?;
-            text.push('\n');
-            let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
-            written.map_err(|cause| ResultFileError::File { attempt: "write", path: path.clone(), cause })?;
-        }
+        self.append(&line)?;
         self.keep(line);
         Ok(())
+    }
+
+    /// Ends the file of a part with the numbers of its trials.
+    pub fn end_part(&mut self, trials: TrialNumbers) -> Result<(), ResultFileError> {
+        self.append(&EndOfPart { trials })
+    }
+
+    fn append(&mut self, line: &impl Serialize) -> Result<(), ResultFileError> {
+        let Some((path, file)) = &mut self.file else { return Ok(()) };
+        let text = serde_json::to_string(line).map_err(|cause| ResultFileError::Unwritable { cause })? + "\n";
+        let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
+        written.map_err(|cause| ResultFileError::File { attempt: "write", path: path.clone(), cause })
     }
 
     /// Result of a unit, where it is finished.
@@ -237,7 +311,6 @@ pub fn program() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
 
     type TestResult = Result<(), Box<dyn std::error::Error>>;
 

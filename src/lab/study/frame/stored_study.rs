@@ -25,9 +25,7 @@ pub struct StoredStudy<R> {
 impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
     /// A result of this program.
     pub fn new(command: &str, cpu_hours: f64, result: R) -> Self {
-        // Three digits say enough.
-        let cpu_hours = format!("{cpu_hours:.2e}").parse().unwrap_or(cpu_hours);
-        Self { command: command.to_owned(), program: program(), cpu_hours, result }
+        Self { command: command.to_owned(), program: program(), cpu_hours: rounded(cpu_hours), result }
     }
 
     /// Reads a stored result. Methods that are gone are marked with the last version that had them.
@@ -121,6 +119,11 @@ impl GeneratedSection {
         let to = from + document[from..].find(&end)?;
         Some(format!("{}\n{}\n\n{}", &document[..from], self.text.trim(), &document[to..]))
     }
+}
+
+/// Three digits of a number, which is all that a stored result is good for.
+pub(in crate::study) fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// A table in Markdown.

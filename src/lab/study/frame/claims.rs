@@ -1,13 +1,15 @@
 //! Claims of the paper beside our intervals: the rules that decide, and the findings that they give.
 
 use super::report::{Agreement, ClaimNumber, Finding, POINTS};
-use super::rows::Gains;
 use palpate_learn::metrics::Interval;
 use std::cmp::Ordering;
 
+/// Gains over others, by name.
+pub(in crate::study) type Gains = Vec<(String, Interval)>;
+
 /// Rule of a claim over intervals. One interval on the wrong side refutes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Rule {
+pub(in crate::study) enum Rule {
     /// All above a limit.
     AllAbove(f64),
     /// All below a limit.
@@ -20,7 +22,7 @@ pub(super) enum Rule {
 
 impl Rule {
     /// Agreement of intervals with it.
-    pub(super) fn judge(self, all: &[Interval]) -> Agreement {
+    pub(in crate::study) fn judge(self, all: &[Interval]) -> Agreement {
         let (any, every) =
             (|is: &dyn Fn(&Interval) -> bool| all.iter().any(is), |is: &dyn Fn(&Interval) -> bool| all.iter().all(is));
         let (refuted, supported) = match self {
@@ -83,14 +85,24 @@ impl Rule {
 
 /// Words of a claim: section of the paper, the claim, and the rule.
 #[derive(Clone, Copy)]
-pub(super) struct Claim<'a>(pub(super) &'a str, pub(super) &'a str, pub(super) &'a str);
+pub(in crate::study) struct Claim<'a>(
+    pub(in crate::study) &'a str,
+    pub(in crate::study) &'a str,
+    pub(in crate::study) &'a str,
+);
 
 /// The usual rule on gains in words.
-pub(super) const ALL_GAIN: &str = "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
+pub(in crate::study) const ALL_GAIN: &str =
+    "Agrees where every paired 95 % interval is above zero, disagrees where one is below";
 
 impl Claim<'_> {
     /// Finding of a verdict on numbers, with the sentences of the verdicts: agrees, partly, disagrees.
-    pub(super) fn finding(self, measured: Vec<ClaimNumber>, verdict: Agreement, sentences: [&str; 3]) -> Finding {
+    pub(in crate::study) fn finding(
+        self,
+        measured: Vec<ClaimNumber>,
+        verdict: Agreement,
+        sentences: [&str; 3],
+    ) -> Finding {
         let found = match verdict {
             Agreement::Agrees => sentences[0],
             Agreement::Partly => sentences[1],
@@ -102,7 +114,7 @@ impl Claim<'_> {
     }
 
     /// Finding on groups of intervals, each judged by a rule.
-    pub(super) fn on_groups(self, unit: &str, groups: impl IntoIterator<Item = (Rule, Gains)>) -> Finding {
+    pub(in crate::study) fn on_groups(self, unit: &str, groups: impl IntoIterator<Item = (Rule, Gains)>) -> Finding {
         let (mut measured, mut verdicts, mut sentences) = (Vec::new(), Vec::new(), [""; 3]);
         for (rule, group) in groups {
             verdicts.push(rule.judge(&group.iter().map(|(_, interval)| *interval).collect::<Vec<_>>()));
@@ -119,23 +131,28 @@ impl Claim<'_> {
     }
 
     /// Finding on intervals, each judged by a rule.
-    pub(super) fn on_each(self, unit: &str, rule: Rule, all: impl IntoIterator<Item = (String, Interval)>) -> Finding {
+    pub(in crate::study) fn on_each(
+        self,
+        unit: &str,
+        rule: Rule,
+        all: impl IntoIterator<Item = (String, Interval)>,
+    ) -> Finding {
         self.on_groups(unit, all.into_iter().map(|one| (rule, vec![one])))
     }
 
     /// Finding on gains of macro F1, each group judged by a rule.
-    pub(super) fn on_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
+    pub(in crate::study) fn on_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
         self.on_groups(POINTS, groups.into_iter().map(|group| (rule, named_gains(group))))
     }
 }
 
 /// Gains of a group, each named with it.
-pub(super) fn named_gains((group, gains): (String, Gains)) -> Gains {
+pub(in crate::study) fn named_gains((group, gains): (String, Gains)) -> Gains {
     gains.into_iter().map(|(name, gain)| (format!("{group}: {name}"), gain)).collect()
 }
 
 /// The same interval from the other side.
-pub(super) fn negated(Interval { estimate, low, high }: Interval) -> Interval {
+pub(in crate::study) fn negated(Interval { estimate, low, high }: Interval) -> Interval {
     Interval { estimate: -estimate, low: -high, high: -low }
 }
 

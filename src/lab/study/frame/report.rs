@@ -1,5 +1,6 @@
 //! What a study reports: tables, findings beside the paper's claims, and figures whose points lead to trials.
 
+use super::stored_study::markdown_table;
 use palpate_geometry::drawing::Figure;
 use palpate_learn::metrics::Interval;
 use palpate_tactile::trial::TrialId;
@@ -216,6 +217,11 @@ pub struct LinkedFigure {
 }
 
 impl LinkedFigure {
+    /// A figure without links, in the width of a README.
+    pub(in crate::study) fn plain(name: &str, figure: Figure) -> Self {
+        Self { name: name.to_owned(), figure, size: [960, 860], links: Vec::new() }
+    }
+
     /// The figure with another line in its note.
     #[must_use]
     pub fn with_note(mut self, line: &str) -> Self {
@@ -326,10 +332,14 @@ impl From<Option<Interval>> for Cell {
 }
 
 /// A column of rows of a study: heading, unit, and value of a row.
-pub(super) struct Column<'a, R>(pub(super) &'static str, pub(super) &'static str, pub(super) &'a dyn Fn(&R) -> Cell);
+pub(in crate::study) struct Column<'a, R>(
+    pub(in crate::study) &'static str,
+    pub(in crate::study) &'static str,
+    pub(in crate::study) &'a dyn Fn(&R) -> Cell,
+);
 
 /// Typed rows of a table: its name, its title, and the trials behind a row.
-pub(super) struct TableRows<'a, R> {
+pub(in crate::study) struct TableRows<'a, R> {
     name: &'a str,
     title: String,
     rows: &'a [R],
@@ -338,17 +348,17 @@ pub(super) struct TableRows<'a, R> {
 
 impl<'a, R> TableRows<'a, R> {
     /// Rows without trials behind them.
-    pub(super) fn new(name: &'a str, title: impl Into<String>, rows: &'a [R]) -> Self {
+    pub(in crate::study) fn new(name: &'a str, title: impl Into<String>, rows: &'a [R]) -> Self {
         Self { name, title: title.into(), rows, trials: &|_| Vec::new() }
     }
 
     /// The same with trials behind each row.
-    pub(super) fn with_trials(self, trials: &'a dyn Fn(&R) -> Vec<TrialId>) -> Self {
+    pub(in crate::study) fn with_trials(self, trials: &'a dyn Fn(&R) -> Vec<TrialId>) -> Self {
         Self { trials, ..self }
     }
 
     /// The table with these columns.
-    pub(super) fn columns(self, columns: &[Column<'_, R>]) -> StudyTable {
+    pub(in crate::study) fn columns(self, columns: &[Column<'_, R>]) -> StudyTable {
         let headings: Vec<(&str, &str)> = columns.iter().map(|Column(name, unit, _)| (*name, *unit)).collect();
         let mut table = StudyTable::new(self.name, self.title, &headings);
         for row in self.rows {
@@ -381,6 +391,19 @@ impl StudyTable {
             columns: columns.iter().map(column).collect(),
             rows: Vec::new(),
         }
+    }
+
+    /// Headings and cells for reading.
+    pub fn shown(&self) -> (Vec<String>, Vec<Vec<String>>) {
+        let cells =
+            |row: &StudyRow| row.cells.iter().zip(&self.columns).map(|(cell, own)| cell.shown(&own.unit)).collect();
+        (self.columns.iter().map(StudyColumn::titled).collect(), self.rows.iter().map(cells).collect())
+    }
+
+    /// The table in Markdown.
+    pub fn markdown(&self) -> String {
+        let (header, rows) = self.shown();
+        markdown_table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows)
     }
 
     /// Adds a row.
@@ -459,8 +482,14 @@ fn quoted(text: &str) -> String {
 
 impl StudyReport {
     /// A report of units; the runner adds the fingerprint.
-    pub(super) fn new(data: Vec<String>, tables: Vec<StudyTable>, findings: Vec<Finding>) -> Self {
+    pub(in crate::study) fn new(data: Vec<String>, tables: Vec<StudyTable>, findings: Vec<Finding>) -> Self {
         Self { fingerprint: String::new(), data, tables, findings }
+    }
+
+    /// The tables in Markdown, with the origin below.
+    pub(in crate::study) fn markdown(&self, origin: &str) -> String {
+        let table = |table: &StudyTable| format!("{}:\n\n{}\n\n", table.title, table.markdown());
+        format!("{}{origin}.", self.tables.iter().map(table).collect::<String>())
     }
 
     /// A table by its name.

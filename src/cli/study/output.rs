@@ -1,0 +1,145 @@
+//! What all studies share: where they write, their threads and progress, and how their results are printed.
+
+use super::super::prelude::*;
+use super::super::setup::threads;
+use super::super::terminal::table;
+use palpate_geometry::palette::Theme;
+use palpate_lab::grasping::Shard;
+use palpate_lab::study::paper::{Cell, Finding, LinkedFigure, StudyFolder, StudyReport, StudyTable};
+use palpate_lab::study::{Experiment, Measuring, StoredStudy, run_experiment, run_part};
+use palpate_render::figure_svg;
+use serde::de::DeserializeOwned;
+
+/// Where a study writes, its threads, and the form of its output.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct StudyOutput {
+    /// Folder for results, which the same command continues, tables (CSV) and figures (SVG) (default: palpate-studies,
+    /// with --quick palpate-studies-quick).
+    #[arg(long, value_name = "DIR", value_parser = file_or_folder(&[]))]
+    out: Option<PathBuf>,
+    /// Number of threads (default: one per core). The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Measure only part K of N, for several machines; `palpate study merge` joins the parts.
+    #[arg(long, value_name = "K/N")]
+    pub(super) shard: Option<Shard>,
+    /// Print one JSON object instead of tables.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl StudyOutput {
+    pub(super) fn threads(&self) -> usize {
+        threads(self.threads)
+    }
+
+    pub(super) fn folder(&self, quick: bool) -> StudyFolder {
+        let named = || PathBuf::from(if quick { "palpate-studies-quick" } else { "palpate-studies" });
+        StudyFolder::new(self.out.clone().unwrap_or_else(named))
+    }
+
+    /// Runs a study under a progress bar until it ends or Ctrl+C stops it, writes its files and prints it, unless as JSON.
+    pub(super) fn run<E: Experiment>(
+        &self,
+        experiment: &E,
+        title: &str,
+        quick: bool,
+    ) -> Result<Option<StoredStudy<E::Report>>, Failure> {
+        let (stop, bar) = (stop_flag()?, Progress::new(BAR));
+        let progress = |done: usize, of: usize| bar.show(done, of);
+        let how = Measuring { threads: self.threads(), cancelled: &stop, progress: &progress };
+        let (folder, key) = (self.folder(quick), experiment.key());
+        if let Some(shard) = self.shard {
+            let part = folder.part(key, shard);
+            let outcome = run_part(experiment, &how, &part, shard)?;
+            drop(bar);
+            note_part(key, &part, outcome);
+            return Ok(None);
+        }
+        let outcome = run_experiment(experiment, &how, Some(&folder.units(key)))?;
+        drop(bar);
+        let Some(stored) = outcome else {
+            note_stopped(key);
+            return Ok(None);
+        };
+        let (shown, figures) = (E::shown(&stored.result), E::figures(&stored.result));
+        self.show(&folder, (key, title, quick), &stored, &shown, figures)?;
+        Ok(Some(stored))
+    }
+
+    /// Writes the files of a study and prints it, unless as JSON.
+    pub(super) fn show<R: Serialize + DeserializeOwned>(
+        &self,
+        folder: &StudyFolder,
+        (key, title, quick): (&str, &str, bool),
+        stored: &StoredStudy<R>,
+        shown: &StudyReport,
+        figures: Vec<LinkedFigure>,
+    ) -> Result<(), Failure> {
+        let draw = |linked: &LinkedFigure| {
+            figure_svg(&linked.figure, Theme::Light, linked.size).map_err(std::io::Error::other)
+        };
+        let names = folder.write(key, stored, &shown.tables, figures, &draw)?;
+        if self.json {
+            return Ok(());
+        }
+        say(title)?;
+        shown.data.iter().try_for_each(|line| say(format!("  {line}")))?;
+        shown.tables.iter().try_for_each(print_table)?;
+        shown.findings.iter().try_for_each(print_finding)?;
+        if quick {
+            note("a quick study: do not quote its numbers");
+        }
+        let written = format!("Written to {}: {}", folder.path().display(), names.join(", "));
+        say(format!("\n{}. {written}\n", stored.cpu_time()))
+    }
+}
+
+/// Progress of a study.
+pub(super) const BAR: &str = "{msg} {bar:40} {pos}/{len} {eta} left";
+
+/// Says how far a part of a study is.
+pub(super) fn note_part(key: &str, part: &Path, units: Option<usize>) {
+    match units {
+        None => note_stopped(key),
+        Some(units) => note(&format!(
+            "{units} units of {key} are in {}; `palpate study merge` joins the files of all parts",
+            part.display()
+        )),
+    }
+}
+
+/// Says that a study was stopped.
+pub(super) fn note_stopped(key: &str) {
+    note(&format!("stopped after a part of {key}; the same command continues here"));
+}
+
+/// A claim, the verdict, and the numbers around the line that decides.
+fn print_finding(finding: &Finding) -> Result<(), Failure> {
+    say(format!("\n[{}] {}: {}", finding.verdict.name(), finding.section, finding.claim))?;
+    say(format!("  {}", finding.found))?;
+    let rows: Vec<Vec<String>> = finding
+        .strips()
+        .map(|(own, strip)| {
+            let line = Cell::Number(own.line).shown(&own.unit);
+            vec![format!("  {}", own.what), own.shown(), line, strip.to_string()]
+        })
+        .collect();
+    if !rows.is_empty() {
+        table(&["  measured", "value", "line", "around the line"], &rows)?;
+    }
+    finding.left_out().map_or(Ok(()), |more| say(format!("  {more}")))?;
+    say(format!("  {}", finding.why))
+}
+
+/// Rows of long tables that are printed; the files have all.
+const MOST_ROWS: usize = 60;
+
+fn print_table(of: &StudyTable) -> Result<(), Failure> {
+    let (header, mut rows) = of.shown();
+    let more = rows.len().saturating_sub(MOST_ROWS);
+    rows.truncate(MOST_ROWS);
+    say(format!("\n{}", of.title))?;
+    table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows)?;
+    if more > 0 { say(format!("and {more} more rows in {}.csv", of.name)) } else { Ok(()) }
+}

@@ -1,0 +1,161 @@
+//! An experiment: a grid of cells, what is found in each, and the report on all of it.
+//!
+//! It names its cells, measures one, and turns what was found into a report. The frame runs the cells in parallel, keeps what is
+//! finished, resumes, and counts the time.
+
+use super::report::{LinkedFigure, StudyReport};
+use super::result_file::{Measuring, ResultFile, ResultFileError, TrialNumbers};
+use super::stored_study::{StoredStudy, StudyCommand};
+use crate::datasets::DatasetError;
+use crate::grasping::{CollectionError, Shard};
+use palpate_learn::{LearnError, Method, SplitError};
+use palpate_sim::objects::ObjectError;
+use palpate_sim::scene::SceneError;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Cell of the grid of a study: the unit of work that is computed at once and kept.
+pub trait StudyCell: Sync {
+    /// Name of its result, different for each cell of a plan.
+    fn name(&self) -> String;
+
+    /// Method that is fitted, on whose version the result depends.
+    fn method(&self) -> Option<&'static Method> {
+        None
+    }
+
+    /// Name of its result in files: results of another version of the method are others.
+    fn stored_name(&self) -> String {
+        let version = self.method().map(|method| format!(" ({})", method.fingerprint()));
+        self.name() + &version.unwrap_or_default()
+    }
+}
+
+/// A study with its plan and what it needs to measure.
+pub trait Experiment: Sync {
+    /// Cell of the grid.
+    type Cell: StudyCell;
+    /// What is found in a cell, as stored.
+    type Found: Clone + Serialize + DeserializeOwned + Send + Sync;
+    /// Report on all cells, as stored.
+    type Report: Serialize + DeserializeOwned;
+
+    /// Key on the command line and in files.
+    fn key(&self) -> &'static str;
+
+    /// Everything that results depend on, but the program: those of another header are not continued.
+    fn header(&self) -> serde_json::Value;
+
+    /// The command that repeats it.
+    fn command(&self) -> StudyCommand;
+
+    /// The grid, in the order of work.
+    fn grid(&self) -> Vec<Self::Cell>;
+
+    /// Computes a cell, or fails with [`StudyError::Stopped`].
+    fn measure(&self, cell: &Self::Cell, stop: &AtomicBool) -> Result<Self::Found, StudyError>;
+
+    /// Numbers of the trials that have been read so far.
+    fn trials(&self) -> TrialNumbers {
+        TrialNumbers::new()
+    }
+
+    /// Report on all cells, in the order of the grid.
+    fn report(&self, found: Vec<(Self::Cell, Self::Found)>) -> Self::Report;
+
+    /// Tables of a report.
+    fn shown(report: &Self::Report) -> StudyReport;
+
+    /// Figures of a report.
+    fn figures(report: &Self::Report) -> Vec<LinkedFigure>;
+}
+
+/// Computes the cells that a file of results lacks, then the result; none where it was stopped. The same experiment continues
+/// the file.
+pub fn run_experiment<E: Experiment>(
+    experiment: &E,
+    how: &Measuring<'_>,
+    results: Option<&Path>,
+) -> Result<Option<StoredStudy<E::Report>>, StudyError> {
+    let mut file = match results {
+        Some(path) => ResultFile::open(path, experiment.key(), &experiment.header())?,
+        None => ResultFile::in_memory(),
+    };
+    let Some(cells) = complete(experiment, how, &mut file, Shard::WHOLE)? else { return Ok(None) };
+    let found = cells.into_iter().filter_map(|(name, cell)| Some((cell, file.get(&name)?.clone())));
+    let report = experiment.report(found.collect());
+    Ok(Some(StoredStudy::new(experiment.command().text(), file.cpu_hours(), report)))
+}
+
+/// Computes the cells of a part that its file lacks. Returns their number; none where it was stopped. A merge of all parts is
+/// the file of the whole.
+pub fn run_part<E: Experiment>(
+    experiment: &E,
+    how: &Measuring<'_>,
+    results: &Path,
+    shard: Shard,
+) -> Result<Option<usize>, StudyError> {
+    let mut file = ResultFile::open(results, experiment.key(), &experiment.header())?;
+    let Some(cells) = complete(experiment, how, &mut file, shard)? else { return Ok(None) };
+    file.end_part(experiment.trials())?;
+    Ok(Some(cells.len()))
+}
+
+/// Computes the cells of a part that a file lacks. Returns them all with their names; none where it was stopped.
+fn complete<E: Experiment>(
+    experiment: &E,
+    how: &Measuring<'_>,
+    file: &mut ResultFile<E::Found>,
+    shard: Shard,
+) -> Result<Option<Vec<(String, E::Cell)>>, StudyError> {
+    let own = experiment.grid().into_iter().enumerate().filter(|(place, _)| shard.has(*place));
+    let cells: Vec<(String, E::Cell)> = own.map(|(_, cell)| (cell.stored_name(), cell)).collect();
+    file.retain(|unit| cells.iter().any(|(name, _)| name == unit));
+    let measured = |cell: &E::Cell| match experiment.measure(cell, how.cancelled) {
+        Err(StudyError::Stopped) => Ok(None),
+        found => found.map(Some),
+    };
+    Ok(file.complete(&cells, how, measured)?.then_some(cells))
+}
+
+/// Error of a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// Grasps could not be collected.
+    #[error(transparent)]
+    Collect(#[from] CollectionError),
+    /// Grasps could not be read.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The file of finished units failed.
+    #[error(transparent)]
+    Results(#[from] ResultFileError),
+    /// A built-in object cannot be loaded.
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    /// A setting does not fit the scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A method could not be fitted.
+    #[error("{method}: {cause}")]
+    Fit {
+        /// Key of the method.
+        method: String,
+        /// Cause.
+        cause: LearnError,
+    },
+    /// The trials cannot be divided into training and test grasps.
+    #[error(transparent)]
+    Split(#[from] SplitError),
+    /// A preset or method that does not exist.
+    #[error("there is no {0}")]
+    Unknown(String),
+    /// The trials lack something that the study needs.
+    #[error("the study needs {0}")]
+    Missing(String),
+    /// It was stopped; the same plan continues.
+    #[error("stopped")]
+    Stopped,
+}

@@ -1,0 +1,27 @@
+//! The frame that all studies stand on: cells that are computed in parallel, kept and resumed; rows with columns; figures by
+//! facets; claims; files.
+
+mod claims;
+mod drawing;
+mod experiment;
+mod folder;
+mod groups;
+mod report;
+mod result_file;
+mod stored_study;
+
+pub(super) use claims::{ALL_GAIN, Claim, Gains, Rule, named_gains, negated};
+pub(super) use drawing::{
+    Along, F1_PERCENT, Facets, LinkedPlots, TableLine, confusion_figure, dots, lines, named_rows, plots_of, series_of,
+};
+pub use experiment::{Experiment, StudyCell, StudyError, run_experiment, run_part};
+pub use folder::StudyFolder;
+pub(super) use groups::{grouped, unique};
+pub use report::{
+    Agreement, Cell, ClaimNumber, FigureLink, FigureMark, Finding, IntervalStrip, LinkedFigure, PERCENT, POINTS,
+    StudyColumn, StudyReport, StudyRow, StudyTable,
+};
+pub(super) use report::{Column, TableRows};
+pub use result_file::{Measuring, ResultFile, ResultFileError, TrialNumbers, merged_units, program};
+pub(super) use stored_study::rounded;
+pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, markdown_table};
