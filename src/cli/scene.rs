@@ -3,7 +3,7 @@
 use super::prelude::*;
 use super::setup::threads;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, explain_effects};
+use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, StudyProgress, explain_effects};
 use palpate_sim::scene::{SCENES, Scene};
 
 /// Arguments of `palpate scene`.
@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
     let scene = scene_of(scene_or_object.as_deref(), scene)?;
     let object = scene.load_object()?;
     let bar = Progress::new("{bar:40} {pos}/{len} effects");
-    let progress = |done: usize, of: usize| bar.show(done, of);
+    let progress = |own: StudyProgress| bar.show(own.done, own.of);
     let how = Measuring { threads: threads(None), cancelled: &AtomicBool::new(false), progress: &progress };
     let explanation = explain_effects(&scene, object.as_ref(), &how).ok_or("the measurement was cancelled")?;
     drop(bar);

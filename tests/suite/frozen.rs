@@ -12,7 +12,7 @@
 use crate::calibration::{capture, parts};
 use crate::program::{palpate, ran, run};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
-use palpate_lab::grasping::{Advisor, RecognisedGrasp};
+use palpate_lab::grasping::{Advisor, RecognisedGrasp, Shard};
 use palpate_lab::study::accuracy::{AccuracyExperiment, AccuracyPlan, SettingFamily};
 use palpate_lab::study::paper::{Agreement, Cell, StudyReport};
 use palpate_lab::study::{Measuring, StoredStudy, run_experiment};
@@ -440,7 +440,7 @@ fn studies_of_the_physics_are_as_they_were() {
     let folder = tempfile::tempdir().unwrap();
     play(folder.path(), "studies_physics");
     let study = AccuracyExperiment::new(accuracy_plan()).unwrap();
-    let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| () };
-    let accuracy = run_experiment(&study, &how, None).unwrap().unwrap().result;
+    let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_| () };
+    let accuracy = run_experiment(&study, &how, None, Shard::WHOLE).unwrap().whole().unwrap().result;
     compare_numbers("studies_accuracy", &pretty(serde_json::to_value(&accuracy).unwrap()));
 }

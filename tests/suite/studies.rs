@@ -5,9 +5,9 @@ use palpate_lab::grasping::Shard;
 use palpate_lab::study::accuracy::stored_accuracy;
 use palpate_lab::study::paper::{
     Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
-    StudyRow, StudySize, StudyStep, StudyWork, is_current, paper_study, stored_report, study_fingerprint,
+    StudyRow, StudySize, StudyStep, is_current, paper_study, stored_report, study_fingerprint,
 };
-use palpate_lab::study::{StoredStudy, generated_sections, merged_units, program};
+use palpate_lab::study::{Measuring, StoredStudy, StudyOutcome, generated_sections, merged_units, program};
 use palpate_render::figure_svg;
 use palpate_store::Store;
 use std::path::{Path, PathBuf};
@@ -63,9 +63,10 @@ fn sample(
         }
     };
     let store = Store::open(&folder.join("store.sqlite")).expect("opens");
-    let work = StudyWork { threads, cancelled: &cancelled, progress: &progress };
+    let work = Measuring { threads, cancelled: &cancelled, progress: &progress };
     let results = stop_after.map(|_| folder.join(format!("{}.jsonl", study.card().key)));
-    study.run(&StudyBench::new(store, &plan, work), results.as_deref())
+    let outcome = study.run(&StudyBench::new(store, &plan, work), results.as_deref(), Shard::WHOLE)?;
+    Ok(outcome.whole())
 }
 
 /// Lines of finished units without the CPU time that each took.
@@ -86,13 +87,13 @@ fn eight_parts_of_a_study_merge_into_the_file_of_one_machine() -> TestResult {
     // Each machine has a store of its own.
     let machine = |name: &str, progress: &(dyn Fn(StudyProgress) + Sync), run: &dyn Fn(&StudyBench<'_>, &Path)| {
         let store = Store::open(&folder.path().join(format!("{name}.sqlite"))).expect("opens");
-        let work = StudyWork { threads: 1, cancelled: &cancelled, progress };
+        let work = Measuring { threads: 1, cancelled: &cancelled, progress };
         let file = folder.path().join(format!("{name}.jsonl"));
         run(&StudyBench::new(store, &plan, work), &file);
         file
     };
     let whole = |bench: &StudyBench<'_>, file: &Path| {
-        let stored = study.run(bench, Some(file)).expect("runs").expect("finished");
+        let stored = study.run(bench, Some(file), Shard::WHOLE).expect("runs").whole().expect("finished");
         std::fs::write(file.with_extension("json"), serde_json::to_string(&stored.result).expect("writes"))
             .expect("writes");
     };
@@ -101,7 +102,8 @@ fn eight_parts_of_a_study_merge_into_the_file_of_one_machine() -> TestResult {
         .map(|number| {
             let shard: Shard = format!("{number}/8").parse().expect("a part");
             let part = |bench: &StudyBench<'_>, file: &Path| {
-                assert!(study.run_part(bench, file, shard).expect("runs").expect("finished") <= 1);
+                let outcome = study.run(bench, Some(file), shard).expect("runs");
+                assert!(matches!(outcome, StudyOutcome::Part(0 | 1)), "{outcome:?}");
             };
             machine(&format!("part{number}"), &|_| (), &part)
         })

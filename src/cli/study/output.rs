@@ -6,7 +6,7 @@ use super::super::terminal::table;
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::Shard;
 use palpate_lab::study::paper::{Cell, Finding, LinkedFigure, StudyFolder, StudyReport, StudyTable};
-use palpate_lab::study::{Experiment, Measuring, StoredStudy, run_experiment, run_part};
+use palpate_lab::study::{Experiment, Measuring, StoredStudy, StudyOutcome, StudyProgress, run_experiment};
 use palpate_render::figure_svg;
 use serde::de::DeserializeOwned;
 
@@ -21,8 +21,8 @@ pub(super) struct StudyOutput {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Measure only part K of N, for several machines; `palpate study merge` joins the parts.
-    #[arg(long, value_name = "K/N")]
-    pub(super) shard: Option<Shard>,
+    #[arg(long, value_name = "K/N", default_value_t = Shard::WHOLE, hide_default_value = true)]
+    pub(super) shard: Shard,
     /// Print one JSON object instead of tables.
     #[arg(long)]
     pub(super) json: bool,
@@ -46,22 +46,13 @@ impl StudyOutput {
         quick: bool,
     ) -> Result<Option<StoredStudy<E::Report>>, Failure> {
         let (stop, bar) = (stop_flag()?, Progress::new(BAR));
-        let progress = |done: usize, of: usize| bar.show(done, of);
+        let progress = |own: StudyProgress| bar.show(own.done, own.of);
         let how = Measuring { threads: self.threads(), cancelled: &stop, progress: &progress };
         let (folder, key) = (self.folder(quick), experiment.key());
-        if let Some(shard) = self.shard {
-            let part = folder.part(key, shard);
-            let outcome = run_part(experiment, &how, &part, shard)?;
-            drop(bar);
-            note_part(key, &part, outcome);
-            return Ok(None);
-        }
-        let outcome = run_experiment(experiment, &how, Some(&folder.units(key)))?;
+        let part = folder.part(key, self.shard);
+        let outcome = run_experiment(experiment, &how, Some(&part), self.shard)?;
         drop(bar);
-        let Some(stored) = outcome else {
-            note_stopped(key);
-            return Ok(None);
-        };
+        let Some(stored) = whole(key, &part, outcome) else { return Ok(None) };
         let (shown, figures) = (E::shown(&stored.result), E::figures(&stored.result));
         self.show(&folder, (key, title, quick), &stored, &shown, figures)?;
         Ok(Some(stored))
@@ -98,20 +89,17 @@ impl StudyOutput {
 /// Progress of a study.
 pub(super) const BAR: &str = "{msg} {bar:40} {pos}/{len} {eta} left";
 
-/// Says how far a part of a study is.
-pub(super) fn note_part(key: &str, part: &Path, units: Option<usize>) {
-    match units {
-        None => note_stopped(key),
-        Some(units) => note(&format!(
+/// The result of a study; none of a part, or where it was stopped, which is said.
+pub(super) fn whole<R>(key: &str, part: &Path, outcome: StudyOutcome<R>) -> Option<StoredStudy<R>> {
+    match &outcome {
+        StudyOutcome::Stopped => note(&format!("stopped after a part of {key}; the same command continues here")),
+        StudyOutcome::Part(units) => note(&format!(
             "{units} units of {key} are in {}; `palpate study merge` joins the files of all parts",
             part.display()
         )),
+        StudyOutcome::Whole(_) => {}
     }
-}
-
-/// Says that a study was stopped.
-pub(super) fn note_stopped(key: &str) {
-    note(&format!("stopped after a part of {key}; the same command continues here"));
+    outcome.whole()
 }
 
 /// A claim, the verdict, and the numbers around the line that decides.

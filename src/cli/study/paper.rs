@@ -2,12 +2,12 @@
 
 use super::super::learning::{QueryArguments, parse_sensors};
 use super::super::prelude::*;
-use super::output::{BAR, StudyOutput, note_part, note_stopped};
+use super::output::{BAR, StudyOutput, whole};
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use palpate_lab::datasets::DatasetQuery;
+use palpate_lab::study::Measuring;
 use palpate_lab::study::paper::{
-    PAPER_STUDIES, STUDY_PRESET, StudyBench, StudyCard, StudyPlan, StudyProgress, StudySize, StudyStep, StudyWork,
-    paper_study,
+    PAPER_STUDIES, STUDY_PRESET, StudyBench, StudyCard, StudyPlan, StudyProgress, StudySize, StudyStep, paper_study,
 };
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
@@ -125,28 +125,20 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
         bar.0.set_message(if step == StudyStep::Collecting { "collecting" } else { "measuring" });
         bar.show(done, of);
     };
-    let work = StudyWork { threads: output.threads(), cancelled: &stop, progress: &progress };
+    let work = Measuring { threads: output.threads(), cancelled: &stop, progress: &progress };
     let bench = StudyBench::new(open_store(store)?, &plan, work);
     let mut reports = BTreeMap::new();
     for study in studies {
         let StudyCard { key, title, .. } = study.card();
         bar.0.reset();
-        if let Some(shard) = output.shard {
-            let part = folder.part(key, shard);
-            let outcome = study.run_part(&bench, &part, shard);
-            bar.0.finish_and_clear();
-            let units = outcome?;
-            note_part(key, &part, units);
-            if units.is_none() {
+        let part = folder.part(key, output.shard);
+        let outcome = study.run(&bench, Some(&part), output.shard);
+        bar.0.finish_and_clear();
+        let Some(stored) = whole(key, &part, outcome?) else {
+            if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
             continue;
-        }
-        let outcome = study.run(&bench, Some(&folder.units(key)));
-        bar.0.finish_and_clear();
-        let Some(stored) = outcome? else {
-            note_stopped(key);
-            return Ok(());
         };
         let title = format!("{title} ({})", study.card().origin());
         let (shown, figures) = (&stored.result, study.figures(&stored.result));
@@ -154,7 +146,8 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
         reports.insert(key, stored);
     }
     match (key, reports.values().next()) {
-        _ if !output.json || output.shard.is_some() => Ok(()),
+        (_, None) => Ok(()),
+        _ if !output.json => Ok(()),
         (Some(_), Some(only)) => say_json(only),
         _ => say_json(&reports),
     }

@@ -231,12 +231,6 @@ impl Comparison<'_> {
         }
     }
 
-    /// Fits and evaluates one method in this thread.
-    pub fn row_of(&self, method: &'static Method) -> Result<ComparisonRow, ComparisonError> {
-        self.check()?;
-        self.row(&self.of_method(method)?)
-    }
-
     fn of_method(&self, method: &'static Method) -> Result<Tested, ComparisonError> {
         let fitting = self.fitting();
         let model =

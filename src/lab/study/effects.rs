@@ -113,10 +113,10 @@ pub fn explain_effects(scene: &Scene, object: Option<&ObjectModel>, how: &Measur
     let (base, cpu_s) = timed_grasp(scene, object, &stopped)?;
     let base = GraspOutcome::new(scene, base);
     let done = AtomicUsize::new(0);
-    (how.progress)(0, Effect::ALL.len());
+    how.measured(0, Effect::ALL.len());
     let one = |effect: &Effect| {
         let explained = explain_one(scene, object, &base, *effect, &stopped)?;
-        (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, Effect::ALL.len());
+        how.measured(done.fetch_add(1, Ordering::Relaxed) + 1, Effect::ALL.len());
         Some(explained)
     };
     let all = || Effect::ALL.par_iter().map(one).collect::<Option<Vec<ExplainedEffect>>>();
@@ -202,7 +202,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     fn explained(scene: &Scene, object: Option<&ObjectModel>) -> Explanation {
-        let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_, _| {} };
+        let how = Measuring { threads: 2, cancelled: &AtomicBool::new(false), progress: &|_| {} };
         let explanation = explain_effects(scene, object, &how).expect("not cancelled");
         assert_eq!(explanation.effects.len(), Effect::ALL.len());
         explanation
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn cancelling_gives_no_result() {
-        let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_, _| {} };
+        let how = Measuring { threads: 1, cancelled: &AtomicBool::new(true), progress: &|_| {} };
         assert_eq!(explain_effects(&draft(), None, &how), None);
     }
 }

@@ -31,7 +31,7 @@ pub use finger_fit::{
 };
 pub use frame::{
     Experiment, GeneratedSection, Measuring, ResultFile, ResultFileError, StoredStudy, StudyCell, StudyCommand,
-    TrialNumbers, markdown_table, merged_units, program, run_experiment, run_part,
+    StudyOutcome, StudyProgress, StudyStep, TrialNumbers, markdown_table, merged_units, program, run_experiment,
 };
 pub use generated::generated_sections;
 pub use labelled_training::{

@@ -2,7 +2,7 @@
 
 use super::job::{Job, Newer, spare_threads};
 use super::messages::Wake;
-use crate::study::{Explanation, Measuring, explain_effects};
+use crate::study::{Explanation, Measuring, StudyProgress, explain_effects};
 use palpate_sim::objects::ObjectError;
 use palpate_sim::scene::Scene;
 use std::collections::VecDeque;
@@ -39,7 +39,8 @@ pub fn effects_job(explain: Explain, wake: Wake) -> Job<Scene, Explanation> {
             }
             std::thread::sleep(LOOK);
         }
-        let progress = |done: usize, of: usize| run.count(done, of, format!("measuring .. {done} of {of}"));
+        let progress =
+            |StudyProgress { done, of, .. }: StudyProgress| run.count(done, of, format!("measuring .. {done} of {of}"));
         let how = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
         let Some(explanation) = explain(scene, &how)? else { return Ok(None) };
         kept.push_back((scene.clone(), explanation.clone()));

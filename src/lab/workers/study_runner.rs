@@ -3,11 +3,12 @@
 
 use super::job::{Job, JobError, JobFailure, JobRun, Newer, spare_threads};
 use super::messages::Wake;
+use crate::grasping::Shard;
 use crate::study::paper::{
     LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport, StudySize,
-    StudyStep, StudyWork, is_current, paper_study, stored_report,
+    StudyStep, is_current, paper_study, stored_report,
 };
-use crate::study::{ResultFileError, StoredStudy, program};
+use crate::study::{Measuring, ResultFileError, StoredStudy, program};
 use palpate_store::Store;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -103,9 +104,10 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
         };
         run.count(done, of, words);
     };
-    let work = StudyWork { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
+    let work = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
     let bench = StudyBench::new(Store::open(store)?, &plan, work);
-    let Some(stored) = study.run(&bench, Some(&folder.units(key)))? else { return Ok(false) };
+    let outcome = study.run(&bench, Some(&folder.units(key)), Shard::WHOLE)?;
+    let Some(stored) = outcome.whole() else { return Ok(false) };
     folder.write(key, &stored, &stored.result.tables, study.figures(&stored.result), draw.as_ref())?;
     Ok(true)
 }

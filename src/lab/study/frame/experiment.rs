@@ -72,44 +72,35 @@ pub trait Experiment: Sync {
     fn figures(report: &Self::Report) -> Vec<LinkedFigure>;
 }
 
-/// Computes the cells that a file of results lacks, then the result; none where it was stopped. The same experiment continues
-/// the file.
+/// End of a run of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StudyOutcome<R> {
+    /// It was stopped; the same study continues its file.
+    Stopped,
+    /// So many cells, which are a part of it, are in its file; [`merged_units`](super::merged_units) joins the parts.
+    Part(usize),
+    /// The whole study.
+    Whole(StoredStudy<R>),
+}
+
+impl<R> StudyOutcome<R> {
+    /// The result; none of a study that was stopped, or of a part.
+    pub fn whole(self) -> Option<StoredStudy<R>> {
+        if let Self::Whole(stored) = self { Some(stored) } else { None }
+    }
+}
+
+/// Computes the cells of a part of a study that a file of results lacks, then the result of the whole.
 pub fn run_experiment<E: Experiment>(
     experiment: &E,
     how: &Measuring<'_>,
     results: Option<&Path>,
-) -> Result<Option<StoredStudy<E::Report>>, StudyError> {
+    shard: Shard,
+) -> Result<StudyOutcome<E::Report>, StudyError> {
     let mut file = match results {
         Some(path) => ResultFile::open(path, experiment.key(), &experiment.header())?,
         None => ResultFile::in_memory(),
     };
-    let Some(cells) = complete(experiment, how, &mut file, Shard::WHOLE)? else { return Ok(None) };
-    let found = cells.into_iter().filter_map(|(name, cell)| Some((cell, file.get(&name)?.clone())));
-    let report = experiment.report(found.collect());
-    Ok(Some(StoredStudy::new(experiment.command().text(), file.cpu_hours(), report)))
-}
-
-/// Computes the cells of a part that its file lacks. Returns their number; none where it was stopped. A merge of all parts is
-/// the file of the whole.
-pub fn run_part<E: Experiment>(
-    experiment: &E,
-    how: &Measuring<'_>,
-    results: &Path,
-    shard: Shard,
-) -> Result<Option<usize>, StudyError> {
-    let mut file = ResultFile::open(results, experiment.key(), &experiment.header())?;
-    let Some(cells) = complete(experiment, how, &mut file, shard)? else { return Ok(None) };
-    file.end_part(experiment.trials())?;
-    Ok(Some(cells.len()))
-}
-
-/// Computes the cells of a part that a file lacks. Returns them all with their names; none where it was stopped.
-fn complete<E: Experiment>(
-    experiment: &E,
-    how: &Measuring<'_>,
-    file: &mut ResultFile<E::Found>,
-    shard: Shard,
-) -> Result<Option<Vec<(String, E::Cell)>>, StudyError> {
     let own = experiment.grid().into_iter().enumerate().filter(|(place, _)| shard.has(*place));
     let cells: Vec<(String, E::Cell)> = own.map(|(_, cell)| (cell.stored_name(), cell)).collect();
     file.retain(|unit| cells.iter().any(|(name, _)| name == unit));
@@ -117,7 +108,16 @@ fn complete<E: Experiment>(
         Err(StudyError::Stopped) => Ok(None),
         found => found.map(Some),
     };
-    Ok(file.complete(&cells, how, measured)?.then_some(cells))
+    if !file.complete(&cells, how, measured)? {
+        return Ok(StudyOutcome::Stopped);
+    }
+    if shard != Shard::WHOLE {
+        file.end_part(experiment.trials())?;
+        return Ok(StudyOutcome::Part(cells.len()));
+    }
+    let found = cells.into_iter().filter_map(|(name, cell)| Some((cell, file.get(&name)?.clone())));
+    let report = experiment.report(found.collect());
+    Ok(StudyOutcome::Whole(StoredStudy::new(experiment.command().text(), file.cpu_hours(), report)))
 }
 
 /// Error of a study.

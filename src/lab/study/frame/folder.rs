@@ -32,7 +32,10 @@ impl StudyFolder {
 
     /// File of finished units of a part of a study.
     pub fn part(&self, key: &str, shard: Shard) -> PathBuf {
-        self.0.join(format!("{key}.{}.jsonl", shard.to_string().replace('/', "-of-")))
+        match shard {
+            Shard::WHOLE => self.units(key),
+            shard => self.0.join(format!("{key}.{}.jsonl", shard.to_string().replace('/', "-of-"))),
+        }
     }
 
     fn result(&self, key: &str) -> PathBuf {

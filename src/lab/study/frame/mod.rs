@@ -14,7 +14,7 @@ pub(super) use claims::{ALL_GAIN, Claim, Gains, Rule, named_gains, negated};
 pub(super) use drawing::{
     Along, F1_PERCENT, Facets, LinkedPlots, TableLine, confusion_figure, dots, lines, named_rows, plots_of, series_of,
 };
-pub use experiment::{Experiment, StudyCell, StudyError, run_experiment, run_part};
+pub use experiment::{Experiment, StudyCell, StudyError, StudyOutcome, run_experiment};
 pub use folder::StudyFolder;
 pub(super) use groups::{grouped, unique};
 pub use report::{
@@ -22,6 +22,8 @@ pub use report::{
     StudyColumn, StudyReport, StudyRow, StudyTable,
 };
 pub(super) use report::{Column, TableRows};
-pub use result_file::{Measuring, ResultFile, ResultFileError, TrialNumbers, merged_units, program};
+pub use result_file::{
+    Measuring, ResultFile, ResultFileError, StudyProgress, StudyStep, TrialNumbers, merged_units, program,
+};
 pub(super) use stored_study::rounded;
 pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, markdown_table};

@@ -14,15 +14,42 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+/// Step of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StudyStep {
+    /// Simulates grasps that the store lacks.
+    Collecting,
+    /// Computes units.
+    Measuring,
+}
+
+/// Progress of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StudyProgress {
+    /// Step.
+    pub step: StudyStep,
+    /// Grasps, units or effects done.
+    pub done: usize,
+    /// All of them.
+    pub of: usize,
+}
+
 /// Threads, stop flag and progress of a measurement.
 #[derive(Clone, Copy)]
 pub struct Measuring<'a> {
-    /// Number of threads.
+    /// Number of threads. The results do not depend on it.
     pub threads: usize,
     /// Flag that stops it.
     pub cancelled: &'a AtomicBool,
-    /// Receives the number of measured units and the number of all.
-    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+    /// Receives progress.
+    pub progress: &'a (dyn Fn(StudyProgress) + Sync),
+}
+
+impl Measuring<'_> {
+    /// Reports measured units.
+    pub(in crate::study) fn measured(&self, done: usize, of: usize) {
+        (self.progress)(StudyProgress { step: StudyStep::Measuring, done, of });
+    }
 }
 
 /// Finished units of a study by name, in memory and, where it has one, in a file.
@@ -246,7 +273,7 @@ impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
     ) -> Result<bool, E> {
         let missing: Vec<&(String, W)> = units.iter().filter(|(name, _)| self.get(name).is_none()).collect();
         let done = AtomicUsize::new(units.len() - missing.len());
-        (how.progress)(done.load(Ordering::Relaxed), units.len());
+        how.measured(done.load(Ordering::Relaxed), units.len());
         let (next, finished, failure) = (AtomicUsize::new(0), AtomicUsize::new(0), Mutex::new(None));
         let file = Mutex::new(self);
         let one = |name: &str, unit: &W| -> Result<(), E> {
@@ -257,7 +284,7 @@ impl<U: Serialize + DeserializeOwned + Send + Sync> ResultFile<U> {
             if let Ok(mut file) = file.lock() {
                 file.add(name, result, cpu_s)?;
                 finished.fetch_add(1, Ordering::Relaxed);
-                (how.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
+                how.measured(done.fetch_add(1, Ordering::Relaxed) + 1, units.len());
             }
             Ok(())
         };
@@ -317,7 +344,7 @@ mod tests {
     fn squares(file: &mut ResultFile<u64>, most: u64, stop_at: Option<u64>) -> Result<(bool, usize), ResultFileError> {
         let units: Vec<(String, u64)> = (0..most).map(|n| (format!("unit {n}"), n)).collect();
         let (cancelled, computed) = (AtomicBool::new(false), AtomicUsize::new(0));
-        let how = Measuring { threads: 1, cancelled: &cancelled, progress: &|done, of| assert!(done <= of) };
+        let how = Measuring { threads: 1, cancelled: &cancelled, progress: &|own| assert!(own.done <= own.of) };
         let finished = file.complete(&units, &how, |n| {
             if stop_at == Some(*n) {
                 cancelled.store(true, Ordering::Relaxed);

@@ -3,51 +3,20 @@
 use super::plan::{DataWanted, StudyPlan};
 use crate::datasets::{DatasetError, DatasetQuery};
 use crate::grasping::{CollectionPlan, collect};
-use crate::study::frame::{Measuring, StudyError, TrialNumbers};
+use crate::study::frame::{Measuring, StudyError, StudyProgress, StudyStep, TrialNumbers};
 use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
 use palpate_sim::fingerprint;
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Step of a study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StudyStep {
-    /// Simulates grasps that the store lacks.
-    Collecting,
-    /// Computes units.
-    Measuring,
-}
-
-/// Progress of a study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StudyProgress {
-    /// Step.
-    pub step: StudyStep,
-    /// Grasps or units done.
-    pub done: usize,
-    /// Grasps or units in all.
-    pub of: usize,
-}
-
-/// Threads, stop flag and progress of a study.
-#[derive(Clone, Copy)]
-pub struct StudyWork<'a> {
-    /// Number of threads. The results do not depend on it.
-    pub threads: usize,
-    /// Flag that stops the study. The same plan continues it.
-    pub cancelled: &'a AtomicBool,
-    /// Receives progress.
-    pub progress: &'a (dyn Fn(StudyProgress) + Sync),
-}
 
 /// Bench of a study.
 pub struct StudyBench<'a> {
     plan: &'a StudyPlan,
-    work: StudyWork<'a>,
+    work: Measuring<'a>,
     store: Mutex<Store>,
     /// Data sets read last, newest last.
     read: Mutex<Vec<(DataWanted, Arc<Dataset>)>>,
@@ -60,7 +29,7 @@ const KEPT: usize = 4;
 
 impl<'a> StudyBench<'a> {
     /// A bench on a store.
-    pub fn new(store: Store, plan: &'a StudyPlan, work: StudyWork<'a>) -> Self {
+    pub fn new(store: Store, plan: &'a StudyPlan, work: Measuring<'a>) -> Self {
         Self { plan, work, store: Mutex::new(store), read: Mutex::default(), trials: Mutex::default() }
     }
 
@@ -70,15 +39,8 @@ impl<'a> StudyBench<'a> {
     }
 
     /// Threads, stop flag and progress.
-    pub fn work(&self) -> StudyWork<'a> {
+    pub fn work(&self) -> Measuring<'a> {
         self.work
-    }
-
-    /// Measures units with the threads and the progress of the study.
-    pub(super) fn measuring<T>(&self, measure: impl FnOnce(&Measuring<'_>) -> T) -> T {
-        let StudyWork { threads, cancelled, progress } = self.work;
-        let progress = |done, of| progress(StudyProgress { step: StudyStep::Measuring, done, of });
-        measure(&Measuring { threads, cancelled, progress: &progress })
     }
 
     /// Numbers of the trials that were read.

@@ -29,10 +29,10 @@ mod training_size;
 
 pub use super::frame::{
     Agreement, Cell, ClaimNumber, FigureLink, FigureMark, Finding, IntervalStrip, LinkedFigure, PERCENT, POINTS,
-    StudyColumn, StudyError, StudyFolder, StudyReport, StudyRow, StudyTable,
+    StudyColumn, StudyError, StudyFolder, StudyProgress, StudyReport, StudyRow, StudyStep, StudyTable,
 };
 pub(in crate::study) use answers::Pool;
-pub use bench::{StudyBench, StudyProgress, StudyStep, StudyWork};
+pub use bench::StudyBench;
 pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub(in crate::study) use stored::sections;

@@ -4,8 +4,8 @@ use super::bench::StudyBench;
 use super::{StudyCard, StudyPlan};
 use crate::grasping::Shard;
 use crate::study::frame::{
-    Experiment, LinkedFigure, StoredStudy, StudyCell, StudyCommand, StudyError, StudyReport, TrialNumbers,
-    run_experiment, run_part,
+    Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyOutcome, StudyReport, TrialNumbers,
+    run_experiment,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -92,11 +92,13 @@ pub trait PaperStudy: Sync {
     /// Names of the results of all cells.
     fn units(&self, plan: &StudyPlan) -> Vec<String>;
 
-    /// Computes the cells that a file of results lacks, then the result; none where it was stopped.
-    fn run(&self, bench: &StudyBench<'_>, file: Option<&Path>) -> Result<Option<StoredStudy<StudyReport>>, StudyError>;
-
-    /// Computes the cells of a part that its file lacks. Returns their number; none where it was stopped.
-    fn run_part(&self, bench: &StudyBench<'_>, file: &Path, shard: Shard) -> Result<Option<usize>, StudyError>;
+    /// Computes the cells of a part that a file of results lacks, then the result of the whole.
+    fn run(
+        &self,
+        bench: &StudyBench<'_>,
+        file: Option<&Path>,
+        shard: Shard,
+    ) -> Result<StudyOutcome<StudyReport>, StudyError>;
 
     /// Figures, drawn from the tables.
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure>;
@@ -111,12 +113,13 @@ impl<S: Study> PaperStudy for S {
         S::grid(plan).iter().map(StudyCell::stored_name).collect()
     }
 
-    fn run(&self, bench: &StudyBench<'_>, file: Option<&Path>) -> Result<Option<StoredStudy<StudyReport>>, StudyError> {
-        bench.measuring(|how| run_experiment(&OnBench { study: self, bench }, how, file))
-    }
-
-    fn run_part(&self, bench: &StudyBench<'_>, file: &Path, shard: Shard) -> Result<Option<usize>, StudyError> {
-        bench.measuring(|how| run_part(&OnBench { study: self, bench }, how, file, shard))
+    fn run(
+        &self,
+        bench: &StudyBench<'_>,
+        file: Option<&Path>,
+        shard: Shard,
+    ) -> Result<StudyOutcome<StudyReport>, StudyError> {
+        run_experiment(&OnBench { study: self, bench }, &bench.work(), file, shard)
     }
 
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure> {

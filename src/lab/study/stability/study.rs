@@ -137,7 +137,8 @@ impl Experiment for StabilityPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::frame::{Measuring, run_experiment};
+    use crate::grasping::Shard;
+    use crate::study::frame::{Measuring, StudyOutcome, StudyProgress, run_experiment};
     use std::collections::BTreeSet;
     use std::sync::atomic::Ordering;
 
@@ -159,10 +160,11 @@ mod tests {
         let plan = StabilityPlan { thorough: false, grasps: 1, scenes: 3, seed: 2 };
         let run = |stop_after: usize, threads: usize| {
             let cancelled = AtomicBool::new(false);
-            let progress = |done: usize, _: usize| {
-                cancelled.fetch_or(done >= stop_after, Ordering::Relaxed);
+            let progress = |own: StudyProgress| {
+                cancelled.fetch_or(own.done >= stop_after, Ordering::Relaxed);
             };
-            run_experiment(&plan, &Measuring { threads, cancelled: &cancelled, progress: &progress }, Some(&path))
+            let how = Measuring { threads, cancelled: &cancelled, progress: &progress };
+            run_experiment(&plan, &how, Some(&path), Shard::WHOLE).map(StudyOutcome::whole)
         };
         assert!(run(plan.grid().len() - 1, 1)?.is_none());
         let resumed = run(usize::MAX, 2)?.ok_or("stopped")?.result;
