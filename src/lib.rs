@@ -80,7 +80,7 @@
 //! | [`palpate_lab::grasping::collect()`], [`palpate_lab::datasets`] | grasps: simulated for the study, or chosen from a store |
 //! | [`palpate_lab::study::paper::StudyPlan`] | the cells to measure: sensors, layouts, methods, parts |
 //! | [`palpate_learn::METHODS`], [`palpate_learn::evaluation`] | a recogniser fitted on some grasps and judged on others |
-//! | [`palpate_lab::study::paper::PaperStudy`] | rows, tables, figures and claims of what was measured |
+//! | [`palpate_lab::study::Experiment`] | what all studies have: a grid of cells, how one is measured, the report on all |
 //! | [`palpate_lab::study::paper::Finding`] | a claim: a sentence of the paper, a verdict, the intervals that decide |
 //! | `assets/studies`, [`palpate_lab::study::generated_sections`] | stored results, and the tables that the manual prints of them |
 //!
@@ -90,6 +90,7 @@
 //! |---|---|
 //! | `src/lab/examples/grasp_to_csv.rs` | a simulated grasp of an object, as a table |
 //! | `src/lab/examples/recognise_trial.rs` | the answer of the shipped model to a stored trial |
+//! | `src/lab/examples/own_study.rs` | a study of your own: a grid of grasps in parallel, kept, resumed, as a table |
 //! | `src/learn/examples/plain_candle.rs` | a network in plain candle, judged like the built-in recognisers |
 //! | `src/device/examples/read_board.rs` | readings of a board on a serial port |
 //! | `src/render/examples/draw_trial.rs` | a picture of a stored trial |

@@ -45,8 +45,8 @@ fn unlabelled_in_short(report: &StudyReport) -> String {
     };
     let [one, three] = ["one grasp", "three grasps"].map(|column| shown(table, Some(&row), column));
     format!(
-        " On a gripper with parts and mechanics that no training saw, and without a labelled grasp, the shipped model reaches \
-         {one} % after one grasp and {three} % after three (`palpate help recognition`)."
+        " On simulated grippers whose parts and mechanics were not in the training data, and without any labelled grasp, the \
+         shipped model reaches {one} % after one grasp and {three} % after three (`palpate help recognition`)."
     )
 }
 
@@ -100,9 +100,9 @@ fn best_in_short(methods: &StudyTable, successive: &StudyTable) -> String {
     let three = three.map(|row| format!(", {} % after three", shown(successive, Some(&row), "F1")));
     let noisy = noisy(best);
     format!(
-        "Of {} methods, each trained on 50 grasps per object (preset B, objects free, C1), `{key}` is best after one grasp \
-         over both kinds of sensors: F1 {} % with perfect ones{}, {} % with ones such as a real gripper has. `palpate help \
-         paper` has all studies.",
+        "Of {} methods, each trained on 50 simulated grasps per object (objects on random faces, one curvature and one pressure \
+         per finger), `{key}` has the highest sum of F1 after one grasp over two sensor models: {} % with perfect sensors{}, \
+         {} % with realistic ones. `palpate help paper` has all studies.",
         rows.len().min(METHODS.len()),
         shown(methods, Some(best), "F1"),
         three.unwrap_or_default(),

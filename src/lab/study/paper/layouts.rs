@@ -6,7 +6,8 @@ use palpate_tactile::{CATALOGUE, SensorLayout, SignalDefinition};
 
 pub(super) struct Layouts;
 
-/// The paper's network, the one that it is compared with, both strict, and a method of seconds.
+/// The paper's network and that of Zuo et al., to which the paper compares it, both as published; and a method that is
+/// trained in seconds.
 const MODELS: [&str; 3] = ["paper-macro-layer", "zuo", "extra-trees"];
 /// The simplest layout, which the paper chooses.
 const SIMPLEST: &str = "C1";
@@ -25,7 +26,8 @@ impl Signals {
         Self { layout: layout.into(), definition }
     }
 
-    /// What parts measure; what only a simulation knows, with and without force; and the paper's C1.
+    /// All layouts as real sensors measure them; all with the contact pressure that only a simulation knows, without and with
+    /// force; and C1 with pressure over the hull of the contacts, as in the paper.
     fn all() -> Vec<Self> {
         let of = |definition, force: &'static str| {
             CATALOGUE.iter().map(move |layout| Self::of(format!("{}{force}", layout.name), definition))
@@ -77,7 +79,7 @@ impl Study for Layouts {
             let is_wanted = if method.recipe.is_none() {
                 of_parts || *sensors != SensorModel::PhysicalLike
             } else {
-                // A network of minutes: on clean sensors, for parts, and for the simplest of other signals.
+                // A network takes minutes to train: perfect sensors only, and of the simulation's own signals only C1.
                 let in_full = of_parts || (simple && method.key == MODELS[0]);
                 let wanted = if plan.size == StudySize::Full { in_full } else { of_parts && simple };
                 wanted && *sensors == SensorModel::Virtual
@@ -91,7 +93,7 @@ impl Study for Layouts {
         (wanted.view.layout, wanted.view.signals) = (kind.factor.layout.clone(), kind.factor.definition);
         let sets = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;
         if sets[0].about.object == "recorded" {
-            let what = "simulated trials: recorded and imported ones have the channels that they have";
+            let what = "simulated trials: the channels of recorded and imported trials are fixed";
             return Err(StudyError::Missing(what.to_owned()));
         }
         bench.judge(kind.method, &sets)

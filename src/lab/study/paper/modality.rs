@@ -92,7 +92,7 @@ impl Study for Modality {
     fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
         crossed(plan, &PATTERNS, &MODELS, |Kind { method, factor, .. }| {
             let is_network = method.recipe.is_some();
-            // Stored trials have the channels that they have.
+            // The channels of stored trials are fixed.
             if (is_network || plan.query.is_some()) && factor.layout != "C1" {
                 return 0;
             }

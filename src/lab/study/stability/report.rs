@@ -242,8 +242,9 @@ fn in_short(report: &StabilityReport) -> String {
     let ((single, _), (agreed, cost)) = (share(Policy::Flags), share(Policy::ThreeAgree));
     let sum = |count: fn(&ChatterRow) -> usize| report.chatter.iter().map(count).sum::<usize>();
     format!(
-        "At accuracy `standard` {single} of extreme random scenes are silently wrong; refined until three levels agree \
-         (`--until-agreement`, {cost} times the cost), {agreed}. Of {} ordinary grasps, {} chatter in the hold as stored.",
+        "At accuracy `standard`, {single} of extreme random scenes give a wrong result without raising a flag; {agreed} do if each \
+         is refined until three levels of accuracy agree (`--until-agreement`, {cost} times the cost). Of {} stored grasps of \
+         ordinary objects, {} have forces that keep jumping (chatter) in the hold.",
         sum(|row| row.grasps),
         sum(|row| row.chattering_stored)
     )
