@@ -134,7 +134,7 @@
 //!
 //! The window steps no physics and waits for no disk: it sends commands and draws the newest snapshot. The renderer
 //! knows no gripper: it draws meshes, soft fingers and arrows. No package below `palpate-render` and `palpate` needs a
-//! window or a graphics card. There is no global state.
+//! window or a graphics card. There is no global state but built-in objects, which are loaded once.
 
 pub mod app;
 pub mod cli;

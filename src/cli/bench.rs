@@ -4,13 +4,14 @@ mod frame;
 mod library;
 
 use super::Failure;
-use super::terminal::{say, say_json, table};
+use super::terminal::{Page, Report};
 use palpate_geometry::units::three_digits;
 use palpate_lab::study::{
     CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
     physics_truth,
 };
 use palpate_sim::scene::Accuracy;
+use serde::Serialize;
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]
@@ -23,6 +24,9 @@ use palpate_sim::scene::Accuracy;
 pub(super) struct BenchArguments {
     #[command(subcommand)]
     benchmark: Benchmark,
+    /// Print JSON instead of a table.
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(Debug, clap::Subcommand)]
@@ -35,9 +39,6 @@ enum Benchmark {
         /// Include the reference accuracy, which costs some five times as much as standard.
         #[arg(long)]
         reference: bool,
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
     },
     /// Measure a training step of the macro-layer, with Palpate's kernel and with candle. tests/peers/lstm_step.py times
     /// PyTorch on the same sizes.
@@ -45,9 +46,6 @@ enum Benchmark {
         /// Steps per row; the median is printed.
         #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
     },
     /// Measure the trial library on a temporary store: opening, scrolling, search, filters, order, bulk edits.
     Library {
@@ -57,9 +55,6 @@ enum Benchmark {
         /// Runs per row; median and 95th percentile are printed.
         #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
     },
     /// Measure frames of the whole window without a display: CPU time outside the rasteriser while grasps run and while
     /// nothing moves, frames per second with it, and the time from the start to the first frame.
@@ -70,18 +65,12 @@ enum Benchmark {
         /// Seconds of grasps.
         #[arg(long, default_value_t = 20.0, value_parser = parse_seconds)]
         seconds: f64,
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
     },
     /// Measure a live step of the macro-layer: a sample in, probabilities out.
     Live {
         /// Sequences per row; the median is printed.
         #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
     },
 }
 
@@ -102,88 +91,83 @@ const TOLERANCES: [f64; 2] = [3e-4, 1e-5];
 /// Channels of C1, and of a layout with a pressure sensor on every joint.
 const FEW_AND_MANY: [usize; 2] = [4, 22];
 
+/// Measurements as a table: its columns, and remarks below it. As JSON, the rows.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Costs<R: 'static> {
+    rows: Vec<R>,
+    #[serde(skip)]
+    columns: &'static [Column<R>],
+    #[serde(skip)]
+    remarks: Vec<String>,
+}
+
+/// Heading of a column and its cell in a row.
+type Column<R> = (&'static str, fn(&R) -> String);
+
+impl<R: Serialize> Report for Costs<R> {
+    fn text(&self, page: &mut Page) {
+        let header: Vec<&str> = self.columns.iter().map(|(name, _)| *name).collect();
+        let cells = |row: &R| self.columns.iter().map(|(_, cell)| cell(row)).collect::<Vec<_>>();
+        page.table(&header, self.rows.iter().map(cells));
+        self.remarks.iter().for_each(|remark| page.line(remark));
+    }
+}
+
 pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
+    let json = arguments.json;
     match &arguments.benchmark {
-        Benchmark::Frame { size, seconds, json } => frame::run(*size, *seconds, *json),
-        Benchmark::Library { trials, runs, json } => library::run(*trials, *runs, *json),
-        Benchmark::Physics { runs, reference, json } => physics(*runs, *reference, *json),
-        Benchmark::Training { runs, json } => {
+        Benchmark::Frame { size, seconds } => frame::measure(*size, *seconds)?.print(json),
+        Benchmark::Library { trials, runs } => library::measure(*trials, usize::from(*runs))?.print(json),
+        Benchmark::Physics { runs, reference } => physics(*runs, *reference)?.print(json),
+        Benchmark::Training { runs } => {
             let mut rows = Vec::new();
             for sizes in FEW_AND_MANY.map(StepSizes::usual) {
                 rows.push(kernel_step_cost(sizes, usize::from(*runs)));
                 rows.push(candle_step_cost(sizes, usize::from(*runs))?);
             }
-            networks(&rows, *json)?;
-            if *json { Ok(()) } else { say("CPU time of one thread. PyTorch: python tests/peers/lstm_step.py") }
+            let remark = "CPU time of one thread. PyTorch: python tests/peers/lstm_step.py";
+            Costs { rows, columns: NETWORK, remarks: vec![remark.to_owned()] }.print(json)
         }
-        Benchmark::Live { runs, json } => networks(
-            &FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs))),
-            *json,
-        ),
+        Benchmark::Live { runs } => {
+            let rows = FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs)));
+            Costs { rows: rows.to_vec(), columns: NETWORK, remarks: Vec::new() }.print(json)
+        }
     }
 }
 
-fn networks(rows: &[NetworkCost], json: bool) -> Result<(), Failure> {
-    if json {
-        return say_json(&rows);
-    }
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| {
-            let times = [row.cpu_ms_median, row.cpu_ms_least].map(|ms| format!("{ms:.4}"));
-            [vec![row.what.to_owned(), row.sizes.channels.to_string()], times.to_vec()].concat()
-        })
-        .collect();
-    table(&["kernel", "channels", "CPU ms", "minimum ms"], &cells)
-}
+const NETWORK: &[Column<NetworkCost>] = &[
+    ("kernel", |row| row.what.to_owned()),
+    ("channels", |row| row.sizes.channels.to_string()),
+    ("CPU ms", |row| format!("{:.4}", row.cpu_ms_median)),
+    ("minimum ms", |row| format!("{:.4}", row.cpu_ms_least)),
+];
 
-fn physics(runs: u16, reference: bool, json: bool) -> Result<(), Failure> {
-    let mut rows: Vec<CostRow> = Vec::new();
+const PHYSICS: &[Column<CostRow>] = &[
+    ("scene", |row| row.scene.to_owned()),
+    ("accuracy", |row| row.accuracy.clone()),
+    ("step ms", |row| format!("{:.3}", row.step_s * 1e3)),
+    ("CPU ms", |row| format!("{:.2}", row.cpu_ms_median)),
+    ("us/step", |row| format!("{:.2}", row.us_per_step)),
+    ("Newton", |row| format!("{:.2}", row.newton_mean)),
+    ("max", |row| row.newton_max.to_string()),
+    ("unconverged", |row| row.unconverged_steps.to_string()),
+    ("x real time", |row| format!("{:.0}", row.times_real_time)),
+    ("error 1/km", |row| row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m * 1e3))),
+    ("error mN", |row| row.error.map_or(String::new(), |error| three_digits(error.force_n * 1e3))),
+];
+
+fn physics(runs: u16, reference: bool) -> Result<Costs<CostRow>, Failure> {
+    let mut rows = Vec::new();
     let accuracies = Accuracy::NAMED.into_iter().filter(|accuracy| *accuracy != Accuracy::Reference || reference);
     let accuracies: Vec<Accuracy> = accuracies.chain(TOLERANCES.map(Accuracy::Tolerance)).collect();
     for scene in &bench_scenes()? {
         let truth = physics_truth(scene);
-        for accuracy in &accuracies {
-            rows.push(physics_cost(scene, *accuracy, usize::from(runs), Some(&truth)));
-        }
+        rows.extend(accuracies.iter().map(|accuracy| physics_cost(scene, *accuracy, usize::from(runs), Some(&truth))));
     }
-    if json {
-        return say_json(&rows);
-    }
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| {
-            vec![
-                row.scene.to_owned(),
-                row.accuracy.clone(),
-                format!("{:.3}", row.step_s * 1e3),
-                format!("{:.2}", row.cpu_ms_median),
-                format!("{:.2}", row.us_per_step),
-                format!("{:.2}", row.newton_mean),
-                row.newton_max.to_string(),
-                row.unconverged_steps.to_string(),
-                format!("{:.0}", row.times_real_time),
-                row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m * 1e3)),
-                row.error.map_or(String::new(), |error| three_digits(error.force_n * 1e3)),
-            ]
-        })
-        .collect();
-    let header = [
-        "scene",
-        "accuracy",
-        "step ms",
-        "CPU ms",
-        "us/step",
-        "Newton",
-        "max",
-        "unconverged",
-        "x real time",
-        "error 1/km",
-        "error mN",
-    ];
-    table(&header, &cells)?;
-    say(format!("One 4 s grasp each, CPU time of one thread, median of {runs} runs."))?;
-    say(
-        "Newton: iterations per solve, mean and maximum. Errors: RMS of curvature and force against a tolerance of 1e-7.",
-    )
+    let errors = "Newton: iterations per solve, mean and maximum. Errors: RMS of curvature and force against a tolerance \
+                  of 1e-7.";
+    let remarks =
+        vec![format!("One 4 s grasp each, CPU time of one thread, median of {runs} runs."), errors.to_owned()];
+    Ok(Costs { rows, columns: PHYSICS, remarks })
 }

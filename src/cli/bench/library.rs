@@ -1,7 +1,9 @@
 //! `palpate bench library`: what a person waits for in the trial library, from a command to the view that shows it.
 
 use super::super::Failure;
-use super::super::terminal::{note, say, say_json, table};
+use super::super::output::TemporaryFolder;
+use super::super::terminal::note;
+use super::{Column, Costs};
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::run::SimRun;
@@ -30,7 +32,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Row of the table.
 #[derive(Serialize)]
-struct Waited {
+pub(super) struct Waited {
     what: &'static str,
     p50_ms: f64,
     p95_ms: f64,
@@ -72,22 +74,18 @@ impl Bench {
     }
 }
 
-pub(super) fn run(trials: u32, runs: u16, json: bool) -> Result<(), Failure> {
-    let folder = std::env::temp_dir().join(format!("palpate-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder)?;
-    let measured = measure(&folder.join("library.sqlite"), trials, usize::from(runs));
-    std::fs::remove_dir_all(&folder)?;
-    let (rows, bytes) = measured?;
-    if json {
-        return say_json(&rows);
-    }
-    let cells: Vec<Vec<String>> = rows
-        .iter()
-        .map(|row| vec![row.what.to_owned(), format!("{:.1}", row.p50_ms), format!("{:.1}", row.p95_ms)])
-        .collect();
-    table(&["from a command to its view", "p50 ms", "p95 ms"], &cells)?;
-    say(format!("{trials} trials; {runs} runs each; {}", memory(bytes, trials)))
+pub(super) fn measure(trials: u32, runs: usize) -> Result<Costs<Waited>, Failure> {
+    let folder = TemporaryFolder::new()?;
+    let (rows, bytes) = wait_in(&folder.path().join("library.sqlite"), trials, runs)?;
+    let remarks = vec![format!("{trials} trials; {runs} runs each; {}", memory(bytes, trials))];
+    Ok(Costs { rows, columns: COLUMNS, remarks })
 }
+
+const COLUMNS: &[Column<Waited>] = &[
+    ("from a command to its view", |row| row.what.to_owned()),
+    ("p50 ms", |row| format!("{:.1}", row.p50_ms)),
+    ("p95 ms", |row| format!("{:.1}", row.p95_ms)),
+];
 
 /// Memory of the process per trial, where the system reports it.
 fn memory(bytes: Option<u64>, trials: u32) -> String {
@@ -104,7 +102,7 @@ fn resident_bytes() -> Option<u64> {
     Some(1024 * line.trim().trim_end_matches("kB").trim().parse::<u64>().ok()?)
 }
 
-fn measure(path: &Path, trials: u32, runs: usize) -> Result<(Vec<Waited>, Option<u64>), Failure> {
+fn wait_in(path: &Path, trials: u32, runs: usize) -> Result<(Vec<Waited>, Option<u64>), Failure> {
     let filled = Instant::now();
     fill(path, trials)?;
     note(&format!("{trials} trials stored in {:.0} s", filled.elapsed().as_secs_f64()));

@@ -1,13 +1,14 @@
 //! Finding an object by what the user wrote: a built-in name, or a URDF, OBJ or STL file.
 
 use super::assemble::{Blueprint, ShapeSource};
-use super::catalogue::{catalogue, read_embedded};
+use super::catalogue::{BuiltIn, catalogue, read_embedded};
 use super::files::{candidates, read_file, read_referenced};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, RandomShape, urdf};
 use palpate_geometry::{MeshFileError, Pose, SurfaceMesh, read_mesh};
 use std::cell::Cell;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// The name that stands for an empty hand.
 pub const EMPTY: &str = "empty";
@@ -64,10 +65,7 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         return Ok(None);
     }
     if let Some(built_in) = catalogue().iter().find(|b| b.name == source) {
-        let mut object = load_built_in(&built_in.name, options)?;
-        object.class = Some(built_in.class());
-        object.friction = built_in.friction;
-        return Ok(Some(object));
+        return built_in_object(built_in, options).map(Some);
     }
     if let Some(shape) = RandomShape::named(source) {
         return shape.build(options).map(Some);
@@ -154,6 +152,23 @@ fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
+/// Built-in objects, each with the options that it was loaded with last. A demo or a study needs them again and again, and
+/// baking the distances of one takes ten times as long as a grasp.
+static LOADED: Mutex<Vec<(LoadOptions, ObjectModel)>> = Mutex::new(Vec::new());
+
+fn built_in_object(built_in: &BuiltIn, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+    let loaded = || LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, object)) = loaded().iter().find(|(with, object)| with == options && object.name == built_in.name) {
+        return Ok(object.clone());
+    }
+    let object = load_built_in(&built_in.name, options)?;
+    let object = ObjectModel { class: Some(built_in.class()), friction: built_in.friction, ..object };
+    let mut loaded = loaded();
+    loaded.retain(|(_, other)| other.name != object.name);
+    loaded.push((*options, object.clone()));
+    Ok(object)
+}
+
 fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
     let folder = Path::new(name);
     let file = folder.join(format!("{name}.urdf"));
@@ -217,6 +232,17 @@ mod tests {
         assert_eq!(class("/set/meshes/part1.stl", None), "part1", "nothing says more");
         assert_eq!(class("/set/can/mug.obj", Some("a\tb")), "mug");
         assert_eq!(class("/set/002.urdf", Some("")), "002");
+    }
+
+    #[test]
+    fn a_built_in_object_is_loaded_once_for_the_same_options() {
+        let load = |options: &LoadOptions| load("case", options).expect("loads").expect("an object");
+        let (usual, heavy) = (LoadOptions::default(), LoadOptions { mass: Some(1.0), ..LoadOptions::default() });
+        let first = load(&usual);
+        assert!(std::sync::Arc::ptr_eq(&first.surface, &load(&usual).surface));
+        let other = load(&heavy);
+        assert!((other.mass.mass - 1.0).abs() < 1e-12 && !std::sync::Arc::ptr_eq(&first.surface, &other.surface));
+        assert!((load(&usual).mass.mass - first.mass.mass).abs() < 1e-12);
     }
 
     #[test]
