@@ -104,8 +104,8 @@
 //! | a built-in object | a function in `src/workshop/sixteen.rs`; `cargo run -p palpate-workshop -- objects` writes its folder |
 //! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in a layout of `src/app/modes/` |
 //! | a mode of the window | a file in `src/app/modes/` and its name in `src/app/modes/mode.rs` |
-//! | a key | a line in `src/app/keys/mod.rs`, or in the mode that it belongs to |
-//! | a feature of the window | a file in `src/app/features/` and its line in `src/app/actions.rs` |
+//! | an action of the window | a method in `src/app/features/`; with a name, a line in `src/app/keys/common.rs` or in its mode |
+//! | a feature of the window | a file in `src/app/features/`, and a field of its [`app::App`] |
 //! | a command | a file in `src/cli/` and a line in its `Command` |
 //! | a chapter of the manual | a file in `assets/help/` and a line in `src/manual.rs` |
 //! | a setting | a field of a struct below [`palpate_sim::scene::Scene`], and its range in `src/sim/scene/check.rs` |

@@ -1,90 +1,98 @@
-//! Actions: panels, bars and keys push them, the workbench hands each to the feature that owns it.
+//! Actions: functions of the [`App`]. Buttons push them; keys, palette, key sheet and manual read one table of [`Act`]s.
 
-use crate::app::features::files::FileAction;
-use crate::app::features::gripper::GripperAction;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::library::LibraryAction;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::studies::StudyAction;
-use crate::app::features::tools::ToolAction;
-use crate::app::features::view::ViewAction;
-use crate::app::notices::UserMessage;
-use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
+use crate::app::features::App;
+use egui::{Key, KeyboardShortcut, Modifiers, Response};
 
-/// Action of the user, by the feature that applies it.
-#[derive(Clone)]
-pub enum Action {
-    /// Simulated gripper and its scene.
-    Simulation(SimulationAction),
-    /// Real gripper.
-    Gripper(GripperAction),
-    /// Trials, labels and plan.
-    Labelling(LabellingAction),
-    /// All trials: search, selection, edits.
-    Library(LibraryAction),
-    /// Recognition by both grippers.
-    Recognition(RecognitionAction),
-    /// Diagnostics, fit and training.
-    Tool(ToolAction),
-    /// Studies of the paper.
-    Study(StudyAction),
-    /// Stored trials that are looked at.
-    Inspect(InspectAction),
-    /// View state.
-    View(ViewAction),
-    /// Files.
-    File(FileAction),
-    /// Stop: vent the fingers, and close the key sheet.
-    Stop,
-    /// Show a message.
-    Tell(UserMessage),
-}
-
-/// Actions pushed in one frame.
+/// Actions pushed in one frame. They run after it, in their order.
 #[derive(Default)]
-pub struct Actions(Vec<Action>);
+pub struct Actions(Vec<Box<dyn FnOnce(&mut App)>>);
 
 impl Actions {
     /// Adds an action.
-    pub fn push(&mut self, action: impl Into<Action>) {
-        self.0.push(action.into());
+    pub fn push(&mut self, action: impl FnOnce(&mut App) + 'static) {
+        self.0.push(Box::new(action));
+    }
+
+    /// Adds the action of a button that was clicked.
+    pub(super) fn on(&mut self, button: &Response, action: impl FnOnce(&mut App) + 'static) {
+        if button.clicked() {
+            self.push(action);
+        }
     }
 }
 
 impl IntoIterator for Actions {
-    type Item = Action;
-    type IntoIter = std::vec::IntoIter<Action>;
+    type Item = Box<dyn FnOnce(&mut App)>;
+    type IntoIter = std::vec::IntoIter<Self::Item>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.into_iter()
     }
 }
 
-/// Conversions into the action of a feature.
-macro_rules! actions_from {
-    ($($part:ty => |$it:ident| $action:expr;)+) => {
-        $(impl From<$part> for Action {
-            fn from($it: $part) -> Self {
-                $action
-            }
-        })+
-    };
+/// An action with a name: a line of the palette and, with a key, of key sheet and manual.
+pub(super) struct Act {
+    pub(super) shortcut: Option<KeyboardShortcut>,
+    /// What it does; empty where another line covers it.
+    pub(super) does: &'static str,
+    run: Run,
 }
 
-actions_from! {
-    SimulationAction => |action| Self::Simulation(action);
-    GripperAction => |action| Self::Gripper(action);
-    LabellingAction => |action| Self::Labelling(action);
-    LibraryAction => |action| Self::Library(action);
-    RecognitionAction => |action| Self::Recognition(action);
-    ToolAction => |action| Self::Tool(action);
-    StudyAction => |action| Self::Study(action);
-    InspectAction => |action| Self::Inspect(action);
-    ViewAction => |action| Self::View(action);
-    FileAction => |action| Self::File(action);
-    UserMessage => |message| Self::Tell(message);
-    Command => |command| Self::Simulation(SimulationAction::Send(command));
-    GripperCommand => |command| Self::Gripper(GripperAction::Send(command));
-    LabelCommand => |command| Self::Labelling(LabellingAction::Edit(command));
+#[derive(Clone, Copy)]
+enum Run {
+    Always(fn(&mut App)),
+    /// Or the reason why it has no effect now.
+    Where(fn(&mut App) -> Result<(), &'static str>),
+}
+
+/// An action with a key.
+pub(super) const fn key(modifiers: Modifiers, key: Key, does: &'static str, run: fn(&mut App)) -> Act {
+    Act { shortcut: Some(KeyboardShortcut::new(modifiers, key)), does, run: Run::Always(run) }
+}
+
+/// An action with a key that says why it has no effect now.
+pub(super) const fn key_where(
+    modifiers: Modifiers,
+    key: Key,
+    does: &'static str,
+    run: fn(&mut App) -> Result<(), &'static str>,
+) -> Act {
+    Act { shortcut: Some(KeyboardShortcut::new(modifiers, key)), does, run: Run::Where(run) }
+}
+
+/// An action of the palette alone.
+pub(super) const fn command(does: &'static str, run: fn(&mut App)) -> Act {
+    Act { shortcut: None, does, run: Run::Always(run) }
+}
+
+impl Act {
+    /// Does it, or says why not.
+    pub(super) fn run(&self, app: &mut App) {
+        match self.run {
+            Run::Always(run) => run(app),
+            Run::Where(run) => {
+                if let Err(why) = run(app) {
+                    app.notices.info(why);
+                }
+            }
+        }
+    }
+
+    /// True if a key triggers it. An additional Shift is ignored: some keyboards need it for the key.
+    pub(super) fn is(&self, key: Key, modifiers: Modifiers) -> bool {
+        self.shortcut.is_some_and(|KeyboardShortcut { modifiers: wanted, logical_key }| {
+            logical_key == key && modifiers.alt == wanted.alt && modifiers.matches_logically(wanted)
+        })
+    }
+
+    /// Acts repeatedly while its key is held down.
+    pub(super) fn repeats(&self) -> bool {
+        let key = self.shortcut.map(|shortcut| shortcut.logical_key);
+        matches!(key, Some(Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Minus | Key::Equals))
+    }
+
+    /// Its key in words; empty without one.
+    pub(super) fn key_text(&self, ctx: &egui::Context) -> String {
+        self.shortcut.map(|shortcut| ctx.format_shortcut(&shortcut)).unwrap_or_default()
+    }
 }

@@ -2,7 +2,6 @@
 //! [`HeatMap`], from which figures are drawn as well.
 
 use crate::app::actions::Actions;
-use crate::app::features::view::ViewAction;
 use crate::app::theme::{colour, veil};
 use egui::{
     Align2, Color32, ColorImage, FontId, Pos2, Rect, Response, Sense, Stroke, TextureFilter, TextureHandle,
@@ -288,8 +287,8 @@ pub(super) fn capital(text: &str) -> String {
 pub(super) fn load_switch(ui: &mut Ui, unit: LoadUnit, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.x = 4.0;
     for (choice, about) in [(LoadUnit::Pressure, "Loads as pressure"), (LoadUnit::Force, "Loads as force")] {
-        if ui.selectable_label(unit == choice, choice.symbol()).on_hover_text(about).clicked() {
-            actions.push(ViewAction::SetLoadUnit(choice));
-        }
+        actions.on(&ui.selectable_label(unit == choice, choice.symbol()).on_hover_text(about), move |app| {
+            app.view.load_unit = choice
+        });
     }
 }

@@ -1,9 +1,8 @@
 //! The window. [`Workbench`] is its contents, so that tests can drive it without a window; this file opens the window around
 //! it.
 //!
-//! Panels, bars and keys read a [`PanelContext`] and push [`Action`]s. The workbench hands each action to the feature that
-//! owns it. Simulation, gripper, store and tools run in threads of their own (see `workers` in the core): nothing here
-//! steps physics or waits for a disk.
+//! Panels and bars read, and push actions: functions of the [`App`], which run after the frame. Simulation, gripper, store
+//! and tools run in threads of their own (see `workers` in the core): nothing here steps physics or waits for a disk.
 //!
 //! # Layers
 //!
@@ -15,19 +14,18 @@
 //! | messages | `notices.rs` | messages to the user |
 //! | source | `view_source.rs` `files.rs` | source shown, questions of the file dialog |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
-//! | inspect | `features/inspect.rs` | stored trials that are open or compared |
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
-//! | simulation | `features/simulation.rs` | simulated gripper and its scene |
-//! | gripper | `features/gripper.rs` `features/files.rs` | real gripper; opening and saving |
-//! | workflow | `features/labelling.rs` `features/library.rs` `features/recognition.rs` `features/presenter.rs` `features/studies.rs` | labelling session; trial library; recognition by both grippers; presenter mode; studies of the paper |
-//! | actions | `actions.rs` `features/` | actions of all features |
+//! | features | `features/` | state of the window, and what can be done with it |
+//! | actions | `actions.rs` | functions of the state, some with a name and a key |
 //! | context | `context.rs` | read-only context of panels |
-//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` `keys/binding.rs` | building blocks of panels and modes |
-//! | curves | `channel_curves.rs` `shown_grasp.rs` `modes/` | curves of channels, heat maps of a grasp; layout and keys of each mode |
+//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` | building blocks of panels |
+//! | curves | `channel_curves.rs` `shown_grasp.rs` | curves of channels, heat maps of a grasp |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
-//! | panels | `panels/` `bars/` `keys/` | one file per panel |
+//! | modes | `modes/` | layout and keys of each mode |
+//! | panels | `panels/` `bars/` | one file per panel |
+//! | keys | `keys/` | keys of all modes, and their sheet |
 //! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter/` | panels beside each other; command palette; file dialog; presenter mode |
-//! | workbench | `workbench.rs` | owner of all features |
+//! | workbench | `workbench.rs` | draws the window |
 //! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |
 //!
@@ -35,7 +33,8 @@
 //! |---|---|---|
 //! | a panel | a file in `panels/` | `panels/mod.rs`, and the layout of a mode |
 //! | a mode | its name in `modes/mode.rs`, its layout and keys in a file of `modes/` | `modes/mod.rs` |
-//! | a feature | its state, actions and their application in a file of `features/` | `actions.rs`, `workbench.rs` |
+//! | an action | a method of `App` or of a feature, in `features/` | with a key: `keys/common.rs` or the mode |
+//! | a feature | its state and methods in a file of `features/` | `features/mod.rs`, `workbench.rs` |
 
 mod actions;
 mod bars;
@@ -73,30 +72,26 @@ mod viewport;
 mod widgets;
 mod workbench;
 
-pub use actions::{Action, Actions};
+pub use actions::Actions;
 pub use context::PanelContext;
 pub use derived::Derivation;
 pub use export::{ExportRequest, FileExportError};
-pub use features::files::FileAction;
-pub use features::gripper::GripperAction;
-pub use features::inspect::{ComparedTrace, InspectAction, Inspected, Pinned};
-pub use features::library::{LibraryAction, LibrarySelection, Reach};
-pub use features::recognition::RecognitionAction;
-pub use features::simulation::SimulationAction;
-pub use features::studies::{Studies, StudyAction};
-pub use features::tools::{GripperTools, GripperToolsSetup, ToolAction};
-pub use features::view::{PathLayer, ViewAction, ViewState};
+pub use features::App;
+pub use features::library::{LibrarySelection, Reach};
+pub use features::studies::Studies;
+pub use features::tools::{GripperTools, GripperToolsSetup};
+pub use features::view::{PathLayer, ViewState};
 pub use modes::mode::Mode;
 pub use notices::UserMessage;
 pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, film_presentation, frame_costs, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;
+pub use shown::{ComparedTrace, Inspected, Pinned};
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
 pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
-use palpate_lab::workers::GripperCommand;
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -145,7 +140,7 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         };
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
         if let Some(port) = options.port {
-            workbench.act(&creation.egui_ctx, GripperCommand::Connect(Some(port)));
+            workbench.act(|app| app.connect(Some(port)));
         }
         Ok(Box::new(Window { workbench }))
     });

@@ -1,8 +1,7 @@
 //! The whole window as a picture, without a display: the same workbench, drawn into a texture.
 
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::view::{ViewAction, ViewState};
+use crate::app::features::App;
+use crate::app::features::view::ViewState;
 use crate::app::modes::mode::Mode;
 use crate::app::playback::Seek;
 use crate::app::startup::ThreadError;
@@ -88,12 +87,11 @@ pub fn film_presentation<E: From<OffscreenError>>(
     mut add: impl FnMut(usize, &Picture) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut drawn = start(window, RendererOptions::PREDICTABLE)?;
-    let ctx = drawn.ctx.clone();
     drawn.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
-    drawn.workbench.act(&ctx, ViewAction::Present(true));
+    drawn.workbench.act(|app| app.present(true));
     drawn.frame();
     // It would run by the clock of the machine.
-    drawn.workbench.act(&ctx, Command::Pause);
+    drawn.workbench.act(|app| app.simulation.send(Command::Pause));
     drawn.settle();
     drawn.frame_s = 0.0;
     let mut due_s = 0.0;
@@ -104,7 +102,7 @@ pub fn film_presentation<E: From<OffscreenError>>(
         drawn.frame();
         // The next object would be grasped by that clock, too.
         if drawn.workbench.snapshot().is_some_and(|now| now.status.playing || now.status.finished) {
-            drawn.workbench.act(&ctx, Command::Pause);
+            drawn.workbench.act(|app| app.simulation.send(Command::Pause));
         }
     }
     Ok(())
@@ -163,11 +161,10 @@ pub fn frame_costs(
     let began = Instant::now();
     // As in a window on a screen.
     let mut drawn = start(window, RendererOptions::default())?;
-    let ctx = drawn.ctx.clone();
     drawn.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
     drawn.cost(cpu_s)?;
     let start_ms = 1e3 * began.elapsed().as_secs_f64();
-    drawn.workbench.act(&ctx, Command::Play);
+    drawn.workbench.act(|app| app.simulation.send(Command::Play));
     for _ in 0..WARM_UP {
         drawn.cost(cpu_s)?;
     }
@@ -175,12 +172,12 @@ pub fn frame_costs(
     while began.elapsed().as_secs_f64() < seconds {
         // Another object once this one is decided.
         if drawn.workbench.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
-            drawn.workbench.act(&ctx, RecognitionAction::NextObject);
+            drawn.workbench.act(App::next_object);
         }
         live.push(drawn.cost(cpu_s)?);
     }
     let frames_per_s = live.len() as f64 / began.elapsed().as_secs_f64();
-    drawn.workbench.act(&ctx, Command::Pause);
+    drawn.workbench.act(|app| app.simulation.send(Command::Pause));
     drawn.settle();
     let paused = (0..PAUSED).map(|_| drawn.cost(cpu_s)).collect::<Result<Vec<f64>, _>>()?;
     let (driver, size, frames) = (describe_adapter(&drawn.state.adapter.get_info()), drawn.size, live.len());
@@ -274,15 +271,14 @@ impl Drawn {
 
     /// Brings the window to what is to be seen.
     fn show(&mut self, window: &OffscreenWindow) -> Result<(), OffscreenError> {
-        let ctx = self.ctx.clone();
         self.until("its scene", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
         if window.mode != Mode::Demo {
-            self.workbench.act(&ctx, ViewAction::SetMode(window.mode));
+            self.workbench.act(|app| app.set_mode(window.mode));
         }
         if let Some(id) = window.trial {
-            self.workbench.act(&ctx, InspectAction::Open(id));
+            self.workbench.act(|app| app.open_trial(id));
             self.until("the trial", |workbench| workbench.inspected().is_some_and(|open| open.trial.id == id))?;
-            self.workbench.act(&ctx, InspectAction::Seek(Seek::To(window.at_s)));
+            self.workbench.act(|app| app.seek(Seek::To(window.at_s)));
             return Ok(());
         }
         // Steps are recorded, so that only the mode of the simulation takes any.
@@ -290,7 +286,7 @@ impl Drawn {
             if now.frame.t > window.at_s - 1e-9 || now.status.finished {
                 break;
             }
-            self.workbench.act(&ctx, Command::Step);
+            self.workbench.act(|app| app.simulation.send(Command::Step));
             let before = now.frame.t;
             self.until("the grasp", |workbench| {
                 workbench.snapshot().is_some_and(|s| s.frame.t > before || s.status.finished)
@@ -301,14 +297,13 @@ impl Drawn {
 
     /// Steps the simulated grasp for some time (s), while it is not decided; returns the rest, shorter than a sample.
     fn step_for(&mut self, mut due_s: f64) -> Result<f64, OffscreenError> {
-        let ctx = self.ctx.clone();
         self.until("the next object", |workbench| workbench.snapshot().is_some_and(|s| s.status.loading.is_none()))?;
         while let Some(now) = self.workbench.snapshot().filter(|now| !now.status.finished) {
             let sample_s = 1.0 / f64::from(now.scene.timing.sample_hz);
             if due_s < sample_s {
                 return Ok(due_s);
             }
-            self.workbench.act(&ctx, Command::Step);
+            self.workbench.act(|app| app.simulation.send(Command::Step));
             // The last step ends the grasp, without another sample.
             self.until("the grasp", |workbench| workbench.snapshot().is_some_and(|s| s.revision > now.revision))?;
             due_s -= sample_s;

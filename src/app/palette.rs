@@ -1,12 +1,9 @@
 //! Command palette: every action of the window, found by a part of its name. Actions with a key show it.
 
-use crate::app::actions::{Action, Actions};
-use crate::app::context::PanelContext;
-use crate::app::features::gripper::GripperAction;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::view::{SCALES, ViewAction};
+use crate::app::actions::{Act, Actions};
+use crate::app::features::App;
+use crate::app::features::view::SCALES;
+use crate::app::heat_map::capital;
 use crate::app::keys;
 use crate::app::modes;
 use crate::app::panels;
@@ -16,9 +13,8 @@ use crate::app::view_source::ViewSource;
 use crate::app::widgets::text_field;
 use egui::{Align2, FontId, Key, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{Command, GripperCommand};
+use palpate_lab::workers::Command;
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_store::TrialPlace;
 
 /// Entry of the palette.
 struct Entry {
@@ -26,8 +22,10 @@ struct Entry {
     title: String,
     /// Its key, where it has one.
     key: String,
-    actions: Vec<Action>,
+    run: Run,
 }
+
+type Run = Box<dyn FnOnce(&mut App)>;
 
 /// Size of the palette (points).
 const WIDTH: f32 = 520.0;
@@ -43,14 +41,14 @@ struct Search {
 }
 
 /// Draws the palette while it is open.
-pub(super) fn ui(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut Actions) {
-    let id = egui::Id::unique("command palette");
-    if !context.view.palette_shown {
+pub(super) fn ui(app: &App, actions: &mut Actions) {
+    let (ctx, id) = (&app.ctx, egui::Id::unique("command palette"));
+    if !app.view.palette_shown {
         return ctx.data_mut(|data| data.remove::<Search>(id));
     }
     let opened = ctx.data(|data| data.get_temp::<Search>(id));
     let mut search = opened.clone().unwrap_or_default();
-    let entries = found(entries(ctx, context), &search.text);
+    let entries = found(entries(app), &search.text);
     let [up, down, enter, closing] = ctx.input_mut(|input| {
         let taken = [Key::ArrowUp, Key::ArrowDown, Key::Enter, Key::Escape];
         let mut pressed = taken.map(|key| input.consume_key(egui::Modifiers::NONE, key));
@@ -82,7 +80,7 @@ pub(super) fn ui(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut 
                 }
                 for (place, entry) in entries.iter().enumerate() {
                     let chosen = place == search.chosen;
-                    let response = row_ui(ui, context.view.theme, entry, chosen);
+                    let response = row_ui(ui, app.view.theme, entry, chosen);
                     if chosen && (up || down || opened.is_none()) {
                         response.scroll_to_me(None);
                     }
@@ -98,9 +96,9 @@ pub(super) fn ui(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut 
     ctx.data_mut(|data| data.insert_temp(id, search));
     let entry = run.and_then(|place| entries.into_iter().nth(place));
     if entry.is_some() || closing || outside {
-        actions.push(ViewAction::ShowPalette(false));
+        actions.push(|app| app.view.palette_shown = false);
     }
-    entry.into_iter().flat_map(|entry| entry.actions).for_each(|action| actions.push(action));
+    entry.into_iter().for_each(|entry| actions.push(entry.run));
 }
 
 fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Response {
@@ -128,91 +126,50 @@ fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Respo
 }
 
 /// Every action, by group.
-fn entries(ctx: &egui::Context, context: &PanelContext<'_>) -> Vec<Entry> {
-    let mode = context.view.mode;
+fn entries(app: &App) -> Vec<Entry> {
+    let mode = app.view.mode;
     let mut all = Vec::new();
-    for (group, bindings) in keys::groups(mode) {
-        for binding in bindings.into_iter().filter(|binding| !binding.does.is_empty()) {
-            let key = ctx.format_shortcut(&binding.shortcut);
-            all.push(Entry { group, title: capital(binding.does), key, actions: vec![binding.action(context)] });
+    let named = |acts: Vec<&'static Act>| acts.into_iter().filter(|act| !act.does.is_empty());
+    let commands = [("Command", keys::COMMANDS.iter().collect())];
+    for (group, acts) in keys::groups(mode).into_iter().chain(commands) {
+        for act in named(acts) {
+            let key = act.key_text(&app.ctx);
+            all.push(Entry { group, title: capital(act.does), key, run: Box::new(|app| act.run(app)) });
         }
     }
-    let mut add = |group: &'static str, title: String, actions: Vec<Action>| {
-        all.push(Entry { group, title, key: String::new(), actions });
+    let mut add = |group: &'static str, title: String, run: Run| {
+        all.push(Entry { group, title, key: String::new(), run });
     };
-    for (title, action) in commands(context) {
-        add("Command", title, vec![action]);
+    for speed in SPEEDS {
+        let run = move |app: &mut App| app.simulation.send(Command::SetSpeed(speed));
+        add("Command", format!("Speed {speed}×"), Box::new(run));
+    }
+    for step in (SCALES.start() * 5.0).round() as u32..=(SCALES.end() * 5.0).round() as u32 {
+        let run = move |app: &mut App| app.set_scale(step as f32 / 5.0);
+        add("Command", format!("UI scale {} %", step * 20), Box::new(run));
     }
     for panel in &panels::ALL {
-        add("Panel", panel.title.to_owned(), vec![ViewAction::ShowPanel(panel.name).into()]);
+        add("Panel", panel.title.to_owned(), Box::new(|app| app.show_panel(panel.name)));
     }
-    let grasped = |name: &str| {
-        let open = SimulationAction::OpenObject(name.to_owned());
-        vec![ViewAction::Show(ViewSource::Simulation).into(), open.into()]
-    };
-    for built_in in catalogue() {
-        add("Grasp", built_in.title.clone(), grasped(&built_in.name));
-    }
-    add("Grasp", "Empty hand".to_owned(), grasped(EMPTY));
-    for path in &context.view.recent {
-        add("Grasp", path.clone(), grasped(path));
+    let built_in = catalogue().iter().map(|built_in| (built_in.title.clone(), built_in.name.clone()));
+    let empty = std::iter::once(("Empty hand".to_owned(), EMPTY.to_owned()));
+    let recent = app.view.recent.iter().map(|path| (path.clone(), path.clone()));
+    for (title, source) in built_in.chain(empty).chain(recent) {
+        let run = move |app: &mut App| {
+            app.view.source = ViewSource::Simulation;
+            app.open(&source);
+        };
+        add("Grasp", title, Box::new(run));
     }
     // Keys of other modes may be about things not in sight: they open their mode.
     for kind in modes::ALL.iter().filter(|kind| kind.mode != mode) {
-        for binding in kind.keys.iter().filter(|binding| !binding.does.is_empty()) {
-            let key =
-                format!("{} {}", ctx.format_shortcut(&kind.open.shortcut), ctx.format_shortcut(&binding.shortcut));
-            let title = format!("{} (opens {} mode)", capital(binding.does), kind.title);
-            all.push(Entry { group: kind.title, title, key, actions: vec![ViewAction::SetMode(kind.mode).into()] });
+        for act in named(kind.keys.iter().collect()) {
+            let key = format!("{} {}", kind.open.key_text(&app.ctx), act.key_text(&app.ctx));
+            let title = format!("{} (opens {} mode)", capital(act.does), kind.title);
+            all.push(Entry { group: kind.title, title, key, run: Box::new(|app| app.set_mode(kind.mode)) });
         }
     }
     all
-}
-
-/// Actions without a key.
-fn commands(context: &PanelContext<'_>) -> Vec<(String, Action)> {
-    let text = |text: &str| text.to_owned();
-    let mut all: Vec<(String, Action)> = vec![
-        (text("Dark theme"), ViewAction::SetTheme(Theme::Dark).into()),
-        (text("Light theme"), ViewAction::SetTheme(Theme::Light).into()),
-        (text("Reset layout of all modes"), ViewAction::ResetLayout.into()),
-        (text("Show or hide the true object"), ViewAction::ShowTruth(!context.view.truth_shown).into()),
-        (text("Show the simulation"), ViewAction::Show(ViewSource::Simulation).into()),
-        (text("Show the real gripper"), ViewAction::Show(ViewSource::Gripper).into()),
-        (text("Close the stored trial that is open"), InspectAction::Close.into()),
-        (text("Remove all trials from the comparison"), InspectAction::UnpinAll.into()),
-        (text("Show mean and spread of each class"), InspectAction::ShowSpread(true).into()),
-        (text("Show each compared trial"), InspectAction::ShowSpread(false).into()),
-        (text("Show the whole grasp in all plots"), ViewAction::SetTimeWindow(None).into()),
-        (text("Measure effects of the scene"), SimulationAction::MeasureEffects.into()),
-        (text("Compute the last grasp again"), Command::ComputeAgain.into()),
-        (text("Use the shipped model for the real gripper"), RecognitionAction::UseModel(None).into()),
-        (text("Teach the model the object file in the hand"), RecognitionAction::TeachObject.into()),
-        (text("Detect trials automatically, or by key"), GripperAction::ToggleWatch.into()),
-        (text("Next actuation: manual, board or untimed"), GripperAction::NextControl.into()),
-        (
-            text("Adapt to the real gripper by one close of the empty hand"),
-            GripperCommand::Adapt(context.view.control).into(),
-        ),
-        (text("List serial ports"), GripperCommand::ListPorts.into()),
-    ];
-    if let Some(snapshot) = context.snapshot {
-        let status = &snapshot.status;
-        for place in TrialPlace::ALL {
-            let title = format!("Record simulated grasps into the {}", place.title());
-            all.push((title, Command::SetRecording(Some(place)).into()));
-        }
-        all.push((text("Error band, on or off"), Command::SetErrorBand(!status.error_band).into()));
-    }
-    all.extend(SPEEDS.iter().map(|speed| (format!("Speed {speed}×"), Command::SetSpeed(*speed).into())));
-    let steps = (SCALES.start() * 5.0).round() as u32..=(SCALES.end() * 5.0).round() as u32;
-    all.extend(steps.map(|step| (format!("UI scale {} %", step * 20), ViewAction::SetScale(step as f32 / 5.0).into())));
-    all
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 /// Entries whose title or group has the letters of the text in their order, best first.

@@ -1,20 +1,20 @@
 //! Source of the data that plots, 3-D view and recognition show: the simulated gripper, the real one, or a stored trial;
 //! and the time of them that is shown.
 
-use crate::app::features::inspect::Inspected;
 use crate::app::playback::Playback;
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::{IdentificationView, LEAD_S};
-use palpate_lab::inspection::{PhaseSpan, TouchPhase, phases_of_frames};
+use palpate_lab::inspection::{Alignment, OpenTrial, PhaseSpan, TouchPhase, phases_of_frames};
 use palpate_lab::picture::Stage;
-use palpate_lab::workers::{GripperView, Snapshot};
+use palpate_lab::why::{Band, bands_for};
+use palpate_lab::workers::{ExplainRequest, GripperView, Snapshot};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::object_title;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Board;
-use palpate_tactile::trial::Control;
+use palpate_tactile::trial::{Control, TrialSource};
 use std::sync::Arc;
 
 /// Data of the source that is shown.
@@ -27,7 +27,64 @@ pub(super) struct SourceData<'a> {
     pub(super) playback: &'a Playback,
     pub(super) traces: &'a TraceHistory,
     pub(super) scene: &'a Scene,
+    /// A trial is being opened.
+    pub(super) opening: bool,
+    /// Phases of the grasp, as far as they are known.
+    pub(super) phases: &'a [PhaseSpan],
+    /// Trials beside it.
+    pub(super) comparison: ComparedTrials<'a>,
+    /// The model's prediction is hidden until the label is given.
+    pub(super) blind: bool,
 }
+
+/// A trial beside the one that is shown.
+#[derive(Clone, Debug)]
+pub struct Pinned {
+    /// The trial.
+    pub trial: Arc<OpenTrial>,
+    /// Number of its colour.
+    pub colour: usize,
+}
+
+/// A curve bundle that plots draw beside the one shown: a pinned trial, or the mean of a class.
+#[derive(Clone, Debug)]
+pub struct ComparedTrace {
+    /// Name: `Tomato, trial 12`, or `Tomato, mean of 5`.
+    pub name: String,
+    /// Number of its colour.
+    pub colour: usize,
+    /// Values in the columns of the trace shown, on its time.
+    pub trace: GraspTrace,
+    /// Standard deviation of each column; empty for a single trial.
+    pub spread: Vec<Vec<f32>>,
+}
+
+/// The open trial, the time shown, and trials compared with it.
+#[derive(Clone, Copy)]
+pub struct Inspected<'a> {
+    /// The trial.
+    pub trial: &'a Arc<OpenTrial>,
+    /// Time that is shown (s).
+    pub cursor_s: f64,
+    /// Trials to compare with.
+    pub pinned: &'a [Pinned],
+}
+
+/// Trials beside the one that is shown.
+#[derive(Clone, Copy)]
+pub(super) struct ComparedTrials<'a> {
+    /// The trials.
+    pub(super) pinned: &'a [Pinned],
+    /// Their curves, or those of their classes.
+    pub(super) traces: &'a [ComparedTrace],
+    /// Origin of time.
+    pub(super) alignment: Alignment,
+    /// Mean and spread of each class in place of each trial.
+    pub(super) spread: bool,
+}
+
+/// Probability from which on the likeliest class of a running grasp has a band: before, it changes with every answer.
+const LEAST_FOR_BANDS: f64 = 0.4;
 
 /// Recognition of the source that is shown.
 pub(super) struct Recognised<'a> {
@@ -120,7 +177,7 @@ impl<'a> SourceData<'a> {
     }
 
     /// Phases of the grasp that is shown: as measured, or else the hold of the programme. They are found once per frame, for
-    /// `PanelContext::phases`.
+    /// `phases`.
     pub(super) fn find_phases(&self) -> Vec<PhaseSpan> {
         let measured = match (self.source, self.traces.current(), self.snapshot) {
             (ViewSource::Trial, ..) => return self.inspected.map(|own| own.trial.phases.clone()).unwrap_or_default(),
@@ -134,6 +191,58 @@ impl<'a> SourceData<'a> {
         }
         let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
         hold.into_iter().collect()
+    }
+
+    /// True where a stored trial or the past of a live gripper is shown.
+    pub(super) fn replays(&self) -> bool {
+        self.source == ViewSource::Trial || self.looks_back()
+    }
+
+    /// True where a raised threshold asks for one more grasp of the simulated object.
+    pub(super) fn one_more(&self) -> bool {
+        let finished = self.snapshot.filter(|snapshot| snapshot.status.finished);
+        finished.and_then(|snapshot| snapshot.identification.as_ref()).is_some_and(|view| view.asks_for_more)
+    }
+
+    /// Last finished grasp of the gripper that is shown, or a sentence that says why there is none.
+    pub(super) fn grasp_to_explain(&self) -> Result<ExplainRequest, String> {
+        if let (ViewSource::Trial, Some(Inspected { trial, .. })) = (self.source, self.inspected) {
+            // The answer to the whole grasp, wherever the cursor is.
+            let last = trial.answers.last().and_then(|answer| answer.last.clone());
+            let off = trial.recognition_off.as_deref().unwrap_or("the trial has no finished grasp");
+            let grasp = last.ok_or_else(|| format!("No answer to explain: {off}."))?;
+            return Ok(ExplainRequest { grasp, trial: Some(trial.id) });
+        }
+        let recognised = self.recognised().ok_or("Waiting for the first grasp ..")?;
+        let Some(view) = recognised.view else {
+            let off = recognised.off.unwrap_or("there is no recognition model");
+            return Err(format!("Recognition is off: {off}. Without an answer there is nothing to explain."));
+        };
+        let Some(grasp) = view.last.clone() else {
+            let start = match self.source {
+                ViewSource::Simulation => "press play (Space)",
+                ViewSource::Gripper => "record a trial (R)",
+                ViewSource::Trial => "open a trial",
+            };
+            return Err(format!("The explanation appears when a grasp ends: {start}."));
+        };
+        Ok(ExplainRequest { grasp, trial: None })
+    }
+
+    /// Mean and spread of the two likeliest classes in a channel, on the time of the plots; none while the answer is open or
+    /// hidden, and for models without class signatures.
+    pub(super) fn bands_for(&self, channel: &str) -> Option<[Band; 2]> {
+        let view = self.recognised()?.view.filter(|_| !self.blind)?;
+        let pmf = view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())?;
+        let open = view.listening && pmf.top().1 < LEAST_FOR_BANDS;
+        let mut bands = bands_for(view.signatures.as_deref().filter(|_| !open)?, &view.labels, pmf, channel)?;
+        // A recorded trial counts its time from the rest before the closing, a signature from the closing.
+        let recorded = |own: &Inspected<'_>| own.trial.source == TrialSource::Recorded;
+        if let Some(own) = self.inspected.filter(|own| self.source == ViewSource::Trial && recorded(own)) {
+            let closing_s = Alignment::Closing.origin_s(own.trial);
+            bands.iter_mut().flat_map(|band| &mut band.t_s).for_each(|t| *t += closing_s);
+        }
+        Some(bands)
     }
 
     /// Board of the real gripper or of a recorded trial, where one is shown.

@@ -1,9 +1,7 @@
 //! Pads and fingers of the grasp that is shown, live or stored, as heat maps: at the time shown, and over all its time.
 
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
 use crate::app::heat_map::{MapsKey, ShownMaps, shown_maps};
-use crate::app::playback::Seek;
 use crate::app::traces::GraspTrace;
 use crate::app::view_source::ViewSource;
 use egui::Ui;
@@ -146,11 +144,6 @@ impl<'a> ShownGrasp<'a> {
         let [first, last] = self.span_s;
         let fits = |[from, to]: &[f64; 2]| *from >= first && to > from && *to <= last + 1e-9;
         self.window_s.filter(fits).unwrap_or([first, last.max(first + 1e-3)])
-    }
-
-    /// Moves the cursor to a time (s).
-    pub(super) fn seek(&self, t: f64) -> InspectAction {
-        InspectAction::Seek(Seek::To(t))
     }
 
     /// Identity of frames or rows, from which maps are made.

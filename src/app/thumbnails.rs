@@ -32,7 +32,7 @@ impl Thumbnails {
     }
 
     /// Takes in what has been drawn, and has each of these files drawn once.
-    pub(super) fn gather(&mut self, ctx: &egui::Context, files: &[String]) {
+    pub(super) fn poll(&mut self, ctx: &egui::Context, files: &[String]) {
         for ended in self.portraits.take() {
             let (source, Ok(rgba)) = (&*ended.command, ended.outcome) else { continue };
             let drawn = texture(ctx, source, [PORTRAIT_SIDE; 2], &rgba);

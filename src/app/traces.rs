@@ -83,7 +83,7 @@ impl GraspTrace {
 
 /// Traces of the last grasps, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct TraceHistory {
+pub(super) struct TraceHistory {
     grasps: VecDeque<GraspTrace>,
     /// The last grasp is shown rather than the stream since.
     held: bool,
@@ -91,7 +91,7 @@ pub struct TraceHistory {
 
 impl TraceHistory {
     /// Adds a sample; a new grasp begins a new trace and pushes out the oldest.
-    pub fn push(&mut self, row: &TraceRow) {
+    pub(super) fn push(&mut self, row: &TraceRow) {
         if self.grasps.back().is_none_or(|last| last.grasp != row.grasp) {
             // A stream before a grasp is nothing to compare it with.
             self.grasps.retain(|trace| !trace.rolling);
@@ -132,28 +132,28 @@ impl TraceHistory {
     }
 
     /// Shows a whole grasp alone.
-    pub fn show(&mut self, trace: GraspTrace) {
+    pub(super) fn show(&mut self, trace: GraspTrace) {
         self.grasps.clear();
         self.grasps.push_back(trace);
     }
 
     /// Forgets the grasps before this one: they had another scene.
-    pub fn forget_before(&mut self, grasp: u64) {
+    pub(super) fn forget_before(&mut self, grasp: u64) {
         self.grasps.retain(|trace| trace.grasp >= grasp);
     }
 
     /// Forgets everything.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.grasps.clear();
     }
 
     /// Shows the last grasp rather than the stream after it, or the newest of either.
-    pub fn hold_grasp(&mut self, held: bool) {
+    pub(super) fn hold_grasp(&mut self, held: bool) {
         self.held = held;
     }
 
     /// Current grasp or stream.
-    pub fn current(&self) -> Option<&GraspTrace> {
+    pub(super) fn current(&self) -> Option<&GraspTrace> {
         self.place().and_then(|place| self.grasps.get(place))
     }
 
@@ -163,7 +163,7 @@ impl TraceHistory {
     }
 
     /// Grasps before it, oldest first; none beside a stream.
-    pub fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
+    pub(super) fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
         let rolling = self.current().is_some_and(|current| current.rolling);
         let many = if rolling { 0 } else { self.place().unwrap_or(0) };
         self.grasps.iter().take(many)

@@ -1,7 +1,7 @@
 //! Widgets that several panels share.
 
 use crate::app::actions::Actions;
-use crate::app::features::tools::ToolAction;
+use crate::app::features::App;
 use crate::app::theme::colour;
 use egui::text_edit::TextEditState;
 use egui::{
@@ -39,7 +39,7 @@ pub(super) fn progress_ui(ui: &mut Ui, progress: &JobProgress, remark: Option<&s
 pub(super) fn job_ui<C, O>(
     ui: &mut Ui,
     job: &Job<C, O>,
-    (hint, stop): (&str, ToolAction),
+    (hint, stop): (&str, fn(&mut App)),
     actions: &mut Actions,
     controls: impl FnOnce(&mut Ui, &mut Actions),
     result: impl FnOnce(&mut Ui, &O, &mut Actions),
@@ -129,9 +129,7 @@ pub(super) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Actions) {
     let button = Button::new(text).fill(colour(colours.error));
     let response = ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers and end the trial (Esc)");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Stop and vent"));
-    if response.clicked() {
-        actions.push(GripperCommand::Vent);
-    }
+    actions.on(&response, |app| _ = app.gripper.send(GripperCommand::Vent));
 }
 
 /// Least range of a sparkline: a newton, or a count.

@@ -3,7 +3,7 @@
 use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
-use palpate::app::{Action, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
+use palpate::app::{App, GripperToolsSetup, PanelKind, ViewState, Workbench, WorkbenchSetup};
 use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::study::{Explanation, Measuring};
@@ -143,9 +143,8 @@ impl Bench {
         self.harness.state().as_ref().expect("made in the first frame")
     }
 
-    pub(crate) fn tell(&mut self, action: impl Into<Action>) {
-        let ctx = self.harness.ctx.clone();
-        self.harness.state_mut().as_mut().expect("made in the first frame").act(&ctx, action);
+    pub(crate) fn tell(&mut self, action: impl FnOnce(&mut App)) {
+        self.harness.state_mut().as_mut().expect("made in the first frame").act(action);
     }
 
     /// Draws until the effects of the scene at hand have been measured.
@@ -216,7 +215,7 @@ impl Bench {
             if now > t - 1e-9 {
                 return;
             }
-            self.tell(Command::Step);
+            self.tell(|app| app.simulation.send(Command::Step));
             self.until(|snapshot| snapshot.frame.t > now);
         }
     }

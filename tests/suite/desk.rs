@@ -8,7 +8,7 @@ use crate::gripper::{TRUE_TO_TIME, board, emulated};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{Mode, ViewAction, ViewSource};
+use palpate::app::{Mode, ViewSource};
 use palpate_lab::gripper::Listen;
 use palpate_lab::workers::{GripperCommand, LabellingAction};
 use palpate_sim::objects::{EMPTY, object_title};
@@ -28,7 +28,7 @@ fn desk_at(listen: Listen) -> Bench {
     };
     let setup = BenchSetup { fill, listen, size: [1400.0, 1000.0], ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.tell(|app| app.set_mode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
     bench
 }
@@ -122,8 +122,8 @@ fn an_afternoon_by_keys_alone() {
     desk.until_shown(true, "2 of 800 trials");
     desk.record();
     desk.press(Key::Escape);
-    desk.tell(LabellingAction::Search(String::new()));
-    desk.tell(LabellingAction::Discard);
+    desk.tell(|app| app.label(LabellingAction::Search(String::new())));
+    desk.tell(|app| app.label(LabellingAction::Discard));
     desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // The first is called something new after all: the arrows pick it.
     desk.press(Key::ArrowDown);
@@ -231,7 +231,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     desk.press(Key::Slash);
     assert!(desk.harness.query_by_role_and_label(Role::SearchInput, "Find an object").is_none());
     // Elsewhere a further grasp gives up nothing.
-    desk.tell(ViewAction::SetMode(Mode::Demo));
+    desk.tell(|app| app.set_mode(Mode::Demo));
     for _ in 0..2 {
         desk.press(Key::R);
         desk.until_shown(true, "Time in the trial");
@@ -244,7 +244,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
 #[test]
 fn stop_works_while_something_is_typed() {
     let mut desk = desk();
-    desk.tell(GripperCommand::Connect(None));
+    desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();
@@ -261,7 +261,7 @@ fn stop_works_while_something_is_typed() {
 #[test]
 fn blind_hides_the_models_guess_until_the_label_is_given() {
     let mut desk = desk();
-    desk.tell(GripperCommand::Connect(None));
+    desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.press(Key::M);
     desk.record();
@@ -293,11 +293,11 @@ fn adapting_shows_the_empty_hand_and_asks_for_one() {
         desk.harness.query_all_by_label_contains("Adapting: take everything out of the hand").next().is_some()
     };
     let mut answered = 0;
-    desk.tell(GripperCommand::Adapt(Control::Driven));
+    desk.tell(|app| _ = app.gripper.send(GripperCommand::Adapt(Control::Driven)));
     while !adapting(&desk) {
         if refused(&desk) > answered {
             answered = refused(&desk);
-            desk.tell(GripperCommand::Adapt(Control::Driven));
+            desk.tell(|app| _ = app.gripper.send(GripperCommand::Adapt(Control::Driven)));
         }
         desk.wait();
     }

@@ -226,7 +226,7 @@ fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
         let listen: Listen = Arc::new(|_| Ok(Box::new(once_with_a_gap())));
         let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
         let mut bench = bench("counts", theme, setup);
-        bench.tell(GripperCommand::Connect(None));
+        bench.tell(|app| app.connect(None));
         // It is silent then, and wakes the window now and then.
         for _ in 0..20 {
             bench.wait();
@@ -254,12 +254,12 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
         GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
     // What has the fingers is not disturbed.
-    bench.tell(calibrate());
+    bench.tell(|app| _ = app.gripper.send(calibrate()));
     bench.wait();
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     bench.until_shown(true, "a calibration is running: end it first");
-    bench.tell(GripperCommand::Calibrate(CalibrationCommand::Stop));
+    bench.tell(|app| _ = app.gripper.send(GripperCommand::Calibrate(CalibrationCommand::Stop)));
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
     for (asked, moved) in [("Bend the left", 0), ("Bend the right", 1), ("Press the left", 2), ("Press the right", 3)] {
@@ -274,7 +274,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.until_shown(true, "No crosstalk of 1 % or more");
     // Each opened the port anew, for the one before had given it back.
     assert_eq!(open.load(Ordering::Relaxed), 2);
-    bench.tell(calibrate());
+    bench.tell(|app| _ = app.gripper.send(calibrate()));
     while open.load(Ordering::Relaxed) < 3 {
         bench.wait();
     }

@@ -4,7 +4,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{InspectAction, Mode, Seek, ViewAction, ViewSource};
+use palpate::app::{Mode, Seek, ViewSource};
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::grasp;
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial, TouchPhase};
@@ -95,7 +95,7 @@ pub(crate) fn three_trials(store: &mut Store) {
 fn inspecting(id: i64) -> Bench {
     let setup = BenchSetup { fill: three_trials, size: [1400.0, 1600.0], ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    bench.tell(InspectAction::Open(id));
+    bench.tell(|app| app.open_trial(id));
     bench.until_shown(true, &format!("TRIAL {id}, SIMULATED"));
     bench
 }
@@ -155,18 +155,18 @@ fn a_trial_is_stepped_through_by_keys_and_closed() {
 fn compared_trials_have_a_line_each_or_a_mean() {
     let mut bench = inspecting(1);
     for id in [2, 3] {
-        bench.tell(InspectAction::Pin(id));
+        bench.tell(|app| app.pin(id));
     }
     bench.until_shown(true, "Tomato, trial 2, simulated");
     bench.until_shown(true, "Lemon, trial 3, simulated");
-    bench.tell(InspectAction::ShowSpread(true));
+    bench.tell(|app| app.inspect.spread = true);
     bench.look();
     bench.until_shown(true, "Lemon, simulated, mean of 1");
     bench.harness.get_by_label("No longer compare trial 3").click();
     bench.look();
     bench.until_shown(false, "Lemon, trial 3");
     // A trial that does not exist is refused, and what is open stays.
-    bench.tell(InspectAction::Open(99));
+    bench.tell(|app| app.open_trial(99));
     bench.until_told("Trial 99 cannot be opened");
     assert_eq!(bench.workbench().inspected().map(|own| own.trial.id), Some(1));
 }
@@ -178,7 +178,7 @@ fn other_sensors_are_read_at_once() {
         bench.workbench().inspected().unwrap().trial.columns.iter().map(|column| column.name.clone()).collect()
     };
     assert!(names(&bench).contains(&"force_left".to_owned()));
-    bench.tell(ViewAction::SetSensors(SensorView { layout: "C6".to_owned(), ..SensorView::default() }));
+    bench.tell(|app| app.set_sensors(SensorView { layout: "C6".to_owned(), ..SensorView::default() }));
     while !names(&bench).contains(&"pressure_left_distal".to_owned()) {
         bench.wait();
     }
@@ -193,7 +193,7 @@ fn the_past_of_a_running_grasp_is_looked_back_on() {
     let mut bench = Bench::new(setup, CpuRenderer::default());
     bench.advance_to(2.0);
     bench.until_shown(false, "Live");
-    bench.tell(InspectAction::Seek(Seek::To(1.0)));
+    bench.tell(|app| app.seek(Seek::To(1.0)));
     bench.look();
     bench.until_shown(true, "Live");
     bench.harness.get_by_label("Play").click();
@@ -211,7 +211,7 @@ fn the_past_of_a_running_grasp_is_looked_back_on() {
 /// Random clicks, drags and keys.
 fn shaken(seed: u64, many: u32) {
     let mut bench = inspecting(1);
-    bench.tell(InspectAction::Pin(2));
+    bench.tell(|app| app.pin(2));
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let keys = [
         Key::Space,
@@ -316,11 +316,11 @@ fn resident() -> u64 {
 fn hours_of_samples_take_no_more_memory_than_the_first() {
     let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
     for command in [Command::SetRecording(None), Command::SetGrasps(1000), Command::SetSpeed(64.0)] {
-        bench.tell(command);
+        bench.tell(|app| app.simulation.send(command));
     }
     let mut grasps_until = |many: u64| {
         while bench.workbench().snapshot().unwrap().grasp < many {
-            bench.tell(Command::Play);
+            bench.tell(|app| app.simulation.send(Command::Play));
             bench.wait();
         }
         resident()

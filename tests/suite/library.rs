@@ -7,7 +7,7 @@ use crate::program::{json, refused, run};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::{ALL_PANELS, LibraryAction, Mode, ViewAction};
+use palpate::app::{ALL_PANELS, Mode};
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
@@ -179,7 +179,7 @@ fn the_panel_finds_sorts_and_selects() {
         row(&mut bench, "Trial 6, mug", Modifiers::COMMAND);
         bench.until_shown(true, "4 selected");
         // Tagged together, and taken back together by another program's undo.
-        bench.tell(LibraryAction::Edit(TrialEdit::Tag(vec!["wet".to_owned()])));
+        bench.tell(|app| app.library.edit(TrialEdit::Tag(vec!["wet".to_owned()])));
         bench.until_told("4 trials tagged wet");
         let tagged = |bench: &Bench| -> Vec<TrialId> {
             let rows = bench.store().list(false).unwrap();
@@ -216,10 +216,10 @@ fn what_the_terminal_changes_shows_in_the_window_and_the_other_way_round() {
     until_rows(&mut bench, &["6", "5", "4"]);
     assert_eq!(run(&at, &["trials", "undo"]).code, Some(0));
     until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
-    bench.tell(LibraryAction::Find(TrialQuery { search: "lemon".to_owned(), ..TrialQuery::default() }));
+    bench.tell(|app| app.library.find(TrialQuery { search: "lemon".to_owned(), ..TrialQuery::default() }));
     until_rows(&mut bench, &["3", "1"]);
-    bench.tell(LibraryAction::SelectAll);
-    bench.tell(LibraryAction::Edit(TrialEdit::Note("ripe".to_owned())));
+    bench.tell(|app| app.library.select_all());
+    bench.tell(|app| app.library.edit(TrialEdit::Note("ripe".to_owned())));
     bench.until_told("2 trials given a note");
     assert!(run(&at, &["trials", "list", "--search", "ripe"]).out.lines().count() == 3);
 }
@@ -239,7 +239,7 @@ fn a_label_from_the_terminal_shows_in_label_mode() {
 fn keys_walk_through_the_library_and_open_trials() {
     let setup = BenchSetup { size: [1400.0, 900.0], fill, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    bench.tell(ViewAction::SetMode(Mode::Inspect));
+    bench.tell(|app| app.set_mode(Mode::Inspect));
     bench.until_shown(true, "Trial 6, mug");
     let press = |bench: &mut Bench, modifiers: Modifiers, key: Key| {
         bench.harness.key_press_modifiers(modifiers, key);

@@ -9,7 +9,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, LibraryAction, Mode, PanelKind, SimulationAction, StudyAction, ViewAction};
+use palpate::app::{ALL_PANELS, Mode, PanelKind};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
@@ -43,7 +43,7 @@ fn every_panel_in_both_themes() {
             match panel.name {
                 "studies" => bench.until_shown(true, "not run"),
                 "study-figure" | "study-tables" | "study-findings" => {
-                    bench.tell(StudyAction::Choose("models".to_owned()));
+                    bench.tell(|app| app.studies.choose("models"));
                     bench.harness.run_steps(4);
                     let text = match panel.name {
                         "study-figure" => "than today's",
@@ -59,7 +59,7 @@ fn every_panel_in_both_themes() {
                 "label" => bench.until_shown(true, "Connect the gripper:"),
                 "library" => {
                     let search = "in no trial".to_owned();
-                    bench.tell(LibraryAction::Find(TrialQuery { search, ..TrialQuery::default() }));
+                    bench.tell(|app| app.library.find(TrialQuery { search, ..TrialQuery::default() }));
                     bench.until_shown(true, "0 of 1 trials");
                     // The button beside it has just appeared.
                     bench.harness.run_steps(8);
@@ -105,10 +105,10 @@ fn shown_light(theme: Theme, iterations: u32) -> (Bench, RgbaImage) {
     let mut bench = bench(BenchSetup { theme, size: [300.0, 380.0], panel, ..BenchSetup::default() });
     let mut scene = Scene::default();
     scene.solver.max_iterations = iterations;
-    bench.tell(SimulationAction::SetScene(Box::new(scene)));
-    bench.tell(Command::SetGrasps(1));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.set_scene(scene));
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(1)));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished && s.status.checking.is_none());
     let picture = bench.picture();
     (bench, picture)
@@ -210,7 +210,7 @@ fn values_beyond_a_field_s_range_are_left_alone() {
                 <box size='0.05 0.1 0.05'/></geometry></collision></link></robot>";
     std::fs::write(&path, text).unwrap();
     let mut bench = whole_window();
-    bench.tell(SimulationAction::OpenObject(path.to_str().unwrap().to_owned()));
+    bench.tell(|app| app.open(path.to_str().unwrap()));
     let loaded = bench.until(|s| s.object.as_ref().is_some_and(|o| o.name == "anvil"));
     bench.harness.run_steps(4);
     let after = bench.workbench().snapshot().unwrap();
@@ -298,7 +298,7 @@ fn the_accuracy_dial_tells_stick_slip_and_what_reference_costs() {
     let mut scene = Scene { pose: PosePreset::named("B").unwrap().poses(), ..Scene::default() };
     scene.object.source = "ball".to_owned();
     scene.object.fixed = true;
-    bench.tell(SimulationAction::SetScene(Box::new(scene.clone())));
+    bench.tell(|app| app.set_scene(scene.clone()));
     bench.until(|s| s.scene.object.fixed);
     let fixed = measured(&mut bench);
     assert!(!fixed.cost.persists);
@@ -312,7 +312,7 @@ fn the_accuracy_dial_tells_stick_slip_and_what_reference_costs() {
     let sampler = PoseSampler::new(&scene, object.as_ref());
     let persists = |seed: u64| {
         let drawn = sampler.draw(object.as_ref(), seed).0;
-        bench.tell(SimulationAction::SetScene(Box::new(drawn.clone())));
+        bench.tell(|app| app.set_scene(drawn.clone()));
         bench.until(|s| *s.scene == drawn);
         let persists = measured(&mut bench).cost.persists;
         assert_eq!(bench.harness.query_by_label("stick-slip").is_some(), persists, "seed {seed}");
@@ -337,7 +337,7 @@ fn error_bands_are_drawn_about_the_traces() {
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "force").unwrap();
     let [dark, light] = Theme::ALL.map(|theme| {
         let mut bench = bench(BenchSetup { theme, size: [300.0, 240.0], panel: Some(panel), ..BenchSetup::default() });
-        bench.tell(Command::SetErrorBand(true));
+        bench.tell(|app| app.simulation.send(Command::SetErrorBand(true)));
         bench.until(|s| s.status.error_band);
         bench.advance_to(2.6);
         bench.picture()
@@ -348,7 +348,7 @@ fn error_bands_are_drawn_about_the_traces() {
 #[test]
 fn effects_are_switched_and_both_numbers_move() {
     let mut bench = whole_window();
-    bench.tell(SimulationAction::OpenObject(EMPTY.to_owned()));
+    bench.tell(|app| app.open(EMPTY));
     bench.until(|s| s.object.is_none());
     bench.harness.get_by_label("Effects").click();
     bench.harness.run_steps(2);
@@ -393,7 +393,7 @@ fn effects_are_switched_and_both_numbers_move() {
 #[test]
 fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
     let mut bench = whole_window();
-    bench.tell(ViewAction::ShowPanel("accuracy"));
+    bench.tell(|app| app.show_panel("accuracy"));
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_label_contains("stored study: free objects").is_some());
     let before = bench.workbench().snapshot().unwrap();

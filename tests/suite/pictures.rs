@@ -8,7 +8,6 @@ use crate::presenter::texts;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state};
 use glam::{Vec2, Vec3};
 use image::RgbaImage;
-use palpate::app::{InspectAction, LibraryAction, SimulationAction, ViewAction};
 use palpate_geometry::drawing::{DrawList, Solid, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
@@ -209,9 +208,9 @@ fn the_home_view_shows_the_whole_hand_beside_the_inset() {
 #[test]
 fn the_ghost_of_a_finished_grasp_has_both_captions() {
     let mut bench = window(Theme::Dark, [1280.0, 820.0]);
-    bench.tell(SimulationAction::SetGhost(true));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.set_ghost(true));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished);
     let says = |bench: &Bench| {
         texts(bench).iter().any(|(.., text)| text == "The same grasp by rapier. As it was held, at 3.0\u{2009}s")
@@ -247,7 +246,7 @@ fn the_window_in_both_themes_and_small() {
         let mut bench = window(theme, size);
         bench.advance_to(2.6);
         if name == "window_keys" {
-            bench.tell(ViewAction::ShowKeys(true));
+            bench.tell(|app| app.view.keys_shown = true);
             bench.harness.run_steps(3);
         }
         compare(name, &bench.picture(), &by);
@@ -261,12 +260,12 @@ fn stored_trials_are_compared_in_both_themes() {
         [("inspect_dark", Theme::Dark, [960.0, 640.0]), ("inspect_light", Theme::Light, [760.0, 500.0])]
     {
         let mut bench = window_on(theme, size, three_trials);
-        bench.tell(InspectAction::Open(1));
+        bench.tell(|app| app.open_trial(1));
         bench.until_shown(true, "TRIAL 1, SIMULATED");
-        bench.tell(InspectAction::Pin(2));
+        bench.tell(|app| app.pin(2));
         bench.until_shown(true, "Tomato, trial 2, simulated");
         // The list has dates, which differ from day to day.
-        bench.tell(LibraryAction::Find(TrialQuery { search: "in no trial".to_owned(), ..TrialQuery::default() }));
+        bench.tell(|app| app.library.find(TrialQuery { search: "in no trial".to_owned(), ..TrialQuery::default() }));
         bench.until_shown(true, "0 of 3 trials");
         // What is computed in the background is done.
         bench.harness.run_steps(8);

@@ -4,7 +4,6 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use egui::{Key, Rect, Shape};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
 use palpate_sim::scene::{PosePreset, Scene};
@@ -14,7 +13,7 @@ fn present(setup: BenchSetup) -> Bench {
     let mut bench = Bench::new(setup, CpuRenderer::default());
     bench.harness.key_press(Key::F11);
     bench.harness.run_steps(2);
-    bench.tell(Command::SetSpeed(64.0));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
     bench
 }
 
@@ -52,7 +51,7 @@ fn presenter_mode_shows_object_after_object_and_counts_verdicts() {
     bench.until_told("1 trial kept in the store");
     bench.harness.key_press(Key::ArrowUp);
     bench.until(|s| s.identification.as_ref().is_some_and(|view| view.rule.threshold == 0.91));
-    bench.tell(RecognitionAction::SetThreshold(0.97));
+    bench.tell(|app| app.set_threshold(0.97));
     bench.until(|s| s.identification.as_ref().is_some_and(|view| view.asks_for_more));
     assert!(reasons(&bench, "Now 97 % is asked for. Press M: one more grasp."));
     bench.harness.key_press(Key::M);
@@ -66,7 +65,7 @@ fn presenter_mode_shows_object_after_object_and_counts_verdicts() {
     let title = second.object.as_ref().map_or_else(|| "Empty hand".to_owned(), |object| object.title.clone());
     assert!(says(&bench, &format!("Wrong: it is {title}")) && says(&bench, "1 right, 1 wrong"));
     // N does not wait.
-    bench.tell(RecognitionAction::NextObject);
+    bench.tell(|app| app.next_object());
     bench.until(|s| s.truth() != second.truth());
     bench.harness.key_press(Key::Escape);
     bench.harness.run_steps(3);
@@ -87,7 +86,7 @@ fn a_hard_pose_is_said_to_be_one() {
     bench.harness.run_steps(2);
     assert!(!hard(&bench));
     scene.object.source = "tomato".to_owned();
-    bench.tell(palpate::app::SimulationAction::SetScene(Box::new(scene)));
+    bench.tell(|app| app.set_scene(scene));
     bench.until(|s| s.truth() == "tomato");
     assert!(hard(&bench));
 }
@@ -136,18 +135,18 @@ fn letters_are_a_36th_of_the_window_and_never_overlap() {
             Bench::new(BenchSetup { size, theme, object: "button", ..BenchSetup::default() }, CpuRenderer::default());
         bench.harness.key_press(Key::F11);
         bench.harness.run_steps(2);
-        bench.tell(Command::Pause);
+        bench.tell(|app| app.simulation.send(Command::Pause));
         for (t, when) in [(0.3, "closing"), (1.5, "touching"), (2.6, "holding")] {
             bench.advance_to(t);
             bench.harness.run_steps(2);
             assert_legible(&bench, size, when);
         }
-        bench.tell(Command::SetSpeed(64.0));
-        bench.tell(Command::Play);
+        bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+        bench.tell(|app| app.simulation.send(Command::Play));
         bench.until(|s| s.status.finished);
         bench.harness.run_steps(2);
         assert_legible(&bench, size, "decided");
-        bench.tell(RecognitionAction::SetThreshold(0.99));
+        bench.tell(|app| app.set_threshold(0.99));
         bench.until(|s| s.identification.as_ref().is_some_and(|view| view.asks_for_more));
         assert_legible(&bench, size, "asked for more");
     }
@@ -162,9 +161,9 @@ fn fill(store: &mut Store) {
 #[test]
 fn the_bar_records_into_the_demo_log_and_keeps_its_last_grasp() {
     let mut bench = Bench::new(BenchSetup { fill, ..BenchSetup::default() }, CpuRenderer::default());
-    bench.tell(Command::SetGrasps(1));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(1)));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished);
     let places =
         |bench: &Bench| -> Vec<TrialPlace> { bench.store().list(false).unwrap().iter().map(|row| row.place).collect() };
@@ -185,7 +184,7 @@ fn the_bar_records_into_the_demo_log_and_keeps_its_last_grasp() {
     // The other choice stores the next grasp at once.
     bench.harness.get_by_label("Store").click();
     bench.harness.run_steps(2);
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished && s.grasp > 1 && s.status.recording == Some(TrialPlace::Store));
     bench.until_told("stored");
     assert_eq!(places(&bench), [TrialPlace::DemoLog, TrialPlace::Store, TrialPlace::Store]);

@@ -7,7 +7,7 @@ use egui::accesskit::Role;
 use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
-use palpate::app::{ALL_PANELS, PanelKind, RecognitionAction, SimulationAction};
+use palpate::app::{ALL_PANELS, PanelKind};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, Snapshot};
 use palpate_learn::{ModelError, Models, StopReason};
@@ -32,8 +32,8 @@ fn beliefs(snapshot: &Snapshot) -> usize {
 
 /// Lets a round of grasps run to its end.
 fn run_out(bench: &mut Bench) {
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|snapshot| snapshot.status.finished);
     bench.harness.run_steps(3);
 }
@@ -54,8 +54,8 @@ fn a_grasp_is_followed_until_it_is_sure() {
     assert!(says(&bench, "Tomato 24 %") && says(&bench, "Empty hand 0 %"));
     assert!(says(&bench, "Grasp 1, running: Lemon 61 %") && says(&bench, "Grasp 2: not yet"));
     assert!(says(&bench, "Truth: shown after the decision"));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| beliefs(s) == 1 && s.identification.as_ref().is_some_and(|view| !view.listening));
     assert!(
         says(&bench, "grasping again: lemon 61 %, tomato 24 %") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
@@ -74,13 +74,13 @@ fn a_guided_grasp_says_by_which_move_it_was_chosen() {
     let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
     scene.pose.between = Between::Guided;
     scene.set_object_fixed(true);
-    bench.tell(SimulationAction::SetScene(Box::new(scene)));
+    bench.tell(|app| app.set_scene(scene));
     bench.until(|s| s.scene.pose.between == Between::Guided);
-    bench.tell(RecognitionAction::SetThreshold(0.999));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.set_threshold(0.999));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     let second = bench.until(|s| s.status.grasp_of_round == 2);
-    bench.tell(Command::Pause);
+    bench.tell(|app| app.simulation.send(Command::Pause));
     bench.harness.run_steps(3);
     let by = second.status.guided.unwrap();
     assert!(says(&bench, &format!("Guided: gripper {by}").replace(" mm", "\u{a0}mm")), "{by}");
@@ -94,10 +94,10 @@ fn fixed_objects_are_recognised_by_a_model_that_has_learned_them() {
     for fixed in [true, false] {
         let mut scene = Scene::clone(&bench.workbench().snapshot().unwrap().scene);
         scene.set_object_fixed(fixed);
-        bench.tell(SimulationAction::SetScene(Box::new(scene)));
+        bench.tell(|app| app.set_scene(scene));
         bench.until(|s| s.scene.holds_object() == fixed);
-        bench.tell(Command::SetSpeed(64.0));
-        bench.tell(Command::Play);
+        bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+        bench.tell(|app| app.simulation.send(Command::Play));
         let last = |s: &Snapshot| s.identification.as_ref().and_then(|view| view.last.clone());
         let grasped = bench.until(|s| s.scene.holds_object() == fixed && last(s).is_some());
         assert_eq!(last(&grasped).unwrap().model.card.data.fixed(), Some(fixed));
@@ -113,7 +113,7 @@ fn the_panel_in_every_state_and_both_themes() {
         ("first", |bench| bench.advance_to(2.6)),
         ("right", run_out),
         ("wrong", |bench| {
-            bench.tell(SimulationAction::OpenObject("case".to_owned()));
+            bench.tell(|app| app.open("case"));
             bench.until(|s| s.truth() == "case");
             run_out(bench);
         }),
@@ -178,7 +178,7 @@ fn without_a_model_everything_else_works_and_it_says_so() {
     });
     assert!(bench.workbench().messages().iter().any(|text| text.contains("it is broken")));
     assert!(says(&bench, "Recognition is off"));
-    bench.tell(Command::SetGrasps(2));
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(2)));
     run_out(&mut bench);
     assert_eq!(bench.workbench().snapshot().unwrap().grasp, 2);
 }
@@ -235,13 +235,13 @@ fn an_object_from_a_file_is_learned_by_itself() {
         let view = snapshot.as_ref().and_then(|snapshot| snapshot.identification.as_ref());
         view.is_some_and(|view| view.labels.class("carton").is_some())
     };
-    bench.tell(SimulationAction::OpenObject(file.to_string_lossy().into_owned()));
+    bench.tell(|app| app.open(&file.to_string_lossy().into_owned()));
     bench.until_shown(true, "Learning carton");
     bench.harness.get_by_label("Stop").click();
     bench.until_shown(false, "Learning carton");
     assert!(!knows(&bench) && bench.workbench().messages().iter().any(|text| text == "The model stays as it is."));
 
-    bench.tell(RecognitionAction::TeachObject);
+    bench.tell(|app| app.teach_object());
     bench.until_told("The model knows carton now.");
     while !knows(&bench) {
         bench.wait();
@@ -253,9 +253,9 @@ fn an_object_from_a_file_is_learned_by_itself() {
     let model = palpate_learn::Model::load(&saved).unwrap();
     assert_eq!(model.card.taught, ["carton"]);
     // It is learned once, and not again when it is opened again.
-    bench.tell(SimulationAction::OpenObject("lemon".to_owned()));
+    bench.tell(|app| app.open("lemon"));
     bench.until(|s| s.truth() == "lemon");
-    bench.tell(SimulationAction::OpenObject(file.to_string_lossy().into_owned()));
+    bench.tell(|app| app.open(&file.to_string_lossy().into_owned()));
     bench.until(|s| s.truth() == "carton");
     bench.harness.run_steps(5);
     assert!(bench.harness.query_by_label_contains("Learning carton").is_none());
@@ -266,7 +266,7 @@ fn a_raised_threshold_offers_one_more_grasp_beyond_the_limit_too() {
     // The script says 61, 86, 95 and 98 %.
     let mut bench = alone(Theme::Dark);
     let raise = |bench: &mut Bench, threshold: f64| {
-        bench.tell(RecognitionAction::SetThreshold(threshold));
+        bench.tell(|app| app.set_threshold(threshold));
         bench.until(|s| s.identification.as_ref().is_some_and(|view| view.rule.threshold == threshold));
         bench.harness.run_steps(2);
     };
@@ -282,15 +282,15 @@ fn a_raised_threshold_offers_one_more_grasp_beyond_the_limit_too() {
     bench.harness.run_steps(3);
     assert!(says(&bench, "Lemon, 98 %") && !says(&bench, "One more grasp"));
     // At the limit there is one more too; the limit stays.
-    bench.tell(Command::SetGrasps(2));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(2)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished && s.grasp == more.grasp + 2);
     raise(&mut bench, 0.98);
     bench.harness.get_by_label("One more grasp").click();
     bench.harness.run_steps(2);
     let more = bench.until(|s| s.status.finished && s.status.grasp_of_round == 3);
     assert_eq!((beliefs(&more), more.status.grasps), (3, 2));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::Play));
     let next = bench.until(|s| s.status.finished && s.grasp > more.grasp);
     assert_eq!(next.status.grasp_of_round, 2);
 }

@@ -5,7 +5,7 @@ use crate::cpu_renderer::CpuRenderer;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
-use palpate::app::{Mode, StudyAction, ViewAction};
+use palpate::app::Mode;
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::StoredStudy;
 use palpate_lab::study::paper::{
@@ -18,8 +18,8 @@ use palpate_store::Store;
 
 const SAMPLE: StudySize = StudySize::Sample { objects: 4, trials: 6 };
 
-fn request(anew: bool) -> StudyAction {
-    StudyAction::Run(StudyRequest { key: "models".to_owned(), size: SAMPLE, anew })
+fn request(anew: bool) -> StudyRequest {
+    StudyRequest { key: "models".to_owned(), size: SAMPLE, anew }
 }
 
 /// A made-up result of the study `models`, whose numbers repeat.
@@ -90,7 +90,7 @@ fn bench(theme: Theme, size: [f32; 2], fill: fn(&mut Store)) -> Bench {
     bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     bench.harness.run_steps(2);
     assert_eq!(bench.workbench().view().mode, Mode::Study);
-    bench.tell(StudyAction::Choose("models".to_owned()));
+    bench.tell(|app| app.studies.choose("models"));
     bench
 }
 
@@ -124,12 +124,12 @@ fn until_open(bench: &mut Bench) -> i64 {
 fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     let mut bench = bench(Theme::Dark, [1600.0, 1800.0], |_| ());
     bench.until_shown(true, "not run here; result of the program");
-    bench.tell(request(false));
+    bench.tell(|app| app.run_study(request(false)));
     bench.until_shown(true, "measuring, ");
     bench.harness.get_by_label("Stop study").click();
     bench.until_told("Study stopped: ");
     bench.until_shown(true, "result of the program, another stopped");
-    bench.tell(request(false));
+    bench.tell(|app| app.run_study(request(false)));
     bench.until_told("Study finished: ");
     bench.until_shown(true, "A short form: do not quote its numbers.");
     // The same files as those of the command line.
@@ -183,7 +183,7 @@ fn units_of_another_plan_are_forgotten_on_request() {
         std::fs::write(folder.units("models"), "{\"study\":\"models\",\"program\":\"0\",\"plan\":null}\n").unwrap();
     };
     let mut bench = bench(Theme::Dark, [1400.0, 1000.0], fill);
-    bench.tell(request(false));
+    bench.tell(|app| app.run_study(request(false)));
     bench.until_told("another version");
     bench.until_shown(true, "Begin anew");
     bench.harness.get_by_label("Begin anew").click();
@@ -201,7 +201,7 @@ fn the_mode_is_drawn_in_both_themes_and_small() {
         ("study_small", Theme::Light, [760.0, 500.0]),
     ] {
         let mut bench = bench(theme, size, scripted_result);
-        bench.tell(ViewAction::ShowPanel("study-figure"));
+        bench.tell(|app| app.show_panel("study-figure"));
         bench.until_shown(true, "Claims of the paper: ");
         bench.harness.run_steps(8);
         let picture: RgbaImage = bench.picture();

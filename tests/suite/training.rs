@@ -8,7 +8,6 @@ use crate::panels::side_by_side;
 use crate::program::{json, refused};
 use crate::scripted;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::RecognitionAction;
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::workers::{EndedJob, Job, TrainRequest, Wake, load_model_job, training_data_job, training_job};
@@ -224,7 +223,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         let used = bench.workbench().view().gripper_model.clone().unwrap();
         assert!(used.extension().is_some_and(|extension| extension == "safetensors"), "{used:?}");
         assert!(bench.workbench().messages().iter().any(|text| text.contains("Model for the real gripper: KNN")));
-        bench.tell(RecognitionAction::UseModel(Some("/nowhere.safetensors".into())));
+        bench.tell(|app| app.use_model(Some("/nowhere.safetensors".into())));
         while !bench.workbench().messages().iter().any(|text| text.contains("Model not changed")) {
             bench.harness.step();
             std::thread::sleep(Duration::from_millis(5));

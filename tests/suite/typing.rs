@@ -8,7 +8,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::Node;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::{ALL_PANELS, LibraryAction, Mode, Reach, ViewAction};
+use palpate::app::{ALL_PANELS, Mode, Reach};
 use palpate_store::Store;
 
 const TOMATO: [(Key, &str); 6] =
@@ -39,21 +39,21 @@ fn fields(bench: &Bench) -> Vec<Node<'_>> {
 
 /// Selects the recorded trial: bars and menus about a selection appear.
 fn select(bench: &mut Bench) {
-    bench.tell(LibraryAction::Find(palpate_store::TrialQuery::default()));
-    bench.tell(LibraryAction::Select(1, Reach::Alone));
+    bench.tell(|app| app.library.find(palpate_store::TrialQuery::default()));
+    bench.tell(|app| app.library.select(1, Reach::Alone));
     bench.harness.run_steps(3);
 }
 
 #[test]
 fn a_word_typed_with_a_trial_selected_arrives_whole_in_each_field_of_each_mode() {
     let mut bench = window();
-    bench.tell(ViewAction::ShowPanel("library"));
+    bench.tell(|app| app.show_panel("library"));
     bench.harness.step();
     bench.until_shown(true, "Trial 1, ");
     let mut seen = Vec::new();
     for panel in &ALL_PANELS {
         select(&mut bench);
-        bench.tell(ViewAction::ShowPanel(panel.name));
+        bench.tell(|app| app.show_panel(panel.name));
         bench.harness.run_steps(3);
         for place in 0..fields(&bench).len() {
             select(&mut bench);
@@ -87,7 +87,7 @@ fn a_word_typed_with_a_trial_selected_arrives_whole_in_each_field_of_each_mode()
 #[test]
 fn a_word_typed_right_after_slash_goes_to_the_search_field() {
     let mut bench = window();
-    bench.tell(ViewAction::SetMode(Mode::Inspect));
+    bench.tell(|app| app.set_mode(Mode::Inspect));
     bench.harness.step();
     bench.until_shown(true, "Trial 1, ");
     for letters_per_frame in [6, 2, 1] {

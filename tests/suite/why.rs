@@ -6,7 +6,7 @@ use crate::golden::compare;
 use crate::program::{json, refused, run};
 use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{ALL_PANELS, Mode, PanelKind, ViewAction};
+use palpate::app::{ALL_PANELS, Mode, PanelKind};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::workers::Command;
@@ -77,10 +77,10 @@ fn panel() -> &'static PanelKind {
 }
 
 fn run_out(bench: &mut Bench) {
-    bench.tell(Command::SetRecording(None));
-    bench.tell(Command::SetGrasps(1));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetRecording(None)));
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(1)));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|snapshot| snapshot.status.finished);
 }
 
@@ -135,7 +135,7 @@ fn a_link_beside_the_answer_opens_the_panel() {
     bench.harness.get_by_label_contains("Trial 1, Lemon, sim").click();
     bench.harness.run_steps(2);
     assert_eq!(bench.workbench().view().mode, Mode::Inspect);
-    bench.tell(ViewAction::ShowPanel("why"));
+    bench.tell(|app| app.show_panel("why"));
     bench.until_shown(false, "Trial 1, Lemon, sim");
     bench.until_shown(true, "Trial 2, Earphone case, sim");
     // A model without signatures says what to do.

@@ -5,7 +5,7 @@ use crate::cpu_renderer::CpuRenderer;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{FileAction, Mode, SimulationAction, ViewAction};
+use palpate::app::Mode;
 use palpate_lab::workers::{Command, LabelCommand};
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
@@ -87,7 +87,7 @@ fn undo_acts_on_what_the_mode_shows() {
     let setup = BenchSetup { fill: labelled, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
     let label = |bench: &Bench| bench.store().labels().trials().unwrap()[0].object.clone();
-    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    bench.tell(|app| app.open("tomato"));
     bench.until(|s| s.truth() == "tomato");
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until(|s| s.truth() == "lemon");
@@ -97,7 +97,7 @@ fn undo_acts_on_what_the_mode_shows() {
     press(&mut bench, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     bench.until(|s| s.truth() == "tomato");
     // In Label mode the label goes.
-    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.tell(|app| app.set_mode(Mode::Label));
     bench.harness.step();
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until_told("undone: trial 1: label");
@@ -115,11 +115,11 @@ fn keys_without_effect_say_why() {
         press(&mut bench, Modifiers::NONE, key);
         bench.until_told(told);
     }
-    bench.tell(SimulationAction::OpenObject("empty".to_owned()));
+    bench.tell(|app| app.open("empty"));
     bench.until(|s| s.object.is_none());
     press(&mut bench, Modifiers::NONE, Key::Z);
     bench.until_told("There is no object in the hand");
-    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.tell(|app| app.set_mode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
     press(&mut bench, Modifiers::NONE, Key::N);
     bench.until_told("No trial waits for a label");
@@ -152,9 +152,9 @@ fn files_are_saved_and_opened_by_the_dialog() {
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_role_and_label(Role::TextInput, "Path").is_none());
     // A file is opened from the list.
-    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    bench.tell(|app| app.open("tomato"));
     bench.until(|s| s.truth() == "tomato");
-    bench.tell(FileAction::Open);
+    bench.tell(|app| app.ask_for_object());
     bench.harness.run_steps(3);
     bench.harness.get_by_label("mine.toml").click();
     bench.harness.run_steps(3);
@@ -184,15 +184,15 @@ fn the_scale_is_set_by_keys_and_remembered() {
 #[test]
 fn results_of_an_earlier_object_vanish() {
     let mut bench = window([1400.0, 1000.0]);
-    bench.tell(Command::SetGrasps(1));
-    bench.tell(Command::SetSpeed(64.0));
-    bench.tell(Command::Play);
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(1)));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished && s.last.is_some());
     bench.harness.get_by_label("This grasp").click();
     bench.harness.run_steps(2);
     assert!(bench.harness.query_by_label_contains("result of grasp").is_some());
-    bench.tell(Command::Pause);
-    bench.tell(SimulationAction::OpenObject("tomato".to_owned()));
+    bench.tell(|app| app.simulation.send(Command::Pause));
+    bench.tell(|app| app.open("tomato"));
     let changed = bench.until(|s| s.truth() == "tomato");
     assert!(changed.last.is_none() && changed.scene_since == changed.grasp);
     assert!(bench.harness.query_by_label_contains("result of grasp").is_none());
@@ -212,7 +212,7 @@ fn every_tab_is_reachable_in_a_small_window() {
     bench.harness.run_steps(3);
     assert!(bench.harness.query_all_by_label_contains("Connect").next().is_some());
     // Also with large letters.
-    bench.tell(ViewAction::SetScale(1.5));
+    bench.tell(|app| app.set_scale(1.5));
     bench.harness.run_steps(4);
     let room = bench.harness.ctx.content_rect();
     for label in ["Menu", "?", "Theme"] {
@@ -224,9 +224,9 @@ fn every_tab_is_reachable_in_a_small_window() {
 #[test]
 fn a_title_names_the_same_object_as_its_class() {
     let mut bench = window([1280.0, 820.0]);
-    bench.tell(ViewAction::SetMode(Mode::Label));
+    bench.tell(|app| app.set_mode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
-    bench.tell(LabelCommand::Want("bigball".to_owned(), 3));
+    bench.tell(|app| app.edit_labels(LabelCommand::Want("bigball".to_owned(), 3)));
     bench.until_shown(true, "Tennis ball: 0 of 3");
     let field = bench.harness.get_by_role_and_label(Role::TextInput, "Add an object to the plan");
     field.focus();
@@ -251,14 +251,14 @@ fn a_warning_carries_the_button_that_helps() {
     }
     std::fs::write(&path, text).unwrap();
     let mut bench = window([1280.0, 820.0]);
-    bench.tell(SimulationAction::OpenObject(path.to_str().unwrap().to_owned()));
+    bench.tell(|app| app.open(path.to_str().unwrap()));
     bench.until_told("the mesh is open");
     bench.harness.run_steps(2);
     bench.harness.get_by_role_and_label(Role::Button, "Use its hull").click();
     bench.harness.run_steps(2);
     bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bin"));
     // An open mesh has its picture in the list of objects.
-    bench.tell(ViewAction::ShowPanel("objects"));
+    bench.tell(|app| app.show_panel("objects"));
     bench.until_shown(true, "Picture of bin.obj");
     // What was refused leaves nothing to undo; the hull does.
     press(&mut bench, Modifiers::COMMAND, Key::Z);

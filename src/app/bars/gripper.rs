@@ -2,7 +2,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::gripper::{GripperAction, control_title};
+use crate::app::features::App;
+use crate::app::features::gripper::control_title;
 use crate::app::theme::colour;
 use egui::{RichText, Ui};
 use palpate_lab::workers::GripperView;
@@ -24,15 +25,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         false => "Trials begin with R. W in Label mode, or a click, detects them automatically",
     };
     let text = RichText::new(trials).small().color(colour(ink));
-    if ui.selectable_label(watching, text).on_hover_text(about).clicked() {
-        actions.push(GripperAction::ToggleWatch);
-    }
+    actions.on(&ui.selectable_label(watching, text).on_hover_text(about), App::toggle_watch);
     let text = RichText::new(drive_text(context, gripper, narrow)).small().color(colour(colours.text));
     let about = "Who sets the pressure of the next trial: you by hand, or the board; untimed trials last until Q. \
                  M in Label mode, or a click, changes it";
-    if ui.selectable_label(false, text).on_hover_text(about).clicked() {
-        actions.push(GripperAction::NextControl);
-    }
+    actions.on(&ui.selectable_label(false, text).on_hover_text(about), App::next_control);
 }
 
 /// Actuation, and line pressure where it is known.

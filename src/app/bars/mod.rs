@@ -4,11 +4,10 @@ mod gripper;
 mod timeline;
 mod trial;
 
-use crate::app::actions::{Action, Actions};
-use crate::app::context::{LoggedGrasp, PanelContext};
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::library::LibraryAction;
-use crate::app::features::view::ViewAction;
+use crate::app::actions::Actions;
+use crate::app::context::PanelContext;
+use crate::app::features::App;
+use crate::app::features::simulation::LoggedGrasp;
 use crate::app::icons::{self, Icon};
 use crate::app::modes;
 use crate::app::modes::mode::Mode;
@@ -34,9 +33,7 @@ fn speed_text(speed: f64) -> String {
 pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     // From the right, so that buttons stay in sight where there is no room for everything.
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        if ui.button("?").on_hover_text("Keys (F1)").clicked() {
-            actions.push(ViewAction::ShowKeys(!context.view.keys_shown));
-        }
+        actions.on(&ui.button("?").on_hover_text("Keys (F1)"), |app| app.view.keys_shown = !app.view.keys_shown);
         menu_ui(ui, context, actions);
         if context.gripper.is_some_and(GripperView::is_connected) {
             stop_button(ui, context.view.theme, actions);
@@ -82,31 +79,25 @@ fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         Theme::Light => (Icon::Moon, Theme::Dark),
     };
     if icons::button(ui, icon, "Theme", &format!("Change to {} theme", other.name())).clicked() {
-        actions.push(ViewAction::SetTheme(other));
+        actions.push(move |app| app.set_theme(other));
     }
     let menu = ui.menu_button("Menu", |ui| {
-        if ui.button("Find an action ..  Ctrl+K").clicked() {
-            actions.push(ViewAction::ShowPalette(true));
-        }
+        actions.on(&ui.button("Find an action ..  Ctrl+K"), |app| app.view.palette_shown = true);
         ui.separator();
         ui.label("UI scale");
         ui.horizontal(|ui| {
             let scale = context.view.scale;
             for step in [0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0] {
                 let text = format!("{:.0} %", 100.0 * step);
-                if ui.selectable_label((scale - step).abs() < 0.01, text).clicked() {
-                    actions.push(ViewAction::SetScale(step));
-                }
+                actions.on(&ui.selectable_label((scale - step).abs() < 0.01, text), move |app| app.set_scale(step));
             }
         });
         ui.separator();
-        if ui.button("Reset layout").on_hover_text("Restore the default layout of all modes").clicked() {
-            actions.push(ViewAction::ResetLayout);
-        }
+        actions.on(&ui.button("Reset layout").on_hover_text("Restore the default layout of all modes"), |app| {
+            app.view.layouts.clear()
+        });
         let hint = "Full screen: object after object, with large letters and a score";
-        if ui.button("Presenter mode  F11").on_hover_text(hint).clicked() {
-            actions.push(ViewAction::Present(true));
-        }
+        actions.on(&ui.button("Presenter mode  F11").on_hover_text(hint), |app| app.present(true));
     });
     menu.response.on_hover_text("Actions, UI scale, layout");
 }
@@ -117,7 +108,7 @@ fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     for kind in &modes::ALL {
         let chosen = context.view.mode == kind.mode;
         if ui.selectable_label(chosen, kind.title).on_hover_text(kind.about).clicked() && !chosen {
-            actions.push(ViewAction::SetMode(kind.mode));
+            actions.push(|app| app.set_mode(kind.mode));
         }
     }
     ui.spacing_mut().item_spacing.x = 8.0;
@@ -159,14 +150,14 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     for (source, text, about, ink) in sources {
         let text = RichText::new(text).small().color(colour(ink));
-        if ui.selectable_label(context.source == source, text).on_hover_text(about).clicked() {
-            actions.push(ViewAction::Show(source));
-        }
+        actions.on(&ui.selectable_label(context.source == source, text).on_hover_text(about), move |app| {
+            app.view.source = source
+        });
     }
     if context.source == ViewSource::Trial
         && icons::button(ui, Icon::Cross, "Close the trial", "Close the trial and show the live gripper").clicked()
     {
-        actions.push(InspectAction::Close);
+        actions.push(App::close_trial);
     }
 }
 
@@ -205,7 +196,7 @@ pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Acti
     }
     let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
     ui.horizontal_centered(|ui| {
-        if context.source == ViewSource::Trial || shown.looks_back() {
+        if shown.replays() {
             replay_buttons(ui, context, actions);
         } else {
             transport(ui, &status, actions);
@@ -230,38 +221,30 @@ pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Acti
 /// Back to the newest sample.
 fn live_button(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let button = egui::Button::new("Live").fill(accented(context.view.theme));
-    if ui.add(button).on_hover_text("Return to the newest sample (End)").clicked() {
-        actions.push(InspectAction::Seek(Seek::End));
-    }
+    actions.on(&ui.add(button).on_hover_text("Return to the newest sample (End)"), |app| app.seek(Seek::End));
 }
 
 /// Buttons of a stored trial, and of the past of a live gripper.
 fn replay_buttons(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let mut button = |icon: Icon, name: &str, hint: &str, action: InspectAction| {
-        if icons::button(ui, icon, name, hint).clicked() {
-            actions.push(action);
-        }
+    let mut button = |icon: Icon, name: &str, hint: &str, action: fn(&mut App)| {
+        actions.on(&icons::button(ui, icon, name, hint), action);
     };
-    button(Icon::Reset, "To the start", "To the start (Home)", InspectAction::Seek(Seek::Start));
-    button(Icon::StepBack, "Step back", "One sample back (Ctrl+Left)", InspectAction::Seek(Seek::Samples(-1)));
+    button(Icon::Reset, "To the start", "To the start (Home)", |app| app.seek(Seek::Start));
+    button(Icon::StepBack, "Step back", "One sample back (Ctrl+Left)", |app| app.seek(Seek::Samples(-1)));
     if context.playback.playing {
-        button(Icon::Pause, "Pause", "Pause (Space)", InspectAction::TogglePlaying);
+        button(Icon::Pause, "Pause", "Pause (Space)", App::toggle_playing);
     } else {
-        button(Icon::Play, "Play", "Play (Space)", InspectAction::TogglePlaying);
+        button(Icon::Play, "Play", "Play (Space)", App::toggle_playing);
     }
-    button(Icon::Step, "Step", "One sample forward (Ctrl+Right)", InspectAction::Seek(Seek::Samples(1)));
+    button(Icon::Step, "Step", "One sample forward (Ctrl+Right)", |app| app.seek(Seek::Samples(1)));
     let repeated = context.playback.repeated.is_some();
     let hint = "Repeat, between the marks A and B where both are set (L)";
-    if ui.selectable_label(repeated, "Loop").on_hover_text(hint).clicked() {
-        actions.push(InspectAction::ToggleRepeat);
-    }
+    actions.on(&ui.selectable_label(repeated, "Loop").on_hover_text(hint), App::toggle_repeat);
 }
 
 fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
     let mut button = |icon: Icon, name: &str, hint: &str, command: Command| {
-        if icons::button(ui, icon, name, hint).clicked() {
-            actions.push(command);
-        }
+        actions.on(&icons::button(ui, icon, name, hint), |app| app.simulation.send(command));
     };
     button(Icon::Reset, "Reset", "Back to the start (Backspace)", Command::Reset);
     if status.playing {
@@ -275,15 +258,15 @@ fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
 
 /// Speed of the replay or of the simulation.
 fn speeds(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mut Actions) {
-    let replayed = context.source == ViewSource::Trial || context.shown().looks_back();
+    let replayed = context.shown().replays();
     let target = if replayed { context.playback.speed } else { status.target_speed };
     let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(target));
     let shown = combo.show_ui(ui, |ui| {
         for speed in SPEEDS {
             if ui.selectable_label(target == speed, speed_text(speed)).clicked() {
-                actions.push(match replayed {
-                    true => Action::from(InspectAction::SetSpeed(speed)),
-                    false => Command::SetSpeed(speed).into(),
+                actions.push(move |app| match replayed {
+                    true => app.playback().speed = speed,
+                    false => app.simulation.send(Command::SetSpeed(speed)),
                 });
             }
         }
@@ -315,14 +298,14 @@ fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: 
     ] {
         let chosen = status.recording == Some(place);
         if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
-            actions.push(Command::SetRecording(Some(place)));
+            actions.push(move |app| app.simulation.send(Command::SetRecording(Some(place))));
         }
     }
     keep_ui(ui, context, actions);
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
     if number_field(ui, "grasps", drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
-        actions.push(Command::SetGrasps(grasps));
+        actions.push(move |app| app.simulation.send(Command::SetGrasps(grasps)));
     }
 }
 
@@ -341,7 +324,7 @@ fn keep_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if button.on_hover_text(&hint).on_disabled_hover_text(&hint).clicked()
         && let Some(LoggedGrasp { trial, .. }) = waits
     {
-        actions.push(LibraryAction::Keep(trial));
+        actions.push(move |app| app.library.keep(trial));
     }
 }
 

@@ -3,8 +3,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::{InspectAction, Inspected};
 use crate::app::playback::Seek;
+use crate::app::shown::Inspected;
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
@@ -29,7 +29,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         && let Some(pointer) = response.interact_pointer_pos()
     {
         let share = f64::from((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
-        actions.push(InspectAction::Seek(Seek::To(first + share * length)));
+        actions.push(move |app| app.seek(Seek::To(first + share * length)));
     }
     let colours = context.view.theme.colours();
     let painter = ui.painter_at(rect);
@@ -115,7 +115,8 @@ fn grip_ui(
         && let Some(from_s) = dragged
     {
         ui.data_mut(|data| data.remove::<f64>(id));
-        actions.push(InspectAction::MovePhase(span.phase, from_s));
+        let phase = span.phase;
+        actions.push(move |app| app.move_phase(phase, from_s));
     }
     response.on_hover_text(format!("Drag to correct where {name} begins; Ctrl+Z takes it back"));
 }

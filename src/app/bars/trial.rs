@@ -1,7 +1,8 @@
 //! Lower bar while the real gripper is shown: keys of a trial, instruction, and time left.
 
-use crate::app::actions::{Action, Actions};
+use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
+use crate::app::features::App;
 use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
@@ -14,21 +15,17 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let trial = context.gripper.and_then(|gripper| gripper.trial.as_ref());
     let connected = context.gripper.is_some_and(GripperView::is_connected);
     ui.horizontal_centered(|ui| {
-        let mut button = |on: bool, text: &str, about: &str, action: Action| {
-            if ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about).clicked() {
-                actions.push(action);
-            }
+        let mut button = |on: bool, text: &str, about: &str, action: fn(&mut App)| {
+            let button = ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about);
+            actions.on(&button, action);
         };
         let record = if trial.is_some() { "Again  R" } else { "Record  R" };
-        button(
-            connected,
-            record,
-            "Record a grasp; during a trial, discard it and start again (R)",
-            LabellingAction::Record.into(),
-        );
-        let end = GripperCommand::End.into();
-        button(trial.is_some(), "End  Q", "End the trial and keep it (Q)", end);
-        button(trial.is_some(), "Discard  D", "Discard the trial (D)", LabellingAction::Discard.into());
+        let about = "Record a grasp; during a trial, discard it and start again (R)";
+        button(connected, record, about, |app| app.label(LabellingAction::Record));
+        let about = "End the trial and keep it (Q)";
+        button(trial.is_some(), "End  Q", about, |app| _ = app.gripper.send(GripperCommand::End));
+        let about = "Discard the trial (D)";
+        button(trial.is_some(), "Discard  D", about, |app| app.label(LabellingAction::Discard));
         ui.separator();
         let colours = context.view.theme.colours();
         match trial {

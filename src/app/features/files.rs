@@ -1,36 +1,19 @@
 //! Files: opening, dropping and saving, and pictures of the 3-D view.
 
+use super::App;
 use crate::app::export::{ExportRequest, export_job};
-use crate::app::features::simulation::SimulationFeature;
 use crate::app::files::{Answer, Question};
 use crate::app::notices::Notices;
-use palpate_lab::inspection::FigureOptions;
+use palpate_geometry::palette::Theme;
+use palpate_lab::inspection::{FigureOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
 use palpate_sim::scene::Scene;
 use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
-
-/// Action on files. Each opens a file dialog.
-#[derive(Clone, Debug)]
-pub enum FileAction {
-    /// Open an object or a scene.
-    Open,
-    /// Save the scene.
-    SaveScene,
-    /// Save another scene.
-    SaveSceneAs(Box<Scene>),
-    /// Save a picture of the 3-D view.
-    SavePicture,
-    /// Export a figure of the trial that is open and of those compared with it.
-    ExportFigure(FigureOptions),
-    /// Export the figure of a study that is shown.
-    ExportStudyFigure,
-    /// Export the trials selected in the library into one file.
-    ExportTrials,
-}
+use std::sync::Arc;
 
 /// State of files in the window.
-pub(in crate::app) struct FileFeature {
+pub struct FileFeature {
     /// File to ask for.
     question: Option<Question>,
     answer: Option<Answer>,
@@ -60,50 +43,82 @@ impl FileFeature {
         self.answer = Some(answer);
     }
 
-    pub(in crate::app) fn apply(&mut self, action: FileAction, simulation: &SimulationFeature) {
-        self.question = Some(match action {
-            FileAction::Open => Question::Object,
-            FileAction::SaveScene => Question::SaveScene(Box::new(simulation.scene().clone())),
-            FileAction::SaveSceneAs(scene) => Question::SaveScene(scene),
-            // Needs what the window shows: see `export`.
-            FileAction::SavePicture
-            | FileAction::ExportFigure(_)
-            | FileAction::ExportStudyFigure
-            | FileAction::ExportTrials => return,
-        });
+    /// Asks for a file.
+    pub(in crate::app) fn ask(&mut self, question: Question) {
+        self.question = Some(question);
     }
 
     /// Asks where to write this.
     pub(in crate::app) fn export(&mut self, request: ExportRequest) {
-        self.question = Some(Question::Export(Box::new(request)));
+        self.ask(Question::Export(Box::new(request)));
+    }
+}
+
+/// Size of exported figures (points).
+const FIGURE_SIZE: [u32; 2] = [900, 560];
+
+impl App {
+    /// Takes in the answer of the dialog and dropped files since the last frame.
+    pub(super) fn poll_files(&mut self) {
+        if let Some(answer) = self.files.answer.take() {
+            let (Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _)) = &answer;
+            self.files.folder = path.parent().map(Path::to_owned);
+            match answer {
+                Answer::Open(path) => self.open(&path.to_string_lossy()),
+                Answer::SaveScene(path, scene) => save_scene(&path, &scene, &mut self.notices),
+                Answer::Export(path, request) => _ = self.files.exports.start((path, *request)),
+            }
+            self.ctx.request_repaint();
+        }
+        for ended in self.files.exports.take() {
+            match ended.outcome {
+                Ok(_written) => self.notices.info(format!("Saved as {}.", ended.command.0.display())),
+                Err(cause) => self.notices.error(cause.to_string()),
+            }
+        }
+        for file in self.ctx.input(|i| i.raw.dropped_files.clone()) {
+            self.open(&file.path().to_string_lossy());
+        }
     }
 
-    /// Takes in the answer of the dialog and dropped files since the last frame.
-    pub(in crate::app) fn gather(
-        &mut self,
-        ctx: &egui::Context,
-        simulation: &mut SimulationFeature,
-        notices: &mut Notices,
-    ) {
-        if let Some(answer) = self.answer.take() {
-            let (Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _)) = &answer;
-            self.folder = path.parent().map(Path::to_owned);
-            match answer {
-                Answer::Open(path) => simulation.open(&path.to_string_lossy(), notices),
-                Answer::SaveScene(path, scene) => save_scene(&path, &scene, notices),
-                Answer::Export(path, request) => _ = self.exports.start((path, *request)),
-            }
-            ctx.request_repaint();
+    /// Opens an object or a scene.
+    pub fn ask_for_object(&mut self) {
+        self.files.ask(Question::Object);
+    }
+
+    pub(in crate::app) fn save_scene(&mut self) {
+        self.files.ask(Question::SaveScene(Box::new(self.simulation.scene.clone())));
+    }
+
+    /// Exports a figure of the trial that is open and of those compared with it.
+    pub(in crate::app) fn export_figure(&mut self, options: FigureOptions) {
+        let Some(own) = self.inspect.inspected() else {
+            return self.notices.warning("Figures are made of stored trials: open one in Inspect mode.");
+        };
+        let others = own.pinned.iter().map(|pinned| &pinned.trial).filter(|trial| trial.id != own.trial.id);
+        let trials: Vec<&OpenTrial> = std::iter::once(own.trial).chain(others).map(Arc::as_ref).collect();
+        let (align, mean) = (self.inspect.alignment, self.inspect.spread);
+        match comparison_figure(&trials, &FigureOptions { align, mean, ..options }) {
+            Ok(figure) => self.files.export(ExportRequest::Figure(figure, Theme::Light, FIGURE_SIZE)),
+            Err(cause) => self.notices.warning(cause.to_string()),
         }
-        for ended in self.exports.take() {
-            match ended.outcome {
-                Ok(_written) => notices.info(format!("Saved as {}.", ended.command.0.display())),
-                Err(cause) => notices.error(cause.to_string()),
-            }
+    }
+
+    /// Exports the figure of a study that is shown.
+    pub(in crate::app) fn export_study_figure(&mut self) {
+        match self.studies.exported() {
+            Some(linked) => self.files.export(ExportRequest::Figure(linked.figure, Theme::Light, linked.size)),
+            None => self.notices.warning("There is no figure: run the study first."),
         }
-        for file in ctx.input(|i| i.raw.dropped_files.clone()) {
-            simulation.open(&file.path().to_string_lossy(), notices);
+    }
+
+    /// Exports the trials selected in the library into one file.
+    pub(in crate::app) fn export_trials(&mut self) {
+        let ids = self.library.selection.ids();
+        if ids.is_empty() {
+            return self.notices.warning("Select trials in the library first.");
         }
+        self.files.export(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options.clone()));
     }
 }
 

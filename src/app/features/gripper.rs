@@ -1,38 +1,25 @@
 //! The real gripper: its thread and its traces, and the simulation that closes its fingers with it.
 
-use crate::app::features::simulation::SimulationFeature;
-use crate::app::features::view::ViewState;
-use crate::app::notices::Notices;
+use super::App;
 use crate::app::traces::TraceHistory;
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
-use palpate_lab::workers::{Command, GripperCommand, GripperWorker, TrialView};
+use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, TrialView};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
 use palpate_tactile::trial::Control;
-
-/// Action on the real gripper.
-#[derive(Clone)]
-pub enum GripperAction {
-    /// Send a command to the gripper.
-    Send(GripperCommand),
-    /// Connect to the last port, or disconnect.
-    ToggleConnection,
-    /// Set the actuation.
-    SetControl(Control),
-    /// Change to the next actuation.
-    NextControl,
-    /// Detect trials from the movement of the fingers, or stop that.
-    ToggleWatch,
-}
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// State of the real gripper in the window.
-pub(in crate::app) struct GripperFeature {
-    worker: GripperWorker,
-    traces: TraceHistory,
+pub struct GripperFeature {
+    pub(super) worker: GripperWorker,
+    /// Its newest state, as of this frame.
+    pub(in crate::app) view: Option<Arc<GripperView>>,
+    pub(in crate::app) traces: TraceHistory,
     connected: bool,
     /// Part of the trial at the last look.
     part: Option<GraspStage>,
@@ -47,124 +34,122 @@ pub(in crate::app) struct GripperFeature {
 impl GripperFeature {
     /// `scene` is the one that the worker was started with.
     pub(in crate::app) fn new(worker: GripperWorker, scene: Scene) -> Self {
-        let traces = TraceHistory::default();
-        Self { worker, traces, connected: false, part: None, before_following: None, scene, before_adapting: None }
-    }
-
-    pub(in crate::app) fn worker(&self) -> &GripperWorker {
-        &self.worker
-    }
-
-    pub(in crate::app) fn traces(&self) -> &TraceHistory {
-        &self.traces
-    }
-
-    /// Keeps the last trial in the plots, while rows after it are only watched.
-    pub(in crate::app) fn keep_trial_in_sight(&mut self, kept: bool) {
-        self.traces.hold_grasp(kept);
-    }
-
-    /// Takes in rows and notices since the last frame, and lets the simulation follow.
-    pub(in crate::app) fn gather(
-        &mut self,
-        simulation: &mut SimulationFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
-        if self.scene != *simulation.scene() {
-            self.scene = simulation.scene().clone();
-            self.worker.send(GripperCommand::SetScene(Box::new(self.scene.clone())));
-        }
-        if self.worker.take_rows_lost() {
-            self.traces.clear();
-        }
-        for row in self.worker.rows() {
-            self.traces.push(&row);
-        }
-        self.worker.notices().for_each(|notice| notices.show(notice));
-        let Some(gripper) = self.worker.view() else { return };
-        if self.connected != gripper.is_connected() {
-            self.connected = gripper.is_connected();
-            view.source = if self.connected { ViewSource::Gripper } else { ViewSource::Simulation };
-            self.hand_over(simulation, notices);
-        }
-        self.show_empty(gripper.trial.as_ref().is_some_and(|trial| trial.adapting), simulation);
-        let part = gripper.trial.as_ref().map(|trial| trial.stage);
-        if self.part != part {
-            self.part = part;
-            if part == Some(GraspStage::Phase(Phase::Close)) {
-                // The simulated fingers lie over the real ones.
-                for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {
-                    simulation.send(command, notices);
-                }
-            }
+        Self {
+            worker,
+            view: None,
+            traces: TraceHistory::default(),
+            connected: false,
+            part: None,
+            before_following: None,
+            scene,
+            before_adapting: None,
         }
     }
 
-    pub(in crate::app) fn apply(&mut self, action: GripperAction, view: &mut ViewState, notices: &mut Notices) {
-        match action {
-            GripperAction::Send(command) => {
-                if let GripperCommand::Connect(Some(port)) = &command {
-                    view.port = Some(port.clone());
-                }
-                self.worker.send(command);
-            }
-            GripperAction::ToggleConnection => {
-                self.worker.send(match self.connected {
-                    true => GripperCommand::Disconnect,
-                    false => GripperCommand::Connect(view.port.clone()),
-                });
-            }
-            GripperAction::SetControl(control) => view.control = control,
-            GripperAction::NextControl => {
-                let now = CONTROLS.iter().position(|control| *control == view.control).unwrap_or(0);
-                view.control = CONTROLS[(now + 1) % CONTROLS.len()];
-                notices.info(format!("Actuation: {}.", control_title(view.control)));
-            }
-            GripperAction::ToggleWatch => {
-                let watching = self.worker.view().is_some_and(|gripper| gripper.watching.is_some());
-                let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
-                self.worker.send(GripperCommand::Watch((!watching).then_some(request)));
-                let state = if watching { "press R to record" } else { "detected automatically" };
-                notices.info(format!("Trials: {state}."));
-            }
-        }
-    }
-
-    /// Shows the empty hand while a close to adapt to is recorded, and then the scene from before.
-    fn show_empty(&mut self, adapting: bool, simulation: &mut SimulationFeature) {
-        match (adapting, self.before_adapting.take()) {
-            (true, None) => {
-                self.before_adapting = Some(simulation.scene().clone());
-                simulation.use_scene(simulation.scene_with(EMPTY));
-            }
-            (true, before) => self.before_adapting = before,
-            (false, Some(before)) => simulation.use_scene(before),
-            (false, None) => {}
-        }
+    /// Sends a command to the gripper; returns its number.
+    pub fn send(&self, command: GripperCommand) -> u64 {
+        self.worker.send(command)
     }
 
     /// Vents the fingers, where a board is connected.
-    pub(in crate::app) fn stop(&self) {
+    pub(super) fn stop(&self) {
         if self.connected {
             self.worker.send(GripperCommand::Vent);
         }
     }
+}
+
+impl App {
+    /// Takes in rows and notices since the last frame, and lets the simulation follow.
+    pub(super) fn poll_gripper(&mut self) {
+        let Self { gripper, simulation, notices, .. } = self;
+        if gripper.scene != simulation.scene {
+            gripper.scene = simulation.scene.clone();
+            gripper.worker.send(GripperCommand::SetScene(Box::new(gripper.scene.clone())));
+        }
+        if gripper.worker.take_rows_lost() {
+            gripper.traces.clear();
+        }
+        for row in gripper.worker.rows() {
+            gripper.traces.push(&row);
+        }
+        gripper.worker.notices().for_each(|notice| notices.show(notice));
+        gripper.view = gripper.worker.view();
+        let Some(now) = gripper.view.clone() else { return };
+        if gripper.connected != now.is_connected() {
+            gripper.connected = now.is_connected();
+            self.view.source = if now.is_connected() { ViewSource::Gripper } else { ViewSource::Simulation };
+            self.hand_over();
+        }
+        self.show_empty(now.trial.as_ref().is_some_and(|trial| trial.adapting));
+        let part = now.trial.as_ref().map(|trial| trial.stage);
+        let begins = std::mem::replace(&mut self.gripper.part, part) != part;
+        if begins && part == Some(GraspStage::Phase(Phase::Close)) {
+            // The simulated fingers lie over the real ones.
+            for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {
+                self.simulation.send(command);
+            }
+        }
+    }
+
+    /// Connects to a port; without one, to the first gripper that is found.
+    pub fn connect(&mut self, port: Option<PathBuf>) {
+        if port.is_some() {
+            self.view.port.clone_from(&port);
+        }
+        self.gripper.send(GripperCommand::Connect(port));
+    }
+
+    /// Connects to the last port, or disconnects.
+    pub(in crate::app) fn toggle_connection(&mut self) {
+        self.gripper.send(match self.gripper.connected {
+            true => GripperCommand::Disconnect,
+            false => GripperCommand::Connect(self.view.port.clone()),
+        });
+    }
+
+    /// Changes to the next actuation.
+    pub(in crate::app) fn next_control(&mut self) {
+        let now = CONTROLS.iter().position(|control| *control == self.view.control).unwrap_or(0);
+        self.view.control = CONTROLS[(now + 1) % CONTROLS.len()];
+        self.notices.info(format!("Actuation: {}.", control_title(self.view.control)));
+    }
+
+    /// Detects trials from the movement of the fingers, or stops that.
+    pub(in crate::app) fn toggle_watch(&mut self) {
+        let watching = self.gripper_view().is_some_and(|gripper| gripper.watching.is_some());
+        let request = TrialRequest { object: None, length_s: None, control: Control::Free, adds: false };
+        self.gripper.send(GripperCommand::Watch((!watching).then_some(request)));
+        let state = if watching { "press R to record" } else { "detected automatically" };
+        self.notices.info(format!("Trials: {state}."));
+    }
+
+    /// Shows the empty hand while a close to adapt to is recorded, and then the scene from before.
+    fn show_empty(&mut self, adapting: bool) {
+        match (adapting, self.gripper.before_adapting.take()) {
+            (true, None) => {
+                self.gripper.before_adapting = Some(self.simulation.scene.clone());
+                self.simulation.use_scene(self.simulation.scene_with(EMPTY));
+            }
+            (true, before) => self.gripper.before_adapting = before,
+            (false, Some(before)) => self.simulation.use_scene(before),
+            (false, None) => {}
+        }
+    }
 
     /// While a gripper is connected, the simulation waits for it and stores nothing.
-    fn hand_over(&mut self, simulation: &mut SimulationFeature, notices: &mut Notices) {
-        let commands = if self.connected {
-            let snapshot = simulation.worker().snapshot();
-            let status = snapshot.map(|snapshot| snapshot.status.clone()).unwrap_or_default();
-            self.before_following = Some((status.recording, status.grasps));
+    fn hand_over(&mut self) {
+        let commands = if self.gripper.connected {
+            let status = self.snapshot().map(|snapshot| snapshot.status.clone()).unwrap_or_default();
+            self.gripper.before_following = Some((status.recording, status.grasps));
             vec![Command::SetRecording(None), Command::SetGrasps(1), Command::Reset, Command::Pause]
         } else {
-            let before = self.before_following.take();
+            let before = self.gripper.before_following.take();
             before.map_or_else(Vec::new, |(recording, grasps)| {
                 vec![Command::SetRecording(recording), Command::SetGrasps(grasps.max(1))]
             })
         };
-        commands.into_iter().for_each(|command| simulation.send(command, notices));
+        commands.into_iter().for_each(|command| self.simulation.send(command));
     }
 }
 

@@ -1,13 +1,14 @@
 //! Inspection: the stored trial that is open, trials beside it for comparison, and the time that is shown.
 
-use crate::app::features::view::ViewState;
+use super::App;
+use super::view::ViewState;
 use crate::app::modes::mode::Mode;
-use crate::app::notices::Notices;
 use crate::app::playback::{Playback, Seek};
+use crate::app::shown::{ComparedTrace, Inspected, Pinned};
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, Keep, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
-use palpate_lab::workers::{Job, LabelView, OpenRequest};
+use palpate_lab::workers::{Command, Job, OpenRequest};
 use palpate_learn::Models;
 use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::{TrialId, TrialSource};
@@ -16,74 +17,6 @@ use std::sync::Arc;
 
 /// Most trials compared at once: more curves cannot be told apart, and their memory stays bounded.
 pub(in crate::app) const MOST_PINNED: usize = 60;
-
-/// Action on stored trials in Inspect mode.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum InspectAction {
-    /// Open a stored trial in Inspect mode.
-    Open(TrialId),
-    /// Open a stored trial in the present mode.
-    Show(TrialId),
-    /// Close the trial; the live gripper is shown again.
-    Close,
-    /// Compare a trial with the one that is shown, or no longer.
-    Pin(TrialId),
-    /// No longer compare a trial.
-    Unpin(TrialId),
-    /// No longer compare any trial.
-    UnpinAll,
-    /// Move the cursor.
-    Seek(Seek),
-    /// Play or pause.
-    TogglePlaying,
-    /// Set the speed, as a multiple of real time.
-    SetSpeed(f64),
-    /// Change to the next faster or slower speed.
-    ChangeSpeed(isize),
-    /// Repeat the part between the marks, or stop that.
-    ToggleRepeat,
-    /// Put mark A (0) or B (1) at the cursor; there already, it is taken away.
-    PutMark(usize),
-    /// Correct the beginning of a phase of the open trial (s).
-    MovePhase(TouchPhase, f64),
-    /// Origin of time of compared trials.
-    Align(Alignment),
-    /// Show mean and spread of each class in place of each compared trial.
-    ShowSpread(bool),
-}
-
-/// A trial beside the one that is shown.
-#[derive(Clone, Debug)]
-pub struct Pinned {
-    /// The trial.
-    pub trial: Arc<OpenTrial>,
-    /// Number of its colour.
-    pub colour: usize,
-}
-
-/// A curve bundle that plots draw beside the one shown: a pinned trial, or the mean of a class.
-#[derive(Clone, Debug)]
-pub struct ComparedTrace {
-    /// Name: `Tomato, trial 12`, or `Tomato, mean of 5`.
-    pub name: String,
-    /// Number of its colour.
-    pub colour: usize,
-    /// Values in the columns of the trace shown, on its time.
-    pub trace: GraspTrace,
-    /// Standard deviation of each column; empty for a single trial.
-    pub spread: Vec<Vec<f32>>,
-}
-
-/// The open trial, the time shown, and trials compared with it.
-#[derive(Clone, Copy)]
-pub struct Inspected<'a> {
-    /// The trial.
-    pub trial: &'a Arc<OpenTrial>,
-    /// Time that is shown (s).
-    pub cursor_s: f64,
-    /// Trials to compare with.
-    pub pinned: &'a [Pinned],
-}
 
 /// Which comparison was built last.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -96,26 +29,30 @@ struct ComparisonKey {
 }
 
 /// State of inspection in the window.
-pub(in crate::app) struct InspectFeature {
+pub struct InspectFeature {
     opener: Job<OpenRequest, OpenTrial>,
     /// Trial that was asked for last.
     wanted: Option<TrialId>,
     open: Option<Arc<OpenTrial>>,
-    history: TraceHistory,
-    pinned: Vec<Pinned>,
+    pub(super) history: TraceHistory,
+    pub(super) pinned: Vec<Pinned>,
     /// Trials that are being opened to be compared.
     awaited: Vec<TrialId>,
     /// Rises with each change of the pinned trials.
     revision: u64,
     key: ComparisonKey,
-    compared: Vec<ComparedTrace>,
-    alignment: Alignment,
-    spread: bool,
+    pub(super) compared: Vec<ComparedTrace>,
+    /// Origin of time of compared trials.
+    pub(in crate::app) alignment: Alignment,
+    /// Mean and spread of each class in place of each compared trial.
+    pub spread: bool,
+    /// Phases of the grasp that is shown.
+    pub(super) phases: Vec<PhaseSpan>,
     /// Cursor in the stored trial, and in the past of the live gripper.
     stored: Playback,
     live: Playback,
     /// How trials are opened, with the models in use.
-    options: OpenOptions,
+    pub(super) options: OpenOptions,
     /// Source that was shown before the trial.
     before: ViewSource,
     /// Number of the simulation's grasp at the last look.
@@ -138,6 +75,7 @@ impl InspectFeature {
             compared: Vec::new(),
             alignment: Alignment::default(),
             spread: false,
+            phases: Vec::new(),
             stored: Playback::default(),
             live: Playback::default(),
             options,
@@ -147,31 +85,9 @@ impl InspectFeature {
         }
     }
 
-    /// How trials are opened, with the models in use.
-    pub(in crate::app) fn options(&self) -> &OpenOptions {
-        &self.options
-    }
-
     /// True while a trial is being opened.
     pub(in crate::app) fn is_opening(&self) -> bool {
         self.wanted.is_some() && self.open.as_ref().map(|open| open.id) != self.wanted
-    }
-
-    /// Traces of the open trial.
-    pub(in crate::app) fn history(&self) -> &TraceHistory {
-        &self.history
-    }
-
-    pub(in crate::app) fn compared(&self) -> &[ComparedTrace] {
-        &self.compared
-    }
-
-    pub(in crate::app) fn alignment(&self) -> Alignment {
-        self.alignment
-    }
-
-    pub(in crate::app) fn shows_spread(&self) -> bool {
-        self.spread
     }
 
     /// Cursor on the data that are shown.
@@ -189,10 +105,6 @@ impl InspectFeature {
         Some(Inspected { trial, cursor_s, pinned: &self.pinned })
     }
 
-    pub(in crate::app) fn pinned(&self) -> &[Pinned] {
-        &self.pinned
-    }
-
     /// Reads trials by these models from now on.
     pub(in crate::app) fn set_models(&mut self, models: Models) {
         self.options.models = models;
@@ -202,34 +114,6 @@ impl InspectFeature {
     /// The live gripper begins something new: its newest sample is shown again.
     fn follow_live(&mut self) {
         self.live = Playback { cursor_s: None, playing: false, repeated: None, marks: [None; 2], ..self.live.clone() };
-    }
-
-    /// Takes in opened trials, and moves the cursor. `grasp` is the number of the simulation's grasp.
-    pub(in crate::app) fn gather(&mut self, grasp: u64, view: &mut ViewState, notices: &mut Notices) {
-        if std::mem::replace(&mut self.grasp, grasp) != grasp && view.source == ViewSource::Simulation {
-            self.follow_live();
-        }
-        if self.options.sensors != view.sensors {
-            self.options.sensors = view.sensors.clone();
-            self.open_again();
-        }
-        for ended in self.opener.take() {
-            let (id, scenery) = (ended.command.id, ended.command.options.keep == Keep::Scenery);
-            match ended.outcome {
-                Ok(trial) if scenery => self.take_open(trial),
-                Ok(trial) => self.take_pinned(trial),
-                Err(cause) => {
-                    self.awaited.retain(|awaited| *awaited != id);
-                    if self.wanted == Some(id) && scenery {
-                        self.wanted = self.open.as_ref().map(|open| open.id);
-                        if self.open.is_none() {
-                            self.show_live(view);
-                        }
-                    }
-                    notices.error(format!("Trial {id} cannot be opened: {cause}"));
-                }
-            }
-        }
     }
 
     /// Moves the cursor with time, within the samples shown.
@@ -289,114 +173,39 @@ impl InspectFeature {
         self.opener.start(OpenRequest { id, options: OpenOptions { keep, ..self.options.clone() } });
     }
 
-    /// Applies an action; returns the change of a stored trial that follows from it.
-    pub(in crate::app) fn apply(
-        &mut self,
-        action: InspectAction,
-        times: &[f64],
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) -> Option<(TrialId, TrialEdit)> {
-        let source = view.source;
-        let live = source != ViewSource::Trial;
-        let span = [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0));
-        let playback = if live { &mut self.live } else { &mut self.stored };
-        match action {
-            InspectAction::Open(id) => {
-                view.mode = Mode::Inspect;
-                self.show(id, view);
-            }
-            InspectAction::Show(id) => self.show(id, view),
-            InspectAction::Close => {
-                self.wanted = None;
-                self.open = None;
-                self.history.clear();
-                self.revision += 1;
-                self.show_live(view);
-            }
-            InspectAction::Pin(id) => self.pin(id, notices),
-            InspectAction::Unpin(id) => {
-                self.pinned.retain(|pinned| pinned.trial.id != id);
-                self.awaited.retain(|awaited| *awaited != id);
-                self.revision += 1;
-            }
-            InspectAction::UnpinAll => {
-                self.pinned.clear();
-                self.awaited.clear();
-                self.revision += 1;
-            }
-            InspectAction::Seek(to) => playback.seek(to, times, live),
-            InspectAction::TogglePlaying => playback.toggle(span),
-            InspectAction::SetSpeed(speed) => playback.speed = speed,
-            InspectAction::ChangeSpeed(by) => playback.change_speed(by),
-            InspectAction::ToggleRepeat => playback.toggle_repeat(span),
-            InspectAction::PutMark(which) => {
-                let at = playback.cursor_s.unwrap_or(span[1]);
-                if let Some(mark) = playback.marks.get_mut(which) {
-                    *mark = if *mark == Some(at) { None } else { Some(at) };
-                }
-            }
-            InspectAction::MovePhase(phase, from_s) => {
-                if let Some(trial) = &self.open {
-                    return Some((trial.id, TrialEdit::Phases(Some(trial.with_phase_at(phase, from_s)))));
-                }
-            }
-            InspectAction::Align(alignment) => self.alignment = alignment,
-            InspectAction::ShowSpread(spread) => self.spread = spread,
-        }
-        None
-    }
-
-    /// Labels or phases in the store have changed: those of trials that were not simulated are read again.
-    pub(in crate::app) fn labels_changed(&mut self, labels: &LabelView) {
-        let kept = |id: TrialId| labels.trial(id).is_none_or(|trial| !trial.discarded);
-        if self.open.as_ref().is_some_and(|open| open.source != TrialSource::Simulated && kept(open.id)) {
-            self.open_again();
-        }
-    }
-
-    /// Shows the open trial in Inspect mode, and the live gripper in the others.
-    pub(in crate::app) fn enter_mode(&mut self, mode: Mode, view: &mut ViewState) {
-        match (mode, self.wanted) {
-            (Mode::Inspect, Some(id)) => self.show(id, view),
-            (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => self.show_live(view),
-        }
-    }
-
     fn show_live(&self, view: &mut ViewState) {
         if view.source == ViewSource::Trial {
             view.source = self.before;
         }
     }
 
-    fn show(&mut self, id: TrialId, view: &mut ViewState) {
-        if view.source != ViewSource::Trial {
-            self.before = view.source;
-        }
-        view.source = ViewSource::Trial;
-        view.time_window = None;
-        if self.wanted == Some(id) && self.open.is_some() {
-            return;
-        }
-        self.wanted = Some(id);
-        self.ask(id, Keep::Scenery);
+    /// Closes the trial.
+    fn close(&mut self) {
+        self.wanted = None;
+        self.open = None;
+        self.history.clear();
+        self.revision += 1;
     }
 
-    fn pin(&mut self, id: TrialId, notices: &mut Notices) {
-        if self.pinned.iter().any(|pinned| pinned.trial.id == id) || self.awaited.contains(&id) {
-            return;
-        }
-        if self.pinned.len() + self.awaited.len() >= MOST_PINNED {
-            return notices.warning(format!("At most {MOST_PINNED} trials are compared at once."));
-        }
-        self.awaited.push(id);
-        self.ask(id, Keep::Channels);
+    /// No longer compares a trial.
+    pub(in crate::app) fn unpin(&mut self, id: TrialId) {
+        self.pinned.retain(|pinned| pinned.trial.id != id);
+        self.awaited.retain(|awaited| *awaited != id);
+        self.revision += 1;
     }
 
-    /// Builds the curves of compared trials again where something has changed. `names` are the columns of the trace that is
-    /// shown, `phases` its phases.
-    pub(in crate::app) fn compare(&mut self, names: Vec<String>, phases: &[PhaseSpan]) {
-        let origin_s = self.alignment.origin_of(phases).unwrap_or(0.0);
+    /// No longer compares any trial.
+    pub(in crate::app) fn unpin_all(&mut self) {
+        self.pinned.clear();
+        self.awaited.clear();
+        self.revision += 1;
+    }
+
+    /// Takes in the phases of what is shown, and builds the curves of compared trials again where something has changed.
+    /// `names` are the columns of the trace that is shown.
+    pub(super) fn compare(&mut self, names: Vec<String>, phases: Vec<PhaseSpan>) {
+        let origin_s = self.alignment.origin_of(&phases).unwrap_or(0.0);
+        self.phases = phases;
         let key =
             ComparisonKey { names, origin_s, alignment: self.alignment, spread: self.spread, revision: self.revision };
         if key == self.key {
@@ -450,6 +259,154 @@ impl InspectFeature {
         };
         classes.into_iter().enumerate().filter_map(compared).collect()
     }
+}
+
+impl App {
+    /// Takes in opened trials.
+    pub(super) fn poll_inspection(&mut self) {
+        let grasp = self.snapshot().map_or(0, |snapshot| snapshot.grasp);
+        let Self { inspect, view, .. } = self;
+        if std::mem::replace(&mut inspect.grasp, grasp) != grasp && view.source == ViewSource::Simulation {
+            inspect.follow_live();
+        }
+        if inspect.options.sensors != view.sensors {
+            inspect.options.sensors = view.sensors.clone();
+            inspect.open_again();
+        }
+        for ended in inspect.opener.take() {
+            let (id, scenery) = (ended.command.id, ended.command.options.keep == Keep::Scenery);
+            match ended.outcome {
+                Ok(trial) if scenery => inspect.take_open(trial),
+                Ok(trial) => inspect.take_pinned(trial),
+                Err(cause) => {
+                    inspect.awaited.retain(|awaited| *awaited != id);
+                    if inspect.wanted == Some(id) && scenery {
+                        inspect.wanted = inspect.open.as_ref().map(|open| open.id);
+                        if inspect.open.is_none() {
+                            inspect.show_live(view);
+                        }
+                    }
+                    self.notices.error(format!("Trial {id} cannot be opened: {cause}"));
+                }
+            }
+        }
+    }
+
+    /// Opens a stored trial in Inspect mode.
+    pub fn open_trial(&mut self, id: TrialId) {
+        self.view.mode = Mode::Inspect;
+        self.show_trial(id);
+    }
+
+    /// Opens a stored trial in the present mode.
+    pub(super) fn show_trial(&mut self, id: TrialId) {
+        let Self { inspect, view, .. } = self;
+        if view.source != ViewSource::Trial {
+            inspect.before = view.source;
+        }
+        view.source = ViewSource::Trial;
+        view.time_window = None;
+        if inspect.wanted == Some(id) && inspect.open.is_some() {
+            return;
+        }
+        inspect.wanted = Some(id);
+        inspect.ask(id, Keep::Scenery);
+    }
+
+    /// Closes the trial; the live gripper is shown again.
+    pub(in crate::app) fn close_trial(&mut self) {
+        self.inspect.close();
+        self.inspect.show_live(&mut self.view);
+    }
+
+    /// Shows the open trial in Inspect mode, and the live gripper in the others.
+    pub(super) fn enter_mode(&mut self, mode: Mode) {
+        match (mode, self.inspect.wanted) {
+            (Mode::Inspect, Some(id)) => self.show_trial(id),
+            (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => {
+                self.inspect.show_live(&mut self.view);
+            }
+        }
+    }
+
+    /// Labels or phases in the store have changed: those of trials that were not simulated are read again.
+    pub(super) fn labels_changed(&mut self) {
+        let kept = |id: TrialId| self.labels().and_then(|view| view.trial(id)).is_none_or(|trial| !trial.discarded);
+        let open = self.inspect.open.as_ref();
+        if open.is_some_and(|open| open.source != TrialSource::Simulated && kept(open.id)) {
+            self.inspect.open_again();
+        }
+    }
+
+    /// Compares a trial with the one that is shown.
+    pub fn pin(&mut self, id: TrialId) {
+        let InspectFeature { pinned, awaited, .. } = &mut self.inspect;
+        if pinned.iter().any(|pinned| pinned.trial.id == id) || awaited.contains(&id) {
+            return;
+        }
+        if pinned.len() + awaited.len() >= MOST_PINNED {
+            return self.notices.warning(format!("At most {MOST_PINNED} trials are compared at once."));
+        }
+        awaited.push(id);
+        self.inspect.ask(id, Keep::Channels);
+    }
+
+    /// Corrects the beginning of a phase of the open trial (s).
+    pub(in crate::app) fn move_phase(&mut self, phase: TouchPhase, from_s: f64) {
+        if let Some(trial) = &self.inspect.open {
+            self.library.edit_one(trial.id, TrialEdit::Phases(Some(trial.with_phase_at(phase, from_s))));
+        }
+    }
+
+    /// Moves the cursor. Looking back pauses the simulation.
+    pub fn seek(&mut self, to: Seek) {
+        if self.view.source == ViewSource::Simulation {
+            self.simulation.send(Command::Pause);
+        }
+        let live = self.view.source != ViewSource::Trial;
+        let times = self.times();
+        self.playback().seek(to, &times, live);
+    }
+
+    /// Plays or pauses.
+    pub(in crate::app) fn toggle_playing(&mut self) {
+        let span = span_of(&self.times());
+        self.playback().toggle(span);
+    }
+
+    /// Repeats the part between the marks, or stops that.
+    pub(in crate::app) fn toggle_repeat(&mut self) {
+        let span = span_of(&self.times());
+        self.playback().toggle_repeat(span);
+    }
+
+    /// Puts mark A (0) or B (1) at the cursor; there already, it is taken away.
+    pub(in crate::app) fn put_mark(&mut self, which: usize) {
+        let [_, last] = span_of(&self.times());
+        let playback = self.playback();
+        let at = playback.cursor_s.unwrap_or(last);
+        if let Some(mark) = playback.marks.get_mut(which) {
+            *mark = if *mark == Some(at) { None } else { Some(at) };
+        }
+    }
+
+    /// Cursor on the data that are shown.
+    pub(in crate::app) fn playback(&mut self) -> &mut Playback {
+        match self.view.source {
+            ViewSource::Trial => &mut self.inspect.stored,
+            ViewSource::Simulation | ViewSource::Gripper => &mut self.inspect.live,
+        }
+    }
+
+    /// Times of the samples that are shown (s).
+    fn times(&self) -> Vec<f64> {
+        self.traces().current().map(|trace| trace.t.clone()).unwrap_or_default()
+    }
+}
+
+/// First and last of some times (s).
+fn span_of(times: &[f64]) -> [f64; 2] {
+    [times.first(), times.last()].map(|t| t.copied().unwrap_or(0.0))
 }
 
 /// Trace of an open trial.

@@ -1,137 +1,116 @@
 //! Labelling in the window: hands actions to the [`LabellingSession`] and carries out its effects.
 
-use crate::app::features::gripper::GripperFeature;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::simulation::SimulationFeature;
-use crate::app::features::view::ViewState;
+use super::App;
 use crate::app::modes::mode::Mode;
-use crate::app::notices::Notices;
 use palpate_lab::workers::{
-    Command, GripperCommand, GripperView, LabelCommand, LabelView, LabelWorker, LabellingAction, LabellingEffect,
-    LabellingSession, SessionContext, TrialInSight,
+    Command, GripperCommand, LabelCommand, LabelView, LabelWorker, LabellingAction, LabellingEffect, LabellingSession,
+    SessionContext, TrialInSight,
 };
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// State of labelling in the window.
 pub(in crate::app) struct LabellingFeature {
-    labels: LabelWorker,
-    session: LabellingSession,
+    worker: LabelWorker,
+    /// Labels, plan and journal, as of this frame.
+    pub(in crate::app) labels: Option<Arc<LabelView>>,
+    pub(in crate::app) session: LabellingSession,
+    /// The model's prediction is hidden.
+    pub(in crate::app) blind: bool,
     /// Stored trial that is shown because the card asks about it.
     shown: Option<TrialId>,
 }
 
 impl LabellingFeature {
-    pub(in crate::app) fn new(labels: LabelWorker, store: PathBuf) -> Self {
-        labels.send(LabelCommand::Refresh);
-        Self { labels, session: LabellingSession::new(store), shown: None }
-    }
-
-    pub(in crate::app) fn worker(&self) -> &LabelWorker {
-        &self.labels
-    }
-
-    pub(in crate::app) fn session(&self) -> &LabellingSession {
-        &self.session
+    pub(in crate::app) fn new(worker: LabelWorker, store: PathBuf) -> Self {
+        worker.send(LabelCommand::Refresh);
+        Self { worker, labels: None, session: LabellingSession::new(store), blind: false, shown: None }
     }
 
     /// Reads the store again.
-    pub(in crate::app) fn refresh(&self) {
-        self.labels.send(LabelCommand::Refresh);
+    pub(super) fn refresh(&self) {
+        self.worker.send(LabelCommand::Refresh);
     }
+}
 
-    /// True while the model's prediction is hidden.
-    pub(in crate::app) fn hides_prediction(
-        &self,
-        gripper: Option<&GripperView>,
-        labels: Option<&LabelView>,
-        view: &ViewState,
-    ) -> bool {
-        self.session.hides_prediction(&context(&self.labels, gripper, labels, view))
-    }
-
-    /// Updates the session with gripper and labels. Returns how the stored trial that the card asks about comes into sight.
-    pub(in crate::app) fn gather(
-        &mut self,
-        gripper: &mut GripperFeature,
-        simulation: &mut SimulationFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) -> Option<InspectAction> {
-        let (seen, labels) = (gripper.worker().view(), self.labels.view());
-        let now = context(&self.labels, seen.as_deref(), labels.as_deref(), view);
-        let effects = self.session.observe(&now);
-        let next = self.session.next_known_object(&now);
-        let in_sight = self.session.in_sight(&now);
-        gripper.keep_trial_in_sight(in_sight == TrialInSight::Last);
-        self.carry_out(effects, gripper, view, notices);
-        self.labels.notices().for_each(|notice| notices.show(notice));
+impl App {
+    /// Updates the session with gripper and labels, and shows the stored trial that its card asks about.
+    pub(super) fn poll_labelling(&mut self) {
+        let before = std::mem::replace(&mut self.labelling.labels, self.labelling.worker.view());
+        let (effects, next, in_sight, blind) = self.in_session(|session, now| {
+            let effects = session.observe(now);
+            (effects, session.next_known_object(now), session.in_sight(now), session.hides_prediction(now))
+        });
+        self.labelling.blind = blind;
+        // The last trial stays in the plots, while rows after it are only watched.
+        self.gripper.traces.hold_grasp(in_sight == TrialInSight::Last);
+        self.carry_out(effects);
+        let Self { labelling, notices, .. } = self;
+        labelling.worker.notices().for_each(|notice| notices.show(notice));
         // The simulation shows the next object of the plan.
-        if let Some(next) = next.filter(|name| *name != simulation.scene().object.source) {
-            simulation.open(&next, notices);
-            simulation.send(Command::Pause, notices);
+        if let Some(next) = next.filter(|name| *name != self.simulation.scene.object.source) {
+            self.open(&next);
+            self.simulation.send(Command::Pause);
+        }
+        if before.as_ref().map(Arc::as_ptr) != self.labelling.labels.as_ref().map(Arc::as_ptr) {
+            self.labels_changed();
         }
         let stored = match in_sight {
             TrialInSight::Stored(id) => Some(id),
             TrialInSight::Live | TrialInSight::Last => None,
         };
-        if std::mem::replace(&mut self.shown, stored) == stored {
-            return None;
+        match (std::mem::replace(&mut self.labelling.shown, stored) == stored, stored) {
+            (true, _) => {}
+            (false, Some(id)) => self.show_trial(id),
+            // Inspect mode shows the open trial again.
+            (false, None) if self.view.mode != Mode::Inspect => self.close_trial(),
+            (false, None) => {}
         }
-        // Inspect mode shows the open trial again.
-        let closes = || (view.mode != Mode::Inspect).then_some(InspectAction::Close);
-        stored.map(InspectAction::Show).or_else(closes)
     }
 
-    pub(in crate::app) fn apply(
-        &mut self,
-        action: LabellingAction,
-        gripper: &GripperFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
-        let (seen, labels) = (gripper.worker().view(), self.labels.view());
-        let now = context(&self.labels, seen.as_deref(), labels.as_deref(), view);
-        let effects = self.session.apply(action, &now);
-        self.carry_out(effects, gripper, view, notices);
+    /// Does something in the labelling session.
+    pub fn label(&mut self, action: LabellingAction) {
+        if matches!(action, LabellingAction::FocusSearch(_)) {
+            self.show_panel("label");
+        }
+        let effects = self.in_session(|session, now| session.apply(action, now));
+        self.carry_out(effects);
     }
 
-    fn carry_out(
-        &mut self,
-        effects: Vec<LabellingEffect>,
-        gripper: &GripperFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
+    /// Changes labels or plan.
+    pub fn edit_labels(&mut self, command: LabelCommand) {
+        self.label(LabellingAction::Edit(command));
+    }
+
+    /// Lets the session look at gripper and labels as they are now.
+    fn in_session<R>(&mut self, act: impl FnOnce(&mut LabellingSession, &SessionContext<'_>) -> R) -> R {
+        // Read first: labels that come meanwhile show the outcome of no fewer commands.
+        let settled = self.labelling.worker.is_settled();
+        let (gripper, labels) = (self.gripper.worker.view(), self.labelling.worker.view());
+        let now = SessionContext {
+            gripper: gripper.as_deref(),
+            labels: labels.as_deref(),
+            settled,
+            labelling: self.view.mode == Mode::Label,
+            blind: self.view.blind,
+            control: self.view.control,
+        };
+        act(&mut self.labelling.session, &now)
+    }
+
+    fn carry_out(&mut self, effects: Vec<LabellingEffect>) {
         for effect in effects {
             match effect {
-                LabellingEffect::Edit(command) => _ = self.labels.send(command),
+                LabellingEffect::Edit(command) => _ = self.labelling.worker.send(command),
                 LabellingEffect::BeginTrial(request) => {
-                    let number = gripper.worker().send(GripperCommand::Begin(request));
-                    self.session.trial_requested(number);
+                    let number = self.gripper.send(GripperCommand::Begin(request));
+                    self.labelling.session.trial_requested(number);
                 }
-                LabellingEffect::DiscardRunning => {
-                    gripper.worker().send(GripperCommand::Discard);
-                }
-                LabellingEffect::SetBlind(blind) => view.blind = blind,
-                LabellingEffect::Inform(text) => notices.info(text),
+                LabellingEffect::DiscardRunning => _ = self.gripper.send(GripperCommand::Discard),
+                LabellingEffect::SetBlind(blind) => self.view.blind = blind,
+                LabellingEffect::Inform(text) => self.notices.info(text),
             }
         }
-    }
-}
-
-fn context<'a>(
-    worker: &LabelWorker,
-    gripper: Option<&'a GripperView>,
-    labels: Option<&'a LabelView>,
-    view: &ViewState,
-) -> SessionContext<'a> {
-    SessionContext {
-        gripper,
-        labels,
-        settled: worker.is_settled(),
-        labelling: view.mode == Mode::Label,
-        blind: view.blind,
-        control: view.control,
     }
 }

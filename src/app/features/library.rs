@@ -1,6 +1,6 @@
-//! The trial library in the window: its query and the selection of trials; hands edits to the [`LibraryWorker`].
+//! The trial library in the window: its query, the selection of trials, and edits of them.
 
-use crate::app::features::inspect::InspectAction;
+use super::App;
 use crate::app::notices::Notices;
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_store::labels::TrialEdit;
@@ -18,35 +18,6 @@ pub enum Reach {
     Toggle,
     /// All from the last trial selected alone.
     Range,
-}
-
-/// Action on the library.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LibraryAction {
-    /// Show the trials that match.
-    Find(TrialQuery),
-    /// Move the keyboard to the search field, and add text typed ahead.
-    FocusSearch(String),
-    /// The search field has the keyboard.
-    SearchFocused,
-    /// Select a trial.
-    Select(TrialId, Reach),
-    /// Select the trial this many rows further; with true also those between.
-    Step(isize, bool),
-    /// Select all trials that were found.
-    SelectAll,
-    /// Make sparklines of these trials, which are in sight.
-    Draw(Vec<TrialId>),
-    /// Change the selected trials.
-    Edit(TrialEdit),
-    /// Move this trial from the demo log to the store.
-    Keep(TrialId),
-    /// Export the selected trials as CSV, into a folder beside the store.
-    Export,
-    /// Open the trial selected last.
-    Open,
-    /// Pin the selected trials for comparison.
-    Pin,
 }
 
 /// Query and selection.
@@ -67,6 +38,11 @@ pub struct LibrarySelection {
 }
 
 impl LibrarySelection {
+    /// Selected trials.
+    pub(super) fn ids(&self) -> Vec<TrialId> {
+        self.selected.iter().copied().collect()
+    }
+
     fn select(&mut self, found: &[Arc<LibraryTrial>], id: TrialId, reach: Reach) {
         let place = |wanted: TrialId| found.iter().position(|trial| trial.row.id == wanted);
         match reach {
@@ -110,91 +86,111 @@ impl LibrarySelection {
 }
 
 /// State of the library in the window.
-pub(in crate::app) struct LibraryFeature {
+pub struct LibraryFeature {
     worker: LibraryWorker,
-    selection: LibrarySelection,
+    /// Trials that were found, as of this frame; absent until they were asked for.
+    pub(in crate::app) view: Option<Arc<LibraryView>>,
+    pub(in crate::app) selection: LibrarySelection,
     /// Trials at the last look.
-    seen: Option<Arc<[Arc<LibraryTrial>]>>,
-    /// Trial kept last.
-    kept: Option<TrialId>,
+    seen: Arc<[Arc<LibraryTrial>]>,
+    /// Trial that was moved from the demo log to the store last.
+    pub(super) kept: Option<TrialId>,
 }
 
 impl LibraryFeature {
     pub(in crate::app) fn new(worker: LibraryWorker) -> Self {
-        Self { worker, selection: LibrarySelection::default(), seen: None, kept: None }
-    }
-
-    pub(in crate::app) fn view(&self) -> Option<Arc<LibraryView>> {
-        self.worker.view()
-    }
-
-    /// Changes a trial.
-    pub(in crate::app) fn edit(&self, id: TrialId, edit: TrialEdit) {
-        self.worker.send(LibraryCommand::Edit(vec![id], edit));
-    }
-
-    /// Trial that was moved from the demo log to the store last.
-    pub(in crate::app) fn kept(&self) -> Option<TrialId> {
-        self.kept
-    }
-
-    pub(in crate::app) fn selection(&self) -> &LibrarySelection {
-        &self.selection
+        Self { worker, view: None, selection: LibrarySelection::default(), seen: Arc::default(), kept: None }
     }
 
     /// Shows outcomes, and forgets trials that are gone.
-    pub(in crate::app) fn gather(&mut self, notices: &mut Notices) {
-        let Some(view) = self.worker.view() else { return };
-        if self.seen.as_ref().is_none_or(|seen| !Arc::ptr_eq(seen, &view.found)) {
+    pub(super) fn poll(&mut self, notices: &mut Notices) {
+        self.view = self.worker.view();
+        let Some(view) = &self.view else { return };
+        if !Arc::ptr_eq(&self.seen, &view.found) {
             self.selection.look(&view.found);
-            self.seen = Some(Arc::clone(&view.found));
+            self.seen = Arc::clone(&view.found);
         }
         self.worker.notices().for_each(|notice| notices.show(notice));
     }
 
-    /// Applies an action; what follows for the inspection.
-    pub(in crate::app) fn apply(&mut self, action: LibraryAction) -> Vec<InspectAction> {
-        let found = self.seen.clone().unwrap_or_default();
-        let selects = matches!(action, LibraryAction::Select(..) | LibraryAction::Step(..) | LibraryAction::SelectAll);
-        let selected: Vec<TrialId> = self.selection.selected.iter().copied().collect();
-        match action {
-            // The first answer is on its way.
-            LibraryAction::Find(query) if query == self.selection.query && !self.worker.is_settled() => {}
-            LibraryAction::Find(query) => {
-                self.selection.query = query.clone();
-                self.worker.send(LibraryCommand::Find(query));
-            }
-            LibraryAction::FocusSearch(typed) => {
-                self.selection.focus_search = true;
-                if !typed.is_empty() {
-                    self.selection.query.search.push_str(&typed);
-                    self.worker.send(LibraryCommand::Find(self.selection.query.clone()));
-                }
-            }
-            LibraryAction::SearchFocused => self.selection.focus_search = false,
-            LibraryAction::Select(id, reach) => self.selection.select(&found, id, reach),
-            LibraryAction::Step(by, range) => self.selection.step(&found, by, range),
-            LibraryAction::SelectAll => {
-                self.selection.selected = found.iter().map(|trial| trial.row.id).collect();
-            }
-            LibraryAction::Draw(ids) => _ = self.worker.send(LibraryCommand::Draw(ids)),
-            LibraryAction::Edit(edit) => {
-                if !self.selection.selected.is_empty() {
-                    self.worker.send(LibraryCommand::Edit(selected, edit));
-                }
-            }
-            LibraryAction::Keep(id) => {
-                self.edit(id, TrialEdit::Keep);
-                self.kept = Some(id);
-            }
-            LibraryAction::Export => _ = self.worker.send(LibraryCommand::Export(selected)),
-            LibraryAction::Open => return self.selection.cursor.map(InspectAction::Open).into_iter().collect(),
-            LibraryAction::Pin => return selected.into_iter().map(InspectAction::Pin).collect(),
+    /// Shows the trials that match.
+    pub fn find(&mut self, query: TrialQuery) {
+        // The first answer may be on its way.
+        if query != self.selection.query || self.worker.is_settled() {
+            self.selection.query = query.clone();
+            self.worker.send(LibraryCommand::Find(query));
         }
-        if selects {
-            self.selection.look(&found);
+    }
+
+    /// Selects a trial.
+    pub fn select(&mut self, id: TrialId, reach: Reach) {
+        self.selection.select(&self.seen, id, reach);
+        self.selection.look(&self.seen);
+    }
+
+    /// Selects the trial this many rows further; with `range` also those between.
+    pub(in crate::app) fn step(&mut self, by: isize, range: bool) {
+        self.selection.step(&self.seen, by, range);
+        self.selection.look(&self.seen);
+    }
+
+    /// Selects all trials that were found.
+    pub fn select_all(&mut self) {
+        self.selection.selected = self.seen.iter().map(|trial| trial.row.id).collect();
+        self.selection.look(&self.seen);
+    }
+
+    /// Makes sparklines of these trials, which are in sight.
+    pub(in crate::app) fn draw(&self, ids: Vec<TrialId>) {
+        self.worker.send(LibraryCommand::Draw(ids));
+    }
+
+    /// Changes the selected trials.
+    pub fn edit(&self, edit: TrialEdit) {
+        if !self.selection.selected.is_empty() {
+            self.worker.send(LibraryCommand::Edit(self.selection.ids(), edit));
         }
-        Vec::new()
+    }
+
+    /// Changes one trial.
+    pub(super) fn edit_one(&self, id: TrialId, edit: TrialEdit) {
+        self.worker.send(LibraryCommand::Edit(vec![id], edit));
+    }
+
+    /// Moves this trial from the demo log to the store.
+    pub(in crate::app) fn keep(&mut self, id: TrialId) {
+        self.edit_one(id, TrialEdit::Keep);
+        self.kept = Some(id);
+    }
+
+    /// Exports the selected trials as CSV, into a folder beside the store.
+    pub(in crate::app) fn export(&self) {
+        self.worker.send(LibraryCommand::Export(self.selection.ids()));
+    }
+}
+
+impl App {
+    /// Moves the keyboard to the search field, and adds text typed ahead.
+    pub(in crate::app) fn search_library(&mut self, typed: &str) {
+        self.show_panel("library");
+        let LibraryFeature { selection, worker, .. } = &mut self.library;
+        selection.focus_search = true;
+        if !typed.is_empty() {
+            selection.query.search.push_str(typed);
+            worker.send(LibraryCommand::Find(selection.query.clone()));
+        }
+    }
+
+    /// Opens the trial selected last.
+    pub(in crate::app) fn open_selected(&mut self) {
+        if let Some(id) = self.library.selection.cursor {
+            self.open_trial(id);
+        }
+    }
+
+    /// Compares the selected trials with the one that is shown.
+    pub(in crate::app) fn pin_selected(&mut self) {
+        self.library.selection.ids().into_iter().for_each(|id| self.pin(id));
     }
 }
 

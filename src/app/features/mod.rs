@@ -1,5 +1,7 @@
-//! Features of the window: each owns its state, its actions and their application. A feature may act on those of lower
-//! layers (see the table in [`crate::app`]).
+//! Features of the window: each file has the state of one, and what can be done with it. [`App`] owns them all.
+//!
+//! What touches one feature alone is a method of that feature. What touches several, or tells the user something, is a
+//! method of [`App`], in the file of the feature that it belongs to.
 
 pub(super) mod files;
 pub(super) mod gripper;
@@ -12,3 +14,135 @@ pub(super) mod simulation;
 pub(super) mod studies;
 pub(super) mod tools;
 pub(super) mod view;
+
+use crate::app::frame_rate::FrameRate;
+use crate::app::notices::Notices;
+use crate::app::shown::{ComparedTrials, SourceData};
+use crate::app::thumbnails::Thumbnails;
+use crate::app::traces::{GraspTrace, TraceHistory};
+use crate::app::view_source::ViewSource;
+use files::FileFeature;
+use gripper::GripperFeature;
+use inspect::InspectFeature;
+use labelling::LabellingFeature;
+use library::LibraryFeature;
+use palpate_lab::workers::{GripperView, LabelView, Snapshot};
+use presenter::PresenterFeature;
+use recognition::RecognitionFeature;
+use simulation::SimulationFeature;
+use std::path::PathBuf;
+use studies::Studies;
+use tools::GripperTools;
+use view::ViewState;
+
+/// State of the window: all its features.
+pub struct App {
+    pub(super) ctx: egui::Context,
+    /// Camera, theme, layout and settings.
+    pub view: ViewState,
+    pub(super) notices: Notices,
+    /// Simulated gripper and its scene.
+    pub simulation: SimulationFeature,
+    /// Real gripper.
+    pub gripper: GripperFeature,
+    pub(super) labelling: LabellingFeature,
+    /// Trial library.
+    pub library: LibraryFeature,
+    pub(super) recognition: RecognitionFeature,
+    /// Stored trials that are open or compared.
+    pub inspect: InspectFeature,
+    pub(super) tools: GripperTools,
+    /// Studies of the paper.
+    pub studies: Studies,
+    pub(super) presenter: PresenterFeature,
+    /// Opening and saving.
+    pub files: FileFeature,
+    pub(super) thumbnails: Thumbnails,
+    /// Name of the graphics driver; absent when the 3-D view cannot be drawn.
+    pub(super) driver: Option<String>,
+    /// Frame rate and resolution of the moving 3-D view.
+    pub(super) frame_rate: FrameRate,
+    pub(super) store: PathBuf,
+    /// Panel that is to be brought to the front, in a mode that has it.
+    pub(super) wanted_panel: Option<&'static str>,
+}
+
+impl App {
+    /// Newest state of the simulation; absent until the first object is loaded.
+    pub(super) fn snapshot(&self) -> Option<&Snapshot> {
+        self.simulation.snapshot.as_deref()
+    }
+
+    /// Newest state of the real gripper; absent until its thread has begun.
+    pub(super) fn gripper_view(&self) -> Option<&GripperView> {
+        self.gripper.view.as_deref()
+    }
+
+    /// Labels, plan and journal; absent until the store has been read.
+    pub(super) fn labels(&self) -> Option<&LabelView> {
+        self.labelling.labels.as_deref()
+    }
+
+    /// Data that are shown.
+    pub(super) fn shown(&self) -> SourceData<'_> {
+        SourceData {
+            source: self.view.source,
+            snapshot: self.snapshot(),
+            gripper: self.gripper_view(),
+            inspected: self.inspect.inspected(),
+            opening: self.inspect.is_opening(),
+            playback: self.inspect.playback(self.view.source),
+            traces: self.traces(),
+            scene: &self.simulation.scene,
+            phases: &self.inspect.phases,
+            comparison: ComparedTrials {
+                pinned: &self.inspect.pinned,
+                traces: &self.inspect.compared,
+                alignment: self.inspect.alignment,
+                spread: self.inspect.spread,
+            },
+            blind: self.labelling.blind,
+        }
+    }
+
+    /// Traces of the source that is shown.
+    pub(super) fn traces(&self) -> &TraceHistory {
+        match self.view.source {
+            ViewSource::Simulation => &self.simulation.traces,
+            ViewSource::Gripper => &self.gripper.traces,
+            ViewSource::Trial => &self.inspect.history,
+        }
+    }
+
+    /// True while the picture moves.
+    pub(super) fn moves(&self) -> bool {
+        let shown = self.shown();
+        let live = shown.source == ViewSource::Simulation && !shown.looks_back();
+        let simulates = live && shown.snapshot.is_some_and(|snapshot| snapshot.status.playing);
+        shown.playback.playing || simulates
+    }
+
+    /// Share of the pixels along each side that the 3-D view has now: all of them while it does not move.
+    pub(super) fn resolution(&self) -> f32 {
+        if self.moves() { self.frame_rate.share() } else { 1.0 }
+    }
+
+    /// Updates each feature once per frame.
+    pub(super) fn poll(&mut self) {
+        self.poll_simulation();
+        self.poll_presenter();
+        self.poll_gripper();
+        self.poll_labelling();
+        self.library.poll(&mut self.notices);
+        self.poll_studies();
+        self.poll_recognition();
+        self.poll_files();
+        self.thumbnails.poll(&self.ctx, &self.view.recent);
+        self.poll_inspection();
+        let shown = self.shown();
+        let (names, phases) = (shown.column_names(), shown.find_phases());
+        let span = shown.traces.current().map_or([0.0; 2], GraspTrace::span);
+        self.inspect.move_cursor(&self.ctx, self.view.source, span);
+        self.inspect.compare(names, phases);
+    }
+}

@@ -1,12 +1,10 @@
 //! Presenter mode: object after object in random poses, with a score. Its grasps go into the demo log.
 
-use crate::app::features::simulation::{SimulationAction, SimulationFeature};
-use crate::app::features::view::ViewState;
-use crate::app::notices::Notices;
+use super::App;
 use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::Presentation;
 use palpate_lab::workers::{Command, Snapshot};
-use palpate_sim::scene::PoseSpread;
+use palpate_sim::scene::{PoseSpread, Scene};
 use palpate_store::TrialPlace;
 use std::time::Duration;
 
@@ -54,86 +52,6 @@ impl PresenterFeature {
         self.score
     }
 
-    /// Begins or ends, counts verdicts, and brings the next object.
-    pub(in crate::app) fn gather(
-        &mut self,
-        ctx: &egui::Context,
-        simulation: &mut SimulationFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
-        let Some(snapshot) = simulation.worker().snapshot() else { return };
-        match (view.presents, self.before.is_some()) {
-            (true, false) => self.begin(&snapshot, simulation, view, notices),
-            (false, true) => self.end(simulation, view, notices),
-            (false, false) => {}
-            (true, true) => self.go_on(ctx, &snapshot, simulation, notices),
-        }
-    }
-
-    fn begin(
-        &mut self,
-        snapshot: &Snapshot,
-        simulation: &mut SimulationFeature,
-        view: &mut ViewState,
-        notices: &mut Notices,
-    ) {
-        let mut scene = simulation.scene().clone();
-        let presentations = self.presentations + 1;
-        *self = Self {
-            before: Some((scene.pose.clone(), snapshot.status.recording)),
-            presentations,
-            presentation: Presentation::new(presentations),
-            judged: snapshot.grasp,
-            ..Self::default()
-        };
-        view.source = ViewSource::Simulation;
-        scene.pose = self.presentation.poses();
-        for command in [Command::SetFirstDrawn(true), Command::SetRecording(Some(TrialPlace::DemoLog))] {
-            simulation.send(command, notices);
-        }
-        simulation.apply(SimulationAction::SetScene(Box::new(scene)), view, notices);
-        simulation.send(Command::Play, notices);
-    }
-
-    fn end(&mut self, simulation: &mut SimulationFeature, view: &mut ViewState, notices: &mut Notices) {
-        let Some((pose, recording)) = self.before.take() else { return };
-        let mut scene = simulation.scene().clone();
-        scene.pose = pose;
-        simulation.send(Command::SetFirstDrawn(false), notices);
-        simulation.send(Command::SetRecording(recording), notices);
-        simulation.apply(SimulationAction::SetScene(Box::new(scene)), view, notices);
-    }
-
-    fn go_on(
-        &mut self,
-        ctx: &egui::Context,
-        snapshot: &Snapshot,
-        simulation: &mut SimulationFeature,
-        notices: &mut Notices,
-    ) {
-        let now = ctx.input(|input| input.time);
-        if snapshot.status.finished && snapshot.grasp > self.judged {
-            self.judge(snapshot);
-            self.next_at = Some(now + VERDICT_S);
-        }
-        // Whoever changes the threshold thinks about one more grasp.
-        let threshold = snapshot.identification.as_ref().map(|view| view.rule.threshold);
-        if std::mem::replace(&mut self.threshold, threshold) != threshold {
-            self.next_at = self.next_at.map(|_| now + VERDICT_S);
-        }
-        // Another object or another grasp was asked for meanwhile.
-        if !snapshot.status.finished {
-            self.next_at = None;
-        }
-        let Some(left) = self.next_at.map(|next_at| next_at - now) else { return };
-        if left <= 0.0 {
-            self.bring_next(simulation, notices);
-        } else {
-            ctx.request_repaint_after(Duration::from_secs_f64(left));
-        }
-    }
-
     /// Counts a verdict; one after a further grasp replaces that of its round.
     fn judge(&mut self, snapshot: &Snapshot) {
         self.judged = snapshot.grasp;
@@ -151,11 +69,75 @@ impl PresenterFeature {
         }
         self.presentation.take_note(grasps);
     }
+}
 
-    /// Brings the next object.
-    pub(in crate::app) fn bring_next(&mut self, simulation: &mut SimulationFeature, notices: &mut Notices) {
-        self.next_at = None;
-        let object = self.presentation.next_object(&simulation.scene().object.source);
-        simulation.open_in(object, self.presentation.poses(), notices);
+impl App {
+    /// Begins or ends, counts verdicts, and brings the next object.
+    pub(super) fn poll_presenter(&mut self) {
+        let Some(snapshot) = self.simulation.snapshot.clone() else { return };
+        match (self.view.presents, self.presenter.before.is_some()) {
+            (true, false) => self.begin_presentation(&snapshot),
+            (false, true) => self.end_presentation(),
+            (false, false) => {}
+            (true, true) => self.go_on_presenting(&snapshot),
+        }
+    }
+
+    fn begin_presentation(&mut self, snapshot: &Snapshot) {
+        let mut scene = self.simulation.scene.clone();
+        let presentations = self.presenter.presentations + 1;
+        self.presenter = PresenterFeature {
+            before: Some((scene.pose.clone(), snapshot.status.recording)),
+            presentations,
+            presentation: Presentation::new(presentations),
+            judged: snapshot.grasp,
+            ..PresenterFeature::default()
+        };
+        self.view.source = ViewSource::Simulation;
+        scene.pose = self.presenter.presentation.poses();
+        self.simulation.send(Command::SetFirstDrawn(true));
+        self.simulation.send(Command::SetRecording(Some(TrialPlace::DemoLog)));
+        self.set_scene(scene);
+        self.simulation.send(Command::Play);
+    }
+
+    fn end_presentation(&mut self) {
+        let Some((pose, recording)) = self.presenter.before.take() else { return };
+        self.simulation.send(Command::SetFirstDrawn(false));
+        self.simulation.send(Command::SetRecording(recording));
+        self.set_scene(Scene { pose, ..self.simulation.scene.clone() });
+    }
+
+    fn go_on_presenting(&mut self, snapshot: &Snapshot) {
+        let now = self.ctx.input(|input| input.time);
+        let own = &mut self.presenter;
+        if snapshot.status.finished && snapshot.grasp > own.judged {
+            own.judge(snapshot);
+            own.next_at = Some(now + VERDICT_S);
+        }
+        // Whoever changes the threshold thinks about one more grasp.
+        let threshold = snapshot.identification.as_ref().map(|view| view.rule.threshold);
+        if std::mem::replace(&mut own.threshold, threshold) != threshold {
+            own.next_at = own.next_at.map(|_| now + VERDICT_S);
+        }
+        // Another object or another grasp was asked for meanwhile.
+        if !snapshot.status.finished {
+            own.next_at = None;
+        }
+        let Some(left) = own.next_at.map(|next_at| next_at - now) else { return };
+        if left <= 0.0 {
+            self.present_next();
+        } else {
+            self.ctx.request_repaint_after(Duration::from_secs_f64(left));
+        }
+    }
+
+    /// Brings the next object, in random poses.
+    pub(super) fn present_next(&mut self) {
+        self.presenter.next_at = None;
+        let object = self.presenter.presentation.next_object(&self.simulation.scene.object.source);
+        let pose = self.presenter.presentation.poses();
+        self.set_scene(Scene { pose, ..self.simulation.scene_with(object) });
+        self.simulation.send(Command::Play);
     }
 }

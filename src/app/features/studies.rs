@@ -1,7 +1,6 @@
-//! Studies of the paper in the window: which is chosen, and what of its results is shown; hands runs to the [`StudyRunner`].
+//! Studies of the paper in the window: which is chosen, what of its results is shown, and which run.
 
-use crate::app::features::inspect::InspectAction;
-use crate::app::notices::Notices;
+use super::App;
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::paper::{LinkedFigure, PAPER_STUDIES, PaperStudy, StudySize, paper_study};
 use palpate_lab::workers::{
@@ -13,27 +12,6 @@ use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Action on the studies.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum StudyAction {
-    /// Read the results again.
-    Look,
-    /// Choose a study by its key.
-    Choose(String),
-    /// Choose the study this many places further.
-    Step(isize),
-    /// Show the result of this origin.
-    ShowResult(StudyOrigin),
-    /// Show this figure of the result.
-    ShowFigure(usize),
-    /// Run a study after those that were asked for before.
-    Run(StudyRequest),
-    /// Stop the running study, and those that wait.
-    Stop,
-    /// Open the first of these trials, and compare the others with it.
-    OpenTrials(Vec<TrialId>),
-}
 
 /// State of the studies in the window.
 pub struct Studies {
@@ -117,77 +95,94 @@ impl Studies {
         Some(linked.with_note(&result.stored.plain_origin()))
     }
 
-    fn choose(&mut self, study: &'static dyn PaperStudy) {
-        (self.chosen, self.figure) = (study, 0);
+    /// Reads the results again.
+    pub(in crate::app) fn look(&self) {
+        // A run looks at its end, and other panels may have asked already.
+        if self.runner.is_settled() && self.looks.is_settled() {
+            self.looks.start(());
+        }
     }
 
-    /// Takes in files that were read, and reports runs that have ended.
-    pub(in crate::app) fn gather(&mut self, notices: &mut Notices) {
-        for files in self.looks.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
-            self.files = files;
+    /// Chooses a study by its key.
+    pub fn choose(&mut self, key: &str) {
+        if let Some(study) = paper_study(key) {
+            (self.chosen, self.figure) = (study, 0);
         }
-        for ended in self.runner.take() {
+    }
+
+    /// Chooses the study this many places further.
+    pub(in crate::app) fn step(&mut self, by: isize) {
+        let key = self.chosen.card().key;
+        let now = PAPER_STUDIES.iter().position(|study| study.card().key == key).unwrap_or(0);
+        let next = now.saturating_add_signed(by).min(PAPER_STUDIES.len() - 1);
+        if next != now {
+            self.choose(PAPER_STUDIES[next].card().key);
+        }
+    }
+
+    /// Shows the result of this origin.
+    pub(in crate::app) fn show_result(&mut self, origin: StudyOrigin) {
+        (self.origin, self.figure) = (Some(origin), 0);
+    }
+
+    /// Shows this figure of the result.
+    pub(in crate::app) fn show_figure(&mut self, figure: usize) {
+        self.figure = figure;
+    }
+
+    /// Stops the running study, and those that wait.
+    pub(in crate::app) fn stop(&self) {
+        self.runner.stop();
+    }
+}
+
+impl App {
+    /// Takes in files that were read, and reports runs that have ended.
+    pub(super) fn poll_studies(&mut self) {
+        let Self { studies, notices, .. } = self;
+        for files in studies.looks.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
+            studies.files = files;
+        }
+        for ended in studies.runner.take() {
             let StudyRequest { key, size, .. } = &*ended.command;
             let title = paper_study(key).map_or(key.as_str(), |study| study.card().title);
-            self.failed.remove(key);
+            studies.failed.remove(key);
             match ended.outcome {
                 Ok(end) => {
-                    self.files = Arc::new(end.files.clone());
+                    studies.files = Arc::new(end.files.clone());
                     if !end.finished {
                         notices.info(format!("Study stopped: {title}. Run it again to resume."));
                         continue;
                     }
                     notices.info(format!("Study finished: {title}."));
-                    if key == self.chosen.card().key {
-                        (self.origin, self.figure) = (Some(StudyOrigin::Run(*size)), 0);
+                    if key == studies.chosen.card().key {
+                        studies.show_result(StudyOrigin::Run(*size));
                     }
                 }
                 Err(cause) => {
                     notices.error(format!("Study {title} failed: {cause}"));
-                    self.failed.insert(key.clone(), (*size, cause));
-                    self.looks.start(());
+                    studies.failed.insert(key.clone(), (*size, cause));
+                    studies.looks.start(());
                 }
             }
         }
     }
 
-    /// Applies an action; what follows for the inspection.
-    pub(in crate::app) fn apply(&mut self, action: StudyAction, notices: &mut Notices) -> Vec<InspectAction> {
-        match action {
-            // A run looks at its end, and other panels may have asked already.
-            StudyAction::Look if self.runner.is_settled() && self.looks.is_settled() => _ = self.looks.start(()),
-            StudyAction::Look => {}
-            StudyAction::Choose(key) => {
-                if let Some(study) = paper_study(&key) {
-                    self.choose(study);
-                }
-            }
-            StudyAction::Step(by) => {
-                let key = self.chosen.card().key;
-                let now = PAPER_STUDIES.iter().position(|study| study.card().key == key).unwrap_or(0);
-                let next = now.saturating_add_signed(by).min(PAPER_STUDIES.len() - 1);
-                if next != now {
-                    self.choose(PAPER_STUDIES[next]);
-                }
-            }
-            StudyAction::ShowResult(origin) => (self.origin, self.figure) = (Some(origin), 0),
-            StudyAction::ShowFigure(figure) => self.figure = figure,
-            StudyAction::Run(request) => {
-                let is_running = self.running().is_some_and(|running| running.command.key == request.key);
-                if is_running || self.waits(&request.key) {
-                    notices.info("This study is running or waits already.".to_owned());
-                } else {
-                    self.runner.start(request);
-                }
-            }
-            StudyAction::Stop => self.runner.stop(),
-            StudyAction::OpenTrials(trials) => {
-                let mut trials = trials.into_iter();
-                let Some(first) = trials.next() else { return Vec::new() };
-                let others = trials.map(InspectAction::Pin);
-                return [InspectAction::UnpinAll, InspectAction::Open(first)].into_iter().chain(others).collect();
-            }
+    /// Runs a study after those that were asked for before.
+    pub fn run_study(&mut self, request: StudyRequest) {
+        let is_running = self.studies.running().is_some_and(|running| running.command.key == request.key);
+        if is_running || self.studies.waits(&request.key) {
+            self.notices.info("This study is running or waits already.");
+        } else {
+            self.studies.runner.start(request);
         }
-        Vec::new()
+    }
+
+    /// Opens the first of these trials, and compares the others with it.
+    pub(in crate::app) fn open_trials(&mut self, trials: &[TrialId]) {
+        let Some((first, others)) = trials.split_first() else { return };
+        self.inspect.unpin_all();
+        self.open_trial(*first);
+        others.iter().for_each(|id| self.pin(*id));
     }
 }

@@ -1,6 +1,6 @@
 //! Tools, each a job behind a panel: diagnostics, finger fit, training, teaching of new objects, advice on the next grasp.
 
-use crate::app::notices::Notices;
+use super::App;
 use palpate_lab::grasping::{ObjectMove, RecognisedGrasp};
 use palpate_lab::workers::{
     DiagnosticsReport, Examine, ExamineRequest, FinishedTraining, FitTrials, FittedFinger, Job, JobFailure,
@@ -25,29 +25,6 @@ pub struct GripperToolsSetup {
     pub fit: FitTrials,
     /// Folder of trained models.
     pub models: PathBuf,
-}
-
-/// Action on a tool.
-#[derive(Clone, Debug)]
-pub enum ToolAction {
-    /// Examine the gripper's board.
-    Examine(ExamineRequest),
-    /// Stop the examination and report so far.
-    StopExamining,
-    /// List the trials that the finger can be fitted to.
-    ListTrials,
-    /// Fit the finger to trials.
-    Fit(Vec<TrialId>),
-    /// Cancel the fit.
-    StopFitting,
-    /// List labelled trials and saved models.
-    ListModels,
-    /// Train on labelled trials.
-    Train(TrainRequest),
-    /// Train with the default method, and use the model.
-    TrainAndUse,
-    /// Cancel the training.
-    StopTraining,
 }
 
 /// The tools' jobs.
@@ -90,26 +67,8 @@ impl GripperTools {
         }
     }
 
-    pub(in crate::app) fn apply(&mut self, action: ToolAction, notices: &mut Notices) {
-        match action {
-            ToolAction::Examine(request) => _ = self.doctor.start(request),
-            ToolAction::StopExamining => self.doctor.stop(),
-            ToolAction::ListTrials => _ = self.trials.start(()),
-            ToolAction::Fit(trials) => _ = self.fit.start(trials),
-            ToolAction::StopFitting => self.fit.stop(),
-            ToolAction::ListModels => _ = self.data.start(()),
-            ToolAction::Train(request) => _ = self.training.start(request),
-            ToolAction::TrainAndUse => {
-                let method = DEFAULT_METHOD.to_owned();
-                self.awaited = Some(self.training.start(TrainRequest { method, seed: TRAINING_SEED, quick: false }));
-                notices.info("Training on all labelled trials: see panel Training.");
-            }
-            ToolAction::StopTraining => self.training.stop(),
-        }
-    }
-
-    /// Outcome of [`ToolAction::TrainAndUse`], once it has ended.
-    pub(in crate::app) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, JobFailure>> {
+    /// Outcome of [`App::train_and_use`], once it has ended.
+    pub(super) fn trained(&mut self) -> Option<Result<Arc<FinishedTraining>, JobFailure>> {
         let ended = self.training.take();
         if !ended.is_empty() {
             self.data.start(());
@@ -118,5 +77,14 @@ impl GripperTools {
             .into_iter()
             .find(|ended| self.awaited.take_if(|number| *number == ended.number).is_some())
             .map(|e| e.outcome)
+    }
+}
+
+impl App {
+    /// Trains with the default method, and uses the model.
+    pub(in crate::app) fn train_and_use(&mut self) {
+        let request = TrainRequest { method: DEFAULT_METHOD.to_owned(), seed: TRAINING_SEED, quick: false };
+        self.tools.awaited = Some(self.tools.training.start(request));
+        self.notices.info("Training on all labelled trials: see panel Training.");
     }
 }

@@ -1,5 +1,6 @@
 //! View state: camera, theme, layout and settings of the window. Remembered between runs, never written into a trial.
 
+use super::App;
 use crate::app::derived::Derivation;
 use crate::app::modes::mode::Mode;
 use crate::app::theme;
@@ -9,7 +10,7 @@ use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{BendUnit, LoadUnit};
-use palpate_lab::workers::Snapshot;
+use palpate_lab::workers::{Command, Snapshot};
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -116,55 +117,6 @@ impl PathLayer {
     }
 }
 
-/// Change of the view state.
-#[derive(Clone, Debug)]
-pub enum ViewAction {
-    /// Change to another mode.
-    SetMode(Mode),
-    /// Show the data of this gripper.
-    Show(ViewSource),
-    /// Move the camera.
-    SetCamera(Camera),
-    /// Show everything in the 3-D view.
-    FrameAll,
-    /// Change the theme.
-    SetTheme(Theme),
-    /// Show or hide force arrows.
-    SetForces(bool),
-    /// Show or hide the circles that flex strips read.
-    SetCircles(bool),
-    /// Draw the contact path, or do not.
-    SetPath(PathLayer),
-    /// Unit of loads in heat maps.
-    SetLoadUnit(LoadUnit),
-    /// Unit of bending in heat maps.
-    SetBendUnit(BendUnit),
-    /// Time shown by all plots (s); `None` for the whole grasp.
-    SetTimeWindow(Option<[f64; 2]>),
-    /// Sensors that plots and recognisers read.
-    SetSensors(SensorView),
-    /// What a plot derives from its channels.
-    Derive(String, Derivation),
-    /// Show or hide mean and spread of the two likeliest classes.
-    ShowClassBands(bool),
-    /// Show raw counts of the real gripper, or physical units.
-    ShowRaw(bool),
-    /// Show or hide the true object.
-    ShowTruth(bool),
-    /// Show or hide the key sheet.
-    ShowKeys(bool),
-    /// Show or hide the command palette.
-    ShowPalette(bool),
-    /// Set the size of texts and buttons.
-    SetScale(f32),
-    /// Bring a panel to the front, in a mode that has it.
-    ShowPanel(&'static str),
-    /// Begin or end presenter mode: full screen, object after object.
-    Present(bool),
-    /// Restore the default layouts.
-    ResetLayout,
-}
-
 /// Sizes of texts and buttons that can be set.
 pub(in crate::app) const SCALES: std::ops::RangeInclusive<f32> = 0.8..=2.0;
 
@@ -207,49 +159,6 @@ impl Default for ViewState {
 }
 
 impl ViewState {
-    pub(in crate::app) fn apply(&mut self, ctx: &egui::Context, action: ViewAction, snapshot: Option<&Snapshot>) {
-        match action {
-            ViewAction::SetMode(mode) => self.mode = mode,
-            ViewAction::Show(source) => self.source = source,
-            ViewAction::SetCamera(camera) => self.camera = camera,
-            ViewAction::FrameAll => {
-                if let Some(snapshot) = snapshot {
-                    self.frame_all(snapshot);
-                }
-            }
-            ViewAction::SetTheme(theme) => {
-                self.theme = theme;
-                theme::apply(ctx, theme);
-            }
-            ViewAction::SetForces(forces) => self.forces = forces,
-            ViewAction::SetCircles(circles) => self.circles = circles,
-            ViewAction::SetPath(path) => self.path = path,
-            ViewAction::SetLoadUnit(unit) => self.load_unit = unit,
-            ViewAction::SetBendUnit(unit) => self.bend_unit = unit,
-            ViewAction::SetTimeWindow(window) => self.time_window = window,
-            ViewAction::SetSensors(sensors) => self.sensors = sensors,
-            ViewAction::Derive(plot, derived) => {
-                self.derived.insert(plot, derived);
-            }
-            ViewAction::ShowClassBands(shown) => self.class_bands = shown,
-            ViewAction::ShowRaw(raw) => self.raw = raw,
-            ViewAction::ShowTruth(shown) => self.truth_shown = shown,
-            ViewAction::ShowKeys(shown) => self.keys_shown = shown,
-            ViewAction::ShowPalette(shown) => self.palette_shown = shown,
-            ViewAction::SetScale(scale) => {
-                self.scale = scale.clamp(*SCALES.start(), *SCALES.end());
-                ctx.set_zoom_factor(self.scale);
-            }
-            // The workbench knows which mode has it.
-            ViewAction::ShowPanel(_) => {}
-            ViewAction::Present(on) => {
-                self.presents = on;
-                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
-            }
-            ViewAction::ResetLayout => self.layouts.clear(),
-        }
-    }
-
     /// The standard view in which the camera is, while nobody has moved it from there.
     pub(in crate::app) fn standard_view(&self) -> Option<StandardView> {
         let framed = Camera { parallel: self.camera.parallel, ..self.framed? };
@@ -268,5 +177,58 @@ impl ViewState {
         self.recent.retain(|known| known != path);
         self.recent.insert(0, path.to_owned());
         self.recent.truncate(MOST_RECENT);
+    }
+}
+
+impl App {
+    /// Changes to another mode.
+    pub fn set_mode(&mut self, mode: Mode) {
+        self.view.mode = mode;
+        self.labelling.refresh();
+        self.enter_mode(mode);
+    }
+
+    /// Brings a panel to the front, in a mode that has it.
+    pub fn show_panel(&mut self, name: &'static str) {
+        self.wanted_panel = Some(name);
+    }
+
+    /// Shows everything in the 3-D view.
+    pub(in crate::app) fn frame_all(&mut self) {
+        if let Some(snapshot) = &self.simulation.snapshot {
+            self.view.frame_all(snapshot);
+        }
+    }
+
+    pub(in crate::app) fn set_theme(&mut self, theme: Theme) {
+        self.view.theme = theme;
+        theme::apply(&self.ctx, theme);
+    }
+
+    /// Sets the size of texts and buttons.
+    pub fn set_scale(&mut self, scale: f32) {
+        self.view.scale = scale.clamp(*SCALES.start(), *SCALES.end());
+        self.ctx.set_zoom_factor(self.view.scale);
+    }
+
+    /// Sets the sensors that plots and recognisers read of the simulation and of stored trials.
+    pub fn set_sensors(&mut self, sensors: SensorView) {
+        self.simulation.send(Command::SetSensors(sensors.clone()));
+        self.view.sensors = sensors;
+    }
+
+    /// Begins or ends presenter mode: full screen, object after object.
+    pub(in crate::app) fn present(&mut self, on: bool) {
+        self.view.presents = on;
+        self.ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
+    }
+
+    /// Vents the fingers, closes key sheet and palette, and ends presenter mode.
+    pub(in crate::app) fn stop(&mut self) {
+        (self.view.keys_shown, self.view.palette_shown) = (false, false);
+        if self.view.presents {
+            self.present(false);
+        }
+        self.gripper.stop();
     }
 }

@@ -1,19 +1,16 @@
-//! Keys of all modes, by group. Within a group those with more modifiers come first, so that they win.
+//! Actions of all modes, by group. Within a group those with more modifiers come first, so that they win.
 
-use super::binding::{Binding, key};
-use crate::app::actions::Action;
-use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::gripper::GripperAction;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::view::ViewAction;
+use crate::app::actions::{Act, command, key, key_where};
+use crate::app::features::App;
 use crate::app::modes::mode::Mode;
+use crate::app::panels::view3d;
 use crate::app::playback::{Seek, next_speed};
 use crate::app::view_source::ViewSource;
 use egui::{Key, Modifiers};
 use palpate_geometry::drawing::{Camera, StandardView};
+use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
+use palpate_store::TrialPlace;
 
 const NONE: Modifiers = Modifiers::NONE;
 const COMMAND: Modifiers = Modifiers::COMMAND;
@@ -24,125 +21,160 @@ const SCALE_STEP: f32 = 0.1;
 
 const NOT_LOADED: &str = "The simulation has not loaded an object yet.";
 
-/// Groups of keys, by title.
-pub(super) static GROUPS: [(&str, &[Binding]); 4] =
+/// Groups of actions with keys, by title.
+pub(super) static GROUPS: [(&str, &[Act]); 4] =
     [("General", GENERAL), ("View", VIEW), ("Time", TIME), ("Real gripper", GRIPPER)];
 
-const GENERAL: &[Binding] = &[
-    key(COMMAND, Key::K, "command palette: find and run any action", |c| {
-        Some(ViewAction::ShowPalette(!c.view.palette_shown).into())
+const GENERAL: &[Act] =
+    &[
+        key(COMMAND, Key::K, "command palette: find and run any action", |app| {
+            app.view.palette_shown = !app.view.palette_shown;
+        }),
+        key(COMMAND_SHIFT, Key::Z, "redo", |app| match app.view.mode {
+            Mode::Demo => app.redo_scene(),
+            Mode::Inspect | Mode::Label | Mode::Study => app.edit_labels(LabelCommand::Redo),
+        }),
+        key(COMMAND, Key::Z, "undo the last change of the scene (Demo mode), or the last label or discard", |app| {
+            match app.view.mode {
+                Mode::Demo => app.undo_scene(),
+                Mode::Inspect | Mode::Label | Mode::Study => app.edit_labels(LabelCommand::Undo),
+            }
+        }),
+        key(COMMAND, Key::O, "open a URDF, OBJ or STL file", App::ask_for_object),
+        key(COMMAND, Key::S, "save the scene", App::save_scene),
+        key_where(COMMAND, Key::P, "save a picture of the 3-D view", |app| {
+            app.snapshot().ok_or(NOT_LOADED)?;
+            view3d::save_picture(app)
+        }),
+        key(COMMAND, Key::Plus, "larger texts and buttons", |app| scale(app, SCALE_STEP)),
+        key(COMMAND, Key::Equals, "", |app| scale(app, SCALE_STEP)),
+        key(COMMAND, Key::Minus, "smaller texts and buttons", |app| scale(app, -SCALE_STEP)),
+        key(COMMAND, Key::Num0, "texts and buttons at 100 %", |app| app.set_scale(1.0)),
+        key(NONE, Key::F1, "show or hide the keys", |app| app.view.keys_shown = !app.view.keys_shown),
+        key(NONE, Key::F11, "presenter mode", |app| app.present(!app.view.presents)),
+    ];
+
+const VIEW: &[Act] = &[
+    key(Modifiers::SHIFT, Key::Z, "show everything", App::frame_all),
+    key_where(NONE, Key::Z, "show the object", |app| {
+        app.view.camera = object_framed(app).ok_or("There is no object in the hand.")?;
+        Ok(())
     }),
-    key(COMMAND_SHIFT, Key::Z, "redo", |c| {
-        Some(if edits_scene(c) { SimulationAction::Redo.into() } else { LabelCommand::Redo.into() })
+    key(NONE, Key::F, "force arrows", |app| app.view.forces = !app.view.forces),
+    key(NONE, Key::O, "circles that the flex strips read", |app| app.view.circles = !app.view.circles),
+    key(NONE, Key::C, "contact path on the object: by time, by pressure, off", |app| {
+        app.view.path = app.view.path.next();
     }),
-    key(COMMAND, Key::Z, "undo the last change of the scene (Demo mode), or the last label or discard", |c| {
-        Some(if edits_scene(c) { SimulationAction::Undo.into() } else { LabelCommand::Undo.into() })
-    }),
-    key(COMMAND, Key::O, "open a URDF, OBJ or STL file", |_| Some(FileAction::Open.into())),
-    key(COMMAND, Key::S, "save the scene", |_| Some(FileAction::SaveScene.into())),
-    key(COMMAND, Key::P, "save a picture of the 3-D view", |c| {
-        c.snapshot?;
-        Some(FileAction::SavePicture.into())
-    })
-    .otherwise(NOT_LOADED),
-    key(COMMAND, Key::Plus, "larger texts and buttons", |c| scaled(c, SCALE_STEP)),
-    key(COMMAND, Key::Equals, "", |c| scaled(c, SCALE_STEP)),
-    key(COMMAND, Key::Minus, "smaller texts and buttons", |c| scaled(c, -SCALE_STEP)),
-    key(COMMAND, Key::Num0, "texts and buttons at 100 %", |_| Some(ViewAction::SetScale(1.0).into())),
-    key(NONE, Key::F1, "show or hide the keys", |c| Some(ViewAction::ShowKeys(!c.view.keys_shown).into())),
-    key(NONE, Key::F11, "presenter mode", |c| Some(ViewAction::Present(!c.view.presents).into())),
+    key(NONE, Key::G, "ghost: result of the other engine", |app| app.set_ghost(!app.view.ghost)),
+    key(Modifiers::ALT, Key::Num1, "front view", |app| turn(app, StandardView::Front)),
+    key(Modifiers::ALT, Key::Num3, "right view", |app| turn(app, StandardView::Right)),
+    key(Modifiers::ALT, Key::Num7, "top view", |app| turn(app, StandardView::Top)),
+    key(Modifiers::ALT, Key::Num5, "parallel projection", |app| app.view.camera.parallel = !app.view.camera.parallel),
 ];
 
-const VIEW: &[Binding] = &[
-    key(Modifiers::SHIFT, Key::Z, "show everything", |_| Some(ViewAction::FrameAll.into())),
-    key(NONE, Key::Z, "show the object", |c| Some(ViewAction::SetCamera(object_framed(c)?).into()))
-        .otherwise("There is no object in the hand."),
-    key(NONE, Key::F, "force arrows", |c| Some(ViewAction::SetForces(!c.view.forces).into())),
-    key(NONE, Key::O, "circles that the flex strips read", |c| Some(ViewAction::SetCircles(!c.view.circles).into())),
-    key(NONE, Key::C, "contact path on the object: by time, by pressure, off", |c| {
-        Some(ViewAction::SetPath(c.view.path.next()).into())
-    }),
-    key(NONE, Key::G, "ghost: result of the other engine", |c| Some(SimulationAction::SetGhost(!c.view.ghost).into())),
-    key(Modifiers::ALT, Key::Num1, "front view", |c| turned(c, StandardView::Front)),
-    key(Modifiers::ALT, Key::Num3, "right view", |c| turned(c, StandardView::Right)),
-    key(Modifiers::ALT, Key::Num7, "top view", |c| turned(c, StandardView::Top)),
-    key(Modifiers::ALT, Key::Num5, "parallel projection", |c| {
-        let camera = Camera { parallel: !c.view.camera.parallel, ..c.view.camera };
-        Some(ViewAction::SetCamera(camera).into())
-    }),
-];
-
-const TIME: &[Binding] = &[
-    key(NONE, Key::Space, "play or pause", |c| {
-        if replays(c) {
-            return Some(InspectAction::TogglePlaying.into());
+const TIME: &[Act] = &[
+    key_where(NONE, Key::Space, "play or pause", |app| {
+        if app.shown().replays() {
+            app.toggle_playing();
+            return Ok(());
         }
-        let playing = c.snapshot?.status.playing;
-        Some(if playing { Command::Pause } else { Command::Play }.into())
-    })
-    .otherwise(NOT_LOADED),
-    key(COMMAND, Key::ArrowRight, "one sample forward", |c| {
-        Some(if replays(c) { InspectAction::Seek(Seek::Samples(1)).into() } else { Command::Step.into() })
+        let playing = app.snapshot().ok_or(NOT_LOADED)?.status.playing;
+        app.simulation.send(if playing { Command::Pause } else { Command::Play });
+        Ok(())
     }),
-    key(COMMAND, Key::ArrowLeft, "one sample back", |_| Some(InspectAction::Seek(Seek::Samples(-1)).into())),
-    key(NONE, Key::ArrowRight, "0.1 s forward", |_| Some(InspectAction::Seek(Seek::By(0.1)).into())),
-    key(NONE, Key::ArrowLeft, "0.1 s back", |_| Some(InspectAction::Seek(Seek::By(-0.1)).into())),
-    key(NONE, Key::End, "last sample; of a live gripper, back to live", |_| {
-        Some(InspectAction::Seek(Seek::End).into())
+    key(COMMAND, Key::ArrowRight, "one sample forward", |app| match app.shown().replays() {
+        true => app.seek(Seek::Samples(1)),
+        false => app.simulation.send(Command::Step),
     }),
-    key(NONE, Key::Backspace, "back to the start", |c| {
-        Some(if replays(c) { InspectAction::Seek(Seek::Start).into() } else { Command::Reset.into() })
+    key(COMMAND, Key::ArrowLeft, "one sample back", |app| app.seek(Seek::Samples(-1))),
+    key(NONE, Key::ArrowRight, "0.1 s forward", |app| app.seek(Seek::By(0.1))),
+    key(NONE, Key::ArrowLeft, "0.1 s back", |app| app.seek(Seek::By(-0.1))),
+    key(NONE, Key::End, "last sample; of a live gripper, back to live", |app| app.seek(Seek::End)),
+    key(NONE, Key::Backspace, "back to the start", |app| match app.shown().replays() {
+        true => app.seek(Seek::Start),
+        false => app.simulation.send(Command::Reset),
     }),
-    key(NONE, Key::Minus, "slower", |c| faster(c, -1)).otherwise(NOT_LOADED),
-    key(NONE, Key::Equals, "faster", |c| faster(c, 1)).otherwise(NOT_LOADED),
+    key_where(NONE, Key::Minus, "slower", |app| change_speed(app, -1)),
+    key_where(NONE, Key::Equals, "faster", |app| change_speed(app, 1)),
 ];
 
-const GRIPPER: &[Binding] = &[
-    key(NONE, Key::R, "record a grasp of the real gripper, or restart it", |_| Some(LabellingAction::Record.into())),
-    key(NONE, Key::Q, "end the trial and keep it", |c| {
-        c.gripper?.trial.as_ref()?;
-        Some(GripperCommand::End.into())
-    })
-    .otherwise("No trial of the real gripper is running."),
-    key(NONE, Key::D, "discard the trial", |_| Some(LabellingAction::Discard.into())),
-    key(NONE, Key::T, "tare the sensors of the real gripper", |_| Some(GripperCommand::Tare.into())),
-    key(COMMAND, Key::G, "connect or disconnect the real gripper", |_| Some(GripperAction::ToggleConnection.into())),
-    key(NONE, Key::Escape, "STOP: vent the real gripper and end the trial; close the keys, end presenter mode", |_| {
-        Some(Action::Stop)
+const GRIPPER: &[Act] = &[
+    key(NONE, Key::R, "record a grasp of the real gripper, or restart it", |app| app.label(LabellingAction::Record)),
+    key_where(NONE, Key::Q, "end the trial and keep it", |app| {
+        let running = app.gripper_view().and_then(|gripper| gripper.trial.as_ref());
+        running.ok_or("No trial of the real gripper is running.")?;
+        app.gripper.send(GripperCommand::End);
+        Ok(())
+    }),
+    key(NONE, Key::D, "discard the trial", |app| app.label(LabellingAction::Discard)),
+    key(NONE, Key::T, "tare the sensors of the real gripper", |app| _ = app.gripper.send(GripperCommand::Tare)),
+    key(COMMAND, Key::G, "connect or disconnect the real gripper", App::toggle_connection),
+    key(
+        NONE,
+        Key::Escape,
+        "STOP: vent the real gripper and end the trial; close the keys, end presenter mode",
+        App::stop,
+    ),
+];
+
+/// Actions without a key.
+pub(in crate::app) static COMMANDS: &[Act] = &[
+    command("Dark theme", |app| app.set_theme(Theme::Dark)),
+    command("Light theme", |app| app.set_theme(Theme::Light)),
+    command("Reset layout of all modes", |app| app.view.layouts.clear()),
+    command("Show or hide the true object", |app| app.view.truth_shown = !app.view.truth_shown),
+    command("Show the simulation", |app| app.view.source = ViewSource::Simulation),
+    command("Show the real gripper", |app| app.view.source = ViewSource::Gripper),
+    command("Close the stored trial that is open", App::close_trial),
+    command("Remove all trials from the comparison", |app| app.inspect.unpin_all()),
+    command("Show mean and spread of each class", |app| app.inspect.spread = true),
+    command("Show each compared trial", |app| app.inspect.spread = false),
+    command("Show the whole grasp in all plots", |app| app.view.time_window = None),
+    command("Measure effects of the scene", |app| app.simulation.measure_effects()),
+    command("Compute the last grasp again", |app| app.simulation.send(Command::ComputeAgain)),
+    command("Use the shipped model for the real gripper", |app| app.use_model(None)),
+    command("Teach the model the object file in the hand", App::teach_object),
+    command("Detect trials automatically, or by key", App::toggle_watch),
+    command("Next actuation: manual, board or untimed", App::next_control),
+    command("Adapt to the real gripper by one close of the empty hand", |app| {
+        app.gripper.send(GripperCommand::Adapt(app.view.control));
+    }),
+    command("List serial ports", |app| _ = app.gripper.send(GripperCommand::ListPorts)),
+    command("Record simulated grasps into the store", |app| {
+        app.simulation.send(Command::SetRecording(Some(TrialPlace::Store)));
+    }),
+    command("Record simulated grasps into the demo log", |app| {
+        app.simulation.send(Command::SetRecording(Some(TrialPlace::DemoLog)));
+    }),
+    command("Error band, on or off", |app| {
+        let shown = app.snapshot().is_some_and(|snapshot| snapshot.status.error_band);
+        app.simulation.send(Command::SetErrorBand(!shown));
     }),
 ];
 
-/// True in the mode whose changes are those of the scene.
-fn edits_scene(context: &PanelContext<'_>) -> bool {
-    context.view.mode == Mode::Demo
-}
-
-fn scaled(context: &PanelContext<'_>, by: f32) -> Option<Action> {
+fn scale(app: &mut App, by: f32) {
     // Whole steps, also after many.
-    let steps = (context.view.scale / SCALE_STEP).round() + (by / SCALE_STEP).round();
-    Some(ViewAction::SetScale(steps * SCALE_STEP).into())
+    let steps = (app.view.scale / SCALE_STEP).round() + (by / SCALE_STEP).round();
+    app.set_scale(steps * SCALE_STEP);
 }
 
-/// True where a stored trial or the past of a live gripper is shown.
-fn replays(context: &PanelContext<'_>) -> bool {
-    context.source == ViewSource::Trial || context.shown().looks_back()
-}
-
-fn faster(context: &PanelContext<'_>, by: isize) -> Option<Action> {
-    if replays(context) {
-        return Some(InspectAction::ChangeSpeed(by).into());
+fn change_speed(app: &mut App, by: isize) -> Result<(), &'static str> {
+    if app.shown().replays() {
+        app.playback().change_speed(by);
+    } else {
+        let now = app.snapshot().ok_or(NOT_LOADED)?.status.target_speed;
+        app.simulation.send(Command::SetSpeed(next_speed(now, by)));
     }
-    let now = context.snapshot?.status.target_speed;
-    Some(Command::SetSpeed(next_speed(now, by)).into())
+    Ok(())
 }
 
-fn turned(context: &PanelContext<'_>, view: StandardView) -> Option<Action> {
-    Some(ViewAction::SetCamera(context.view.camera.turned_to(view)).into())
+fn turn(app: &mut App, view: StandardView) {
+    app.view.camera = app.view.camera.turned_to(view);
 }
 
-fn object_framed(context: &PanelContext<'_>) -> Option<Camera> {
-    let snapshot = context.snapshot?;
+fn object_framed(app: &App) -> Option<Camera> {
+    let snapshot = app.snapshot()?;
     let place = snapshot.frame.world_from_object?.position.as_vec3();
     let radius = snapshot.object.as_ref()?.size.length() as f32;
-    Some(context.view.camera.framing(place, 0.6 * radius.max(0.02)))
+    Some(app.view.camera.framing(place, 0.6 * radius.max(0.02)))
 }

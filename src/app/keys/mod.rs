@@ -1,16 +1,13 @@
-//! Keys: one list for behaviour and key sheet alike, that of the mode before that of all modes. Off while a text field
+//! Keys: one table for behaviour and key sheet alike, that of the mode before that of all modes. Off while a text field
 //! has focus.
 
-pub(super) mod binding;
 mod common;
 
-use crate::app::actions::{Action, Actions};
-use crate::app::context::PanelContext;
-use crate::app::features::view::ViewAction;
+use crate::app::actions::{Act, Actions};
+use crate::app::features::App;
 use crate::app::modes;
 use crate::app::modes::mode::Mode;
-use crate::app::notices::UserMessage;
-use binding::Binding;
+pub(super) use common::COMMANDS;
 use common::GROUPS;
 use egui::{Key, RichText, Ui};
 
@@ -24,71 +21,68 @@ const MOUSE: [(&str, &str); 6] = [
     ("Ctrl+drag", "pull at the object"),
 ];
 
-/// Bindings of a mode in groups with titles: its own, those that open modes, and those of all modes.
-pub(super) fn groups(mode: Mode) -> Vec<(&'static str, Vec<&'static Binding>)> {
+/// Actions of a mode with keys, in groups with titles: its own, those that open modes, and those of all modes.
+pub(super) fn groups(mode: Mode) -> Vec<(&'static str, Vec<&'static Act>)> {
     let own = modes::kind(mode);
     let open = modes::ALL.iter().map(|kind| &kind.open).collect();
-    let common = GROUPS.iter().map(|(title, bindings)| (*title, bindings.iter().collect()));
+    let common = GROUPS.iter().map(|(title, acts)| (*title, acts.iter().collect()));
     [(own.title, own.keys.iter().collect()), ("Modes", open)].into_iter().chain(common).collect()
 }
 
-/// Bindings of a mode, in the order in which they are looked through.
-fn bindings(mode: Mode) -> impl Iterator<Item = &'static Binding> {
-    groups(mode).into_iter().flat_map(|(_, bindings)| bindings)
+/// Actions of a mode, in the order in which they are looked through.
+fn acts(mode: Mode) -> impl Iterator<Item = &'static Act> {
+    groups(mode).into_iter().flat_map(|(_, acts)| acts)
 }
 
 /// Pushes the actions of the keys pressed in this frame.
-pub(super) fn pressed(ctx: &egui::Context, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn pressed(app: &App, actions: &mut Actions) {
+    let ctx = &app.ctx;
     let dialog = ctx.memory(|memory| memory.top_modal_layer().is_some());
-    if ctx.text_edit_focused() || context.view.palette_shown || dialog {
+    if ctx.text_edit_focused() || app.view.palette_shown || dialog {
         return stop(ctx, actions);
     }
     // Presenter mode demonstrates, whatever mode is behind it.
-    let mode = if context.view.presents { Mode::Demo } else { context.view.mode };
-    if let Some(action) = (modes::kind(mode).typed)(ctx, context) {
-        actions.push(action);
+    let mode = if app.view.presents { Mode::Demo } else { app.view.mode };
+    if let Some((waits, search)) = modes::kind(mode).search
+        && let Some(typed) = typed_ahead(ctx, waits(app))
+    {
+        actions.push(move |app| search(app, typed));
         return stop(ctx, actions);
     }
     for pressed in bound(ctx, mode) {
-        actions.push(match pressed {
-            Pressed::Key(binding) => binding.action(context),
-            Pressed::Elsewhere(binding, mode) => elsewhere(ctx, binding, mode).into(),
+        actions.push(move |app| match pressed {
+            Pressed::Key(act) => act.run(app),
+            Pressed::Elsewhere(act, mode) => {
+                let kind = modes::kind(mode);
+                let [key, open] = [act, &kind.open].map(|act| act.key_text(&app.ctx));
+                app.notices.info(format!("{key} acts in {} mode ({open}): {}.", kind.title, act.does));
+            }
         });
     }
 }
 
 /// Key pressed in this frame.
 enum Pressed {
-    Key(&'static Binding),
+    Key(&'static Act),
     /// Key of another mode.
-    Elsewhere(&'static Binding, Mode),
+    Elsewhere(&'static Act, Mode),
 }
 
-/// Message about a key that acts in another mode.
-fn elsewhere(ctx: &egui::Context, binding: &Binding, mode: Mode) -> UserMessage {
-    let kind = modes::kind(mode);
-    let [key, open] = [&binding.shortcut, &kind.open.shortcut].map(|shortcut| ctx.format_shortcut(shortcut));
-    UserMessage::Info(format!("{key} acts in {} mode ({open}): {}.", kind.title, binding.does))
-}
-
-/// Bindings of the keys pressed in this frame, in their order. The keys are consumed.
+/// Actions of the keys pressed in this frame, in their order. The keys are consumed.
 fn bound(ctx: &egui::Context, mode: Mode) -> Vec<Pressed> {
     let mut pressed = Vec::new();
     ctx.input_mut(|input| {
         input.events.retain(|event| {
             let egui::Event::Key { key, modifiers, pressed: true, repeat, .. } = event else { return true };
-            let Some(binding) = bindings(mode).find(|binding| binding.is(*key, *modifiers)) else {
+            let Some(act) = acts(mode).find(|act| act.is(*key, *modifiers)) else {
                 let others = modes::ALL.iter().filter(|kind| kind.mode != mode && !repeat);
-                pressed.extend(others.flat_map(|kind| kind.keys.iter().map(|binding| (binding, kind.mode))).find_map(
-                    |(binding, mode)| {
-                        let told = binding.is(*key, *modifiers) && !binding.does.is_empty();
-                        told.then_some(Pressed::Elsewhere(binding, mode))
-                    },
-                ));
+                let mut keys = others.flat_map(|kind| kind.keys.iter().map(|act| (act, kind.mode)));
+                let told = keys.find(|(act, _)| act.is(*key, *modifiers) && !act.does.is_empty());
+                pressed.extend(told.map(|(act, mode)| Pressed::Elsewhere(act, mode)));
                 return true;
             };
-            if !repeat || binding.repeats() {
-                pressed.push(Pressed::Key(binding));
+            if !repeat || act.repeats() {
+                pressed.push(Pressed::Key(act));
             }
             false
         });
@@ -99,8 +93,34 @@ fn bound(ctx: &egui::Context, mode: Mode) -> Vec<Pressed> {
 /// Escape stops the gripper wherever the cursor is.
 fn stop(ctx: &egui::Context, actions: &mut Actions) {
     if ctx.input(|i| i.key_pressed(Key::Escape)) {
-        actions.push(Action::Stop);
+        actions.push(App::stop);
     }
+}
+
+/// Text typed after the key of a search field, in the same frame or before the field has the keyboard (`waits`). It is for
+/// the field and triggers no keys.
+fn typed_ahead(ctx: &egui::Context, waits: bool) -> Option<String> {
+    ctx.input_mut(|input| {
+        let slash = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Slash, pressed: true, .. });
+        let text = |event: &egui::Event| match event {
+            egui::Event::Text(text) if text != "/" => Some(text.clone()),
+            _ => None,
+        };
+        let pressed = input.events.iter().position(slash);
+        let from = pressed.or_else(|| waits.then_some(0))?;
+        let typed: String = input.events[from..].iter().filter_map(text).collect();
+        if pressed.is_none() && !input.events.iter().any(|event| matches!(event, egui::Event::Text(_))) {
+            return None;
+        }
+        let is_stop = |event: &egui::Event| matches!(event, egui::Event::Key { key: Key::Escape, .. });
+        let is_typed = |event: &egui::Event| matches!(event, egui::Event::Key { .. } | egui::Event::Text(_));
+        let mut place = 0;
+        input.events.retain(|event| {
+            place += 1;
+            place <= from || !is_typed(event) || is_stop(event)
+        });
+        Some(typed)
+    })
 }
 
 /// Width of a column of the sheet (points).
@@ -130,18 +150,17 @@ pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut 
         });
     });
     if shown && !open {
-        actions.push(ViewAction::ShowKeys(false));
+        actions.push(|app| app.view.keys_shown = false);
     }
 }
 
 /// Lines of the sheet by group: how, and what it does.
 fn sheet_lines(ctx: &egui::Context, mode: Mode) -> Vec<(&'static str, Vec<(String, &'static str)>)> {
-    let keys = |bindings: Vec<&'static Binding>| -> Vec<(String, &'static str)> {
-        let named = bindings.into_iter().filter(|binding| !binding.does.is_empty());
-        named.map(|binding| (ctx.format_shortcut(&binding.shortcut), binding.does)).collect()
+    let keys = |acts: Vec<&'static Act>| -> Vec<(String, &'static str)> {
+        acts.into_iter().filter(|act| !act.does.is_empty()).map(|act| (act.key_text(ctx), act.does)).collect()
     };
     let mouse = MOUSE.iter().map(|(how, does)| ((*how).to_owned(), *does)).collect();
-    groups(mode).into_iter().map(|(title, bindings)| (title, keys(bindings))).chain([("Mouse", mouse)]).collect()
+    groups(mode).into_iter().map(|(title, acts)| (title, keys(acts))).chain([("Mouse", mouse)]).collect()
 }
 
 fn group_ui(ui: &mut Ui, title: &str, lines: &[(String, &str)]) {
@@ -167,7 +186,7 @@ mod tests {
     #[test]
     fn no_key_does_two_things() {
         for kind in &modes::ALL {
-            let all: Vec<&Binding> = bindings(kind.mode).collect();
+            let all: Vec<&Act> = acts(kind.mode).collect();
             for (k, a) in all.iter().enumerate() {
                 assert!(all[k + 1..].iter().all(|b| a.shortcut != b.shortcut), "{}: {}", kind.title, a.does);
             }
@@ -177,9 +196,9 @@ mod tests {
     #[test]
     fn the_manual_lists_the_same_keys() {
         let row = |how: &str, does: &str| if does.is_empty() { String::new() } else { format!("| {how} | {does} |\n") };
-        let name = |binding: &Binding| binding.shortcut.format(&egui::ModifierNames::NAMES, false);
-        let table = |keys: &[&'static Binding]| -> String {
-            let rows: String = keys.iter().map(|binding| row(&name(binding), binding.does)).collect();
+        let name = |act: &Act| act.shortcut.expect("a key").format(&egui::ModifierNames::NAMES, false);
+        let table = |keys: &[&'static Act]| -> String {
+            let rows: String = keys.iter().map(|act| row(&name(act), act.does)).collect();
             format!("| key | action |\n|---|---|\n{rows}\n")
         };
         let holds = |topic: &str, expected: &str| {
@@ -208,7 +227,7 @@ mod tests {
             does = bound(ui.ctx(), Mode::Label)
                 .iter()
                 .map(|pressed| match pressed {
-                    Pressed::Key(binding) | Pressed::Elsewhere(binding, _) => binding.does,
+                    Pressed::Key(act) | Pressed::Elsewhere(act, _) => act.does,
                 })
                 .collect();
         });

@@ -2,13 +2,8 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
-use crate::app::actions::Action;
-use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::library::LibraryAction;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key};
+use crate::app::actions::{Act, key, key_where};
+use crate::app::features::App;
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
@@ -19,38 +14,45 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Demo",
     about: "Grasp and recognise, live (Ctrl+1)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num1, "Demo mode", |_| Some(ViewAction::SetMode(Mode::Demo).into())),
+    open: key(Modifiers::COMMAND, Key::Num1, "Demo mode", |app| app.set_mode(Mode::Demo)),
     keys: KEYS,
-    typed: |_, _| None,
+    search: None,
 };
 
-const KEYS: &[Binding] = &[
-    key(Modifiers::NONE, Key::N, "next object", |_| Some(RecognitionAction::NextObject.into())),
-    key(Modifiers::NONE, Key::M, "one more grasp, where the threshold is raised after a verdict", |c| {
-        c.one_more().then(|| Command::GraspOnceMore.into())
-    })
-    .otherwise("One more grasp follows a higher threshold: raise it after a verdict, above the probability reached."),
-    key(Modifiers::NONE, Key::K, "keep the last grasp: from the demo log to the store", |c| {
-        Some(LibraryAction::Keep(c.logged?.trial).into())
-    })
-    .otherwise("The last grasp is not in the demo log."),
-    key(Modifiers::NONE, Key::ArrowUp, "higher threshold", |c| threshold(c, 1.0)).otherwise(OFF),
-    key(Modifiers::NONE, Key::ArrowDown, "lower threshold", |c| threshold(c, -1.0)).otherwise(OFF),
-    key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
-];
+const NONE: Modifiers = Modifiers::NONE;
 
-const OFF: &str = "Recognition is off: there is no threshold.";
+const KEYS: &[Act] = &[
+    key(NONE, Key::N, "next object", App::next_object),
+    key_where(NONE, Key::M, "one more grasp, where the threshold is raised after a verdict", |app| {
+        if !app.shown().one_more() {
+            return Err("One more grasp follows a higher threshold: raise it after a verdict, above the probability \
+                        reached.");
+        }
+        app.simulation.send(Command::GraspOnceMore);
+        Ok(())
+    }),
+    key_where(NONE, Key::K, "keep the last grasp: from the demo log to the store", |app| {
+        let logged = app.logged().ok_or("The last grasp is not in the demo log.")?;
+        app.library.keep(logged.trial);
+        Ok(())
+    }),
+    key_where(NONE, Key::ArrowUp, "higher threshold", |app| move_threshold(app, 1.0)),
+    key_where(NONE, Key::ArrowDown, "lower threshold", |app| move_threshold(app, -1.0)),
+    key(NONE, Key::Home, "first sample", |app| app.seek(Seek::Start)),
+];
 
 /// Change of the threshold by one key press; above 99 % a tenth of it.
 const STEP: f64 = 0.01;
 
-fn threshold(context: &PanelContext<'_>, sign: f64) -> Option<Action> {
-    let now = context.shown().recognised()?.view?.rule.threshold;
+fn move_threshold(app: &mut App, sign: f64) -> Result<(), &'static str> {
+    let view = app.shown().recognised().and_then(|recognised| recognised.view);
+    let now = view.ok_or("Recognition is off: there is no threshold.")?.rule.threshold;
     let fine = now + 1e-6 * sign > 0.99;
     let next = now + sign * if fine { 0.1 * STEP } else { STEP };
     // Whole steps, also after many.
     let steps = if fine { 1e3 } else { 1e2 };
-    Some(RecognitionAction::SetThreshold((next * steps).round() / steps).into())
+    app.set_threshold((next * steps).round() / steps);
+    Ok(())
 }
 
 /// Objects and scene left, the view over two plots in the middle, results right.

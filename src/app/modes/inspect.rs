@@ -2,15 +2,12 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
-use crate::app::features::files::FileAction;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::library::LibraryAction;
-use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key, typed_ahead};
+use crate::app::actions::{Act, key};
+use crate::app::features::App;
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
-use palpate_lab::inspection::FigureOptions;
+use palpate_lab::inspection::{Alignment, FigureOptions};
 use palpate_store::labels::TrialEdit;
 
 pub(super) const KIND: ModeKind = ModeKind {
@@ -18,44 +15,43 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Inspect",
     about: "Open, replay, compare and explain stored trials (Ctrl+2)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num2, "Inspect mode", |_| Some(ViewAction::SetMode(Mode::Inspect).into())),
+    open: key(Modifiers::COMMAND, Key::Num2, "Inspect mode", |app| app.set_mode(Mode::Inspect)),
     keys: KEYS,
-    typed: |ctx, context| {
-        typed_ahead(ctx, context.picked.focus_search).map(|typed| LibraryAction::FocusSearch(typed).into())
-    },
+    search: Some((|app| app.library.selection.focus_search, |app, typed| app.search_library(&typed))),
 };
 
-const KEYS: &[Binding] = &[
-    key(Modifiers::NONE, Key::Slash, "search the library", |_| Some(LibraryAction::FocusSearch(String::new()).into())),
+const NONE: Modifiers = Modifiers::NONE;
+const SHIFT: Modifiers = Modifiers::SHIFT;
+const COMMAND: Modifiers = Modifiers::COMMAND;
+
+const KEYS: &[Act] = &[
+    key(NONE, Key::Slash, "search the library", |app| app.search_library("")),
     // Those with more modifiers come first, so that they win.
-    key(Modifiers::SHIFT, Key::ArrowUp, "select the trial above too", |_| Some(LibraryAction::Step(-1, true).into())),
-    key(Modifiers::SHIFT, Key::ArrowDown, "select the trial below too", |_| Some(LibraryAction::Step(1, true).into())),
-    key(Modifiers::NONE, Key::ArrowUp, "trial above", |_| Some(LibraryAction::Step(-1, false).into())),
-    key(Modifiers::NONE, Key::ArrowDown, "trial below", |_| Some(LibraryAction::Step(1, false).into())),
-    key(Modifiers::COMMAND, Key::A, "select all trials found", |_| Some(LibraryAction::SelectAll.into())),
-    key(Modifiers::NONE, Key::Enter, "open the trial", |_| Some(LibraryAction::Open.into())),
-    key(Modifiers::NONE, Key::P, "compare the selected trials, or no longer", |_| Some(LibraryAction::Pin.into())),
-    key(Modifiers::NONE, Key::K, "keep the selected trials: from the demo log to the store", |_| {
-        Some(LibraryAction::Edit(TrialEdit::Keep).into())
+    key(SHIFT, Key::ArrowUp, "select the trial above too", |app| app.library.step(-1, true)),
+    key(SHIFT, Key::ArrowDown, "select the trial below too", |app| app.library.step(1, true)),
+    key(NONE, Key::ArrowUp, "trial above", |app| app.library.step(-1, false)),
+    key(NONE, Key::ArrowDown, "trial below", |app| app.library.step(1, false)),
+    key(COMMAND, Key::A, "select all trials found", |app| app.library.select_all()),
+    key(NONE, Key::Enter, "open the trial", App::open_selected),
+    key(NONE, Key::P, "compare the selected trials, or no longer", App::pin_selected),
+    key(NONE, Key::K, "keep the selected trials: from the demo log to the store", |app| {
+        app.library.edit(TrialEdit::Keep);
     }),
-    key(Modifiers::NONE, Key::Delete, "discard the selected trials", |_| {
-        Some(LibraryAction::Edit(TrialEdit::Discard).into())
+    key(NONE, Key::Delete, "discard the selected trials", |app| app.library.edit(TrialEdit::Discard)),
+    key(NONE, Key::Home, "first sample", |app| app.seek(Seek::Start)),
+    key(SHIFT, Key::A, "mark A at the cursor", |app| app.put_mark(0)),
+    key(SHIFT, Key::B, "mark B at the cursor", |app| app.put_mark(1)),
+    key(COMMAND, Key::E, "export a figure of the trial and those compared with it", |app| {
+        app.export_figure(FigureOptions::default());
     }),
-    key(Modifiers::NONE, Key::Home, "first sample", |_| Some(InspectAction::Seek(Seek::Start).into())),
-    key(Modifiers::SHIFT, Key::A, "mark A at the cursor", |_| Some(InspectAction::PutMark(0).into())),
-    key(Modifiers::SHIFT, Key::B, "mark B at the cursor", |_| Some(InspectAction::PutMark(1).into())),
-    key(Modifiers::COMMAND, Key::E, "export a figure of the trial and those compared with it", |_| {
-        Some(FileAction::ExportFigure(FigureOptions::default()).into())
+    key(NONE, Key::L, "repeat, between the marks where both are set", App::toggle_repeat),
+    key(NONE, Key::M, "origin of compared trials: start or contact", |app| {
+        app.inspect.alignment = match app.inspect.alignment {
+            Alignment::Closing => Alignment::Contact,
+            Alignment::Contact => Alignment::Closing,
+        };
     }),
-    key(Modifiers::NONE, Key::L, "repeat, between the marks where both are set", |_| {
-        Some(InspectAction::ToggleRepeat.into())
-    }),
-    key(Modifiers::NONE, Key::M, "origin of compared trials: start or contact", |c| {
-        Some(InspectAction::Align(c.next_alignment()).into())
-    }),
-    key(Modifiers::NONE, Key::S, "mean and spread of each class, or each trial", |c| {
-        Some(InspectAction::ShowSpread(!c.comparison.spread).into())
-    }),
+    key(NONE, Key::S, "mean and spread of each class, or each trial", |app| app.inspect.spread = !app.inspect.spread),
 ];
 
 /// Trials left, the view over plots in the middle, answers and facts right.

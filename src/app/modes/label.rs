@@ -2,11 +2,8 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
-use crate::app::actions::Action;
-use crate::app::features::gripper::GripperAction;
-use crate::app::features::tools::ToolAction;
-use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key, typed_ahead};
+use crate::app::actions::{Act, key};
+use crate::app::features::App;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 use palpate_lab::workers::LabellingAction;
@@ -16,43 +13,45 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Label",
     about: "Record and label trials of the real gripper (Ctrl+3)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num3, "Label mode", |_| Some(ViewAction::SetMode(Mode::Label).into())),
+    open: key(COMMAND, Key::Num3, "Label mode", |app| app.set_mode(Mode::Label)),
     keys: KEYS,
-    typed: |ctx, context| {
-        typed_ahead(ctx, context.draft.focus_search).map(|typed| LabellingAction::FocusSearch(typed).into())
-    },
+    search: Some((
+        |app| app.labelling.session.draft().focus_search,
+        |app, typed| app.label(LabellingAction::FocusSearch(typed)),
+    )),
 };
 
 const NONE: Modifiers = Modifiers::NONE;
+const COMMAND: Modifiers = Modifiers::COMMAND;
 
-const KEYS: &[Binding] = &[
-    key(NONE, Key::N, "give the label and continue", |_| Some(LabellingAction::GiveLabel.into())),
-    key(NONE, Key::Enter, "give the label", |_| Some(LabellingAction::GiveLabel.into())),
-    key(NONE, Key::U, "mark the label as unsure", |_| Some(LabellingAction::ToggleUnsure.into())),
-    key(NONE, Key::B, "blind: hide the model's prediction until the label is given", |_| {
-        Some(LabellingAction::ToggleBlind.into())
+const KEYS: &[Act] = &[
+    key(NONE, Key::N, "give the label and continue", |app| app.label(LabellingAction::GiveLabel)),
+    key(NONE, Key::Enter, "give the label", |app| app.label(LabellingAction::GiveLabel)),
+    key(NONE, Key::U, "mark the label as unsure", |app| app.label(LabellingAction::ToggleUnsure)),
+    key(NONE, Key::B, "blind: hide the model's prediction until the label is given", |app| {
+        app.label(LabellingAction::ToggleBlind);
     }),
-    key(NONE, Key::M, "actuation: manual, board or untimed", |_| Some(GripperAction::NextControl.into())),
-    key(NONE, Key::W, "detect trials automatically", |_| Some(GripperAction::ToggleWatch.into())),
-    key(Modifiers::COMMAND, Key::E, "export all labelled trials", |_| Some(LabellingAction::Export.into())),
-    key(Modifiers::COMMAND, Key::T, "train on all labelled trials", |_| Some(ToolAction::TrainAndUse.into())),
-    key(NONE, Key::Slash, "find an object", |_| Some(LabellingAction::FocusSearch(String::new()).into())),
-    key(NONE, Key::Num1, "choose the first object; 2 to 9: the others", |_| choose(0)),
-    key(NONE, Key::Num2, "", |_| choose(1)),
-    key(NONE, Key::Num3, "", |_| choose(2)),
-    key(NONE, Key::Num4, "", |_| choose(3)),
-    key(NONE, Key::Num5, "", |_| choose(4)),
-    key(NONE, Key::Num6, "", |_| choose(5)),
-    key(NONE, Key::Num7, "", |_| choose(6)),
-    key(NONE, Key::Num8, "", |_| choose(7)),
-    key(NONE, Key::Num9, "", |_| choose(8)),
-    key(NONE, Key::ArrowUp, "previous trial", |_| Some(LabellingAction::Step(-1).into())),
-    key(NONE, Key::ArrowDown, "next trial", |_| Some(LabellingAction::Step(1).into())),
-    key(NONE, Key::Home, "newest unlabelled trial", |_| Some(LabellingAction::Select(None).into())),
+    key(NONE, Key::M, "actuation: manual, board or untimed", App::next_control),
+    key(NONE, Key::W, "detect trials automatically", App::toggle_watch),
+    key(COMMAND, Key::E, "export all labelled trials", |app| app.label(LabellingAction::Export)),
+    key(COMMAND, Key::T, "train on all labelled trials", App::train_and_use),
+    key(NONE, Key::Slash, "find an object", |app| app.label(LabellingAction::FocusSearch(String::new()))),
+    key(NONE, Key::Num1, "choose the first object; 2 to 9: the others", |app| choose(app, 0)),
+    key(NONE, Key::Num2, "", |app| choose(app, 1)),
+    key(NONE, Key::Num3, "", |app| choose(app, 2)),
+    key(NONE, Key::Num4, "", |app| choose(app, 3)),
+    key(NONE, Key::Num5, "", |app| choose(app, 4)),
+    key(NONE, Key::Num6, "", |app| choose(app, 5)),
+    key(NONE, Key::Num7, "", |app| choose(app, 6)),
+    key(NONE, Key::Num8, "", |app| choose(app, 7)),
+    key(NONE, Key::Num9, "", |app| choose(app, 8)),
+    key(NONE, Key::ArrowUp, "previous trial", |app| app.label(LabellingAction::Step(-1))),
+    key(NONE, Key::ArrowDown, "next trial", |app| app.label(LabellingAction::Step(1))),
+    key(NONE, Key::Home, "newest unlabelled trial", |app| app.label(LabellingAction::Select(None))),
 ];
 
-fn choose(place: usize) -> Option<Action> {
-    Some(LabellingAction::ChooseObject(place).into())
+fn choose(app: &mut App, place: usize) {
+    app.label(LabellingAction::ChooseObject(place));
 }
 
 /// Plan and trials left, plots over the view in the middle, label and gripper right.

@@ -7,9 +7,8 @@ mod label;
 pub(super) mod mode;
 mod study;
 
-use crate::app::actions::Action;
-use crate::app::context::PanelContext;
-use crate::app::keys::binding::Binding;
+use crate::app::actions::Act;
+use crate::app::features::App;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use mode::Mode;
 
@@ -23,12 +22,14 @@ pub(super) struct ModeKind {
     /// Lays out its panels.
     layout: fn(&mut Tiles<String>) -> TileId,
     /// Key that opens it.
-    pub(super) open: Binding,
+    pub(super) open: Act,
     /// Keys that act in it alone.
-    pub(super) keys: &'static [Binding],
-    /// Takes text that is typed outside of fields.
-    pub(super) typed: fn(&egui::Context, &PanelContext<'_>) -> Option<Action>,
+    pub(super) keys: &'static [Act],
+    /// Its search field: whether it waits for the keyboard, and what takes text that is typed ahead of it.
+    pub(super) search: Option<SearchField>,
 }
+
+type SearchField = (fn(&App) -> bool, fn(&mut App, String));
 
 /// All modes, in the order of their tabs.
 pub(super) static ALL: [ModeKind; 4] = [demo::KIND, inspect::KIND, label::KIND, study::KIND];

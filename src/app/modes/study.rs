@@ -2,12 +2,8 @@
 
 use super::mode::Mode;
 use super::{ModeKind, split, tabs};
-use crate::app::actions::Action;
-use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::studies::StudyAction;
-use crate::app::features::view::ViewAction;
-use crate::app::keys::binding::{Binding, key};
+use crate::app::actions::{Act, key, key_where};
+use crate::app::features::App;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 use palpate_lab::study::paper::StudySize;
@@ -18,28 +14,30 @@ pub(super) const KIND: ModeKind = ModeKind {
     title: "Study",
     about: "Run the studies of the paper and open the trials behind their figures (Ctrl+4)",
     layout,
-    open: key(Modifiers::COMMAND, Key::Num4, "Study mode", |_| Some(ViewAction::SetMode(Mode::Study).into())),
+    open: key(Modifiers::COMMAND, Key::Num4, "Study mode", |app| app.set_mode(Mode::Study)),
     keys: KEYS,
-    typed: |_, _| None,
+    search: None,
 };
 
-const KEYS: &[Binding] = &[
+const NONE: Modifiers = Modifiers::NONE;
+
+const KEYS: &[Act] = &[
     // Those with more modifiers come first, so that they win.
-    key(Modifiers::SHIFT, Key::Enter, "run the study in full", |c| run(c, StudySize::Full)),
-    key(Modifiers::NONE, Key::Enter, "run the study in its quick form", |c| run(c, StudySize::Quick)),
-    key(Modifiers::NONE, Key::Delete, "stop the running study, which can be resumed", |c| {
-        c.studies.running()?;
-        Some(StudyAction::Stop.into())
-    })
-    .otherwise("No study is running."),
-    key(Modifiers::NONE, Key::ArrowUp, "study above", |_| Some(StudyAction::Step(-1).into())),
-    key(Modifiers::NONE, Key::ArrowDown, "study below", |_| Some(StudyAction::Step(1).into())),
-    key(Modifiers::COMMAND, Key::E, "export the figure that is shown", |_| Some(FileAction::ExportStudyFigure.into())),
+    key(Modifiers::SHIFT, Key::Enter, "run the study in full", |app| run(app, StudySize::Full)),
+    key(NONE, Key::Enter, "run the study in its quick form", |app| run(app, StudySize::Quick)),
+    key_where(NONE, Key::Delete, "stop the running study, which can be resumed", |app| {
+        app.studies.running().ok_or("No study is running.")?;
+        app.studies.stop();
+        Ok(())
+    }),
+    key(NONE, Key::ArrowUp, "study above", |app| app.studies.step(-1)),
+    key(NONE, Key::ArrowDown, "study below", |app| app.studies.step(1)),
+    key(Modifiers::COMMAND, Key::E, "export the figure that is shown", App::export_study_figure),
 ];
 
-fn run(context: &PanelContext<'_>, size: StudySize) -> Option<Action> {
-    let key = context.studies.chosen().card().key.to_owned();
-    Some(StudyAction::Run(StudyRequest { key, size, anew: false }).into())
+fn run(app: &mut App, size: StudySize) {
+    let key = app.studies.chosen().card().key.to_owned();
+    app.run_study(StudyRequest { key, size, anew: false });
 }
 
 /// Studies left, figures over tables in the middle, findings right.

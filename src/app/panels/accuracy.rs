@@ -2,7 +2,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::simulation::SimulationAction;
 use crate::app::figure_plot::{self, ShownPlot};
 use crate::app::theme::colour;
 use egui::{Button, Pos2, RichText, ScrollArea, Tooltip, Ui};
@@ -107,8 +106,8 @@ fn pointed_ui(
 
 fn adopt(setting: &AccuracySetting, context: &PanelContext<'_>, actions: &mut Actions) {
     match setting.adopted(context.scene) {
-        Ok(scene) => actions.push(SimulationAction::SetScene(Box::new(scene))),
-        Err(cause) => actions.push(crate::app::notices::UserMessage::Error(cause.to_string())),
+        Ok(scene) => actions.push(|app| app.set_scene(scene)),
+        Err(cause) => actions.push(move |app| app.notices.error(cause.to_string())),
     }
 }
 

@@ -90,7 +90,7 @@ fn begin_ui(
     if begin.on_disabled_hover_text("Name the part: calibrations belong to parts").clicked() {
         let port = Some(form.port.trim()).filter(|port| !port.is_empty()).map(PathBuf::from);
         let plan = CalibrationPlan { sensor: form.sensor, part: form.part.trim().to_owned(), port };
-        actions.push(GripperCommand::Calibrate(CalibrationCommand::Begin(plan)));
+        actions.push(|app| _ = app.gripper.send(GripperCommand::Calibrate(CalibrationCommand::Begin(plan))));
     }
     ui.data_mut(|data| data.insert_temp(id, form));
 }
@@ -133,9 +133,9 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
 
 fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, fits: bool, actions: &mut Actions) {
     let mut button = |ready: bool, text: &str, about: &str, command: CalibrationCommand| {
-        if ui.add_enabled(ready, Button::new(text)).on_hover_text(about).clicked() {
-            actions.push(GripperCommand::Calibrate(command));
-        }
+        actions.on(&ui.add_enabled(ready, Button::new(text)).on_hover_text(about), |app| {
+            _ = app.gripper.send(GripperCommand::Calibrate(command))
+        });
     };
     let (free, procedure) = (!running.closing, running.procedure.as_ref());
     let next = procedure.and_then(Procedure::next);

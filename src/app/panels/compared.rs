@@ -3,7 +3,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use crate::app::view_source::ViewSource;
@@ -24,15 +23,16 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         ui.label("Aligned at");
         for alignment in Alignment::ALL {
             let chosen = comparison.alignment == alignment;
-            if ui.selectable_label(chosen, alignment.name()).on_hover_text("Origin of time (M)").clicked() {
-                actions.push(InspectAction::Align(alignment));
-            }
+            actions
+                .on(&ui.selectable_label(chosen, alignment.name()).on_hover_text("Origin of time (M)"), move |app| {
+                    app.inspect.alignment = alignment
+                });
         }
     });
     let mut spread = comparison.spread;
     let hint = "Draw the mean of each class, and its spread as a band, in place of each trial (S)";
     if ui.checkbox(&mut spread, "Mean and spread of each class").on_hover_text(hint).changed() {
-        actions.push(InspectAction::ShowSpread(spread));
+        actions.push(move |app| app.inspect.spread = spread);
     }
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -49,26 +49,22 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             ui.separator();
         }
         for pinned in comparison.pinned {
-            let trial = &pinned.trial;
+            let (id, trial) = (pinned.trial.id, &pinned.trial);
             ui.horizontal(|ui| {
                 let colour = if comparison.spread { None } else { Some(pinned.colour) };
                 let remove = format!("No longer compare trial {}", trial.id);
-                if icons::button(ui, Icon::Cross, &remove, &remove).clicked() {
-                    actions.push(InspectAction::Unpin(trial.id));
-                }
+                actions.on(&icons::button(ui, Icon::Cross, &remove, &remove), move |app| app.inspect.unpin(id));
                 if let Some(colour) = colour {
                     stroke_ui(ui, ink_of(context, colour));
                 }
                 let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
                 let link = ui.add(Label::new(&name).truncate().sense(Sense::click()));
                 link.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
-                if link.on_hover_text("Open this trial").clicked() {
-                    actions.push(InspectAction::Open(trial.id));
-                }
+                actions.on(&link.on_hover_text("Open this trial"), move |app| app.open_trial(id));
             });
         }
         if comparison.pinned.len() > 1 && ui.button("Remove all").clicked() {
-            actions.push(InspectAction::UnpinAll);
+            actions.push(|app| app.inspect.unpin_all());
         }
     });
 }

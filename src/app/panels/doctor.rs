@@ -3,7 +3,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::tools::ToolAction;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::colour;
 use crate::app::widgets::{command_ui, failure_ui, port_field, progress_ui, wrapped};
@@ -31,7 +30,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             Some(running) => {
                 let remark = "Now bend each finger and press each pad.";
                 if progress_ui(ui, &running.progress, Some(remark), "End and report so far") {
-                    actions.push(ToolAction::StopExamining);
+                    actions.push(|app| app.tools.doctor.stop());
                 }
             }
             None => begin_ui(ui, actions),
@@ -58,13 +57,13 @@ fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
     let hint = "Meanwhile, bend each finger and press each pad: what does not move is not checked.";
     ui.horizontal_wrapped(|ui| {
         if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
-            let port = port.clone();
-            actions.push(ToolAction::Examine(ExamineRequest { port, seconds: USUAL_LISTEN_S }));
+            let request = ExamineRequest { port: port.clone(), seconds: USUAL_LISTEN_S };
+            actions.push(|app| _ = app.tools.doctor.start(request));
         }
         let about = "Move each sensor in turn; those of the other finger must not follow";
-        if ui.button("Test for crosstalk").on_hover_text(about).clicked() {
-            actions.push(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)));
-        }
+        actions.on(&ui.button("Test for crosstalk").on_hover_text(about), |app| {
+            _ = app.gripper.send(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)))
+        });
     });
     wrapped(ui, RichText::new(hint).weak());
 }
@@ -110,9 +109,9 @@ fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCros
             ("Skip", "Continue with the next sensor", CrosstalkCommand::Skip),
             ("Stop", "End the test and report so far", CrosstalkCommand::Stop),
         ] {
-            if ui.button(text).on_hover_text(about).clicked() {
-                actions.push(GripperCommand::Crosstalk(command));
-            }
+            actions.on(&ui.button(text).on_hover_text(about), |app| {
+                _ = app.gripper.send(GripperCommand::Crosstalk(command))
+            });
         }
     });
     bleeds_ui(ui, &view.found);

@@ -4,7 +4,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::simulation::SimulationAction;
 use crate::app::theme::{colour, veil};
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
@@ -34,7 +33,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let (running, last) = (context.effects.running(), context.effects.last());
     let fresh = last.as_ref().filter(|ended| *ended.command == *context.scene);
     if fresh.is_none() && running.as_ref().is_none_or(|running| *running.command != *context.scene) {
-        actions.push(SimulationAction::MeasureEffects);
+        actions.push(|app| app.simulation.measure_effects());
     }
     let explanation = last.as_ref().and_then(|ended| ended.outcome.as_deref().ok());
     let state = match fresh.map(|ended| &ended.outcome) {
@@ -70,7 +69,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     });
     ui.data_mut(|data| data.insert_temp(unfolded_id, unfolded));
     if scene != *context.scene {
-        actions.push(SimulationAction::SetScene(Box::new(scene)));
+        actions.push(|app| app.set_scene(scene));
     }
 }
 

@@ -3,10 +3,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::tools::ToolAction;
-use crate::app::notices::UserMessage;
+use crate::app::features::App;
+use crate::app::files::Question;
 use crate::app::plots::static_plot;
 use crate::app::theme::{colour, veil};
 use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
@@ -25,7 +23,7 @@ use std::collections::BTreeSet;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "fit") {
-        actions.push(ToolAction::ListTrials);
+        actions.push(|app| _ = app.tools.trials.start(()));
     }
     let tools = context.tools;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -37,7 +35,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             Some(Ok(rows)) => choice_ui(ui, &rows, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
         };
-        let stop = ("Cancel; nothing changes", ToolAction::StopFitting);
+        let stop = ("Cancel; nothing changes", (|app| app.tools.fit.stop()) as fn(&mut App));
         job_ui(ui, &tools.fit, stop, actions, controls, |ui, fitted, actions| fitted_ui(ui, context, fitted, actions));
     });
 }
@@ -75,11 +73,10 @@ fn choice_ui(ui: &mut Ui, rows: &[TrialRow], actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let fit = ui.add_enabled(!chosen.is_empty(), Button::new("Fit"));
         if fit.on_disabled_hover_text("Choose at least one trial").clicked() {
-            actions.push(ToolAction::Fit(chosen.iter().copied().collect()));
+            let trials = chosen.iter().copied().collect();
+            actions.push(|app| _ = app.tools.fit.start(trials));
         }
-        if ui.button("Refresh").on_hover_text("Reload the trials").clicked() {
-            actions.push(ToolAction::ListTrials);
-        }
+        actions.on(&ui.button("Refresh").on_hover_text("Reload the trials"), |app| _ = app.tools.trials.start(()));
     });
     ui.data_mut(|data| data.insert_temp(id, chosen));
 }
@@ -102,11 +99,14 @@ fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, act
         let hint = "Simulate with the fitted finger from now on";
         if ui.add_enabled(!in_use, Button::new(text)).on_hover_text(hint).clicked() {
             let scene = Scene { gripper: fit.gripper.clone(), ..context.scene.clone() };
-            actions.push(SimulationAction::SetScene(Box::new(scene)));
-            actions.push(UserMessage::Info("Fitted finger in use.".to_owned()));
+            actions.push(|app| {
+                app.set_scene(scene);
+                app.notices.info("Fitted finger in use.");
+            });
         }
         if ui.button("Save as scene ..").on_hover_text("Scene of the first trial with this finger, as TOML").clicked() {
-            actions.push(FileAction::SaveSceneAs(Box::new(scene.clone())));
+            let scene = Box::new(scene.clone());
+            actions.push(|app| app.files.ask(Question::SaveScene(scene)));
         }
     });
     for remark in fit.remarks.iter().chain(warnings) {

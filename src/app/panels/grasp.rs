@@ -111,9 +111,9 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
         "Not possible: the object was pulled by hand, or this engine controls no error"
     };
     let button = ui.add_enabled(free, Button::new("Compute again"));
-    if button.on_hover_text(about).on_disabled_hover_text(about).clicked() {
-        actions.push(Command::ComputeAgain);
-    }
+    actions.on(&button.on_hover_text(about).on_disabled_hover_text(about), |app| {
+        app.simulation.send(Command::ComputeAgain)
+    });
 }
 
 /// Light of a trial: a green circle, an amber triangle or a red square.

@@ -2,7 +2,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::gripper::{CONTROLS, GripperAction, control_title};
+use crate::app::features::App;
+use crate::app::features::gripper::{CONTROLS, control_title};
 use crate::app::theme::{accented, colour, veil};
 use crate::app::widgets::{command_ui, failure_ui, stop_button, text_field, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
@@ -38,19 +39,18 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(context.view.theme));
-        if ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)").clicked() {
-            actions.push(GripperCommand::Connect(None));
-        }
-        if ui.button("List ports").clicked() {
-            actions.push(GripperCommand::ListPorts);
-        }
+        actions.on(&ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)"), |app| {
+            app.connect(None)
+        });
+        actions.on(&ui.button("List ports"), |app| _ = app.gripper.send(GripperCommand::ListPorts));
     });
     let ports: &[PortInfo] = context.gripper.map_or(&[], |gripper| &gripper.ports);
     for port in ports {
         let path = port.path.display().to_string();
         let button = Button::new(format!("{path}\n{}", port.title)).wrap();
         if ui.add_sized([ui.available_width(), 40.0], button).on_hover_text("Connect to this port").clicked() {
-            actions.push(GripperCommand::Connect(Some(port.path.clone())));
+            let path = port.path.clone();
+            actions.push(|app| app.connect(Some(path)));
         }
     }
     let id = egui::Id::unique("port path");
@@ -60,7 +60,8 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         let field = text_field(&mut path, id.with("field")).hint_text("/dev/ttyACM0 or captured bytes");
         let response = ui.add(field).labelled_by(label.id);
         if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-            actions.push(GripperCommand::Connect(Some(PathBuf::from(path.trim()))));
+            let path = PathBuf::from(path.trim());
+            actions.push(|app| app.connect(Some(path)));
         }
     });
     ui.data_mut(|data| data.insert_temp(id, path));
@@ -80,7 +81,7 @@ fn connected_ui(
             .on_hover_text("Set the present readings as zero; nothing may touch the fingers (T)")
             .clicked()
         {
-            actions.push(GripperCommand::Tare);
+            actions.push(|app| _ = app.gripper.send(GripperCommand::Tare));
         }
         if ui
             .add_enabled(gripper.trial.is_none() && context.view.control != Control::Free, Button::new("Adapt"))
@@ -91,11 +92,9 @@ fn connected_ui(
             .on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand")
             .clicked()
         {
-            actions.push(GripperCommand::Adapt(context.view.control));
+            actions.push(|app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
         }
-        if ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)").clicked() {
-            actions.push(GripperCommand::Disconnect);
-        }
+        actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| _ = app.gripper.send(GripperCommand::Disconnect));
     });
     health_ui(ui, link);
     ui.separator();
@@ -220,12 +219,12 @@ fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, ac
             Control::Free => "Untimed: recording runs until Q, phases are unknown",
         };
         if ui.radio_value(&mut control, kind, control_title(kind)).on_hover_text(about).changed() {
-            actions.push(GripperAction::SetControl(control));
+            actions.push(move |app| app.view.control = control);
         }
     }
     let mut watching = gripper.watching.is_some();
     let about = "A trial starts when the pressure rises or the fingers move, and ends when they are at rest again";
     if ui.checkbox(&mut watching, "Detect trials automatically  (W)").on_hover_text(about).changed() {
-        actions.push(GripperAction::ToggleWatch);
+        actions.push(App::toggle_watch);
     }
 }

@@ -2,19 +2,17 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
 use crate::app::widgets::wrapped;
 use egui::{Label, RichText, ScrollArea, Sense, Ui};
 use palpate_lab::workers::LabelCommand;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
-        if ui.button("Undo").on_hover_text("Undo the last change (Ctrl+Z)").clicked() {
-            actions.push(LabelCommand::Undo);
-        }
-        if ui.button("Redo").on_hover_text("Redo it (Ctrl+Shift+Z)").clicked() {
-            actions.push(LabelCommand::Redo);
-        }
+        actions.on(&ui.button("Undo").on_hover_text("Undo the last change (Ctrl+Z)"), |app| {
+            app.edit_labels(LabelCommand::Undo)
+        });
+        actions
+            .on(&ui.button("Redo").on_hover_text("Redo it (Ctrl+Shift+Z)"), |app| app.edit_labels(LabelCommand::Redo));
     });
     let journal = context.labels.map(|view| &view.journal).filter(|journal| !journal.is_empty());
     let Some(journal) = journal else {
@@ -32,12 +30,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             };
             let line = ui.add(Label::new(text).wrap().sense(Sense::click()));
             if line.double_clicked() {
-                actions.push(InspectAction::Open(id));
+                actions.push(move |app| app.open_trial(id));
             }
             line.context_menu(|ui| {
-                if ui.button("Inspect").clicked() {
-                    actions.push(InspectAction::Open(id));
-                }
+                actions.on(&ui.button("Inspect"), move |app| app.open_trial(id));
             });
         }
     });

@@ -91,9 +91,9 @@ fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &
     let connected = context.gripper.is_some_and(GripperView::is_connected);
     if connected {
         let button = Button::new("Record  R").fill(accented(context.view.theme));
-        if ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)").clicked() {
-            actions.push(LabellingAction::Record);
-        }
+        actions.on(&ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)"), |app| {
+            app.label(LabellingAction::Record)
+        });
     } else {
         wrapped(
             ui,
@@ -190,19 +190,18 @@ fn question_ui(
     }
     search_ui(ui, context, actions);
     ui.horizontal_wrapped(|ui| {
-        if ui.add(Button::new("Label  N, Enter").fill(accented(context.view.theme))).clicked() {
-            actions.push(LabellingAction::GiveLabel);
-        }
+        actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(context.view.theme))), |app| {
+            app.label(LabellingAction::GiveLabel)
+        });
         let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
-        if ui.button(again).on_hover_text("Record again; an unlabelled trial is discarded").clicked() {
-            actions.push(LabellingAction::Record);
-        }
-        if ui.button("Discard  D").clicked() {
-            actions.push(LabellingAction::Discard);
-        }
+        actions.on(&ui.button(again).on_hover_text("Record again; an unlabelled trial is discarded"), |app| {
+            app.label(LabellingAction::Record)
+        });
+        actions.on(&ui.button("Discard  D"), |app| app.label(LabellingAction::Discard));
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {
-            actions.push(LabelCommand::Unsure(trial.id, unsure));
+            let id = trial.id;
+            actions.push(move |app| app.edit_labels(LabelCommand::Unsure(id, unsure)));
         }
     });
     let (names, chosen) = (draft.objects(view), draft.place(view));
@@ -212,8 +211,8 @@ fn question_ui(
     for (place, name) in names.iter().take(NUMBERED_OBJECTS).enumerate() {
         let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
         if object_row(ui, context, place, name, Some(place) == chosen, !known).clicked() {
-            actions.push(LabellingAction::ChooseObject(place));
-            actions.push(LabellingAction::GiveLabel);
+            actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
+            actions.push(|app| app.label(LabellingAction::GiveLabel));
         }
     }
     if names.len() > NUMBERED_OBJECTS {
@@ -241,7 +240,7 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let mut search = draft.search.clone();
     let hint = "find or name an object ( / )";
     if draft.focus_search && focus_field(ui, search_id()) {
-        actions.push(LabellingAction::SearchFocused);
+        actions.push(|app| app.label(LabellingAction::SearchFocused));
     }
     let field = text_field(&mut search, search_id()).hint_text(hint).char_limit(80);
     let response = ui.add(field);
@@ -252,12 +251,12 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         let chosen = draft.chosen.or_else(|| context.labels.and_then(|view| draft.place(view)));
         let next = |chosen: usize| chosen.saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
         let place = chosen.map_or(0, next);
-        actions.push(LabellingAction::ChooseObject(place));
+        actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
     }
     if search != draft.search {
-        actions.push(LabellingAction::Search(search));
+        actions.push(|app| app.label(LabellingAction::Search(search)));
     } else if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
-        actions.push(LabellingAction::GiveLabel);
+        actions.push(|app| app.label(LabellingAction::GiveLabel));
     }
 }
 
@@ -290,7 +289,7 @@ fn object_row(
 
 /// Note and tags.
 fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, actions: &mut Actions) {
-    let draft = &context.draft;
+    let (id, draft) = (trial.id, &context.draft);
     let own = |written: &Option<(i64, String)>, stored: String| match written {
         Some((id, text)) if *id == trial.id => text.clone(),
         _ => stored,
@@ -300,10 +299,11 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         let label = ui.label("Note");
         let response = ui.add(text_field(&mut note, Id::unique("note")).char_limit(500)).labelled_by(label.id);
         if response.changed() {
-            actions.push(LabellingAction::WriteNote(trial.id, note.clone()));
+            let note = note.clone();
+            actions.push(move |app| app.label(LabellingAction::WriteNote(id, note)));
         }
         if response.lost_focus() && note != trial.note {
-            actions.push(LabelCommand::Note(trial.id, note));
+            actions.push(move |app| app.edit_labels(LabelCommand::Note(id, note)));
         }
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
@@ -311,11 +311,12 @@ fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, ac
         let field = text_field(&mut tags, Id::unique("tags")).hint_text("separated by commas").char_limit(200);
         let response = ui.add(field).labelled_by(label.id);
         if response.changed() {
-            actions.push(LabellingAction::WriteTags(trial.id, tags.clone()));
+            let tags = tags.clone();
+            actions.push(move |app| app.label(LabellingAction::WriteTags(id, tags)));
         }
         let list = parse_tags(&tags);
         if response.lost_focus() && list != trial.tags {
-            actions.push(LabelCommand::Tags(trial.id, list));
+            actions.push(move |app| app.edit_labels(LabelCommand::Tags(id, list)));
         }
         ui.end_row();
     });

@@ -2,8 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::simulation::SimulationAction;
+use crate::app::features::App;
 use crate::app::theme::colour;
 use crate::app::widgets::text_field;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
@@ -20,38 +19,32 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         for path in &context.view.recent {
             let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
             let texture = context.thumbnails.get(path);
-            if row(ui, context, chosen == path, texture, name, path).clicked() {
-                actions.push(SimulationAction::OpenObject(path.clone()));
-            }
+            let clicked = row(ui, context, chosen == path, texture, name, path);
+            let source = path.clone();
+            actions.on(&clicked, move |app| app.open(&source));
         }
         for built_in in catalogue() {
             let texture = context.thumbnails.get(&built_in.name);
-            let clicked =
-                row(ui, context, chosen == built_in.name, texture, &built_in.title, &built_in.class().to_string())
-                    .clicked();
-            if clicked {
-                actions.push(SimulationAction::OpenObject(built_in.name.clone()));
-            }
+            let class = built_in.class().to_string();
+            let clicked = row(ui, context, chosen == built_in.name, texture, &built_in.title, &class);
+            actions.on(&clicked, |app| app.open(&built_in.name));
         }
-        if row(ui, context, chosen == EMPTY, None, "Empty hand", "nothing to grasp").clicked() {
-            actions.push(SimulationAction::OpenObject(EMPTY.to_owned()));
-        }
+        let clicked = row(ui, context, chosen == EMPTY, None, "Empty hand", "nothing to grasp");
+        actions.on(&clicked, |app| app.open(EMPTY));
     });
 }
 
 /// Button and field for files.
 fn open_row(ui: &mut Ui, actions: &mut Actions) {
     let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL .."));
-    if open.on_hover_text("Ctrl+O, or drop a file anywhere on the window").clicked() {
-        actions.push(FileAction::Open);
-    }
+    actions.on(&open.on_hover_text("Ctrl+O, or drop a file anywhere on the window"), App::ask_for_object);
     let id = egui::Id::unique("object path");
     let mut path = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
     let field = text_field(&mut path, id.with("field")).hint_text(".. or paste a path");
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-        actions.push(SimulationAction::OpenObject(path.trim().trim_matches(['"', '\'']).to_owned()));
-        path.clear();
+        let source = std::mem::take(&mut path);
+        actions.push(move |app| app.open(source.trim().trim_matches(['"', '\''])));
     }
     ui.data_mut(|data| data.insert_temp(id, path));
 }

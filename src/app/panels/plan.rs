@@ -42,8 +42,8 @@ fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object ..").char_limit(80));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
-        actions.push(LabelCommand::Want(class_of(&name).to_owned(), WANTED));
-        name.clear();
+        let added = std::mem::take(&mut name);
+        actions.push(move |app| app.edit_labels(LabelCommand::Want(class_of(&added).to_owned(), WANTED)));
     }
     ui.data_mut(|data| data.insert_temp(id, name));
 }
@@ -88,14 +88,16 @@ fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, action
         let response = number_field(ui, ("wanted", name), sized).on_hover_text("Trials wanted");
         // Dragging has not ended.
         if new != *wanted && new > 0 && !response.dragged() {
-            actions.push(LabelCommand::Want(name.clone(), new));
+            let name = name.clone();
+            actions.push(move |app| app.edit_labels(LabelCommand::Want(name, new)));
         }
         let remove = ui.add_enabled(*wanted > 0, egui::Button::new("–").small());
         remove.widget_info(|| {
             egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {} from the plan", object_title(name)))
         });
         if remove.on_hover_text("Remove it from the plan; its trials stay").clicked() {
-            actions.push(LabelCommand::Unplan(name.clone()));
+            let name = name.clone();
+            actions.push(|app| app.edit_labels(LabelCommand::Unplan(name)));
         }
     });
 }

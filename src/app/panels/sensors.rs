@@ -3,10 +3,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::tools::ToolAction;
-use crate::app::features::view::ViewAction;
 
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
@@ -86,7 +82,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
         });
         if sensors != *now {
-            actions.push(ViewAction::SetSensors(sensors));
+            actions.push(|app| app.set_sensors(sensors));
         }
         ui.add_space(8.0);
         ui.strong("Model");
@@ -101,14 +97,15 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let chosen = context.view.simulation_model.as_ref();
     if just_opened(ui, "sensors") {
-        actions.push(ToolAction::ListModels);
+        actions.push(|app| _ = app.tools.data.start(()));
     }
     let data = context.tools.data.outcome();
     let saved = data.as_ref().map_or(&[][..], |data| &data.models);
     let mut name = |path: &Path, about: &str| {
         let file = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         if ui.radio(chosen.is_some_and(|own| own == path), file).on_hover_text(about).clicked() {
-            actions.push(RecognitionAction::UseSimulationModel(Some(path.to_owned())));
+            let path = path.to_owned();
+            actions.push(|app| app.use_simulation_model(Some(path)));
         }
     };
     for model in saved {
@@ -122,7 +119,7 @@ fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         .on_hover_text("Comes with Palpate; trained on simulated grasps")
         .clicked()
     {
-        actions.push(RecognitionAction::UseSimulationModel(None));
+        actions.push(|app| app.use_simulation_model(None));
     }
     wrapped(
         ui,
@@ -166,7 +163,7 @@ fn poses_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
             if ui.selectable_label(chosen, preset.name).on_hover_text(about_preset(preset.text)).clicked() && !chosen {
                 let mut scene = scene.clone();
                 scene.pose = PoseSpread { between: scene.pose.between, ..preset.poses() };
-                actions.push(SimulationAction::SetScene(Box::new(scene)));
+                actions.push(|app| app.set_scene(scene));
             }
         }
     });
@@ -188,7 +185,7 @@ fn poses_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
             if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
                 let mut scene = scene.clone();
                 scene.pose.between = between;
-                actions.push(SimulationAction::SetScene(Box::new(scene)));
+                actions.push(|app| app.set_scene(scene));
             }
         }
     });

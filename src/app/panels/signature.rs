@@ -3,9 +3,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::view::ViewAction;
 use crate::app::heat_map::{OverTime, cells_width, height_beside, load_switch, over_time_ui};
+use crate::app::playback::Seek;
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
 use crate::app::view_source::ViewSource;
 use egui::{RichText, Ui, vec2};
@@ -24,16 +23,16 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         for (choice, about) in
             [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")]
         {
-            if ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about).clicked() {
-                actions.push(ViewAction::SetBendUnit(choice));
-            }
+            actions.on(&ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about), move |app| {
+                app.view.bend_unit = choice
+            });
         }
         if context.source == ViewSource::Trial {
             ui.separator();
             for (heat, name) in [(HeatKind::Joints, "Export joints"), (HeatKind::Pads, "Export pads")] {
                 if ui.small_button(name).on_hover_text("Export this heat map as SVG or PNG").clicked() {
                     let options = FigureOptions { heat: Some(heat), ..FigureOptions::default() };
-                    actions.push(FileAction::ExportFigure(options));
+                    actions.push(|app| app.export_figure(options));
                 }
             }
         }
@@ -62,7 +61,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             seconds,
         };
         if let Some(t) = over_time_ui(ui, &over_time, height_beside(names, seconds) + each) {
-            actions.push(grasp.seek(t));
+            actions.push(move |app| app.seek(Seek::To(t)));
         }
     }
 }

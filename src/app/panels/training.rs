@@ -3,8 +3,8 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED, ToolAction};
+use crate::app::features::App;
+use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED};
 use crate::app::theme::colour;
 use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
@@ -17,12 +17,12 @@ use std::path::Path;
 
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "training") {
-        actions.push(ToolAction::ListModels);
+        actions.push(|app| _ = app.tools.data.start(()));
     }
     let data = context.tools.data.outcome();
     let data = data.as_deref();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let stop = ("Cancel; nothing is saved", ToolAction::StopTraining);
+        let stop = ("Cancel; nothing is saved", (|app| app.tools.training.stop()) as fn(&mut App));
         let controls = |ui: &mut Ui, actions: &mut Actions| begin_ui(ui, data, actions);
         job_ui(ui, &context.tools.training, stop, actions, controls, |ui, finished, actions| {
             finished_ui(ui, context, finished, actions);
@@ -57,7 +57,7 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
             .on_hover_text("Train on all labelled trials of the real gripper");
         if train.on_disabled_hover_text(too_little.as_deref().unwrap_or_default()).clicked() {
             let request = TrainRequest { method: chosen.clone(), seed: TRAINING_SEED, quick: false };
-            actions.push(ToolAction::Train(request));
+            actions.push(|app| _ = app.tools.training.start(request));
         }
     });
     if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
@@ -109,7 +109,8 @@ fn use_ui(ui: &mut Ui, context: &PanelContext<'_>, path: Option<&Path>, text: &s
     let label = if in_use { format!("{name} is in use") } else { format!("Use {name}") };
     button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, !in_use, &label));
     if button.on_hover_text("Use it to recognise objects in the real gripper").clicked() {
-        actions.push(RecognitionAction::UseModel(path.map(Path::to_owned)));
+        let path = path.map(Path::to_owned);
+        actions.push(|app| app.use_model(path));
     }
 }
 
@@ -138,7 +139,8 @@ fn classes_ui(ui: &mut Ui, context: &PanelContext<'_>, classes: &[LabelledClass]
         let hint =
             format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
         if ui.button(format!("Teach the model in use: {}", class.name)).on_hover_text(hint).clicked() {
-            actions.push(RecognitionAction::TeachRecorded(class.name.clone()));
+            let name = class.name.clone();
+            actions.push(|app| app.teach_recorded(name));
         }
     }
 }
@@ -174,9 +176,7 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, data: Option<&TrainingData
     ui.add_space(8.0);
     ui.horizontal(|ui| {
         ui.strong("Models for the real gripper");
-        if ui.button("Refresh").on_hover_text("Reload trials and models").clicked() {
-            actions.push(ToolAction::ListModels);
-        }
+        actions.on(&ui.button("Refresh").on_hover_text("Reload trials and models"), |app| _ = app.tools.data.start(()));
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
     // A model from outside the folder.

@@ -2,8 +2,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::simulation::SimulationAction;
 use crate::app::playback::Seek;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
@@ -43,7 +41,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             for span in &trial.phases {
                 let name = ui.link(span.phase.name()).on_hover_text("Go to its beginning");
                 if name.clicked() {
-                    actions.push(InspectAction::Seek(Seek::To(span.from_s)));
+                    let from_s = span.from_s;
+                    actions.push(move |app| app.seek(Seek::To(from_s)));
                 }
                 ui.monospace(format!("{:.2} s", span.from_s));
                 ui.weak(format!("for {:.2} s", span.to_s - span.from_s));
@@ -56,7 +55,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         if trial.source == TrialSource::Simulated
             && ui.button("Grasp this scene again").on_hover_text("Take the trial's scene as the live one").clicked()
         {
-            actions.push(SimulationAction::SetScene(Box::new(trial.header.scene.clone())));
+            let scene = trial.header.scene.clone();
+            actions.push(|app| app.set_scene(scene));
         }
     });
 }

@@ -2,7 +2,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
 use crate::app::theme::colour;
 use crate::app::widgets::sparkline;
 use egui::{Align2, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
@@ -26,9 +25,9 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         ui.spacing_mut().item_spacing.x = 4.0;
         for shown in TrialFilter::ALL {
             let text = format!("{} {}", shown.title(), shown.of(view).len());
-            if ui.selectable_label(draft.filter == shown, RichText::new(text).small()).clicked() {
-                actions.push(LabellingAction::Filter(shown));
-            }
+            actions.on(&ui.selectable_label(draft.filter == shown, RichText::new(text).small()), move |app| {
+                app.label(LabellingAction::Filter(shown))
+            });
         }
     });
     let listed = draft.filter.of(view);
@@ -75,7 +74,7 @@ fn row_ui(
     current: bool,
     actions: &mut Actions,
 ) {
-    let colours = context.view.theme.colours();
+    let (id, colours) = (trial.id, context.view.theme.colours());
     let (rect, response) =
         ui.allocate_exact_size(vec2(ui.available_width(), ROW - ui.spacing().item_spacing.y), Sense::click());
     let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
@@ -118,20 +117,18 @@ fn row_ui(
         )
     };
     if response.double_clicked() {
-        actions.push(InspectAction::Open(trial.id));
+        actions.push(move |app| app.open_trial(id));
     }
     response.on_hover_text(about()).context_menu(|ui| {
         if !trial.discarded && ui.button("Inspect").clicked() {
-            actions.push(InspectAction::Open(trial.id));
+            actions.push(move |app| app.open_trial(id));
         }
         if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
-            actions.push(LabelCommand::Reviewed(trial.id));
+            actions.push(move |app| app.edit_labels(LabelCommand::Reviewed(id)));
         }
-        if ui.button("Discard").clicked() {
-            actions.push(LabelCommand::Discard(trial.id));
-        }
+        actions.on(&ui.button("Discard"), move |app| app.edit_labels(LabelCommand::Discard(id)));
     });
     if clicked {
-        actions.push(LabellingAction::Select(Some(trial.id)));
+        actions.push(move |app| app.label(LabellingAction::Select(Some(id))));
     }
 }

@@ -5,8 +5,8 @@ use crate::app::actions::Actions;
 use crate::app::contact_path::{path_colour, path_mesh};
 use crate::app::context::PanelContext;
 use crate::app::export::ExportRequest;
-use crate::app::features::simulation::SimulationAction;
-use crate::app::features::view::{PathLayer, ViewAction};
+use crate::app::features::App;
+use crate::app::features::view::PathLayer;
 use crate::app::shown::Moment;
 use crate::app::shown_grasp::ShownGrasp;
 use crate::app::small_pads::small_pads;
@@ -90,24 +90,25 @@ fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, moment:
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
     let pulled = ui.data(|data| data.get_temp::<bool>(response.id)).unwrap_or(false);
     if pulled && !pulling {
-        actions.push(Command::Pull(DVec3::ZERO));
+        actions.push(|app| app.simulation.send(Command::Pull(DVec3::ZERO)));
     }
     ui.data_mut(|data| data.insert_temp(response.id, pulling));
     if pulling {
-        actions.push(Command::Pull(pull(response, &camera, height)));
+        let force = pull(response, &camera, height);
+        actions.push(move |app| app.simulation.send(Command::Pull(force)));
     } else if response.dragged_by(PointerButton::Primary) && !shift {
-        actions.push(ViewAction::SetCamera(camera.orbited(drag)));
+        actions.push(move |app| app.view.camera = camera.orbited(drag));
     } else if response.dragged() && drag != Vec2::ZERO {
-        actions.push(ViewAction::SetCamera(camera.panned(drag)));
+        actions.push(move |app| app.view.camera = camera.panned(drag));
     }
     if response.hovered() {
         let wheel = ui.input(|i| i.smooth_scroll_delta().y + 60.0 * i.zoom_delta().ln());
         if wheel != 0.0 {
-            actions.push(ViewAction::SetCamera(camera.zoomed((-wheel * 0.0025).exp())));
+            actions.push(move |app| app.view.camera = camera.zoomed((-wheel * 0.0025).exp()));
         }
     }
     if response.double_clicked() {
-        actions.push(ViewAction::FrameAll);
+        actions.push(App::frame_all);
     }
 }
 
@@ -162,7 +163,8 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
     let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
     let path = grasp_path.as_ref().map(|(_, colour)| *colour);
     let view = PictureView { full_scale, path, ..picture_view(context, moment, size) };
-    let ghost = ghost_frame(context.ghost, moment);
+    let ghost = context.ghost();
+    let ghost = ghost_frame(ghost.as_deref(), moment);
     let real = real_curvature(context);
     let mut list = stage.draw(frame, &view);
     if let Some(ghost) = ghost {
@@ -190,8 +192,14 @@ fn ghost_frame<'a>(ghost: Option<&'a GhostGrasp>, moment: Moment<'_>) -> Option<
 /// Size of exported pictures (points).
 const EXPORTED: [u32; 2] = [800, 560];
 
-/// The 3-D view as it stands, to be exported; none where there is nothing to draw.
-pub(in crate::app) fn exported(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<ExportRequest> {
+/// Asks where to save the 3-D view as it stands, or says that there is nothing to draw.
+pub(in crate::app) fn save_picture(app: &mut App) -> Result<(), &'static str> {
+    let picture = exported(&app.ctx, &PanelContext::of(app)).ok_or("There is nothing to draw.")?;
+    app.files.export(picture);
+    Ok(())
+}
+
+fn exported(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<ExportRequest> {
     let moment = context.shown().moment()?;
     let badge = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
         Some(own) => format!("TRIAL {}, {}", own.trial.id, own.trial.source_title().to_uppercase()),
@@ -355,39 +363,31 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         (StandardView::Top, "Top", "Alt+7"),
     ] {
         if ui.small_button(name).on_hover_text(format!("{name} view ({key})")).clicked() {
-            actions.push(ViewAction::SetCamera(camera.turned_to(view)));
-            if view == StandardView::Home {
-                actions.push(ViewAction::FrameAll);
-            }
+            actions.push(move |app| {
+                app.view.camera = camera.turned_to(view);
+                if view == StandardView::Home {
+                    app.frame_all();
+                }
+            });
         }
     }
     let parallel = ui.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
-    if parallel.clicked() {
-        actions.push(ViewAction::SetCamera(Camera { parallel: !camera.parallel, ..camera }));
-    }
+    actions.on(&parallel, |app| app.view.camera.parallel = !app.view.camera.parallel);
     let forces = ui.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
-    if forces.clicked() {
-        actions.push(ViewAction::SetForces(!context.view.forces));
-    }
+    actions.on(&forces, |app| app.view.forces = !app.view.forces);
     let circles = ui
         .selectable_label(context.view.circles, "Circles")
         .on_hover_text("The circle that each flex strip reads, with its curvature (O)");
-    if circles.clicked() {
-        actions.push(ViewAction::SetCircles(!context.view.circles));
-    }
+    actions.on(&circles, |app| app.view.circles = !app.view.circles);
     let path = ui
         .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
         .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
-    if path.clicked() {
-        actions.push(ViewAction::SetPath(context.view.path.next()));
-    }
+    actions.on(&path, |app| app.view.path = app.view.path.next());
     let other = context.scene.solver.engine.other().name();
     let ghost = ui
         .selectable_label(context.view.ghost, "Ghost")
         .on_hover_text(format!("Result of the other engine, {other}, translucent (G)"));
-    if ghost.clicked() {
-        actions.push(SimulationAction::SetGhost(!context.view.ghost));
-    }
+    actions.on(&ghost, |app| app.set_ghost(!app.view.ghost));
 }
 
 #[cfg(test)]

@@ -3,8 +3,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::{colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
@@ -36,7 +34,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         wrapped(ui, "The model's prediction is hidden until you label the trial.".into());
         return;
     }
-    let request = match context.grasp_to_explain() {
+    let request = match context.shown().grasp_to_explain() {
         Ok(request) => request,
         Err(nothing) => {
             wrapped(ui, RichText::new(nothing).weak());
@@ -44,7 +42,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         }
     };
     let Some(explained) = context.explainer.explained(&request) else {
-        actions.push(RecognitionAction::Explain(request));
+        actions.push(move |app| app.recognition.explainer.explain(&request));
         ui.weak("Leaving out channels and phases ..");
         return;
     };
@@ -275,7 +273,8 @@ fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, ac
         );
         put(ui, &format!("{:.2}", trial.distance), rect, Align2::RIGHT_CENTER, colour(colours.text));
         if response.on_hover_text(format!("{text}; click to open it")).clicked() {
-            actions.push(InspectAction::Open(trial.id));
+            let id = trial.id;
+            actions.push(move |app| app.open_trial(id));
         }
     }
     let left_out =

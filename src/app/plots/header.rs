@@ -3,8 +3,6 @@
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::derived::Derivation;
-use crate::app::features::files::FileAction;
-use crate::app::features::view::ViewAction;
 use crate::app::view_source::ViewSource;
 use egui::Ui;
 use palpate_lab::inspection::FigureOptions;
@@ -23,7 +21,8 @@ pub(super) fn ui(
         let shown = combo.selected_text(egui::RichText::new(derived.name()).small()).show_ui(ui, |ui| {
             for choice in Derivation::ALL {
                 if ui.selectable_label(choice == derived, choice.name()).clicked() {
-                    actions.push(ViewAction::Derive(id.to_owned(), choice));
+                    let plot = id.to_owned();
+                    actions.push(move |app| _ = app.view.derived.insert(plot, choice));
                 }
             }
         });
@@ -31,10 +30,10 @@ pub(super) fn ui(
         if context.shown().board().is_some() && id != "counts" && id != "line pressure" {
             let mut raw = context.view.raw;
             if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
-                actions.push(ViewAction::ShowRaw(raw));
+                actions.push(move |app| app.view.raw = raw);
             }
         }
-        if let Some([first, second]) = plotted.first().and_then(|name| context.bands_for(name)) {
+        if let Some([first, second]) = plotted.first().and_then(|name| context.shown().bands_for(name)) {
             let mut shown = context.view.class_bands;
             let text = egui::RichText::new("likeliest classes").small();
             let hint = format!(
@@ -43,7 +42,7 @@ pub(super) fn ui(
                 object_title(&second.class)
             );
             if ui.checkbox(&mut shown, text).on_hover_text(hint).changed() {
-                actions.push(ViewAction::ShowClassBands(shown));
+                actions.push(move |app| app.view.class_bands = shown);
             }
         }
         if context.source == ViewSource::Trial {
@@ -52,7 +51,8 @@ pub(super) fn ui(
                 let channel = if id == "line pressure" { "line" } else { id };
                 let raw = id == "counts" || context.view.raw;
                 let channels = if raw { Vec::new() } else { vec![channel.to_owned()] };
-                actions.push(FileAction::ExportFigure(FigureOptions { channels, raw, ..FigureOptions::default() }));
+                let options = FigureOptions { channels, raw, ..FigureOptions::default() };
+                actions.push(|app| app.export_figure(options));
             }
         }
         let playback = context.playback;

@@ -2,7 +2,7 @@
 
 use super::{PlotCurve, TimePlot};
 use crate::app::context::PanelContext;
-use crate::app::features::inspect::ComparedTrace;
+use crate::app::shown::ComparedTrace;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use egui::{Color32, Ui};
@@ -74,7 +74,7 @@ pub(super) fn add_spread(plot_ui: &mut egui_plot::PlotUi<'_>, compared: &Compare
 pub(super) fn add_class_bands(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, plot: &TimePlot<'_>) {
     let colours = context.view.theme.colours();
     for (name, factor) in plot.curves.iter().filter_map(|curve| curve.channel.as_ref()) {
-        let Some(bands) = context.bands_for(name) else { continue };
+        let Some(bands) = context.shown().bands_for(name) else { continue };
         for (band, ink) in bands.iter().zip([colours.accent, colours.warning]) {
             let points: Vec<[f64; 3]> = (0..band.t_s.len())
                 .map(|k| [band.t_s[k], factor * band.low[k], factor * band.high[k]])

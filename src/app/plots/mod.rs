@@ -13,8 +13,6 @@ pub(super) use axes::{static_plot, value_marks};
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
 use crate::app::derived::Derivation;
-use crate::app::features::inspect::InspectAction;
-use crate::app::features::view::ViewAction;
 use crate::app::playback::Seek;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
@@ -149,10 +147,10 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, format!("{} over time", plot.id)));
     if let Some(t) = mouse::sought(ui, &response.response, &response.inner) {
-        actions.push(InspectAction::Seek(Seek::To(t)));
+        actions.push(move |app| app.seek(Seek::To(t)));
     }
     if let Some(window) = mouse::moved_window(ui, &response.response, &response.inner, [from, to], span) {
-        actions.push(ViewAction::SetTimeWindow(window));
+        actions.push(move |app| app.view.time_window = window);
     }
 }
 

@@ -2,8 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::library::LibraryAction;
+use crate::app::features::App;
 use crate::app::widgets::{text_field, wrapped};
 use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Id, Key, PopupCloseBehavior, RichText, ScrollArea, Ui};
@@ -28,21 +27,15 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
         ui.strong(format!("{} selected", trials.len()));
         if gone {
-            if ui.button("Restore").clicked() {
-                actions.push(LibraryAction::Edit(TrialEdit::Restore));
-            }
+            actions.on(&ui.button("Restore"), |app| app.library.edit(TrialEdit::Restore));
             return;
         }
-        if ui.button("Open").on_hover_text("Open the trial selected last (Enter)").clicked() {
-            actions.push(LibraryAction::Open);
-        }
-        if ui.button("Compare").on_hover_text("Pin for comparison (P)").clicked() {
-            actions.push(LibraryAction::Pin);
-        }
+        actions.on(&ui.button("Open").on_hover_text("Open the trial selected last (Enter)"), App::open_selected);
+        actions.on(&ui.button("Compare").on_hover_text("Pin for comparison (P)"), App::pin_selected);
         let logged = trials.iter().any(|trial| trial.row.place == TrialPlace::DemoLog);
         let hint = "Move from the demo log to the store (K)";
         if logged && ui.button("Keep").on_hover_text(hint).clicked() {
-            actions.push(LibraryAction::Edit(TrialEdit::Keep));
+            actions.push(|app| app.library.edit(TrialEdit::Keep));
         }
         if ui.available_width() < WHOLE {
             menu(ui, "Edit", |ui| edits_ui(ui, context, view, actions));
@@ -60,16 +53,16 @@ fn edits_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
         if ui.button("CSV into a folder beside the store").clicked() {
-            actions.push(LibraryAction::Export);
+            actions.push(|app| app.library.export());
             ui.close();
         }
         if ui.button("MCAP or NPZ file ..").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
-            actions.push(FileAction::ExportTrials);
+            actions.push(App::export_trials);
             ui.close();
         }
     });
     if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {
-        actions.push(LibraryAction::Edit(TrialEdit::Discard));
+        actions.push(|app| app.library.edit(TrialEdit::Discard));
         ui.close();
     }
 }
@@ -168,5 +161,5 @@ fn note_ui(ui: &mut Ui, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
 }
 
 fn actions_of(edit: Option<TrialEdit>, actions: &mut Actions) {
-    edit.into_iter().for_each(|edit| actions.push(LibraryAction::Edit(edit)));
+    edit.into_iter().for_each(|edit| actions.push(|app| app.library.edit(edit)));
 }

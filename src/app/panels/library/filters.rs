@@ -3,7 +3,6 @@
 use super::columns;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::library::LibraryAction;
 use egui::{RichText, ScrollArea, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
@@ -53,7 +52,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
         set_ui(ui, &mut wanted);
     });
     if wanted != *query {
-        actions.push(LibraryAction::Find(wanted));
+        actions.push(|app| app.library.find(wanted));
     }
 }
 

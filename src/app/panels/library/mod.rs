@@ -7,7 +7,6 @@ mod rows;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::library::LibraryAction;
 use crate::app::theme::colour;
 use crate::app::widgets::{focus_field, text_field};
 use egui::{Frame, Id, Margin, Panel, RichText, Ui};
@@ -17,7 +16,7 @@ use palpate_store::TrialQuery;
 pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     let Some(view) = context.library else {
         ui.weak("Reading the store ..");
-        actions.push(LibraryAction::Find(TrialQuery::default()));
+        actions.push(|app| app.library.find(TrialQuery::default()));
         return;
     };
     if !context.picked.trials.is_empty() {
@@ -43,7 +42,7 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, action
     let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept));
     let id = Id::unique("library search");
     if picked.focus_search && focus_field(ui, id) {
-        actions.push(LibraryAction::SearchFocused);
+        actions.push(|app| app.library.selection.focus_search = false);
     }
     let field = ui.add(text_field(&mut search, id).hint_text(hint));
     field.widget_info(|| {
@@ -52,7 +51,8 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, action
         info
     });
     if search != picked.query.search {
-        actions.push(LibraryAction::Find(TrialQuery { search, ..picked.query.clone() }));
+        let query = TrialQuery { search, ..picked.query.clone() };
+        actions.push(|app| app.library.find(query));
     }
 }
 
@@ -66,7 +66,8 @@ fn count_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions
         }
         let query = &context.picked.query;
         if query.is_filtered() && ui.small_button("Clear").on_hover_text("Remove search and filters").clicked() {
-            actions.push(LibraryAction::Find(query.cleared()));
+            let cleared = query.cleared();
+            actions.push(|app| app.library.find(cleared));
         }
     });
 }

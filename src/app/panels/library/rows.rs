@@ -3,7 +3,8 @@
 use super::columns::{self, Shows, cell, fitting, title};
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::library::{LibraryAction, Reach};
+use crate::app::features::App;
+use crate::app::features::library::Reach;
 use crate::app::theme::colour;
 use crate::app::widgets::sparkline;
 use egui::text::{LayoutJob, TextWrapping};
@@ -54,8 +55,8 @@ fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, a
     let before = ui.data(|data| data.get_temp::<Vec<TrialId>>(asked)).unwrap_or_default();
     // Those asked for before are on their way.
     if ids.iter().any(|id| !before.contains(id)) {
-        actions.push(LibraryAction::Draw(ids.clone()));
-        ui.data_mut(|data| data.insert_temp(asked, ids));
+        ui.data_mut(|data| data.insert_temp(asked, ids.clone()));
+        actions.push(|app| app.library.draw(ids));
     }
 }
 
@@ -97,8 +98,8 @@ fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, columns: &[(Shows, f32)], 
         }
         if response.clicked() {
             let descending = if sorted { !query.order.descending } else { column == TrialColumn::Date };
-            let order = TrialOrder { column, descending };
-            actions.push(LibraryAction::Find(TrialQuery { order, ..query.clone() }));
+            let sorted = TrialQuery { order: TrialOrder { column, descending }, ..query.clone() };
+            actions.push(|app| app.library.find(sorted));
         }
     }
 }
@@ -165,23 +166,26 @@ fn answer(ui: &Ui, response: &Response, trial: &LibraryTrial, selected: bool, ac
             (_, true) => Reach::Toggle,
             _ => Reach::Alone,
         };
-        actions.push(LibraryAction::Select(id, reach));
+        actions.push(move |app| app.library.select(id, reach));
     }
     if response.double_clicked() && !modifiers.shift && !modifiers.command {
-        actions.push(LibraryAction::Open);
+        actions.push(App::open_selected);
     }
     // A menu is about the selection; opened beside it, about its row.
     if response.secondary_clicked() && !selected {
-        actions.push(LibraryAction::Select(id, Reach::Alone));
+        actions.push(move |app| app.library.select(id, Reach::Alone));
     }
     response.context_menu(|ui| {
         let gone = trial.row.deleted.is_some();
-        let discard = if gone { ("Restore", TrialEdit::Restore) } else { ("Discard", TrialEdit::Discard) };
-        let keep = ("Keep", LibraryAction::Edit(TrialEdit::Keep));
-        let keep = Some(keep).filter(|_| trial.row.place == TrialPlace::DemoLog);
-        let choices = [("Open", LibraryAction::Open), ("Compare", LibraryAction::Pin)];
-        let choices = choices.into_iter().chain(keep).filter(|_| !gone);
-        for (name, action) in choices.chain([(discard.0, LibraryAction::Edit(discard.1))]) {
+        let logged = trial.row.place == TrialPlace::DemoLog;
+        let choices: [(bool, &str, fn(&mut App)); 5] = [
+            (!gone, "Open", App::open_selected),
+            (!gone, "Compare", App::pin_selected),
+            (!gone && logged, "Keep", |app| app.library.edit(TrialEdit::Keep)),
+            (!gone, "Discard", |app| app.library.edit(TrialEdit::Discard)),
+            (gone, "Restore", |app| app.library.edit(TrialEdit::Restore)),
+        ];
+        for (_, name, action) in choices.into_iter().filter(|(offered, ..)| *offered) {
             if ui.button(name).clicked() {
                 actions.push(action);
                 ui.close();

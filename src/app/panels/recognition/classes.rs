@@ -2,7 +2,6 @@
 
 use super::words::{newest, percent, ranked, title};
 use super::{LEAST_LETTERS, Part, eased, fitted, labelled, put};
-use crate::app::features::recognition::RecognitionAction;
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::workers::THRESHOLDS;
@@ -120,7 +119,7 @@ fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
         let wanted = stepped(f64::from((pointer.x - from) / (to - from)));
         if wanted != threshold {
-            part.actions.push(RecognitionAction::SetThreshold(wanted));
+            part.actions.push(move |app| app.set_threshold(wanted));
         }
     }
 }

@@ -11,8 +11,7 @@ pub(in crate::app) mod words;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::recognition::RecognitionAction;
-use crate::app::features::view::ViewAction;
+use crate::app::features::App;
 use crate::app::icons::{self, Icon};
 use crate::app::shown::Recognised;
 use crate::app::theme::{accented, colour};
@@ -142,16 +141,16 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 
 /// Button for one more grasp, where a raised threshold asks for it.
 fn more_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
-    if context.source != ViewSource::Simulation || !context.one_more() {
+    if context.source != ViewSource::Simulation || !context.shown().one_more() {
         return;
     }
     let hint = "The threshold is above the probability reached: grasp the same object again (M)";
     let more = egui::Button::new("One more grasp").fill(accented(context.view.theme));
     // Beside the button for another object.
     let width = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
-    if ui.add_sized([width, measures.button], more).on_hover_text(hint).clicked() {
-        actions.push(Command::GraspOnceMore);
-    }
+    actions.on(&ui.add_sized([width, measures.button], more).on_hover_text(hint), |app| {
+        app.simulation.send(Command::GraspOnceMore)
+    });
 }
 
 /// Button for another object.
@@ -163,9 +162,7 @@ fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions
         ViewSource::Gripper => "Start over with another object in the hand (N)",
     };
     let next = egui::Button::new("Next object").fill(fill);
-    if ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint).clicked() {
-        actions.push(RecognitionAction::NextObject);
-    }
+    actions.on(&ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint), App::next_object);
 }
 
 fn off_ui(ui: &mut Ui, why: Option<&str>) {
@@ -307,7 +304,7 @@ impl Part<'_, '_> {
                 .line_segment([eye.center() + vec2(-7.0, 6.0), eye.center() + vec2(7.0, -6.0)], (2.0, colour(lit)));
         }
         if toggle.clicked() {
-            self.actions.push(ViewAction::ShowTruth(!shown));
+            self.actions.push(move |app| app.view.truth_shown = !shown);
         }
     }
 
@@ -329,18 +326,18 @@ impl Part<'_, '_> {
                 .suffix(" %");
             let hint = "Probability from which a class counts as certain; drag the line or the number";
             if number_field(ui, "threshold", drag).labelled_by(label.id).on_hover_text(hint).changed() {
-                self.actions.push(RecognitionAction::SetThreshold(classes::stepped(threshold / 100.0)));
+                self.actions.push(move |app| app.set_threshold(classes::stepped(threshold / 100.0)));
             }
             if self.view.last.is_some() {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     let hint = "What spoke for and against this answer (panel Why)";
                     if ui.link("Why?").on_hover_text(hint).clicked() {
-                        self.actions.push(ViewAction::ShowPanel("why"));
+                        self.actions.push(|app| app.show_panel("why"));
                     }
                     let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
                     let is_unknown = self.view.is_unknown() && self.context.source == ViewSource::Gripper;
                     if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
-                        self.actions.push(ViewAction::ShowPanel("label"));
+                        self.actions.push(|app| app.show_panel("label"));
                     }
                 });
             }

@@ -72,7 +72,7 @@ fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         "Estimate the numerical error from a finer simulation, and show it in the plots. Restarts the grasp",
     );
     if ui.add(egui::Checkbox::without_text(&mut shown)).labelled_by(label.id).changed() {
-        actions.push(Command::SetErrorBand(shown));
+        actions.push(move |app| app.simulation.send(Command::SetErrorBand(shown)));
     }
     ui.end_row();
 }

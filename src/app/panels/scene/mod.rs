@@ -4,8 +4,7 @@ mod accuracy_dial;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::simulation::SimulationAction;
+use crate::app::features::App;
 use crate::app::widgets::number_field;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
@@ -24,9 +23,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         ui.add_space(4.0);
         named_scenes_ui(ui, &mut scene);
         ui.horizontal_wrapped(|ui| {
-            if ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)").clicked() {
-                actions.push(FileAction::SaveScene);
-            }
+            actions.on(&ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)"), App::save_scene);
             if ui.button("Defaults").on_hover_text("Restore all settings, keep the object").clicked() {
                 let source = std::mem::take(&mut scene.object.source);
                 scene = Scene::default();
@@ -35,7 +32,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         });
     });
     if scene != *context.scene {
-        actions.push(SimulationAction::SetScene(Box::new(scene)));
+        actions.push(|app| app.set_scene(scene));
     }
 }
 

@@ -4,8 +4,7 @@ use super::plot::plot_ui;
 use super::result_ui;
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::files::FileAction;
-use crate::app::features::studies::StudyAction;
+use crate::app::features::App;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
@@ -47,21 +46,21 @@ fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, result: &StudyResult, numb
             let chosen = other.origin.is_like(result.origin);
             let button = ui.selectable_label(chosen, RichText::new(other.origin.title()).small());
             if button.on_hover_text(about_origin(other.origin)).clicked() {
-                actions.push(StudyAction::ShowResult(other.origin));
+                let origin = other.origin;
+                actions.push(move |app| app.studies.show_result(origin));
             }
         }
         if result.figures.len() > 1 {
             ui.separator();
             for (k, figure) in result.figures.iter().enumerate() {
                 let button = ui.selectable_label(k == number, RichText::new(&figure.name).small());
-                if button.on_hover_text(&figure.figure.title).clicked() {
-                    actions.push(StudyAction::ShowFigure(k));
-                }
+                actions.on(&button.on_hover_text(&figure.figure.title), move |app| app.studies.show_figure(k));
             }
         }
-        if ui.small_button("Export").on_hover_text("Save this figure as SVG or PNG (Ctrl+E)").clicked() {
-            actions.push(FileAction::ExportStudyFigure);
-        }
+        actions.on(
+            &ui.small_button("Export").on_hover_text("Save this figure as SVG or PNG (Ctrl+E)"),
+            App::export_study_figure,
+        );
     });
     let warning = match result.origin {
         _ if !result.current => "From other settings, methods or physics than today's: run the study again.",

@@ -2,7 +2,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::studies::StudyAction;
 use crate::app::theme::{accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
@@ -16,7 +15,7 @@ const ROW: f32 = 40.0;
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     if just_opened(ui, "studies") {
-        actions.push(StudyAction::Look);
+        actions.push(|app| app.studies.look());
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for study in PAPER_STUDIES {
@@ -38,7 +37,8 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
 }
 
 fn run(key: &str, size: StudySize, anew: bool, actions: &mut Actions) {
-    actions.push(StudyAction::Run(StudyRequest { key: key.to_owned(), size, anew }));
+    let request = StudyRequest { key: key.to_owned(), size, anew };
+    actions.push(|app| app.run_study(request));
 }
 
 fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, chosen: bool, actions: &mut Actions) {
@@ -67,7 +67,8 @@ fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, chosen: boo
         colour(if chosen { colours.text } else { ink }),
     );
     if response.on_hover_text(card.about).clicked() {
-        actions.push(StudyAction::Choose(card.key.to_owned()));
+        let key = card.key;
+        actions.push(|app| app.studies.choose(key));
     }
 }
 
@@ -125,9 +126,7 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions:
             let stop = ui
                 .button("Stop study")
                 .on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
-            if stop.clicked() {
-                actions.push(StudyAction::Stop);
-            }
+            actions.on(&stop, |app| app.studies.stop());
             return;
         }
         let begun = |size: StudySize| context.studies.files(key).is_some_and(|files| files.begun.contains(&size));

@@ -9,11 +9,11 @@ pub(super) mod tables;
 
 use crate::app::actions::Actions;
 use crate::app::context::PanelContext;
-use crate::app::features::studies::StudyAction;
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{RichText, Ui};
 use palpate_lab::study::paper::{Cell, StudyRow, StudyTable};
 use palpate_lab::workers::{StudyOrigin, StudyResult};
+use palpate_tactile::trial::TrialId;
 use std::sync::Arc;
 
 /// Result of the chosen study. Without one the panel says what to do.
@@ -25,7 +25,7 @@ fn result_ui(
     actions: &mut Actions,
 ) -> Option<Arc<StudyResult>> {
     if just_opened(ui, panel) {
-        actions.push(StudyAction::Look);
+        actions.push(|app| app.studies.look());
     }
     let result = context.studies.result();
     if result.is_none() {
@@ -44,10 +44,10 @@ fn result_ui(
     result
 }
 
-/// Opens the trials behind a row; none where they are not in the store of the window.
-fn opening(result: &StudyResult, row: &StudyRow) -> Option<StudyAction> {
+/// The trials behind a row; none where they are not in the store of the window.
+fn opening(result: &StudyResult, row: &StudyRow) -> Option<Vec<TrialId>> {
     let own = !row.trials.is_empty() && result.origin != StudyOrigin::Shipped;
-    own.then(|| StudyAction::OpenTrials(row.trials.clone()))
+    own.then(|| row.trials.clone())
 }
 
 /// What a click on a row does, or why it does nothing.

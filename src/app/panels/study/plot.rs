@@ -90,9 +90,7 @@ fn pointed_ui<'a>(
     // Beside the mark at once, without the delay of hints.
     let (ctx, response) = (ui.ctx().clone(), &shown.response);
     Tooltip::always_open(ctx, response.layer_id, response.id, rect).show(|ui| about_row_ui(ui, result, table, row));
-    let Some(action) = opening(result, row) else { return };
+    let Some(trials) = opening(result, row) else { return };
     ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    if response.clicked() {
-        actions.push(action);
-    }
+    actions.on(&response, move |app| app.open_trials(&trials));
 }

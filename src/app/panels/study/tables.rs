@@ -87,20 +87,20 @@ fn row_ui(
     actions: &mut Actions,
 ) {
     let colours = theme.colours();
-    let action = opening(result, row);
+    let trials = opening(result, row);
     let (rect, response) = ui.allocate_exact_size(vec2(whole, ROW), Sense::click());
     let cells: Vec<String> =
         row.cells.iter().zip(&table.columns).map(|(cell, column)| cell.shown(&column.unit)).collect();
     let label = format!("Row {}", cells.join(", "));
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, action.is_some(), &label));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, trials.is_some(), &label));
     if response.hovered() || response.has_focus() {
         ui.painter().rect_filled(rect, 3.0, colour(colours.background.mix(colours.accent, 0.14)));
     }
     texts(ui, rect, places, cells.into_iter(), colour(colours.text));
     let clicked = response.clicked();
     response.on_hover_ui(|ui| about_row_ui(ui, result, table, row));
-    if let Some(action) = action.filter(|_| clicked) {
-        actions.push(action);
+    if let Some(trials) = trials.filter(|_| clicked) {
+        actions.push(move |app| app.open_trials(&trials));
     }
 }
 
