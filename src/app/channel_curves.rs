@@ -1,7 +1,7 @@
 //! Curves of the channels of one quantity, for the plots.
 
-use crate::app::context::PanelContext;
 use crate::app::plots::PlotCurve;
+use crate::app::shown::DisplayedData;
 use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
 use palpate_sim::gripper::Side;
@@ -11,23 +11,23 @@ use palpate_tactile::{Channel, Quantity, SignalDefinition, Span};
 /// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and
 /// their unit; or the raw counts of their sensors, where those are chosen.
 pub(super) fn channel_curves<'a>(
-    context: &PanelContext<'_>,
+    data: &DisplayedData<'_>,
     quantity: Quantity,
     (factor, unit): (f64, &'a str),
 ) -> (Vec<PlotCurve>, &'a str) {
-    match context.shown().board().filter(|_| context.view.raw) {
-        Some(board) => (raw_curves(context, board, quantity), "counts"),
-        None => (physical_curves(context, quantity, factor), unit),
+    match data.board().filter(|_| data.view.raw) {
+        Some(board) => (raw_curves(data, board, quantity), "counts"),
+        None => (physical_curves(data, quantity, factor), unit),
     }
 }
 
 /// Curves of the counts of the sensors that measure a quantity.
-fn raw_curves(context: &PanelContext<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
+fn raw_curves(data: &DisplayedData<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
     let sensors = match quantity {
         Quantity::Curvature => [Sensor::FlexLeft, Sensor::FlexRight],
         Quantity::Pressure | Quantity::ContactPressure | Quantity::Force => [Sensor::PadLeft, Sensor::PadRight],
     };
-    let derived = context.shown().channels().iter().filter(|channel| channel.is_some()).count();
+    let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
     let curve = |(sensor, side): (Sensor, Side)| {
         let column = derived + board.channel_of(sensor)?;
         let channel = Channel { quantity, side, span: Span::WHOLE, signals: SignalDefinition::Parts };
@@ -43,8 +43,8 @@ fn raw_curves(context: &PanelContext<'_>, board: &Board, quantity: Quantity) -> 
     sensors.into_iter().zip(Side::BOTH).filter_map(curve).collect()
 }
 
-fn physical_curves(context: &PanelContext<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
-    let channels = context.shown().channels();
+fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
+    let channels = data.channels();
     let channels = channels.into_iter().enumerate().filter_map(|(index, channel)| Some((index, channel?)));
     channels
         .filter(|(_, channel)| shows(quantity, channel))

@@ -17,7 +17,6 @@
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
 //! | features | `features/` | state of the window, and what can be done with it |
 //! | actions | `actions.rs` | functions of the state, some with a name and a key |
-//! | context | `context.rs` | read-only context of panels |
 //! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` | building blocks of panels |
 //! | curves | `channel_curves.rs` `shown_grasp.rs` | curves of channels, heat maps of a grasp |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
@@ -40,7 +39,6 @@ mod actions;
 mod bars;
 mod channel_curves;
 mod contact_path;
-mod context;
 mod derived;
 mod export;
 mod features;
@@ -73,7 +71,6 @@ mod widgets;
 mod workbench;
 
 pub use actions::Actions;
-pub use context::PanelContext;
 pub use derived::Derivation;
 pub use export::{ExportRequest, FileExportError};
 pub use features::App;
@@ -82,7 +79,6 @@ pub use features::studies::Studies;
 pub use features::tools::{GripperTools, GripperToolsSetup};
 pub use features::view::{PathLayer, ViewState};
 pub use modes::mode::Mode;
-pub use notices::UserMessage;
 pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, film_presentation, frame_costs, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;

@@ -8,17 +8,6 @@ use palpate_lab::workers::Notice;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Message to the user.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum UserMessage {
-    /// Something was done.
-    Info(String),
-    /// Something needs a look.
-    Warning(String),
-    /// Something failed.
-    Error(String),
-}
-
 /// What can be done about a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Remedy {
@@ -89,12 +78,7 @@ fn remedies(text: &str) -> impl Iterator<Item = (&'static str, Remedy)> + '_ {
 
 impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
-    pub(super) fn tell(&mut self, message: UserMessage) {
-        let (level, text) = match message {
-            UserMessage::Info(text) => (Level::Info, text),
-            UserMessage::Warning(text) => (Level::Warning, text),
-            UserMessage::Error(text) => (Level::Error, text),
-        };
+    fn tell(&mut self, level: Level, text: String) {
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
         let time = if text.contains(STORE_LOST) { LASTING } else { time };
@@ -122,15 +106,15 @@ impl Notices {
     }
 
     pub(super) fn info(&mut self, text: impl Into<String>) {
-        self.tell(UserMessage::Info(text.into()));
+        self.tell(Level::Info, text.into());
     }
 
     pub(super) fn warning(&mut self, text: impl Into<String>) {
-        self.tell(UserMessage::Warning(text.into()));
+        self.tell(Level::Warning, text.into());
     }
 
     pub(super) fn error(&mut self, text: impl Into<String>) {
-        self.tell(UserMessage::Error(text.into()));
+        self.tell(Level::Error, text.into());
     }
 
     /// Last messages, oldest first.

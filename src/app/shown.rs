@@ -1,6 +1,7 @@
 //! Source of the data that plots, 3-D view and recognition show: the simulated gripper, the real one, or a stored trial;
 //! and the time of them that is shown.
 
+use crate::app::features::view::ViewState;
 use crate::app::playback::Playback;
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
@@ -17,10 +18,11 @@ use palpate_tactile::board::Board;
 use palpate_tactile::trial::{Control, TrialSource};
 use std::sync::Arc;
 
-/// Data of the source that is shown.
+/// Data of the source that is shown, and how they are shown.
 #[derive(Clone, Copy)]
-pub(super) struct SourceData<'a> {
+pub(super) struct DisplayedData<'a> {
     pub(super) source: ViewSource,
+    pub(super) view: &'a ViewState,
     pub(super) snapshot: Option<&'a Snapshot>,
     pub(super) gripper: Option<&'a GripperView>,
     pub(super) inspected: Option<Inspected<'a>>,
@@ -122,7 +124,7 @@ const ROLLING_S: f64 = 10.0;
 /// Least length of a trial in the plots (s).
 const TRIAL_S: f64 = 4.0;
 
-impl<'a> SourceData<'a> {
+impl<'a> DisplayedData<'a> {
     /// Time that is shown (s): the cursor, or the newest sample.
     pub(super) fn time_s(&self) -> Option<f64> {
         self.playback.cursor_s.or_else(|| self.traces.current()?.t.last().copied())

@@ -1,7 +1,7 @@
 //! Pads and fingers of the grasp that is shown, live or stored, as heat maps: at the time shown, and over all its time.
 
-use crate::app::context::PanelContext;
 use crate::app::heat_map::{MapsKey, ShownMaps, shown_maps};
+use crate::app::shown::DisplayedData;
 use crate::app::traces::GraspTrace;
 use crate::app::view_source::ViewSource;
 use egui::Ui;
@@ -19,7 +19,7 @@ use palpate_tactile::electronics::PadPart;
 /// Most columns of a heat map over time.
 pub(super) const MAP_COLUMNS: usize = 600;
 
-/// The grasp that is shown.
+/// The grasp that is data.
 pub(super) struct ShownGrasp<'a> {
     gripper: &'a GripperModel,
     /// Simulated frames, in order; none of a real gripper.
@@ -51,24 +51,23 @@ pub(super) struct PadLoad {
 
 impl<'a> ShownGrasp<'a> {
     /// The grasp that is shown; none before there is anything of it.
-    pub(super) fn of(context: &PanelContext<'a>) -> Option<Self> {
-        let shown = context.shown();
-        let trace = shown.traces.current();
-        let (gripper, frames, frame) = match shown.source {
+    pub(super) fn of(data: &DisplayedData<'a>) -> Option<Self> {
+        let trace = data.traces.current();
+        let (gripper, frames, frame) = match data.source {
             ViewSource::Simulation => {
-                let snapshot = shown.snapshot?;
+                let snapshot = data.snapshot?;
                 let own = trace.filter(|trace| trace.grasp == snapshot.grasp);
                 let frames = own.map(|trace| trace.frames.iter().flatten().map(|frame| &**frame).collect());
-                (&snapshot.scene.gripper, frames.unwrap_or_default(), shown.moment().map(|moment| moment.frame))
+                (&snapshot.scene.gripper, frames.unwrap_or_default(), data.moment().map(|moment| moment.frame))
             }
             ViewSource::Trial => {
-                let trial = shown.inspected?.trial;
+                let trial = data.inspected?.trial;
                 let frames = || trial.frames.iter().map(|frame| &**frame).collect();
                 let frames: Vec<&Frame> = if trial.simulated.is_some() { frames() } else { Vec::new() };
-                let frame = shown.moment().map(|moment| moment.frame).filter(|_| trial.simulated.is_some());
+                let frame = data.moment().map(|moment| moment.frame).filter(|_| trial.simulated.is_some());
                 (&trial.header.scene.gripper, frames, frame)
             }
-            ViewSource::Gripper => (&shown.scene.gripper, Vec::new(), None),
+            ViewSource::Gripper => (&data.scene.gripper, Vec::new(), None),
         };
         if frame.is_none() && trace.is_none_or(|trace| trace.t.is_empty()) {
             return None;
@@ -76,7 +75,7 @@ impl<'a> ShownGrasp<'a> {
         let column = |(k, channel): (usize, Option<&palpate_tactile::Channel>)| {
             channel.map(|channel| (k, channel.quantity, channel.side))
         };
-        let span_s = shown.time_span();
+        let span_s = data.time_span();
         let full_scale = match frames.as_slice() {
             [] => PAD_FULL_SCALE,
             frames => full_scale_of(gripper, frames.iter().copied()),
@@ -87,18 +86,18 @@ impl<'a> ShownGrasp<'a> {
             full_scale,
             frame,
             trace,
-            columns: shown.channels().into_iter().enumerate().filter_map(column).collect(),
-            cursor_s: shown.time_s().or(frame.map(|frame| frame.t)).unwrap_or(span_s[0]),
+            columns: data.channels().into_iter().enumerate().filter_map(column).collect(),
+            cursor_s: data.time_s().or(frame.map(|frame| frame.t)).unwrap_or(span_s[0]),
             span_s,
-            window_s: context.view.time_window,
-            phases: context.phases.to_vec(),
+            window_s: data.view.time_window,
+            phases: data.phases.to_vec(),
         })
     }
 
     /// What to do where there is none.
-    pub(super) fn missing(context: &PanelContext<'_>) -> &'static str {
-        match context.source {
-            ViewSource::Trial if context.opening => "Opening the trial ..",
+    pub(super) fn missing(data: &DisplayedData<'_>) -> &'static str {
+        match data.source {
+            ViewSource::Trial if data.opening => "Opening the trial ..",
             ViewSource::Trial => "Choose a trial in the library.",
             ViewSource::Simulation => "Start a grasp: press Space.",
             ViewSource::Gripper => "Connect the gripper (Ctrl+G), then record a grasp (R).",
@@ -115,7 +114,7 @@ impl<'a> ShownGrasp<'a> {
         self.frames.len() > 1 || (self.frame.is_none() && self.trace.is_some_and(|trace| trace.t.len() > 1))
     }
 
-    /// Load on both pads at the time shown.
+    /// Load on both pads at the time data.
     pub(super) fn pads(&self) -> [PadLoad; 2] {
         let grid = self.gripper.taxels();
         Side::BOTH.map(|side| match self.frame {

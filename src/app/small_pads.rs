@@ -1,8 +1,8 @@
 //! Small pads beside the 3-D view of what no simulation knows, below the legend that gives their colours: one plain field for
 //! each pad, as it reads one number.
 
-use crate::app::context::PanelContext;
 use crate::app::heat_map::pad_ui;
+use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, FontId, Rect, Ui, pos2, vec2};
@@ -22,8 +22,8 @@ const LEGEND: f32 = 40.0;
 const BUTTONS: f32 = 620.0;
 
 /// Draws both pads where nothing else is; leaves them out where the view is too small.
-pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: &PictureView) {
-    let Some(grasp) = ShownGrasp::of(context).filter(|grasp| !grasp.is_simulated()) else { return };
+pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &PictureView) {
+    let Some(grasp) = ShownGrasp::of(data).filter(|grasp| !grasp.is_simulated()) else { return };
     let legends = legend_room(view);
     let below = rect.height() - legends.y - SCALE_BAR - TEXTS;
     let beside = rect.height() - 18.0 - SCALE_BAR - TEXTS;
@@ -38,7 +38,7 @@ pub(super) fn small_pads(ui: &Ui, rect: Rect, context: &PanelContext<'_>, view: 
     if room < HEIGHT[0] || rect.width() < 2.0 * EACH + 90.0 {
         return;
     }
-    let theme = context.view.theme;
+    let theme = data.view.theme;
     let height = (0.3 * rect.height()).clamp(HEIGHT[0], HEIGHT[1]).min(room);
     let size = vec2((WIDTH * height).max(14.0), height);
     let shown = shown_pads(ui, "small pads", &grasp, LoadUnit::Pressure);

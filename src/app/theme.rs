@@ -13,6 +13,11 @@ pub(super) fn veil(Rgb(r, g, b): Rgb, opacity: f32) -> Color32 {
     Color32::from_rgba_unmultiplied(r, g, b, (opacity.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
+/// Theme in which a part of the window is drawn.
+pub(super) fn of(ui: &egui::Ui) -> Theme {
+    if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light }
+}
+
 /// Fill of the button that a panel proposes.
 pub(super) fn accented(theme: Theme) -> Color32 {
     let colours = theme.colours();

@@ -6,7 +6,7 @@ use palpate_sim::objects::{catalogue, thumbnail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Textures by the name of a class or the path of a file.
+/// Pictures by the name of a class or the path of a file.
 pub(super) struct Thumbnails {
     textures: BTreeMap<String, egui::TextureHandle>,
     portraits: Job<String, Vec<u8>>,
@@ -26,9 +26,9 @@ impl Thumbnails {
         Self { textures, portraits: portrait_job(wake), asked: BTreeSet::new() }
     }
 
-    /// All that are ready.
-    pub(super) fn textures(&self) -> &BTreeMap<String, egui::TextureHandle> {
-        &self.textures
+    /// Picture of an object, once it is ready.
+    pub(super) fn get(&self, name: &str) -> Option<&egui::TextureHandle> {
+        self.textures.get(name)
     }
 
     /// Takes in what has been drawn, and has each of these files drawn once.

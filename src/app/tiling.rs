@@ -1,7 +1,7 @@
 //! Tiles: the panels of a mode beside each other.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
+use crate::app::features::App;
 use crate::app::panels::{self, PanelKind};
 use crate::app::theme::colour;
 use egui::{Frame, Margin, Ui};
@@ -14,21 +14,21 @@ pub(super) fn panel_frame(panel: &PanelKind) -> Frame {
     Frame::new().inner_margin(margin)
 }
 
-/// Drawing of all panels: their context, and where their actions go.
-pub(super) struct Tiling<'a, 'b> {
-    pub(super) context: &'a PanelContext<'b>,
+/// Drawing of all panels: what they read, and where their actions go.
+pub(super) struct Tiling<'a> {
+    pub(super) app: &'a App,
     pub(super) actions: &'a mut Actions,
     /// Tab chosen in a menu.
     pub(super) chosen: Option<TileId>,
 }
 
-impl Tiling<'_, '_> {
+impl Tiling<'_> {
     fn theme(&self) -> Theme {
-        self.context.view.theme
+        self.app.view.theme
     }
 }
 
-impl Behavior<String> for Tiling<'_, '_> {
+impl Behavior<String> for Tiling<'_> {
     fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
         panels::named(pane).map_or(pane.as_str(), |panel| panel.title).into()
     }
@@ -37,7 +37,7 @@ impl Behavior<String> for Tiling<'_, '_> {
         let Some(panel) = panels::named(pane) else { return UiResponse::None };
         panel_frame(panel).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            (panel.ui)(ui, self.context, self.actions);
+            (panel.ui)(ui, self.app, self.actions);
         });
         UiResponse::None
     }

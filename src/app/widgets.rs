@@ -2,13 +2,13 @@
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
 use egui::text_edit::TextEditState;
 use egui::{
     AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Stroke, TextEdit, Ui, UiBuilder,
     Widget, pos2,
 };
-use palpate_geometry::palette::{Theme, Trace};
+use palpate_geometry::palette::Trace;
 use palpate_lab::workers::{GripperCommand, Job, JobProgress};
 use palpate_store::labels::Sparkline;
 use std::fmt::Display;
@@ -123,8 +123,8 @@ pub(super) fn port_field(ui: &mut Ui, id: egui::Id) -> Option<PathBuf> {
 pub(super) const ANY_PORT: &str = "automatic";
 
 /// Stop button, the same everywhere.
-pub(super) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Actions) {
-    let colours = theme.colours();
+pub(super) fn stop_button(ui: &mut Ui, actions: &mut Actions) {
+    let colours = theme::of(ui).colours();
     let text = RichText::new("STOP  Esc").strong().color(colour(colours.background));
     let button = Button::new(text).fill(colour(colours.error));
     let response = ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers and end the trial (Esc)");
@@ -136,8 +136,8 @@ pub(super) fn stop_button(ui: &mut Ui, theme: Theme, actions: &mut Actions) {
 const LEAST_RANGE: f32 = 1.0;
 
 /// Sparkline of both pads, over the range of its values.
-pub(super) fn sparkline(ui: &Ui, theme: Theme, values: &Sparkline, place: Rect) {
-    let painter = ui.painter_at(place);
+pub(super) fn sparkline(ui: &Ui, values: &Sparkline, place: Rect) {
+    let (theme, painter) = (theme::of(ui), ui.painter_at(place));
     painter.rect_filled(place, 2.0, colour(theme.colours().raised));
     let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
     let all = || values.iter().flatten().flatten().copied();

@@ -2,7 +2,6 @@
 
 use crate::app::actions::Actions;
 use crate::app::bars;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
 use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
@@ -247,14 +246,13 @@ impl Workbench {
         let mode = self.app.view.mode;
         let mut layout = self.app.view.layouts.remove(&mode).unwrap_or_else(|| modes::default_layout(mode));
         let app = &self.app;
-        let context = PanelContext::of(app);
         keys::pressed(app, &mut actions);
         let colours = app.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
-        Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, &context, &mut actions));
-        Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, &context, &mut actions));
+        Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, app, &mut actions));
+        Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, app, &mut actions));
         CentralPanel::default().frame(Frame::NONE).show(ui, |ui| {
-            let mut tiling = Tiling { context: &context, actions: &mut actions, chosen: None };
+            let mut tiling = Tiling { app, actions: &mut actions, chosen: None };
             layout.ui(&mut tiling, ui);
             if let Some(chosen) = tiling.chosen {
                 layout.make_active(|id, _| id == chosen);
@@ -273,7 +271,7 @@ impl Workbench {
         let message = self.app.notices.current(ui.ctx()).map(str::to_owned);
         let mut actions = Actions::default();
         keys::pressed(&self.app, &mut actions);
-        presenter::ui(ui, &PanelContext::of(&self.app), self.app.presenter.score(), message.as_deref());
+        presenter::ui(ui, &self.app, self.app.presenter.score(), message.as_deref());
         self.run(actions);
     }
 
@@ -284,7 +282,7 @@ impl Workbench {
         let ground = colour(self.app.view.theme.colours().background);
         panel_frame(panel).fill(ground).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            (panel.ui)(ui, &PanelContext::of(&self.app), &mut actions);
+            (panel.ui)(ui, &self.app, &mut actions);
         });
         self.run(actions);
     }

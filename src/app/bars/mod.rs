@@ -5,7 +5,6 @@ mod timeline;
 mod trial;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
 use crate::app::features::simulation::LoggedGrasp;
 use crate::app::icons::{self, Icon};
@@ -30,32 +29,31 @@ fn speed_text(speed: f64) -> String {
     }
 }
 
-pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
     // From the right, so that buttons stay in sight where there is no room for everything.
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         actions.on(&ui.button("?").on_hover_text("Keys (F1)"), |app| app.view.keys_shown = !app.view.keys_shown);
-        menu_ui(ui, context, actions);
-        if context.gripper.is_some_and(GripperView::is_connected) {
-            stop_button(ui, context.view.theme, actions);
+        menu_ui(ui, app, actions);
+        if app.gripper_view().is_some_and(GripperView::is_connected) {
+            stop_button(ui, actions);
         }
         ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
             ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
             if ui.available_width() > 780.0 {
                 ui.label(RichText::new("Palpate").heading().strong());
             }
-            modes_ui(ui, context, actions);
+            modes_ui(ui, app, actions);
             // Before what may be cut off.
-            gripper::ui(ui, context, actions);
-            sources_ui(ui, context, actions);
-            if context.source == ViewSource::Simulation {
-                simulated_ui(ui, context);
+            gripper::ui(ui, app, actions);
+            sources_ui(ui, app, actions);
+            if app.view.source == ViewSource::Simulation {
+                simulated_ui(ui, app);
             }
             let room = ui.available_width();
-            if let Some(driver) = context.driver.filter(|_| room > 240.0) {
+            if let Some(driver) = app.driver.as_deref().filter(|_| room > 240.0) {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let quiet = RichText::new(drawn_by(context, driver))
-                        .small()
-                        .color(colour(context.view.theme.colours().quiet_text));
+                    let quiet =
+                        RichText::new(drawn_by(app, driver)).small().color(colour(app.view.theme.colours().quiet_text));
                     ui.add(egui::Label::new(quiet).truncate());
                 });
             }
@@ -64,17 +62,17 @@ pub(super) fn top(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions
 }
 
 /// Driver that draws, and while the view moves how often and how finely.
-fn drawn_by(context: &PanelContext<'_>, driver: &str) -> String {
-    let Some(rate) = context.frame_rate.per_second() else { return driver.to_owned() };
-    let resolution = context.resolution();
+fn drawn_by(app: &App, driver: &str) -> String {
+    let Some(rate) = app.frame_rate.per_second() else { return driver.to_owned() };
+    let resolution = app.resolution();
     let coarse =
         if resolution < 1.0 { format!(", 3-D view at {:.0}\u{2009}%", 100.0 * resolution) } else { String::new() };
     format!("{rate:.0}\u{2009}frames/s{coarse} \u{b7} {driver}")
 }
 
 /// Settings of the window.
-fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let (icon, other) = match context.view.theme {
+fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let (icon, other) = match app.view.theme {
         Theme::Dark => (Icon::Sun, Theme::Light),
         Theme::Light => (Icon::Moon, Theme::Dark),
     };
@@ -86,7 +84,7 @@ fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         ui.separator();
         ui.label("UI scale");
         ui.horizontal(|ui| {
-            let scale = context.view.scale;
+            let scale = app.view.scale;
             for step in [0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0] {
                 let text = format!("{:.0} %", 100.0 * step);
                 actions.on(&ui.selectable_label((scale - step).abs() < 0.01, text), move |app| app.set_scale(step));
@@ -103,10 +101,10 @@ fn menu_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 }
 
 /// Tabs of the modes.
-fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+fn modes_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.x = 2.0;
     for kind in &modes::ALL {
-        let chosen = context.view.mode == kind.mode;
+        let chosen = app.view.mode == kind.mode;
         if ui.selectable_label(chosen, kind.title).on_hover_text(kind.about).clicked() && !chosen {
             actions.push(|app| app.set_mode(kind.mode));
         }
@@ -115,9 +113,9 @@ fn modes_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 }
 
 /// Sources of the data; with more than one, a click changes it.
-fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let colours = context.view.theme.colours();
-    let link = context.gripper.and_then(|gripper| gripper.link.as_ref());
+fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let colours = app.view.theme.colours();
+    let link = app.gripper_view().and_then(|gripper| gripper.link.as_ref());
     let mut sources: Vec<(ViewSource, String, String, Rgb)> = Vec::new();
     if let Some(link) = link {
         let cadence = &link.cadence;
@@ -139,7 +137,7 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     let simulated = "SIMULATED".to_owned();
     sources.push((ViewSource::Simulation, simulated, "Show the simulated gripper".to_owned(), colours.text));
-    if let Some(inspected) = context.inspected {
+    if let Some(inspected) = app.inspect.inspected() {
         let trial = inspected.trial;
         let text = format!("TRIAL {}, {}", trial.id, trial.source_title().to_uppercase());
         let about = format!("{}: show this stored trial", trial.title);
@@ -150,11 +148,11 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     for (source, text, about, ink) in sources {
         let text = RichText::new(text).small().color(colour(ink));
-        actions.on(&ui.selectable_label(context.source == source, text).on_hover_text(about), move |app| {
+        actions.on(&ui.selectable_label(app.view.source == source, text).on_hover_text(about), move |app| {
             app.view.source = source
         });
     }
-    if context.source == ViewSource::Trial
+    if app.view.source == ViewSource::Trial
         && icons::button(ui, Icon::Cross, "Close the trial", "Close the trial and show the live gripper").clicked()
     {
         actions.push(App::close_trial);
@@ -162,12 +160,12 @@ fn sources_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 }
 
 /// Object in the simulated hand, and grasps made.
-fn simulated_ui(ui: &mut Ui, context: &PanelContext<'_>) {
-    let object = context.snapshot.and_then(|s| s.object.as_deref());
-    if let Some(object) = object.filter(|_| context.view.truth_shown) {
+fn simulated_ui(ui: &mut Ui, app: &App) {
+    let object = app.snapshot().and_then(|s| s.object.as_deref());
+    if let Some(object) = object.filter(|_| app.view.truth_shown) {
         ui.add(egui::Label::new(&object.title).truncate());
     }
-    if let Some(snapshot) = context.snapshot.filter(|_| ui.available_width() > 120.0) {
+    if let Some(snapshot) = app.snapshot().filter(|_| ui.available_width() > 120.0) {
         let status = &snapshot.status;
         // With a model, grasping ends as soon as the object is recognised.
         let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
@@ -182,62 +180,62 @@ fn badge(ui: &mut Ui, text: &str, fill: egui::Color32, ink: egui::Color32) {
     });
 }
 
-pub(super) fn bottom(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let shown = context.shown();
-    let running = context.gripper.is_some_and(|gripper| gripper.trial.is_some());
-    let records = match context.source {
+pub(super) fn bottom(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let shown = app.shown();
+    let running = app.gripper_view().is_some_and(|gripper| gripper.trial.is_some());
+    let records = match app.view.source {
         ViewSource::Gripper => true,
-        ViewSource::Simulation => context.view.mode == Mode::Label,
+        ViewSource::Simulation => app.view.mode == Mode::Label,
         // A trial runs while the card asks about an older one.
-        ViewSource::Trial => context.view.mode == Mode::Label && running,
+        ViewSource::Trial => app.view.mode == Mode::Label && running,
     };
     if records && !shown.looks_back() {
-        return trial::ui(ui, context, actions);
+        return trial::ui(ui, app, actions);
     }
-    let status = context.snapshot.map(|s| s.status.clone()).unwrap_or_default();
+    let status = app.snapshot().map(|s| s.status.clone()).unwrap_or_default();
     ui.horizontal_centered(|ui| {
         if shown.replays() {
-            replay_buttons(ui, context, actions);
+            replay_buttons(ui, app, actions);
         } else {
             transport(ui, &status, actions);
         }
         ui.separator();
-        speeds(ui, context, &status, actions);
+        speeds(ui, app, &status, actions);
         ui.separator();
-        if context.source == ViewSource::Simulation && ui.available_width() > 420.0 {
-            recording(ui, context, &status, actions);
+        if app.view.source == ViewSource::Simulation && ui.available_width() > 420.0 {
+            recording(ui, app, &status, actions);
             ui.separator();
         }
         let [first, last] = shown.time_span();
         let t = shown.time_s().unwrap_or(first);
         ui.label(RichText::new(format!("{t:5.2} / {last:.2} s")).monospace());
         if shown.looks_back() {
-            live_button(ui, context, actions);
+            live_button(ui, app, actions);
         }
-        timeline::ui(ui, context, actions);
+        timeline::ui(ui, &shown, actions);
     });
 }
 
 /// Back to the newest sample.
-fn live_button(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let button = egui::Button::new("Live").fill(accented(context.view.theme));
+fn live_button(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let button = egui::Button::new("Live").fill(accented(app.view.theme));
     actions.on(&ui.add(button).on_hover_text("Return to the newest sample (End)"), |app| app.seek(Seek::End));
 }
 
 /// Buttons of a stored trial, and of the past of a live gripper.
-fn replay_buttons(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+fn replay_buttons(ui: &mut Ui, app: &App, actions: &mut Actions) {
     let mut button = |icon: Icon, name: &str, hint: &str, action: fn(&mut App)| {
         actions.on(&icons::button(ui, icon, name, hint), action);
     };
     button(Icon::Reset, "To the start", "To the start (Home)", |app| app.seek(Seek::Start));
     button(Icon::StepBack, "Step back", "One sample back (Ctrl+Left)", |app| app.seek(Seek::Samples(-1)));
-    if context.playback.playing {
+    if app.shown().playback.playing {
         button(Icon::Pause, "Pause", "Pause (Space)", App::toggle_playing);
     } else {
         button(Icon::Play, "Play", "Play (Space)", App::toggle_playing);
     }
     button(Icon::Step, "Step", "One sample forward (Ctrl+Right)", |app| app.seek(Seek::Samples(1)));
-    let repeated = context.playback.repeated.is_some();
+    let repeated = app.shown().playback.repeated.is_some();
     let hint = "Repeat, between the marks A and B where both are set (L)";
     actions.on(&ui.selectable_label(repeated, "Loop").on_hover_text(hint), App::toggle_repeat);
 }
@@ -257,9 +255,9 @@ fn transport(ui: &mut Ui, status: &Status, actions: &mut Actions) {
 }
 
 /// Speed of the replay or of the simulation.
-fn speeds(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mut Actions) {
-    let replayed = context.shown().replays();
-    let target = if replayed { context.playback.speed } else { status.target_speed };
+fn speeds(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
+    let replayed = app.shown().replays();
+    let target = if replayed { app.shown().playback.speed } else { status.target_speed };
     let combo = egui::ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_text(target));
     let shown = combo.show_ui(ui, |ui| {
         for speed in SPEEDS {
@@ -288,7 +286,7 @@ fn speeds(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mu
 const NAMED: f32 = 620.0;
 
 /// Where grasps are recorded, a button that keeps the last one, and how many grasps there are at most.
-fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: &mut Actions) {
+fn recording(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
     if ui.available_width() > NAMED {
         ui.weak("Record into");
     }
@@ -301,7 +299,7 @@ fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: 
             actions.push(move |app| app.simulation.send(Command::SetRecording(Some(place))));
         }
     }
-    keep_ui(ui, context, actions);
+    keep_ui(ui, app, actions);
     let mut grasps = status.grasps.max(1);
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
     if number_field(ui, "grasps", drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
@@ -310,10 +308,10 @@ fn recording(ui: &mut Ui, context: &PanelContext<'_>, status: &Status, actions: 
 }
 
 /// Button that moves the last grasp from the demo log to the store.
-fn keep_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let kept = context.logged.is_some_and(|logged| logged.kept);
-    let waits = context.logged.filter(|logged| !logged.kept);
-    let hint = match context.logged {
+fn keep_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let kept = app.logged().is_some_and(|logged| logged.kept);
+    let waits = app.logged().filter(|logged| !logged.kept);
+    let hint = match app.logged() {
         Some(LoggedGrasp { trial, kept: true }) => format!("Trial {trial} is in the store"),
         Some(LoggedGrasp { trial, kept: false }) => {
             format!("Move the last grasp, trial {trial}, from the demo log to the store (K)")

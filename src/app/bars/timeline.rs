@@ -2,9 +2,8 @@
 //! simulated grasp alike.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::playback::Seek;
-use crate::app::shown::Inspected;
+use crate::app::shown::{DisplayedData, Inspected};
 use crate::app::theme::{colour, veil};
 use crate::app::view_source::ViewSource;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
@@ -15,14 +14,13 @@ use palpate_tactile::trial::TrialSource;
 /// Height of the bar (points).
 const HEIGHT: f32 = 26.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     if ui.available_width() < 60.0 {
         return;
     }
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width() - 6.0, HEIGHT), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Time bar"));
-    let shown = context.shown();
-    let [first, last] = shown.time_span();
+    let [first, last] = data.time_span();
     let length = (last - first).max(1e-9);
     let x_of = |t: f64| rect.left() + rect.width() * ((t - first) / length).clamp(0.0, 1.0) as f32;
     if (response.dragged() || response.clicked())
@@ -31,11 +29,11 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         let share = f64::from((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
         actions.push(move |app| app.seek(Seek::To(first + share * length)));
     }
-    let colours = context.view.theme.colours();
+    let colours = data.view.theme.colours();
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, colour(colours.background));
-    line_pressure(&painter, rect, context, x_of);
-    for (place, span) in context.phases.iter().enumerate() {
+    line_pressure(&painter, rect, data, x_of);
+    for (place, span) in data.phases.iter().enumerate() {
         let [left, right] = [x_of(span.from_s), x_of(span.to_s)];
         if place > 0 {
             painter.vline(left, rect.y_range(), Stroke::new(1.0, veil(colours.text, 0.45)));
@@ -48,12 +46,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             painter.galley(at, word, colour(colours.text));
         }
     }
-    if let Some(own) = context.inspected.filter(|own| is_corrected_by_hand(context, own)) {
+    if let Some(own) = data.inspected.filter(|own| is_corrected_by_hand(data, own)) {
         for span in &own.trial.phases {
-            grip_ui(ui, rect, context, span, (first, length), actions);
+            grip_ui(ui, rect, data, span, (first, length), actions);
         }
     }
-    let playback = context.playback;
+    let playback = data.playback;
     if let Some([from, to]) = playback.repeated {
         let part = Rect::from_x_y_ranges(x_of(from)..=x_of(to), rect.bottom() - 4.0..=rect.bottom());
         painter.rect_filled(part, 0.0, colour(colours.accent));
@@ -71,22 +69,22 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             );
         }
     }
-    if let Some(t) = shown.time_s() {
+    if let Some(t) = data.time_s() {
         painter.vline(x_of(t), rect.y_range(), Stroke::new(2.5, colour(colours.accent)));
     }
     response.on_hover_text("Drag to move through time (arrow keys: 0.1 s, with Ctrl a sample)");
 }
 
 /// Marks of a simulated grasp are exact; those of others are measured, and a person may know better.
-fn is_corrected_by_hand(context: &PanelContext<'_>, own: &Inspected<'_>) -> bool {
-    context.source == ViewSource::Trial && own.trial.source != TrialSource::Simulated
+fn is_corrected_by_hand(data: &DisplayedData<'_>, own: &Inspected<'_>) -> bool {
+    data.source == ViewSource::Trial && own.trial.source != TrialSource::Simulated
 }
 
 /// Grip at the beginning of a phase, by which it is moved.
 fn grip_ui(
     ui: &mut Ui,
     rect: Rect,
-    context: &PanelContext<'_>,
+    data: &DisplayedData<'_>,
     span: &PhaseSpan,
     (first, length): (f64, f64),
     actions: &mut Actions,
@@ -99,7 +97,7 @@ fn grip_ui(
     let response = ui.interact(place, id, Sense::drag()).on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
     let name = span.phase.name();
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, format!("Beginning of {name}")));
-    let ink = colour(context.view.theme.colours().accent);
+    let ink = colour(data.view.theme.colours().accent);
     let points = vec![place.left_top(), place.right_top(), pos2(x, place.bottom())];
     ui.painter().add(egui::Shape::convex_polygon(points, ink, Stroke::NONE));
     if dragged.is_some() {
@@ -122,10 +120,10 @@ fn grip_ui(
 }
 
 /// Line pressure as a filled curve.
-fn line_pressure(painter: &egui::Painter, rect: Rect, context: &PanelContext<'_>, x_of: impl Fn(f64) -> f32) {
-    let Some(trace) = context.traces.current() else { return };
+fn line_pressure(painter: &egui::Painter, rect: Rect, data: &DisplayedData<'_>, x_of: impl Fn(f64) -> f32) {
+    let Some(trace) = data.traces.current() else { return };
     let top = trace.line_bar.iter().copied().filter(|bar| bar.is_finite()).fold(0.05, f64::max);
-    let fill = veil(Trace::Line.colour(context.view.theme), 0.40);
+    let fill = veil(Trace::Line.colour(data.view.theme), 0.40);
     let height = |bar: f64| rect.height() * 0.92 * (bar / top).clamp(0.0, 1.0) as f32;
     // At most one column per point: a long trial has more samples than that.
     let mut drawn = f32::NEG_INFINITY;

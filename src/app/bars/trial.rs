@@ -1,7 +1,6 @@
 //! Lower bar while the real gripper is shown: keys of a trial, instruction, and time left.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
 use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
@@ -11,9 +10,9 @@ use palpate_lab::grasping::{GraspStage, LEAD_S};
 use palpate_lab::workers::{GripperCommand, GripperView, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let trial = context.gripper.and_then(|gripper| gripper.trial.as_ref());
-    let connected = context.gripper.is_some_and(GripperView::is_connected);
+pub(super) fn ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let trial = app.gripper_view().and_then(|gripper| gripper.trial.as_ref());
+    let connected = app.gripper_view().is_some_and(GripperView::is_connected);
     ui.horizontal_centered(|ui| {
         let mut button = |on: bool, text: &str, about: &str, action: fn(&mut App)| {
             let button = ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about);
@@ -27,10 +26,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         let about = "Discard the trial (D)";
         button(trial.is_some(), "Discard  D", about, |app| app.label(LabellingAction::Discard));
         ui.separator();
-        let colours = context.view.theme.colours();
+        let colours = app.view.theme.colours();
         match trial {
             Some(trial) => {
-                let (text, ink) = (instruction(trial), part_colour(context, trial.stage));
+                let (text, ink) = (instruction(trial), part_colour(app, trial.stage));
                 ui.label(RichText::new(text).heading().strong().color(colour(ink)));
                 progress_ui(ui, trial, ink, colours.raised);
             }
@@ -44,8 +43,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     });
 }
 
-fn part_colour(context: &PanelContext<'_>, part: GraspStage) -> Rgb {
-    let colours = context.view.theme.colours();
+fn part_colour(app: &App, part: GraspStage) -> Rgb {
+    let colours = app.view.theme.colours();
     match part {
         GraspStage::Phase(Phase::Close | Phase::Hold) => colours.accent,
         GraspStage::Phase(Phase::Release) => colours.warning,

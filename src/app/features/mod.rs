@@ -17,7 +17,7 @@ pub(super) mod view;
 
 use crate::app::frame_rate::FrameRate;
 use crate::app::notices::Notices;
-use crate::app::shown::{ComparedTrials, SourceData};
+use crate::app::shown::{ComparedTrials, DisplayedData};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::traces::{GraspTrace, TraceHistory};
 use crate::app::view_source::ViewSource;
@@ -84,9 +84,10 @@ impl App {
     }
 
     /// Data that are shown.
-    pub(super) fn shown(&self) -> SourceData<'_> {
-        SourceData {
+    pub(super) fn shown(&self) -> DisplayedData<'_> {
+        DisplayedData {
             source: self.view.source,
+            view: &self.view,
             snapshot: self.snapshot(),
             gripper: self.gripper_view(),
             inspected: self.inspect.inspected(),

@@ -1,9 +1,9 @@
 //! What accuracy costs: the picture of the stored study. Each point is a setting; a click adopts it.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
+use crate::app::features::simulation::SimulationFeature;
 use crate::app::figure_plot::{self, ShownPlot};
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
 use egui::{Button, Pos2, RichText, ScrollArea, Tooltip, Ui};
 use palpate_geometry::drawing::Plot;
 use palpate_geometry::units::three_digits;
@@ -12,13 +12,13 @@ use palpate_lab::study::accuracy::{
 };
 use palpate_sim::scene::Scene;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let group = SceneGroup::of(context.scene.holds_object());
-    let Some(study) = context.stored_accuracy else {
+pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
+    let group = SceneGroup::of(simulation.scene.holds_object());
+    let Some(study) = &simulation.stored_accuracy else {
         ui.weak("The stored study cannot be read.");
         return;
     };
-    let held = if context.scene.holds_object() { "fixed" } else { "free" };
+    let held = if simulation.scene.holds_object() { "fixed" } else { "free" };
     let (shapes, poses) = (study.objects.len(), study.poses);
     ui.weak(format!("stored study: {held} objects, {shapes} shapes, {poses} poses"))
         .on_hover_text("palpate study accuracy; palpate help accuracy has its tables");
@@ -27,15 +27,14 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
         let roomy = height > ROOM_FOR_LABELS;
         let labelled = |label: &str| roomy && (label.contains("(default)") || ["draft", "reference"].contains(&label));
-        let shown =
-            figure_plot::show(ui, context.view.theme, ("error against CPU time", &plot), height, true, labelled);
+        let shown = figure_plot::show(ui, theme::of(ui), ("error against CPU time", &plot), height, true, labelled);
         shown.response.widget_info(|| {
             let text = format!("Error against CPU time, {} settings", study.rows.len());
             egui::WidgetInfo::labeled(egui::Role::Figure, true, text)
         });
-        mark_current(ui, context, study, group, (&plot, &shown));
-        pointed_ui(ui, context, study, group, (&plot, &shown), actions);
-        front_ui(ui, context, study, group, actions);
+        mark_current(ui, simulation, study, group, (&plot, &shown));
+        pointed_ui(ui, simulation, study, group, (&plot, &shown), actions);
+        front_ui(ui, simulation, study, group, actions);
     });
 }
 
@@ -58,14 +57,14 @@ fn is_current(setting: &AccuracySetting, scene: &Scene) -> bool {
 /// Rings the setting of the scene.
 fn mark_current(
     ui: &Ui,
-    context: &PanelContext<'_>,
+    simulation: &SimulationFeature,
     study: &AccuracyStudy,
     group: SceneGroup,
     (plot, shown): (&Plot, &ShownPlot),
 ) {
-    let stroke = egui::Stroke::new(2.0, colour(context.view.theme.colours().text));
+    let stroke = egui::Stroke::new(2.0, colour(theme::of(ui).colours().text));
     // Joints and taxels of the scene belong to every setting of motion.
-    let current = settings(study, group).find(|(setting, _)| is_current(setting, context.scene));
+    let current = settings(study, group).find(|(setting, _)| is_current(setting, &simulation.scene));
     if let Some(place) = current.and_then(|(_, cost)| shown.position(plot, place_of(cost))) {
         ui.painter().with_clip_rect(shown.response.rect).circle_stroke(place, 8.0, stroke);
     }
@@ -81,7 +80,7 @@ const NEAR: f32 = 14.0;
 /// Tells the setting under the pointer; a click adopts it.
 fn pointed_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    simulation: &SimulationFeature,
     study: &AccuracyStudy,
     group: SceneGroup,
     (plot, shown): (&Plot, &ShownPlot),
@@ -100,12 +99,12 @@ fn pointed_ui(
     let (ctx, response) = (ui.ctx().clone(), &shown.response);
     Tooltip::always_open(ctx, response.layer_id, response.id, beside).show(|ui| about_ui(ui, setting, cost));
     if response.clicked() {
-        adopt(setting, context, actions);
+        adopt(setting, simulation, actions);
     }
 }
 
-fn adopt(setting: &AccuracySetting, context: &PanelContext<'_>, actions: &mut Actions) {
-    match setting.adopted(context.scene) {
+fn adopt(setting: &AccuracySetting, simulation: &SimulationFeature, actions: &mut Actions) {
+    match setting.adopted(&simulation.scene) {
         Ok(scene) => actions.push(|app| app.set_scene(scene)),
         Err(cause) => actions.push(move |app| app.notices.error(cause.to_string())),
     }
@@ -131,19 +130,25 @@ fn about_ui(ui: &mut Ui, setting: &AccuracySetting, cost: &GroupCost) {
 }
 
 /// Buttons of the settings on the front, for the keyboard and for small windows.
-fn front_ui(ui: &mut Ui, context: &PanelContext<'_>, study: &AccuracyStudy, group: SceneGroup, actions: &mut Actions) {
+fn front_ui(
+    ui: &mut Ui,
+    simulation: &SimulationFeature,
+    study: &AccuracyStudy,
+    group: SceneGroup,
+    actions: &mut Actions,
+) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
         ui.weak("front").on_hover_text("Nothing cheaper is as accurate");
         for (setting, cost) in study.front(group) {
-            let current = is_current(setting, context.scene);
+            let current = is_current(setting, &simulation.scene);
             let euler = if setting.family == SettingFamily::Tolerance { "" } else { " Euler" };
             let name = format!("{}{euler}", setting.name);
             let response = ui.add(Button::selectable(current, RichText::new(&name).small()));
             let label = format!("Adopt {name}");
             response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, current, &label));
             if response.on_hover_ui(|ui| about_ui(ui, setting, cost)).clicked() {
-                adopt(setting, context, actions);
+                adopt(setting, simulation, actions);
             }
         }
     });

@@ -1,27 +1,27 @@
 //! Calibration of the real gripper's sensors, step by step: instruction, reading, points with the fitted curve, residuals.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::plots::static_plot;
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
 use crate::app::widgets::{ANY_PORT, failure_ui, text_field, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{
-    CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, RunningCalibration, SensorJobError,
+    CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, GripperView, RunningCalibration,
+    SensorJobError,
 };
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Procedure, Record, SensorKind};
 use std::path::PathBuf;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let view = context.gripper.and_then(|gripper| gripper.calibration.as_deref());
+pub(super) fn ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
+    let view = gripper.and_then(|gripper| gripper.calibration.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match view {
-        Some(CalibrationView { running: Some(running), .. }) => running_ui(ui, context, running, actions),
-        Some(CalibrationView { running: None, ended }) => begin_ui(ui, context, ended.as_ref(), actions),
-        None => begin_ui(ui, context, None, actions),
+        Some(CalibrationView { running: Some(running), .. }) => running_ui(ui, running, actions),
+        Some(CalibrationView { running: None, ended }) => begin_ui(ui, gripper, ended.as_ref(), actions),
+        None => begin_ui(ui, gripper, None, actions),
     });
 }
 
@@ -41,7 +41,7 @@ impl Default for Form {
 
 fn begin_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    gripper: Option<&GripperView>,
     ended: Option<&Result<String, SensorJobError>>,
     actions: &mut Actions,
 ) {
@@ -75,7 +75,7 @@ fn begin_ui(
         ui.add(text_field(&mut form.part, id.with("part")).hint_text(hint).char_limit(80)).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Port");
-        match context.gripper.and_then(|gripper| gripper.link.as_ref()) {
+        match gripper.and_then(|gripper| gripper.link.as_ref()) {
             Some(link) => {
                 ui.add(egui::Label::new(link.port.path.display().to_string()).truncate());
             }
@@ -95,7 +95,7 @@ fn begin_ui(
     ui.data_mut(|data| data.insert_temp(id, form));
 }
 
-fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibration, actions: &mut Actions) {
+fn running_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
     let RunningCalibration { plan, procedure, fit, closing, .. } = running;
     let procedure = procedure.as_ref();
     wrapped(ui, RichText::new(format!("\"{}\", {}", plan.part, plan.sensor.label())).weak());
@@ -124,7 +124,7 @@ fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, running: &RunningCalibrat
         None => wrapped(ui, RichText::new("no points yet").weak()),
     }
     if let Some(calibration) = calibration {
-        let (kind, theme) = (SensorKind::of(plan.sensor), context.view.theme);
+        let (kind, theme) = (SensorKind::of(plan.sensor), theme::of(ui));
         curve_plot(ui, kind, calibration, theme);
         residual_plot(ui, kind, calibration, theme);
         bending_plot(ui, calibration, theme);

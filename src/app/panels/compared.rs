@@ -2,8 +2,8 @@
 //! class is drawn.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::icons::{self, Icon};
+use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
 use crate::app::view_source::ViewSource;
 use crate::app::widgets::wrapped;
@@ -11,8 +11,8 @@ use egui::{Color32, Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::series_colour;
 use palpate_lab::inspection::Alignment;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let comparison = context.comparison;
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let comparison = data.comparison;
     if comparison.pinned.is_empty() {
         let text = "No trial is compared. Select trials in the library and press P, or choose Compare: each is drawn over \
                     the one shown, in a colour of its own.";
@@ -36,15 +36,15 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     }
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        if let Some(shown) = shown_name(context) {
+        if let Some(shown) = shown_name(data) {
             ui.horizontal(|ui| {
-                stroke_ui(ui, colour(context.view.theme.colours().text));
+                stroke_ui(ui, colour(data.view.theme.colours().text));
                 ui.add(Label::new(shown).truncate());
             });
         }
         if comparison.spread {
             for class in comparison.traces {
-                row_ui(ui, context, class.colour, &class.name);
+                row_ui(ui, data, class.colour, &class.name);
             }
             ui.separator();
         }
@@ -55,7 +55,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 let remove = format!("No longer compare trial {}", trial.id);
                 actions.on(&icons::button(ui, Icon::Cross, &remove, &remove), move |app| app.inspect.unpin(id));
                 if let Some(colour) = colour {
-                    stroke_ui(ui, ink_of(context, colour));
+                    stroke_ui(ui, ink_of(data, colour));
                 }
                 let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
                 let link = ui.add(Label::new(&name).truncate().sense(Sense::click()));
@@ -70,23 +70,23 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
 }
 
 /// Name of the trial or gripper shown.
-fn shown_name(context: &PanelContext<'_>) -> Option<String> {
-    match context.source {
-        ViewSource::Trial => context.inspected.map(|own| format!("{}, trial {}, shown", own.trial.title, own.trial.id)),
+fn shown_name(data: &DisplayedData<'_>) -> Option<String> {
+    match data.source {
+        ViewSource::Trial => data.inspected.map(|own| format!("{}, trial {}, shown", own.trial.title, own.trial.id)),
         ViewSource::Simulation => Some("Simulation, live".to_owned()),
         ViewSource::Gripper => Some("Real gripper, live".to_owned()),
     }
 }
 
-fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, ink: usize, name: &str) {
+fn row_ui(ui: &mut Ui, data: &DisplayedData<'_>, ink: usize, name: &str) {
     ui.horizontal(|ui| {
-        stroke_ui(ui, ink_of(context, ink));
+        stroke_ui(ui, ink_of(data, ink));
         ui.add(Label::new(name).truncate());
     });
 }
 
-fn ink_of(context: &PanelContext<'_>, ink: usize) -> Color32 {
-    colour(series_colour(ink, context.view.theme))
+fn ink_of(data: &DisplayedData<'_>, ink: usize) -> Color32 {
+    colour(series_colour(ink, data.view.theme))
 }
 
 /// A stroke in the colour of a trial's curves.

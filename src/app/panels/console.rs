@@ -1,12 +1,11 @@
 //! Lines of the real gripper's board as they arrive, decoded.
 
-use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use egui::{RichText, ScrollArea, TextWrapMode, Ui};
 use palpate_device::protocol::LineKind;
+use palpate_lab::workers::GripperView;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
-    let lines = context.gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());
+pub(super) fn ui(ui: &mut Ui, gripper: Option<&GripperView>) {
+    let lines = gripper.map(|gripper| &gripper.console).filter(|lines| !lines.is_empty());
     let Some(lines) = lines else {
         ui.weak("Lines of the board. Connect it in the panel Gripper.");
         return;

@@ -1,17 +1,17 @@
 //! Raw ADC counts of the real gripper's board, channel by channel.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::plots::{PlotCurve, TimePlot, show};
+use crate::app::shown::DisplayedData;
 use palpate_geometry::palette::Trace;
 use palpate_tactile::board::Sensor;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(board) = context.shown().board() else {
+pub(super) fn ui(ui: &mut egui::Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(board) = data.board() else {
         ui.weak("Raw ADC counts. Connect the board in the panel Gripper, or open a trial of it.");
         return;
     };
-    let derived = context.shown().channels().iter().filter(|channel| channel.is_some()).count();
+    let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
     let curves = board.channels.iter().enumerate().map(|(place, name)| {
         let sensor = Sensor::ALL.into_iter().find(|sensor| board.channel_of(*sensor) == Some(place));
         let (trace, dashed) = look(sensor, place);
@@ -25,7 +25,7 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ac
         }
     });
     let curves = curves.collect();
-    show(ui, context, actions, TimePlot { id: "counts", unit: "counts", curves, least: [0.0, 100.0] });
+    show(ui, data, actions, TimePlot { id: "counts", unit: "counts", curves, least: [0.0, 100.0] });
 }
 
 /// Colour and dash: those of the sensor; other channels take turns.

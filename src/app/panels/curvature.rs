@@ -2,11 +2,11 @@
 
 use crate::app::actions::Actions;
 use crate::app::channel_curves::channel_curves;
-use crate::app::context::PanelContext;
 use crate::app::plots::{TimePlot, show};
+use crate::app::shown::DisplayedData;
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let (curves, unit) = channel_curves(context, Quantity::Curvature, (1.0, "1/m"));
-    show(ui, context, actions, TimePlot { id: "curvature", unit, curves, least: [0.0, 8.0] });
+pub(super) fn ui(ui: &mut egui::Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let (curves, unit) = channel_curves(data, Quantity::Curvature, (1.0, "1/m"));
+    show(ui, data, actions, TimePlot { id: "curvature", unit, curves, least: [0.0, 8.0] });
 }

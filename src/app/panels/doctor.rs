@@ -2,9 +2,8 @@
 //! command to copy.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::icons::{self, Icon};
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
 use crate::app::widgets::{command_ui, failure_ui, port_field, progress_ui, wrapped};
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, RichText, ScrollArea, Sense, Ui};
@@ -13,13 +12,17 @@ use palpate_device::doctor::{
 };
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{
-    CrosstalkCommand, CrosstalkView, DiagnosticsReport, ExamineRequest, GripperCommand, RunningCrosstalk,
-    SensorJobError,
+    CrosstalkCommand, CrosstalkView, DiagnosticsReport, ExamineRequest, GripperCommand, GripperView, Job,
+    RunningCrosstalk, SensorJobError,
 };
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let doctor = &context.tools.doctor;
-    let crosstalk = context.gripper.and_then(|gripper| gripper.crosstalk.as_deref());
+pub(super) fn ui(
+    ui: &mut Ui,
+    doctor: &Job<ExamineRequest, DiagnosticsReport>,
+    gripper: Option<&GripperView>,
+    actions: &mut Actions,
+) {
+    let crosstalk = gripper.and_then(|gripper| gripper.crosstalk.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
             return crosstalk_running_ui(ui, crosstalk, running, actions);
@@ -39,7 +42,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             crosstalk_ended_ui(ui, crosstalk, ended);
         }
         match last.map(|ended| ended.outcome) {
-            Some(Ok(report)) => examination_ui(ui, context.view.theme, &report),
+            Some(Ok(report)) => examination_ui(ui, theme::of(ui), &report),
             Some(Err(cause)) => failure_ui(ui, cause),
             None => {
                 ui.add_space(6.0);

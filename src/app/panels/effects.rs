@@ -3,8 +3,8 @@
 //! stay, dimmed and named so, until new ones come. A click on a name unfolds it.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::{colour, veil};
+use crate::app::features::simulation::SimulationFeature;
+use crate::app::theme::{self, colour, veil};
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
@@ -29,10 +29,10 @@ const BEFORE: &str = "of the scene before";
 /// Smallest change that has a bar, as a share of a sensor's range; the bar is logarithmic.
 const LEAST_CHANGE: f64 = 1e-3;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let (running, last) = (context.effects.running(), context.effects.last());
-    let fresh = last.as_ref().filter(|ended| *ended.command == *context.scene);
-    if fresh.is_none() && running.as_ref().is_none_or(|running| *running.command != *context.scene) {
+pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
+    let (running, last) = (simulation.effects.running(), simulation.effects.last());
+    let fresh = last.as_ref().filter(|ended| *ended.command == simulation.scene);
+    if fresh.is_none() && running.as_ref().is_none_or(|running| *running.command != simulation.scene) {
         actions.push(|app| app.simulation.measure_effects());
     }
     let explanation = last.as_ref().and_then(|ended| ended.outcome.as_deref().ok());
@@ -45,7 +45,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             .unwrap_or_else(|| "measuring ..".to_owned()),
     };
     let fresh = fresh.is_some();
-    let mut scene = context.scene.clone();
+    let mut scene = simulation.scene.clone();
     let unfolded_id = ui.scope_id().with("unfolded");
     let mut unfolded: Option<Effect> = ui.data(|data| data.get_temp(unfolded_id)).flatten();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -55,9 +55,10 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         for effect in Effect::ALL {
             let explained = explanation.and_then(|e| e.effects.iter().find(|e| e.planned.name == effect.name()));
             // The plan of the current grasp comes before the measurement.
-            let running = context.snapshot.and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
+            let running =
+                simulation.snapshot.as_ref().and_then(|s| s.plan.effects.iter().find(|e| e.name == effect.name()));
             let planned = if fresh { explained.map(|e| &e.planned).or(running) } else { running };
-            let row = Row { effect: *effect, planned, explained, explanation, fresh, theme: context.view.theme };
+            let row = Row { effect: *effect, planned, explained, explanation, fresh, theme: theme::of(ui) };
             let open = unfolded == Some(*effect);
             if let Some(setting) = row.setting_ui(ui, scene.effects.get(*effect), open, &mut unfolded) {
                 scene.effects.set(*effect, setting);
@@ -68,7 +69,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         }
     });
     ui.data_mut(|data| data.insert_temp(unfolded_id, unfolded));
-    if scene != *context.scene {
+    if scene != simulation.scene {
         actions.push(|app| app.set_scene(scene));
     }
 }

@@ -2,11 +2,11 @@
 //! the fitted finger.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
+use crate::app::features::tools::GripperTools;
 use crate::app::files::Question;
 use crate::app::plots::static_plot;
-use crate::app::theme::{colour, veil};
+use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
@@ -21,11 +21,10 @@ use palpate_store::TrialRow;
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, scene: &Scene, actions: &mut Actions) {
     if just_opened(ui, "fit") {
         actions.push(|app| _ = app.tools.trials.start(()));
     }
-    let tools = context.tools;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let hint =
             "Fits the simulated finger to trials of the real one: a few empty closes, and grasps of a fixed object.";
@@ -36,7 +35,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             Some(Err(cause)) => failure_ui(ui, cause),
         };
         let stop = ("Cancel; nothing changes", (|app| app.tools.fit.stop()) as fn(&mut App));
-        job_ui(ui, &tools.fit, stop, actions, controls, |ui, fitted, actions| fitted_ui(ui, context, fitted, actions));
+        job_ui(ui, &tools.fit, stop, actions, controls, |ui, fitted, actions| fitted_ui(ui, scene, fitted, actions));
     });
 }
 
@@ -87,18 +86,18 @@ fn trial_text(row: &TrialRow) -> String {
     format!("{}  {object}  {began}", row.id)
 }
 
-fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, actions: &mut Actions) {
+fn fitted_ui(ui: &mut Ui, now: &Scene, fitted: &FittedFinger, actions: &mut Actions) {
     let FittedFinger { trials, fit, scene, warnings } = fitted;
     ui.add_space(6.0);
     let names: Vec<String> = trials.iter().map(ToString::to_string).collect();
     let plural = if names.len() == 1 { "trial" } else { "trials" };
     wrapped(ui, RichText::new(format!("Fitted to {plural} {}", names.join(", "))).heading());
     ui.horizontal_wrapped(|ui| {
-        let in_use = context.scene.gripper == fit.gripper;
+        let in_use = now.gripper == fit.gripper;
         let text = if in_use { "Finger in use" } else { "Use this finger" };
         let hint = "Simulate with the fitted finger from now on";
         if ui.add_enabled(!in_use, Button::new(text)).on_hover_text(hint).clicked() {
-            let scene = Scene { gripper: fit.gripper.clone(), ..context.scene.clone() };
+            let scene = Scene { gripper: fit.gripper.clone(), ..now.clone() };
             actions.push(|app| {
                 app.set_scene(scene);
                 app.notices.info("Fitted finger in use.");
@@ -112,8 +111,8 @@ fn fitted_ui(ui: &mut Ui, context: &PanelContext<'_>, fitted: &FittedFinger, act
     for remark in fit.remarks.iter().chain(warnings) {
         wrapped(ui, RichText::new(remark).color(ui.visuals().warn_fg_color));
     }
-    estimates_ui(ui, context.view.theme, &fit.estimates);
-    courses_ui(ui, context.view.theme, fit);
+    estimates_ui(ui, theme::of(ui), &fit.estimates);
+    courses_ui(ui, theme::of(ui), fit);
 }
 
 /// Least and largest share of the value at which the bars end.

@@ -2,7 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::channel_curves::shows;
-use crate::app::context::PanelContext;
+use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
 use egui::{Button, Grid, RichText, ScrollArea, Sense, Shape, Stroke, Ui, pos2, vec2};
@@ -13,8 +13,8 @@ use palpate_sim::frame::TrustLevel;
 use palpate_sim::gripper::Side;
 use palpate_tactile::Quantity;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(snapshot) = context.snapshot else {
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(snapshot) = data.snapshot else {
         ui.weak("Waiting for the first grasp ..");
         return;
     };
@@ -26,12 +26,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
         }
         ui.add_space(6.0);
-        readings_ui(ui, context, snapshot);
+        readings_ui(ui, data, snapshot);
         ui.add_space(6.0);
         match &snapshot.last {
             Some(last) => {
                 ui.weak(format!("result of grasp {}", last.grasp));
-                trust_ui(ui, context.view.theme, last, snapshot.status.checking, actions);
+                trust_ui(ui, data.view.theme, last, snapshot.status.checking, actions);
                 last_ui(ui, last);
             }
             None => {
@@ -53,9 +53,9 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
 }
 
 /// Newest values of the channels, left and right.
-fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, snapshot: &Snapshot) {
+fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
     let newest = |quantity: Quantity, side: Side| -> Option<f64> {
-        let trace = context.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
+        let trace = data.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
         let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side == side)?;
         trace.channels.get(index)?.last().map(|value| f64::from(*value))
     };

@@ -1,14 +1,12 @@
 //! The real gripper: port, timing of its board, sensor readings and zeros, actuation, and the stop button.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
 use crate::app::features::gripper::{CONTROLS, control_title};
-use crate::app::theme::{accented, colour, veil};
+use crate::app::theme::{self, accented, colour, veil};
 use crate::app::widgets::{command_ui, failure_ui, stop_button, text_field, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
-use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{GripperCommand, GripperView, LatestReading};
 use palpate_tactile::board::Sensor;
@@ -16,19 +14,19 @@ use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
 use std::path::PathBuf;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, gripper: Option<&GripperView>, control: Control, actions: &mut Actions) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let connected = context.gripper.and_then(|gripper| Some((gripper, gripper.link.as_ref()?)));
+        let connected = gripper.and_then(|gripper| Some((gripper, gripper.link.as_ref()?)));
         match connected {
-            Some((gripper, link)) => connected_ui(ui, context, gripper, link, actions),
-            None => ports_ui(ui, context, actions),
+            Some((gripper, link)) => connected_ui(ui, gripper, link, control, actions),
+            None => ports_ui(ui, gripper, actions),
         }
     });
 }
 
 /// Ports to connect to.
-fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    if let Some(refused) = context.gripper.and_then(|gripper| gripper.refused.as_ref()) {
+fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
+    if let Some(refused) = gripper.and_then(|gripper| gripper.refused.as_ref()) {
         failure_ui(ui, &refused.text);
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
@@ -38,13 +36,13 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
         wrapped(ui, RichText::new("No gripper connected. Everything works with the simulated one too.").weak());
     }
     ui.horizontal_wrapped(|ui| {
-        let connect = Button::new("Connect").fill(accented(context.view.theme));
+        let connect = Button::new("Connect").fill(accented(theme::of(ui)));
         actions.on(&ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)"), |app| {
             app.connect(None)
         });
         actions.on(&ui.button("List ports"), |app| _ = app.gripper.send(GripperCommand::ListPorts));
     });
-    let ports: &[PortInfo] = context.gripper.map_or(&[], |gripper| &gripper.ports);
+    let ports: &[PortInfo] = gripper.map_or(&[], |gripper| &gripper.ports);
     for port in ports {
         let path = port.path.display().to_string();
         let button = Button::new(format!("{path}\n{}", port.title)).wrap();
@@ -67,15 +65,9 @@ fn ports_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     ui.data_mut(|data| data.insert_temp(id, path));
 }
 
-fn connected_ui(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    gripper: &GripperView,
-    link: &LinkStatus,
-    actions: &mut Actions,
-) {
+fn connected_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus, control: Control, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
-        stop_button(ui, context.view.theme, actions);
+        stop_button(ui, actions);
         if ui
             .button("Tare")
             .on_hover_text("Set the present readings as zero; nothing may touch the fingers (T)")
@@ -84,7 +76,7 @@ fn connected_ui(
             actions.push(|app| _ = app.gripper.send(GripperCommand::Tare));
         }
         if ui
-            .add_enabled(gripper.trial.is_none() && context.view.control != Control::Free, Button::new("Adapt"))
+            .add_enabled(gripper.trial.is_none() && control != Control::Free, Button::new("Adapt"))
             .on_hover_text(
                 "Close the empty hand once and calibrate the sensors by it, so that objects are recognised without labels. \
                  Sensors that were calibrated by hand stay so",
@@ -98,12 +90,12 @@ fn connected_ui(
     });
     health_ui(ui, link);
     ui.separator();
-    readings_ui(ui, context, gripper, link);
+    readings_ui(ui, gripper, link);
     for remark in &gripper.remarks {
         wrapped(ui, RichText::new(remark).small().color(ui.visuals().warn_fg_color));
     }
     ui.separator();
-    control_ui(ui, context, gripper, actions);
+    control_ui(ui, control, gripper, actions);
 }
 
 /// Port, board and timing.
@@ -148,7 +140,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
 }
 
 /// Counts, calibrated value and zero of each sensor.
-fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, link: &LinkStatus) {
+fn readings_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus) {
     let Some(latest) = &gripper.latest else {
         ui.weak("no readings yet");
         return;
@@ -168,7 +160,7 @@ fn readings_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, l
                 ui.label(value);
             }
             match gripper.drift.iter().find(|drift| drift.sensor == sensor) {
-                Some(drift) => drift_badge(ui, context.view.theme, drift),
+                Some(drift) => drift_badge(ui, drift),
                 None => {
                     ui.weak("");
                 }
@@ -195,8 +187,8 @@ fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
 }
 
 /// Drift of a zero since the calibration.
-fn drift_badge(ui: &mut Ui, theme: Theme, drift: &Drift) {
-    let colours = theme.colours();
+fn drift_badge(ui: &mut Ui, drift: &Drift) {
+    let colours = theme::of(ui).colours();
     let (word, ink) = match drift.level {
         DriftLevel::Steady => ("stable", colours.quiet_text),
         DriftLevel::Moved => ("drifted", colours.warning),
@@ -209,9 +201,8 @@ fn drift_badge(ui: &mut Ui, theme: Theme, drift: &Drift) {
 }
 
 /// Actuation, and automatic detection of trials.
-fn control_ui(ui: &mut Ui, context: &PanelContext<'_>, gripper: &GripperView, actions: &mut Actions) {
+fn control_ui(ui: &mut Ui, mut control: Control, gripper: &GripperView, actions: &mut Actions) {
     ui.label("Actuation  (M)");
-    let mut control = context.view.control;
     for kind in CONTROLS {
         let about = match kind {
             Control::ByHand => "You set the pressure at the control box, as instructed",

@@ -1,10 +1,9 @@
 //! Hysteresis: the load of each pad over the curvature of its finger; closing and releasing run on different paths where the
 //! finger or the object gives way.
 
-use crate::app::actions::Actions;
 use crate::app::channel_curves::{colour_of, shows};
-use crate::app::context::PanelContext;
 use crate::app::plots::value_marks;
+use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use egui::{Color32, Ui};
@@ -21,9 +20,9 @@ struct Finger {
     ink: Color32,
 }
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions) {
-    let theme = context.view.theme;
-    let channels = context.shown().channels();
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>) {
+    let theme = data.view.theme;
+    let channels = data.channels();
     let find = |quantity: Quantity, side: Side| {
         let wanted = |channel: &Channel| shows(quantity, channel) && channel.side == side;
         channels.iter().position(|channel| channel.is_some_and(wanted))
@@ -34,12 +33,12 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
         Some(Finger { side, curvature: find(Quantity::Curvature, side)?, load, ink })
     };
     let fingers: Vec<Finger> = Side::BOTH.into_iter().filter_map(finger).collect();
-    let Some(trace) = context.traces.current().filter(|_| !fingers.is_empty()) else {
+    let Some(trace) = data.traces.current().filter(|_| !fingers.is_empty()) else {
         ui.weak("Pressure over curvature: nothing is shown yet that has both.");
         return;
     };
     ui.weak("Pressure over curvature. Left finger solid, right finger dashed; the dot is the cursor.");
-    let now = context.shown().sample();
+    let now = data.sample();
     Plot::new("hysteresis")
         .x_axis_label("curvature (1/m)")
         .y_axis_label("pressure (kPa)")
@@ -51,14 +50,14 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, _actions: &mut Actions
         .show_y(false)
         .grid_color(colour(theme.colours().border))
         .show(ui, |plot_ui| {
-            for compared in context.comparison.traces {
+            for compared in data.comparison.traces {
                 let ink = colour(series_colour(compared.colour, theme));
                 for finger in &fingers {
                     add_loop(plot_ui, &compared.trace, finger, ink, 1.2);
                 }
             }
             for finger in &fingers {
-                let alone = context.comparison.traces.is_empty();
+                let alone = data.comparison.traces.is_empty();
                 let ink = if alone { finger.ink } else { colour(theme.colours().text) };
                 add_loop(plot_ui, trace, finger, ink, 1.8);
                 let Some(place) = now.and_then(|k| point(trace, finger, k)) else { continue };

@@ -1,12 +1,11 @@
 //! Journal: changes of labels and plan, newest first.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::widgets::wrapped;
 use egui::{Label, RichText, ScrollArea, Sense, Ui};
-use palpate_lab::workers::LabelCommand;
+use palpate_lab::workers::{LabelCommand, LabelView};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         actions.on(&ui.button("Undo").on_hover_text("Undo the last change (Ctrl+Z)"), |app| {
             app.edit_labels(LabelCommand::Undo)
@@ -14,7 +13,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         actions
             .on(&ui.button("Redo").on_hover_text("Redo it (Ctrl+Shift+Z)"), |app| app.edit_labels(LabelCommand::Redo));
     });
-    let journal = context.labels.map(|view| &view.journal).filter(|journal| !journal.is_empty());
+    let journal = labels.map(|view| &view.journal).filter(|journal| !journal.is_empty());
     let Some(journal) = journal else {
         ui.weak("No changes yet.");
         return;

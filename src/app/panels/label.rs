@@ -1,13 +1,14 @@
 //! Label card: the next object and its pose, the running trial, or the question for a label. Everything on it has a key.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::gripper::instruction;
-use crate::app::theme::{accented, colour, veil};
+use crate::app::features::labelling::LabellingFeature;
+use crate::app::theme::{self, accented, colour, veil};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, text_field, wrapped};
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_lab::workers::{
-    GripperView, LabelCommand, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
+    GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
 use palpate_sim::objects::catalogue;
 use palpate_sim::objects::object_title;
@@ -16,39 +17,46 @@ use palpate_store::labels::{LabelledTrial, NextTrial};
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(view) = context.labels else {
+pub(super) fn ui(
+    ui: &mut Ui,
+    labelling: &LabellingFeature,
+    gripper: Option<&GripperView>,
+    pictures: &Thumbnails,
+    actions: &mut Actions,
+) {
+    let Some(view) = &labelling.labels else {
         ui.weak("Reading the store ..");
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let running = context.gripper.and_then(|gripper| gripper.trial.as_ref());
-        let open = context.draft.trial(view).filter(|trial| trial.object.is_none());
-        match (running, context.draft.trial(view)) {
-            (Some(trial), _) if trial.automatic && context.draft.selected.is_some() && open.is_some() => {
+        let running = gripper.and_then(|gripper| gripper.trial.as_ref());
+        let draft = labelling.session.draft();
+        let open = draft.trial(view).filter(|trial| trial.object.is_none());
+        match (running, draft.trial(view)) {
+            (Some(trial), _) if trial.automatic && draft.selected.is_some() && open.is_some() => {
                 let text = format!("{} is being recorded automatically: {}", trial.title(), instruction(trial));
-                wrapped(ui, RichText::new(text).small().color(colour(context.view.theme.colours().accent)));
-                open.into_iter().for_each(|asked| question_ui(ui, context, view, asked, actions));
+                wrapped(ui, RichText::new(text).small().color(colour(theme::of(ui).colours().accent)));
+                open.into_iter().for_each(|asked| question_ui(ui, labelling, pictures, (view, asked), actions));
             }
-            (Some(trial), _) if trial.adapting => adapting_ui(ui, context, trial),
+            (Some(trial), _) if trial.adapting => adapting_ui(ui, trial),
             (Some(trial), _) => {
-                running_ui(ui, context, view, trial);
-                answer_ahead_ui(ui, context, actions);
+                running_ui(ui, pictures, view, trial);
+                answer_ahead_ui(ui, labelling, actions);
             }
-            (None, Some(trial)) => question_ui(ui, context, view, trial, actions),
+            (None, Some(trial)) => question_ui(ui, labelling, pictures, (view, trial), actions),
             (None, None) => {
-                next_ui(ui, context, view, actions);
-                answer_ahead_ui(ui, context, actions);
+                next_ui(ui, gripper, pictures, view, actions);
+                answer_ahead_ui(ui, labelling, actions);
             }
         }
     });
 }
 
 /// Picture, name and class of an object.
-fn object_ui(ui: &mut Ui, context: &PanelContext<'_>, name: &str, below: &str) {
+fn object_ui(ui: &mut Ui, pictures: &Thumbnails, name: &str, below: &str) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(PICTURE, PICTURE), Sense::hover());
-        picture(ui, context, name, rect);
+        picture(ui, pictures, name, rect);
         ui.vertical(|ui| {
             ui.label(RichText::new(object_title(name)).size(24.0).strong());
             if let Some(built_in) = catalogue().iter().find(|built_in| built_in.name == name) {
@@ -61,23 +69,23 @@ fn object_ui(ui: &mut Ui, context: &PanelContext<'_>, name: &str, below: &str) {
     });
 }
 
-fn picture(ui: &Ui, context: &PanelContext<'_>, name: &str, place: Rect) {
-    match context.thumbnails.get(name) {
+fn picture(ui: &Ui, pictures: &Thumbnails, name: &str, place: Rect) {
+    match pictures.get(name) {
         Some(texture) => egui::Image::new(texture).corner_radius(4.0).paint_at(ui, place),
         None => {
-            let stroke = egui::Stroke::new(1.5, colour(context.view.theme.colours().border));
+            let stroke = egui::Stroke::new(1.5, colour(theme::of(ui).colours().border));
             ui.painter().rect_stroke(place.shrink(1.0), 4.0, stroke, egui::StrokeKind::Inside);
         }
     }
 }
 
 /// Next object of the plan.
-fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &mut Actions) {
-    last_ui(ui, context, view);
+fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, view: &LabelView, actions: &mut Actions) {
+    last_ui(ui, view);
     match &view.next {
         Some(next) => {
             ui.weak("next");
-            object_ui(ui, context, &next.object, &cue(next));
+            object_ui(ui, pictures, &next.object, &cue(next));
         }
         None => {
             ui.heading("Plan complete");
@@ -88,9 +96,9 @@ fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, actions: &
         }
     }
     ui.add_space(4.0);
-    let connected = context.gripper.is_some_and(GripperView::is_connected);
+    let connected = gripper.is_some_and(GripperView::is_connected);
     if connected {
-        let button = Button::new("Record  R").fill(accented(context.view.theme));
+        let button = Button::new("Record  R").fill(accented(theme::of(ui)));
         actions.on(&ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)"), |app| {
             app.label(LabellingAction::Record)
         });
@@ -115,22 +123,22 @@ fn cue(next: &NextTrial) -> String {
     format!("trial {}: {turn}{shifts}", next.number)
 }
 
-fn running_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView, trial: &TrialView) {
-    stage_ui(ui, context, trial);
+fn running_ui(ui: &mut Ui, pictures: &Thumbnails, view: &LabelView, trial: &TrialView) {
+    stage_ui(ui, trial);
     if let Some(next) = &view.next {
-        object_ui(ui, context, &next.object, &cue(next));
+        object_ui(ui, pictures, &next.object, &cue(next));
     }
 }
 
 /// A close to adapt to holds no object.
-fn adapting_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &TrialView) {
+fn adapting_ui(ui: &mut Ui, trial: &TrialView) {
     ui.strong("Adapting: take everything out of the hand");
-    stage_ui(ui, context, trial);
+    stage_ui(ui, trial);
 }
 
 /// Instruction, large enough to be read at the control box.
-fn stage_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &TrialView) {
-    let accent = colour(context.view.theme.colours().accent);
+fn stage_ui(ui: &mut Ui, trial: &TrialView) {
+    let accent = colour(theme::of(ui).colours().accent);
     ui.label(RichText::new(instruction(trial)).size(26.0).strong().color(accent));
     if let Some(left_s) = trial.left_s {
         ui.label(RichText::new(format!("{left_s:.1} s")).size(30.0).monospace());
@@ -139,10 +147,10 @@ fn stage_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &TrialView) {
 }
 
 /// Last label, with the model's prediction.
-fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
+fn last_ui(ui: &mut Ui, view: &LabelView) {
     let last = view.trials.iter().find(|trial| !trial.discarded && trial.object.is_some());
     let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
-    let (colours, title) = (context.view.theme.colours(), object_title(label));
+    let (colours, title) = (theme::of(ui).colours(), object_title(label));
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
             (format!("trial {}: {title}. The model agrees ({:.0} %)", trial.id, 100.0 * guess.p), colours.accent)
@@ -172,12 +180,12 @@ fn last_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LabelView) {
 /// Question for a label.
 fn question_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
-    view: &LabelView,
-    trial: &LabelledTrial,
+    labelling: &LabellingFeature,
+    pictures: &Thumbnails,
+    (view, trial): (&LabelView, &LabelledTrial),
     actions: &mut Actions,
 ) {
-    let draft = &context.draft;
+    let draft = labelling.session.draft();
     let question = match &trial.object {
         Some(label) => format!("Trial {}: labelled {}. Change it?", trial.id, object_title(label)),
         None => format!("Trial {}: which object?", trial.id),
@@ -188,9 +196,9 @@ fn question_ui(
         let text = format!("{}: {}", flag.flag.label(), flag.remark);
         wrapped(ui, RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
-    search_ui(ui, context, actions);
+    search_ui(ui, labelling, actions);
     ui.horizontal_wrapped(|ui| {
-        actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(context.view.theme))), |app| {
+        actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(theme::of(ui)))), |app| {
             app.label(LabellingAction::GiveLabel)
         });
         let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
@@ -210,7 +218,7 @@ fn question_ui(
     }
     for (place, name) in names.iter().take(NUMBERED_OBJECTS).enumerate() {
         let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
-        if object_row(ui, context, place, name, Some(place) == chosen, !known).clicked() {
+        if object_row(ui, pictures, place, name, Some(place) == chosen, !known).clicked() {
             actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
             actions.push(|app| app.label(LabellingAction::GiveLabel));
         }
@@ -218,15 +226,15 @@ fn question_ui(
     if names.len() > NUMBERED_OBJECTS {
         ui.weak(format!("and {} more: type to find them (/)", names.len() - NUMBERED_OBJECTS));
     }
-    remarks_ui(ui, context, trial, actions);
+    remarks_ui(ui, draft, trial, actions);
 }
 
 /// Search field before the question, to answer ahead.
-fn answer_ahead_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let draft = &context.draft;
+fn answer_ahead_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
+    let draft = labelling.session.draft();
     if draft.focus_search || !draft.search.is_empty() || ui.memory(|memory| memory.has_focus(search_id())) {
         ui.add_space(4.0);
-        search_ui(ui, context, actions);
+        search_ui(ui, labelling, actions);
     }
 }
 
@@ -235,8 +243,8 @@ fn search_id() -> egui::Id {
 }
 
 /// Search field for objects.
-fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let draft = &context.draft;
+fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
+    let draft = labelling.session.draft();
     let mut search = draft.search.clone();
     let hint = "find or name an object ( / )";
     if draft.focus_search && focus_field(ui, search_id()) {
@@ -248,7 +256,7 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     // Arrows choose among the matches while the cursor stays in the field.
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
     if response.has_focus() && step != 0 {
-        let chosen = draft.chosen.or_else(|| context.labels.and_then(|view| draft.place(view)));
+        let chosen = draft.chosen.or_else(|| labelling.labels.as_ref().and_then(|view| draft.place(view)));
         let next = |chosen: usize| chosen.saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
         let place = chosen.map_or(0, next);
         actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
@@ -261,15 +269,8 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 }
 
 /// Object to choose: key, picture, name.
-fn object_row(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    place: usize,
-    name: &str,
-    chosen: bool,
-    new: bool,
-) -> egui::Response {
-    let colours = context.view.theme.colours();
+fn object_row(ui: &mut Ui, pictures: &Thumbnails, place: usize, name: &str, chosen: bool, new: bool) -> egui::Response {
+    let colours = theme::of(ui).colours();
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 23.0), Sense::click());
     let title = if new { format!("{name} (new)") } else { object_title(name) };
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("Label {title}")));
@@ -282,14 +283,14 @@ fn object_row(
     let mut inside = ui.new_child(builder);
     inside.label(RichText::new((place + 1).to_string()).monospace().color(colour(colours.quiet_text)));
     let (thumbnail, _) = inside.allocate_exact_size(vec2(21.0, 21.0), Sense::hover());
-    picture(&inside, context, name, thumbnail);
+    picture(&inside, pictures, name, thumbnail);
     inside.add(egui::Label::new(title).truncate().selectable(false));
     response
 }
 
 /// Note and tags.
-fn remarks_ui(ui: &mut Ui, context: &PanelContext<'_>, trial: &LabelledTrial, actions: &mut Actions) {
-    let (id, draft) = (trial.id, &context.draft);
+fn remarks_ui(ui: &mut Ui, draft: &LabelDraft, trial: &LabelledTrial, actions: &mut Actions) {
+    let id = trial.id;
     let own = |written: &Option<(i64, String)>, stored: String| match written {
         Some((id, text)) if *id == trial.id => text.clone(),
         _ => stored,

@@ -1,11 +1,11 @@
 //! Line pressure over time.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::plots::{PlotCurve, TimePlot, show};
+use crate::app::shown::DisplayedData;
 use palpate_geometry::palette::Trace;
 
-pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut egui::Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let curve = PlotCurve {
         name: "line".to_owned(),
         trace: Trace::Line,
@@ -14,5 +14,5 @@ pub(super) fn ui(ui: &mut egui::Ui, context: &PanelContext<'_>, actions: &mut Ac
         half_width: Box::new(|_, _| None),
         channel: None,
     };
-    show(ui, context, actions, TimePlot { id: "line pressure", unit: "bar", curves: vec![curve], least: [0.0, 1.0] });
+    show(ui, data, actions, TimePlot { id: "line pressure", unit: "bar", curves: vec![curve], least: [0.0, 1.0] });
 }

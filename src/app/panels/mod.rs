@@ -34,8 +34,9 @@ pub(super) mod view3d;
 mod why;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
+use crate::app::features::App;
 use egui::Ui;
+use view3d::View3d;
 
 /// Kind of a panel.
 pub struct PanelKind {
@@ -43,46 +44,64 @@ pub struct PanelKind {
     pub name: &'static str,
     /// Title of its tab.
     pub title: &'static str,
-    /// Draws it.
-    pub ui: fn(&mut Ui, &PanelContext<'_>, &mut Actions),
+    /// Draws it from the parts of the [`App`] that it reads.
+    pub ui: fn(&mut Ui, &App, &mut Actions),
 }
 
-/// All panels.
+const fn panel(name: &'static str, title: &'static str, ui: fn(&mut Ui, &App, &mut Actions)) -> PanelKind {
+    PanelKind { name, title, ui }
+}
+
+/// All panels, and what each of them reads.
 pub const ALL: [PanelKind; 34] = [
-    PanelKind { name: "objects", title: "Objects", ui: objects::ui },
-    PanelKind { name: "view", title: "3-D view", ui: view3d::ui },
-    PanelKind { name: "curvature", title: "Curvature", ui: curvature::ui },
-    PanelKind { name: "pressure", title: "Pressure", ui: pressure::ui },
-    PanelKind { name: "force", title: "Force", ui: force::ui },
-    PanelKind { name: "line", title: "Line pressure", ui: line_pressure::ui },
-    PanelKind { name: "recognition", title: "Recognition", ui: recognition::ui },
-    PanelKind { name: "why", title: "Why", ui: why::ui },
-    PanelKind { name: "grasp", title: "This grasp", ui: grasp::ui },
-    PanelKind { name: "scene", title: "Scene", ui: scene::ui },
-    PanelKind { name: "effects", title: "Effects", ui: effects::ui },
-    PanelKind { name: "accuracy", title: "Accuracy", ui: accuracy::ui },
-    PanelKind { name: "label", title: "Label", ui: label::ui },
-    PanelKind { name: "plan", title: "Plan", ui: plan::ui },
-    PanelKind { name: "trials", title: "Trials", ui: trials::ui },
-    PanelKind { name: "library", title: "Library", ui: library::ui },
-    PanelKind { name: "journal", title: "Journal", ui: journal::ui },
-    PanelKind { name: "gripper", title: "Gripper", ui: gripper::ui },
-    PanelKind { name: "counts", title: "Counts", ui: counts::ui },
-    PanelKind { name: "console", title: "Console", ui: console::ui },
-    PanelKind { name: "calibration", title: "Calibration", ui: calibration::ui },
-    PanelKind { name: "doctor", title: "Doctor", ui: doctor::ui },
-    PanelKind { name: "fit", title: "Fit", ui: fit::ui },
-    PanelKind { name: "pads", title: "Pads", ui: pads::ui },
-    PanelKind { name: "signature", title: "Signature", ui: signature::ui },
-    PanelKind { name: "trial", title: "This trial", ui: trial::ui },
-    PanelKind { name: "compared", title: "Compared", ui: compared::ui },
-    PanelKind { name: "sensors", title: "Sensors", ui: sensors::ui },
-    PanelKind { name: "hysteresis", title: "Hysteresis", ui: hysteresis::ui },
-    PanelKind { name: "training", title: "Training", ui: training::ui },
-    PanelKind { name: "studies", title: "Studies", ui: study::list::ui },
-    PanelKind { name: "study-figure", title: "Figure", ui: study::figure::ui },
-    PanelKind { name: "study-tables", title: "Tables", ui: study::tables::ui },
-    PanelKind { name: "study-findings", title: "Findings", ui: study::findings::ui },
+    panel("objects", "Objects", |ui, app, actions| {
+        objects::ui(ui, &app.simulation.scene.object.source, &app.view.recent, &app.thumbnails, actions);
+    }),
+    panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
+    panel("curvature", "Curvature", |ui, app, actions| curvature::ui(ui, &app.shown(), actions)),
+    panel("pressure", "Pressure", |ui, app, actions| pressure::ui(ui, &app.shown(), actions)),
+    panel("force", "Force", |ui, app, actions| force::ui(ui, &app.shown(), actions)),
+    panel("line", "Line pressure", |ui, app, actions| line_pressure::ui(ui, &app.shown(), actions)),
+    panel("recognition", "Recognition", |ui, app, actions| {
+        recognition::ui(ui, &app.shown(), &app.tools, &app.thumbnails, actions);
+    }),
+    panel("why", "Why", |ui, app, actions| {
+        why::ui(ui, &app.shown(), &app.recognition.explainer, &app.thumbnails, actions);
+    }),
+    panel("grasp", "This grasp", |ui, app, actions| grasp::ui(ui, &app.shown(), actions)),
+    panel("scene", "Scene", |ui, app, actions| scene::ui(ui, &app.simulation, actions)),
+    panel("effects", "Effects", |ui, app, actions| effects::ui(ui, &app.simulation, actions)),
+    panel("accuracy", "Accuracy", |ui, app, actions| accuracy::ui(ui, &app.simulation, actions)),
+    panel("label", "Label", |ui, app, actions| {
+        label::ui(ui, &app.labelling, app.gripper_view(), &app.thumbnails, actions);
+    }),
+    panel("plan", "Plan", |ui, app, actions| plan::ui(ui, app.labels(), actions)),
+    panel("trials", "Trials", |ui, app, actions| trials::ui(ui, &app.labelling, actions)),
+    panel("library", "Library", |ui, app, actions| {
+        library::ui(ui, &app.library, app.labels(), &app.thumbnails, actions);
+    }),
+    panel("journal", "Journal", |ui, app, actions| journal::ui(ui, app.labels(), actions)),
+    panel("gripper", "Gripper", |ui, app, actions| gripper::ui(ui, app.gripper_view(), app.view.control, actions)),
+    panel("counts", "Counts", |ui, app, actions| counts::ui(ui, &app.shown(), actions)),
+    panel("console", "Console", |ui, app, _| console::ui(ui, app.gripper_view())),
+    panel("calibration", "Calibration", |ui, app, actions| calibration::ui(ui, app.gripper_view(), actions)),
+    panel("doctor", "Doctor", |ui, app, actions| doctor::ui(ui, &app.tools.doctor, app.gripper_view(), actions)),
+    panel("fit", "Fit", |ui, app, actions| fit::ui(ui, &app.tools, &app.simulation.scene, actions)),
+    panel("pads", "Pads", |ui, app, actions| pads::ui(ui, &app.shown(), actions)),
+    panel("signature", "Signature", |ui, app, actions| signature::ui(ui, &app.shown(), actions)),
+    panel("trial", "This trial", |ui, app, actions| trial::ui(ui, &app.shown(), actions)),
+    panel("compared", "Compared", |ui, app, actions| compared::ui(ui, &app.shown(), actions)),
+    panel("sensors", "Sensors", |ui, app, actions| {
+        sensors::ui(ui, &app.view, &app.simulation.scene, &app.tools.data, actions);
+    }),
+    panel("hysteresis", "Hysteresis", |ui, app, _| hysteresis::ui(ui, &app.shown())),
+    panel("training", "Training", |ui, app, actions| {
+        training::ui(ui, &app.tools, app.recognition.gripper_model(), app.view.gripper_model.as_deref(), actions);
+    }),
+    panel("studies", "Studies", |ui, app, actions| study::list::ui(ui, &app.studies, actions)),
+    panel("study-figure", "Figure", |ui, app, actions| study::figure::ui(ui, &app.studies, actions)),
+    panel("study-tables", "Tables", |ui, app, actions| study::tables::ui(ui, &app.studies, actions)),
+    panel("study-findings", "Findings", |ui, app, actions| study::findings::ui(ui, &app.studies, actions)),
 ];
 
 /// Panel of a name.

@@ -1,9 +1,9 @@
 //! Objects to grasp: built-in ones, the empty hand, and files.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::text_field;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -11,25 +11,24 @@ use palpate_sim::objects::{EMPTY, catalogue};
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, chosen: &str, recent: &[String], pictures: &Thumbnails, actions: &mut Actions) {
     open_row(ui, actions);
     ui.add_space(2.0);
-    let chosen = context.scene.object.source.as_str();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for path in &context.view.recent {
+        for path in recent {
             let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
-            let texture = context.thumbnails.get(path);
-            let clicked = row(ui, context, chosen == path, texture, name, path);
+            let texture = pictures.get(path);
+            let clicked = row(ui, chosen == path, texture, name, path);
             let source = path.clone();
             actions.on(&clicked, move |app| app.open(&source));
         }
         for built_in in catalogue() {
-            let texture = context.thumbnails.get(&built_in.name);
+            let texture = pictures.get(&built_in.name);
             let class = built_in.class().to_string();
-            let clicked = row(ui, context, chosen == built_in.name, texture, &built_in.title, &class);
+            let clicked = row(ui, chosen == built_in.name, texture, &built_in.title, &class);
             actions.on(&clicked, |app| app.open(&built_in.name));
         }
-        let clicked = row(ui, context, chosen == EMPTY, None, "Empty hand", "nothing to grasp");
+        let clicked = row(ui, chosen == EMPTY, None, "Empty hand", "nothing to grasp");
         actions.on(&clicked, |app| app.open(EMPTY));
     });
 }
@@ -50,15 +49,8 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
 }
 
 /// Row of an object: picture, title, and a line below.
-fn row(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    chosen: bool,
-    texture: Option<&egui::TextureHandle>,
-    title: &str,
-    below: &str,
-) -> egui::Response {
-    let colours = context.view.theme.colours();
+fn row(ui: &mut Ui, chosen: bool, texture: Option<&egui::TextureHandle>, title: &str, below: &str) -> egui::Response {
+    let colours = theme::of(ui).colours();
     let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width(), THUMBNAIL + 6.0), Sense::click());
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, title));
     if chosen || response.hovered() || response.has_focus() {

@@ -1,8 +1,8 @@
 //! Both pads unrolled at the cursor: the load on every taxel, from the palm down to the tip.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::heat_map::{colour_bar, load_switch, pad_ui};
+use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
@@ -12,12 +12,12 @@ use palpate_geometry::units::three_digits;
 const LOWEST: f32 = 60.0;
 const WIDEST: f32 = 0.6;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(grasp) = ShownGrasp::of(context) else {
-        ui.label(RichText::new(ShownGrasp::missing(context)).weak());
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(grasp) = ShownGrasp::of(data) else {
+        ui.label(RichText::new(ShownGrasp::missing(data)).weak());
         return;
     };
-    let (theme, unit) = (context.view.theme, context.view.load_unit);
+    let (theme, unit) = (data.view.theme, data.view.load_unit);
     let shown = shown_pads(ui, "pads", &grasp, unit);
     let [map, _] = &*shown.maps;
     let (header, _) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::hover());

@@ -1,20 +1,18 @@
 //! Labelling plan: trials recorded and wanted of each object, and the next one.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::{colour, veil};
+use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::{number_field, text_field};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
-use palpate_geometry::palette::Theme;
-use palpate_lab::workers::LabelCommand;
+use palpate_lab::workers::{LabelCommand, LabelView};
 use palpate_sim::objects::{class_of, object_title};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).
 const WANTED: u32 = 50;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(view) = context.labels else {
+pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions) {
+    let Some(view) = labels else {
         ui.weak("Reading the store ..");
         return;
     };
@@ -30,7 +28,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
         for object in &view.progress.objects {
-            row_ui(ui, context.view.theme, object, next == Some(object.name.as_str()), actions);
+            row_ui(ui, object, next == Some(object.name.as_str()), actions);
         }
     });
 }
@@ -49,8 +47,8 @@ fn add_ui(ui: &mut Ui, actions: &mut Actions) {
 }
 
 /// Name, progress, and trials wanted.
-fn row_ui(ui: &mut Ui, theme: Theme, object: &ObjectProgress, next: bool, actions: &mut Actions) {
-    let colours = theme.colours();
+fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Actions) {
+    let colours = theme::of(ui).colours();
     let ObjectProgress { name, wanted, done, flagged } = object;
     ui.horizontal(|ui| {
         let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);

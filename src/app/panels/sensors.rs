@@ -2,19 +2,20 @@
 //! that recognises; and in which poses the simulation grasps.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
+use crate::app::features::view::ViewState;
 
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
-use palpate_sim::scene::{Between, PRESETS, PoseSpread};
+use palpate_lab::workers::{Job, TrainingData};
+use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::{CATALOGUE, SignalDefinition};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), TrainingData>, actions: &mut Actions) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.strong("Sensors");
-        let now = &context.view.sensors;
+        let now = &view.sensors;
         let mut sensors = now.clone();
         let (name, force) = match now.layout.strip_suffix("+F") {
             Some(name) => (name.to_owned(), true),
@@ -86,20 +87,19 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         }
         ui.add_space(8.0);
         ui.strong("Model");
-        model_ui(ui, context, actions);
+        model_ui(ui, view.simulation_model.as_ref(), data, actions);
         ui.add_space(8.0);
         ui.strong("Poses of the simulation");
-        poses_ui(ui, context, actions);
+        poses_ui(ui, scene, actions);
     });
 }
 
 /// Choice of the recogniser of the simulation and of its trials.
-fn model_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let chosen = context.view.simulation_model.as_ref();
+fn model_ui(ui: &mut Ui, chosen: Option<&PathBuf>, data: &Job<(), TrainingData>, actions: &mut Actions) {
     if just_opened(ui, "sensors") {
         actions.push(|app| _ = app.tools.data.start(()));
     }
-    let data = context.tools.data.outcome();
+    let data = data.outcome();
     let saved = data.as_ref().map_or(&[][..], |data| &data.models);
     let mut name = |path: &Path, about: &str| {
         let file = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -153,8 +153,7 @@ fn about_preset(text: &str) -> &str {
     text.lines().next().unwrap_or_default().trim_start_matches('#').trim()
 }
 
-fn poses_ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let scene = context.scene;
+fn poses_ui(ui: &mut Ui, scene: &Scene, actions: &mut Actions) {
     let drawn = PoseSpread { between: Between::default(), ..scene.pose.clone() };
     let now = PRESETS.iter().find(|preset| preset.poses() == drawn);
     ui.horizontal_wrapped(|ui| {

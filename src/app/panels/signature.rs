@@ -2,21 +2,21 @@
 //! fingers. A click or drag moves the cursor.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::heat_map::{OverTime, cells_width, height_beside, load_switch, over_time_ui};
 use crate::app::playback::Seek;
+use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
 use crate::app::view_source::ViewSource;
 use egui::{RichText, Ui, vec2};
 use palpate_lab::inspection::{FigureOptions, HeatKind};
 use palpate_lab::picture::BendUnit;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(grasp) = ShownGrasp::of(context).filter(ShownGrasp::has_course) else {
-        ui.add(egui::Label::new(RichText::new(ShownGrasp::missing(context)).weak()).wrap());
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(grasp) = ShownGrasp::of(data).filter(ShownGrasp::has_course) else {
+        ui.add(egui::Label::new(RichText::new(ShownGrasp::missing(data)).weak()).wrap());
         return;
     };
-    let (load_unit, bend_unit) = (context.view.load_unit, context.view.bend_unit);
+    let (load_unit, bend_unit) = (data.view.load_unit, data.view.bend_unit);
     ui.horizontal(|ui| {
         load_switch(ui, load_unit, actions);
         ui.separator();
@@ -27,7 +27,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
                 app.view.bend_unit = choice
             });
         }
-        if context.source == ViewSource::Trial {
+        if data.source == ViewSource::Trial {
             ui.separator();
             for (heat, name) in [(HeatKind::Joints, "Export joints"), (HeatKind::Pads, "Export pads")] {
                 if ui.small_button(name).on_hover_text("Export this heat map as SVG or PNG").clicked() {
@@ -52,7 +52,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let maps = [shown_joints(ui, &grasp, bend_unit, most), shown_rows(ui, &grasp, load_unit, most)];
     for (shown, (names, seconds)) in maps.iter().zip(parts) {
         let over_time = OverTime {
-            theme: context.view.theme,
+            theme: data.view.theme,
             shown,
             time,
             cursor_s: Some(grasp.cursor_s),

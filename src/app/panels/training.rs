@@ -2,37 +2,42 @@
 //! real gripper.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
-use crate::app::features::tools::{DEFAULT_METHOD, TRAINING_SEED};
-use crate::app::theme::colour;
+use crate::app::features::tools::{DEFAULT_METHOD, GripperTools, TRAINING_SEED};
+use crate::app::theme::{self, colour};
 use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, in_table_order};
 use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::metrics::Confusion;
-use palpate_learn::{Labels, METHODS, counted, method};
+use palpate_learn::{Labels, METHODS, Model, counted, method};
 use std::path::Path;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(
+    ui: &mut Ui,
+    tools: &GripperTools,
+    model: Option<&Model>,
+    chosen: Option<&Path>,
+    actions: &mut Actions,
+) {
     if just_opened(ui, "training") {
         actions.push(|app| _ = app.tools.data.start(()));
     }
-    let data = context.tools.data.outcome();
+    let data = tools.data.outcome();
     let data = data.as_deref();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let stop = ("Cancel; nothing is saved", (|app| app.tools.training.stop()) as fn(&mut App));
         let controls = |ui: &mut Ui, actions: &mut Actions| begin_ui(ui, data, actions);
-        job_ui(ui, &context.tools.training, stop, actions, controls, |ui, finished, actions| {
-            finished_ui(ui, context, finished, actions);
+        job_ui(ui, &tools.training, stop, actions, controls, |ui, finished, actions| {
+            finished_ui(ui, chosen, finished, actions);
         });
         match data.map(|data| &data.classes) {
-            Some(Ok(classes)) => classes_ui(ui, context, classes, actions),
+            Some(Ok(classes)) => classes_ui(ui, model, classes, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
             None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
         }
-        models_ui(ui, context, data, actions);
+        models_ui(ui, chosen, data, actions);
     });
 }
 
@@ -71,7 +76,7 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
     ui.data_mut(|data| data.insert_temp(id, chosen));
 }
 
-fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTraining, actions: &mut Actions) {
+fn finished_ui(ui: &mut Ui, chosen: Option<&Path>, finished: &FinishedTraining, actions: &mut Actions) {
     let FinishedTraining { trained, judged } = finished;
     let [low, high] = judged.evaluation.ci95;
     ui.add_space(6.0);
@@ -97,13 +102,13 @@ fn finished_ui(ui: &mut Ui, context: &PanelContext<'_>, finished: &FinishedTrain
         let text = "This model cannot answer \"unknown\": that takes more trials.";
         wrapped(ui, RichText::new(text).weak());
     }
-    confusion_ui(ui, context.view.theme, &judged.evaluation.confusion, &trained.model.card.labels);
-    use_ui(ui, context, Some(&trained.path), "Use for the real gripper", actions);
+    confusion_ui(ui, theme::of(ui), &judged.evaluation.confusion, &trained.model.card.labels);
+    use_ui(ui, chosen, Some(&trained.path), "Use for the real gripper", actions);
 }
 
 /// Button that uses a model, or shows that it is in use.
-fn use_ui(ui: &mut Ui, context: &PanelContext<'_>, path: Option<&Path>, text: &str, actions: &mut Actions) {
-    let in_use = context.view.gripper_model.as_deref() == path;
+fn use_ui(ui: &mut Ui, chosen: Option<&Path>, path: Option<&Path>, text: &str, actions: &mut Actions) {
+    let in_use = chosen == path;
     let button = ui.add_enabled(!in_use, Button::new(if in_use { "in use" } else { text }));
     let name = path.map_or("the shipped model".into(), name_of);
     let label = if in_use { format!("{name} is in use") } else { format!("Use {name}") };
@@ -119,7 +124,7 @@ fn name_of(path: &Path) -> std::borrow::Cow<'_, str> {
 }
 
 /// Trials of each object.
-fn classes_ui(ui: &mut Ui, context: &PanelContext<'_>, classes: &[LabelledClass], actions: &mut Actions) {
+fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], actions: &mut Actions) {
     ui.add_space(6.0);
     let all: usize = classes.iter().map(|class| class.trials).sum();
     wrapped(ui, RichText::new("Labelled trials").strong());
@@ -131,9 +136,9 @@ fn classes_ui(ui: &mut Ui, context: &PanelContext<'_>, classes: &[LabelledClass]
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
-        class_ui(ui, context.view.theme, class, class.trials as f32 / most as f32);
+        class_ui(ui, theme::of(ui), class, class.trials as f32 / most as f32);
     }
-    let Some(model) = context.gripper_model.filter(|model| model.learns_new_objects()) else { return };
+    let Some(model) = model.filter(|model| model.learns_new_objects()) else { return };
     let is_new = |class: &&LabelledClass| class.is_enough() && model.card.labels.class(&class.name).is_none();
     for class in classes.iter().filter(is_new) {
         let hint =
@@ -171,7 +176,7 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
 const BUTTON: f32 = 72.0;
 
 /// Saved models and the shipped one.
-fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, data: Option<&TrainingData>, actions: &mut Actions) {
+fn models_ui(ui: &mut Ui, chosen: Option<&Path>, data: Option<&TrainingData>, actions: &mut Actions) {
     let saved = data.map_or(&[][..], |data| &data.models);
     ui.add_space(8.0);
     ui.horizontal(|ui| {
@@ -180,7 +185,7 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, data: Option<&TrainingData
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
     // A model from outside the folder.
-    let other = context.view.gripper_model.as_deref().filter(|own| saved.iter().all(|m| m.path != *own));
+    let other = chosen.filter(|own| saved.iter().all(|m| m.path != *own));
     let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
     let saved =
         saved.iter().map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
@@ -193,7 +198,7 @@ fn models_ui(ui: &mut Ui, context: &PanelContext<'_>, data: Option<&TrainingData
                 wrapped(ui, RichText::new(name));
                 wrapped(ui, RichText::new(about).small().weak());
             });
-            use_ui(ui, context, path, "Use", actions);
+            use_ui(ui, chosen, path, "Use", actions);
         });
         ui.add_space(3.0);
     }

@@ -1,8 +1,8 @@
 //! Facts of the stored trial that is open: object, source, quality, phases with their times, and the scene.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::playback::Seek;
+use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
 use egui::{Grid, RichText, ScrollArea, Ui};
@@ -10,13 +10,13 @@ use palpate_lab::inspection::OpenTrial;
 use palpate_sim::frame::TrustLevel;
 use palpate_tactile::trial::TrialSource;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(inspected) = context.inspected else {
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(inspected) = data.inspected else {
         ui.weak("No trial is open. Choose one in the library, or press Enter on it.");
         return;
     };
     let trial = inspected.trial;
-    let colours = context.view.theme.colours();
+    let colours = data.view.theme.colours();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.heading(&trial.title);
         ui.weak(format!("Trial {}, {}, {}", trial.id, trial.source_title(), date(&trial.created)));

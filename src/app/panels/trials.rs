@@ -1,8 +1,8 @@
 //! Trials of the real gripper, newest first: sparkline, label, flags, and disagreement of the model.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::colour;
+use crate::app::features::labelling::LabellingFeature;
+use crate::app::theme::{self, colour};
 use crate::app::widgets::sparkline;
 use egui::{Align2, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
@@ -15,12 +15,12 @@ const ROW: f32 = 38.0;
 /// Width of the sparkline (points).
 const PICTURE: f32 = 74.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(view) = context.labels else {
+pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
+    let Some(view) = &labelling.labels else {
         ui.weak("Reading the store ..");
         return;
     };
-    let draft = &context.draft;
+    let draft = labelling.session.draft();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for shown in TrialFilter::ALL {
@@ -48,7 +48,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     let height = ROW - ui.spacing().item_spacing.y;
     list.show_rows(ui, height, listed.len(), |ui, rows| {
         for trial in &listed[rows] {
-            row_ui(ui, context, view, trial, current == Some(trial.id), actions);
+            row_ui(ui, labelling, view, trial, current == Some(trial.id), actions);
         }
     });
 }
@@ -68,13 +68,13 @@ fn scroll_offset(ui: &Ui, listed: &[&LabelledTrial], current: Option<TrialId>) -
 
 fn row_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    labelling: &LabellingFeature,
     view: &LabelView,
     trial: &LabelledTrial,
     current: bool,
     actions: &mut Actions,
 ) {
-    let (id, colours) = (trial.id, context.view.theme.colours());
+    let (id, colours) = (trial.id, theme::of(ui).colours());
     let (rect, response) =
         ui.allocate_exact_size(vec2(ui.available_width(), ROW - ui.spacing().item_spacing.y), Sense::click());
     let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
@@ -86,7 +86,7 @@ fn row_ui(
         ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
     }
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
-    sparkline(ui, context.view.theme, &trial.sparkline, picture);
+    sparkline(ui, &trial.sparkline, picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);
     let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
     let painter = ui.painter_at(words);
@@ -94,7 +94,7 @@ fn row_ui(
     let mark = if trial.unsure { "?" } else { "" };
     let title = format!("{}  {name}{mark}", trial.id);
     painter.text(words.left_top(), Align2::LEFT_TOP, title, FontId::proportional(13.0), colour(ink));
-    let blind = context.blind && trial.object.is_none();
+    let blind = labelling.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
         (_, _, Some(found)) => {

@@ -3,11 +3,10 @@
 
 use crate::app::actions::Actions;
 use crate::app::contact_path::{path_colour, path_mesh};
-use crate::app::context::PanelContext;
 use crate::app::export::ExportRequest;
 use crate::app::features::App;
 use crate::app::features::view::PathLayer;
-use crate::app::shown::Moment;
+use crate::app::shown::{DisplayedData, Moment};
 use crate::app::shown_grasp::ShownGrasp;
 use crate::app::small_pads::small_pads;
 use crate::app::theme::{colour, veil};
@@ -22,6 +21,24 @@ use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::object_title;
 use palpate_tactile::SensorLayout;
+use std::sync::Arc;
+
+/// What the 3-D view reads.
+pub(in crate::app) struct View3d<'a> {
+    data: DisplayedData<'a>,
+    /// Last grasp of the other engine, where it is drawn.
+    ghost: Option<Arc<GhostGrasp>>,
+    /// Share of the pixels along each side.
+    resolution: f32,
+    has_driver: bool,
+}
+
+impl<'a> View3d<'a> {
+    pub(in crate::app) fn of(app: &'a App) -> Self {
+        let (data, ghost) = (app.shown(), app.simulation.ghost(&app.view));
+        Self { data, ghost, resolution: app.resolution(), has_driver: app.driver.is_some() }
+    }
+}
 
 /// Force of a pull across the height of the picture (N).
 const PULL: f64 = 3.0;
@@ -32,38 +49,38 @@ const PRESENTED: f32 = 0.38;
 /// Smallest visible change of curvature (1/m): 0.25 mm at the tip of a 100 mm finger.
 const SEEN_PER_M: f64 = 0.05;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
     let rect = ui.available_rect_before_wrap();
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "3-D view"));
-    let Some(moment) = context.shown().moment() else {
-        return message(ui, rect, context, why_nothing(context));
+    let Some(moment) = own.data.moment() else {
+        return message(ui, rect, own, why_nothing(own));
     };
-    if context.driver.is_none() {
-        message(ui, rect, context, "The 3-D view needs a graphics driver. Everything else works without.");
+    if !own.has_driver {
+        message(ui, rect, own, "The 3-D view needs a graphics driver. Everything else works without.");
         return;
     }
-    steer(ui, &response, context, moment, actions);
-    let picture = paint(ui, rect, context, moment, 1.0);
-    small_pads(ui, rect, context, &picture);
-    buttons(ui, rect, context, actions);
-    if let Some(loading) = context.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
+    steer(ui, &response, own, moment, actions);
+    let picture = paint(ui, rect, own, moment, 1.0);
+    small_pads(ui, rect, &own.data, &picture);
+    buttons(ui, rect, own, actions);
+    if let Some(loading) = own.data.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
         // Below the buttons.
         let text = format!("Loading {} ..", object_title(loading));
-        let (font, ink) = (egui::FontId::proportional(14.0), colour(context.view.theme.colours().text));
+        let (font, ink) = (egui::FontId::proportional(14.0), colour(own.data.view.theme.colours().text));
         let galley = ui.painter().layout(text, font, ink, (rect.width() - 24.0).max(60.0));
         let place = rect.center_top() + egui::vec2(-0.5 * galley.size().x, 48.0);
         let ground = Rect::from_min_size(place, galley.size()).expand(4.0);
-        ui.painter().rect_filled(ground, 4.0, veil(context.view.theme.colours().background, 0.7));
+        ui.painter().rect_filled(ground, 4.0, veil(own.data.view.theme.colours().background, 0.7));
         ui.painter().galley(place, galley, ink);
     }
 }
 
 /// Why there is nothing to draw.
-fn why_nothing(context: &PanelContext<'_>) -> &'static str {
-    match context.source {
-        ViewSource::Trial if context.opening => "Opening the trial ..",
-        ViewSource::Trial if context.inspected.is_some() => {
+fn why_nothing(own: &View3d<'_>) -> &'static str {
+    match own.data.source {
+        ViewSource::Trial if own.data.opening => "Opening the trial ..",
+        ViewSource::Trial if own.data.inspected.is_some() => {
             "Nothing to draw: this trial has no poses, and no calibrated flex strip from which the fingers could be \
              reconstructed."
         }
@@ -72,19 +89,19 @@ fn why_nothing(context: &PanelContext<'_>) -> &'static str {
     }
 }
 
-fn message(ui: &Ui, rect: Rect, context: &PanelContext<'_>, text: &str) {
-    let ink = colour(context.view.theme.colours().quiet_text);
+fn message(ui: &Ui, rect: Rect, own: &View3d<'_>, text: &str) {
+    let ink = colour(own.data.view.theme.colours().quiet_text);
     let font = egui::FontId::proportional(15.0);
     let galley = ui.painter().layout(text.to_owned(), font, ink, rect.width() - 24.0);
     ui.painter().galley(rect.center() - 0.5 * galley.size(), galley, ink);
 }
 
 /// Moves the camera or pulls at the object by the mouse.
-fn steer(ui: &Ui, response: &egui::Response, context: &PanelContext<'_>, moment: Moment<'_>, actions: &mut Actions) {
+fn steer(ui: &Ui, response: &egui::Response, own: &View3d<'_>, moment: Moment<'_>, actions: &mut Actions) {
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
-    let camera = picture_view(context, moment, Vec2::new(response.rect.width(), height)).camera;
+    let camera = picture_view(own, moment, Vec2::new(response.rect.width(), height)).camera;
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
     // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
@@ -121,25 +138,25 @@ fn pull(response: &egui::Response, camera: &Camera, height: f32) -> DVec3 {
 }
 
 /// What a picture of this size shows. A camera that nobody has moved from a standard view shows the whole hand.
-fn picture_view(context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> PictureView {
-    let inset = match context.source {
+fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView {
+    let inset = match own.data.source {
         // Nothing is known of where a real gripper touched.
         ViewSource::Gripper => 0.0,
-        ViewSource::Trial if context.inspected.is_none_or(|own| own.trial.simulated.is_none()) => 0.0,
-        ViewSource::Trial | ViewSource::Simulation if context.view.presents => PRESENTED,
+        ViewSource::Trial if own.data.inspected.is_none_or(|own| own.trial.simulated.is_none()) => 0.0,
+        ViewSource::Trial | ViewSource::Simulation if own.data.view.presents => PRESENTED,
         ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
     };
     let view = PictureView {
-        camera: context.view.camera,
-        theme: context.view.theme,
+        camera: own.data.view.camera,
+        theme: own.data.view.theme,
         size,
-        forces: context.view.forces,
-        layout: SensorLayout::named(&context.view.sensors.layout).ok(),
-        circles: context.view.circles,
+        forces: own.data.view.forces,
+        layout: SensorLayout::named(&own.data.view.sensors.layout).ok(),
+        circles: own.data.view.circles,
         inset,
         ..PictureView::default()
     };
-    match context.view.standard_view() {
+    match own.data.view.standard_view() {
         Some(standard) => PictureView { camera: moment.stage.camera(standard, moment.frame, &view), ..view },
         None => view,
     }
@@ -155,23 +172,22 @@ struct Drawn {
     real: Option<[Option<f64>; 2]>,
 }
 
-fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
+fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
     let Moment { stage, frame, .. } = moment;
-    let shown = ShownGrasp::of(context);
+    let shown = ShownGrasp::of(&own.data);
     let full_scale = shown.as_ref().map_or(PAD_FULL_SCALE, |shown| shown.full_scale);
     let course = shown.filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
-    let grasp_path = course.and_then(|shown| path_colour(context.view.path, &shown).map(|colour| (shown, colour)));
+    let grasp_path = course.and_then(|shown| path_colour(own.data.view.path, &shown).map(|colour| (shown, colour)));
     let path = grasp_path.as_ref().map(|(_, colour)| *colour);
-    let view = PictureView { full_scale, path, ..picture_view(context, moment, size) };
-    let ghost = context.ghost();
-    let ghost = ghost_frame(ghost.as_deref(), moment);
-    let real = real_curvature(context);
+    let view = PictureView { full_scale, path, ..picture_view(own, moment, size) };
+    let ghost = ghost_frame(own.ghost.as_deref(), moment);
+    let real = real_curvature(own);
     let mut list = stage.draw(frame, &view);
     if let Some(ghost) = ghost {
-        list.ghosts = stage.ghosts(ghost, context.view.theme);
+        list.ghosts = stage.ghosts(ghost, own.data.view.theme);
     }
     if let Some(curvature) = real {
-        list.ghosts.extend(stage.reconstructed(curvature, context.view.theme));
+        list.ghosts.extend(stage.reconstructed(curvature, own.data.view.theme));
     }
     if let Some((shown, colour)) = &grasp_path {
         let path = stage.path(&path_mesh(ctx, stage, shown, *colour), frame);
@@ -179,7 +195,7 @@ fn drawn(ctx: &egui::Context, context: &PanelContext<'_>, moment: Moment<'_>, si
             inset.list.solids.extend(path.clone());
         }
         list.solids.extend(path);
-        Stage::unveil(&mut list, context.view.theme);
+        Stage::unveil(&mut list, own.data.view.theme);
     }
     Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
 }
@@ -194,28 +210,28 @@ const EXPORTED: [u32; 2] = [800, 560];
 
 /// Asks where to save the 3-D view as it stands, or says that there is nothing to draw.
 pub(in crate::app) fn save_picture(app: &mut App) -> Result<(), &'static str> {
-    let picture = exported(&app.ctx, &PanelContext::of(app)).ok_or("There is nothing to draw.")?;
+    let picture = exported(&app.ctx, &View3d::of(app)).ok_or("There is nothing to draw.")?;
     app.files.export(picture);
     Ok(())
 }
 
-fn exported(ctx: &egui::Context, context: &PanelContext<'_>) -> Option<ExportRequest> {
-    let moment = context.shown().moment()?;
-    let badge = match context.inspected.filter(|_| context.source == ViewSource::Trial) {
+fn exported(ctx: &egui::Context, own: &View3d<'_>) -> Option<ExportRequest> {
+    let moment = own.data.moment()?;
+    let badge = match own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
         Some(own) => format!("TRIAL {}, {}", own.trial.id, own.trial.source_title().to_uppercase()),
         None => "SIMULATED".to_owned(),
     };
-    let Drawn { mut list, view, .. } = drawn(ctx, context, moment, Vec2::from(EXPORTED.map(|side| side as f32)));
+    let Drawn { mut list, view, .. } = drawn(ctx, own, moment, Vec2::from(EXPORTED.map(|side| side as f32)));
     let badged = PictureView { badge: Some(badge), ..view };
     list.overlay = moment.stage.draw(moment.frame, &badged).overlay;
     Some(ExportRequest::View3d(Box::new(list), EXPORTED))
 }
 
 /// The picture alone, with letters of a size relative to the usual one; false where there is nothing to draw.
-pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, context: &PanelContext<'_>, letters: f32) -> bool {
-    match context.shown().moment().filter(|_| context.driver.is_some()) {
+pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, own: &View3d<'_>, letters: f32) -> bool {
+    match own.data.moment().filter(|_| own.has_driver) {
         Some(moment) => {
-            paint(ui, rect, context, moment, letters);
+            paint(ui, rect, own, moment, letters);
             true
         }
         None => false,
@@ -223,20 +239,20 @@ pub(in crate::app) fn picture_ui(ui: &Ui, rect: Rect, context: &PanelContext<'_>
 }
 
 /// Draws the picture, with letters of a size relative to the usual one; returns what it was drawn by.
-fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, letters: f32) -> PictureView {
+fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32) -> PictureView {
     let size = Vec2::new(rect.width(), rect.height());
-    let Drawn { mut list, view, ghost, real } = drawn(ui.ctx(), context, moment, size / letters);
-    if context.resolution() < 1.0 {
+    let Drawn { mut list, view, ghost, real } = drawn(ui.ctx(), own, moment, size / letters);
+    if own.resolution < 1.0 {
         list.detail = Detail::Fast;
         list.inset.iter_mut().for_each(|inset| inset.list.detail = Detail::Fast);
     }
-    let per_point = context.resolution() * ui.ctx().pixels_per_point();
+    let per_point = own.resolution * ui.ctx().pixels_per_point();
     let pixels = [rect.width(), rect.height()].map(|side| (side * per_point).round().max(1.0) as u32);
     let pixels_per_point = per_point * letters;
     let (grasp, sample) = (moment.grasp, moment.frame.t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
-    let theme = context.view.theme;
-    let (caption, ghosted) = caption(context, &key);
+    let theme = own.data.view.theme;
+    let (caption, ghosted) = caption(own, &key);
     // Texts keep their sharpness where the picture has fewer pixels.
     let mut overlays = vec![(rect.min, std::mem::take(&mut list.overlay))];
     if let Some(inset) = &mut list.inset {
@@ -255,16 +271,16 @@ fn paint(ui: &Ui, rect: Rect, context: &PanelContext<'_>, moment: Moment<'_>, le
 }
 
 /// What is said about a picture, and the colour of the ghost in it.
-fn caption(context: &PanelContext<'_>, key: &PictureKey) -> (String, Option<Rgb>) {
-    let theme = context.view.theme;
-    if let Some(inspected) = context.inspected.filter(|_| context.source == ViewSource::Trial) {
+fn caption(own: &View3d<'_>, key: &PictureKey) -> (String, Option<Rgb>) {
+    let theme = own.data.view.theme;
+    if let Some(inspected) = own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
         return (inspected.trial.remarks.join(" "), None);
     }
-    let held = context.shown().held_s().map(|t| format!("As it was held, at {t:.1}\u{2009}s"));
+    let held = own.data.held_s().map(|t| format!("As it was held, at {t:.1}\u{2009}s"));
     if key.real.is_some() {
         ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
     } else if key.ghost.is_some() {
-        let engine = context.scene.solver.engine.other().name();
+        let engine = own.data.scene.solver.engine.other().name();
         let texts: Vec<String> = std::iter::once(format!("The same grasp by {engine}")).chain(held).collect();
         (texts.join(". "), Some(GhostKind::Engine.colour(theme)))
     } else {
@@ -326,36 +342,36 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
 }
 
 /// Curvature of the real fingers (1/m), while they are shown.
-fn real_curvature(context: &PanelContext<'_>) -> Option<[Option<f64>; 2]> {
-    let estimate = context.gripper?.latest.as_ref()?.estimate;
+fn real_curvature(own: &View3d<'_>) -> Option<[Option<f64>; 2]> {
+    let estimate = own.data.gripper?.latest.as_ref()?.estimate;
     // In invisible steps, so that noise alone does not redraw the picture.
     let curvature = estimate.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
-    (context.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
+    (own.data.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
 /// Width of all buttons in a row, beside the legend (points).
 const BUTTONS: f32 = 680.0;
 
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
-fn buttons(ui: &mut Ui, rect: Rect, context: &PanelContext<'_>, actions: &mut Actions) {
+fn buttons(ui: &mut Ui, rect: Rect, own: &View3d<'_>, actions: &mut Actions) {
     let place = Rect::from_min_size(rect.min + egui::vec2(10.0, 10.0), egui::vec2(rect.width() - 20.0, 26.0));
     let layout = egui::Layout::left_to_right(egui::Align::Center);
     let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
     bar.spacing_mut().item_spacing.x = 4.0;
     if place.width() < BUTTONS {
-        let menu = bar.menu_button("View", |ui| switches(ui, context, actions));
+        let menu = bar.menu_button("View", |ui| switches(ui, own, actions));
         menu.response.on_hover_text("Standard views, parallel projection, forces, ghost");
     } else {
         // Legible on whatever comes near.
         let behind = ui.painter().add(egui::Shape::Noop);
-        switches(&mut bar, context, actions);
-        let ground = veil(context.view.theme.colours().background, 0.6);
+        switches(&mut bar, own, actions);
+        let ground = veil(own.data.view.theme.colours().background, 0.6);
         ui.painter().set(behind, egui::Shape::rect_filled(bar.min_rect().expand(3.0), 4.0, ground));
     }
 }
 
-fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let camera = context.view.camera;
+fn switches(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
+    let camera = own.data.view.camera;
     for (view, name, key) in [
         (StandardView::Home, "Home", "double click, Shift+Z"),
         (StandardView::Front, "Front", "Alt+1"),
@@ -373,19 +389,19 @@ fn switches(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
     }
     let parallel = ui.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
     actions.on(&parallel, |app| app.view.camera.parallel = !app.view.camera.parallel);
-    let forces = ui.selectable_label(context.view.forces, "Forces").on_hover_text("Force arrows (F)");
+    let forces = ui.selectable_label(own.data.view.forces, "Forces").on_hover_text("Force arrows (F)");
     actions.on(&forces, |app| app.view.forces = !app.view.forces);
     let circles = ui
-        .selectable_label(context.view.circles, "Circles")
+        .selectable_label(own.data.view.circles, "Circles")
         .on_hover_text("The circle that each flex strip reads, with its curvature (O)");
     actions.on(&circles, |app| app.view.circles = !app.view.circles);
     let path = ui
-        .selectable_label(context.view.path != PathLayer::Off, context.view.path.title())
+        .selectable_label(own.data.view.path != PathLayer::Off, own.data.view.path.title())
         .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
     actions.on(&path, |app| app.view.path = app.view.path.next());
-    let other = context.scene.solver.engine.other().name();
+    let other = own.data.scene.solver.engine.other().name();
     let ghost = ui
-        .selectable_label(context.view.ghost, "Ghost")
+        .selectable_label(own.data.view.ghost, "Ghost")
         .on_hover_text(format!("Result of the other engine, {other}, translucent (G)"));
     actions.on(&ghost, |app| app.set_ghost(!app.view.ghost));
 }

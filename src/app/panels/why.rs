@@ -2,14 +2,15 @@
 //! by phase, the course of the belief, and the nearest stored trials.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::{colour, veil};
+use crate::app::shown::DisplayedData;
+use crate::app::theme::{self, colour, veil};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::wrapped;
 use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_geometry::palette::Rgb;
+use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
-use palpate_lab::workers::ExplainRequest;
+use palpate_lab::workers::{ExplainRequest, Explainer};
 use palpate_sim::objects::object_title;
 
 /// Height of a row (points).
@@ -28,20 +29,26 @@ const LEAST_LETTERS: f32 = 9.0;
 /// Letters above columns (points).
 const HEADERS: f32 = 10.5;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    if context.blind {
+pub(super) fn ui(
+    ui: &mut Ui,
+    data: &DisplayedData<'_>,
+    explainer: &Explainer,
+    pictures: &Thumbnails,
+    actions: &mut Actions,
+) {
+    if data.blind {
         ui.heading("Blind");
         wrapped(ui, "The model's prediction is hidden until you label the trial.".into());
         return;
     }
-    let request = match context.shown().grasp_to_explain() {
+    let request = match data.grasp_to_explain() {
         Ok(request) => request,
         Err(nothing) => {
             wrapped(ui, RichText::new(nothing).weak());
             return;
         }
     };
-    let Some(explained) = context.explainer.explained(&request) else {
+    let Some(explained) = explainer.explained(&request) else {
         actions.push(move |app| app.recognition.explainer.explain(&request));
         ui.weak("Leaving out channels and phases ..");
         return;
@@ -50,8 +57,8 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
         ui.spacing_mut().item_spacing.y = 3.0;
         match &explained.outcome {
             Ok(why) => {
-                evidence_ui(ui, context, why);
-                nearest_ui(ui, context, &request, actions);
+                evidence_ui(ui, why);
+                nearest_ui(ui, explainer, pictures, &request, actions);
             }
             Err(cause) => {
                 ui.heading("No explanation");
@@ -67,13 +74,13 @@ fn capitalised(text: &str) -> String {
     first.chain(letters).collect::<String>() + "."
 }
 
-fn evidence_ui(ui: &mut Ui, context: &PanelContext<'_>, why: &Attribution) {
+fn evidence_ui(ui: &mut Ui, why: &Attribution) {
     ui.add(egui::Label::new(RichText::new(why.answer()).heading()).wrap());
     for sentence in why.sentences() {
         wrapped(ui, RichText::new(sentence));
     }
     let title = object_title(&why.first.name);
-    let rows = Rows::new(context, why);
+    let rows = Rows::new(theme::of(ui), why);
     heading(ui, "Channels", &format!("Percent points of {title} that the answer loses without this channel"));
     for (channel, evidence) in why.channels.iter().zip(&why.by_channel) {
         rows.bar_ui(ui, &channel_words(channel), evidence);
@@ -116,10 +123,10 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(context: &PanelContext<'_>, why: &Attribution) -> Self {
+    fn new(theme: Theme, why: &Attribution) -> Self {
         let parts = why.by_channel.iter().chain(&why.by_phase).chain(why.by_both.iter().flatten());
         let scale = parts.map(|evidence| evidence.points.abs()).fold(LEAST_SCALE, f64::max);
-        let colours = context.view.theme.colours();
+        let colours = theme.colours();
         Self {
             scale,
             signs: [colours.accent, colours.warning],
@@ -227,13 +234,19 @@ fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink
     ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
 }
 
-fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, request: &ExplainRequest, actions: &mut Actions) {
+fn nearest_ui(
+    ui: &mut Ui,
+    explainer: &Explainer,
+    pictures: &Thumbnails,
+    request: &ExplainRequest,
+    actions: &mut Actions,
+) {
     heading(ui, "Nearest stored trials", "By the root mean square difference of all channels over the grasp");
-    let nearest = &context.explainer.nearest;
+    let nearest = &explainer.nearest;
     match nearest.last().filter(|ended| ended.command.is_like(request)).map(|ended| ended.outcome) {
-        Some(Ok(report)) => report_ui(ui, context, &report, actions),
+        Some(Ok(report)) => report_ui(ui, pictures, &report, actions),
         Some(Err(cause)) => {
-            let ink = colour(context.view.theme.colours().error);
+            let ink = colour(theme::of(ui).colours().error);
             wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
         }
         None => {
@@ -243,12 +256,12 @@ fn nearest_ui(ui: &mut Ui, context: &PanelContext<'_>, request: &ExplainRequest,
     }
 }
 
-fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, actions: &mut Actions) {
+fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, actions: &mut Actions) {
     if report.trials.is_empty() {
         wrapped(ui, RichText::new("No stored trial has these channels. Record grasps, or run palpate collect.").weak());
         return;
     }
-    let colours = context.view.theme.colours();
+    let colours = theme::of(ui).colours();
     for trial in &report.trials {
         let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { object_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
@@ -260,7 +273,7 @@ fn report_ui(ui: &mut Ui, context: &PanelContext<'_>, report: &NearestReport, ac
             ui.painter().rect_filled(rect, 3.0, colour(ground));
         }
         let picture = Rect::from_min_size(rect.min, vec2(ROW, ROW));
-        if let Some(texture) = context.thumbnails.get(&trial.label) {
+        if let Some(texture) = pictures.get(&trial.label) {
             egui::Image::new(texture).corner_radius(3.0).paint_at(ui, picture.shrink(1.0));
         }
         let words = rect.with_min_x(picture.right() + 6.0).with_max_x(rect.right() - NUMBER);

@@ -1,8 +1,8 @@
 //! Line above a plot: derived curves, raw counts, classes, export, times of cursor and marks.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::derived::Derivation;
+use crate::app::shown::DisplayedData;
 use crate::app::view_source::ViewSource;
 use egui::Ui;
 use palpate_lab::inspection::FigureOptions;
@@ -11,7 +11,7 @@ use palpate_sim::objects::object_title;
 /// Choice of derived curves, and the times of cursor and marks.
 pub(super) fn ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    data: &DisplayedData<'_>,
     actions: &mut Actions,
     (id, plotted): (&str, &[&str]),
     derived: Derivation,
@@ -27,14 +27,14 @@ pub(super) fn ui(
             }
         });
         shown.response.on_hover_text("Values, sum or difference of both fingers, or change over time");
-        if context.shown().board().is_some() && id != "counts" && id != "line pressure" {
-            let mut raw = context.view.raw;
+        if data.board().is_some() && id != "counts" && id != "line pressure" {
+            let mut raw = data.view.raw;
             if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
                 actions.push(move |app| app.view.raw = raw);
             }
         }
-        if let Some([first, second]) = plotted.first().and_then(|name| context.shown().bands_for(name)) {
-            let mut shown = context.view.class_bands;
+        if let Some([first, second]) = plotted.first().and_then(|name| data.bands_for(name)) {
+            let mut shown = data.view.class_bands;
             let text = egui::RichText::new("likeliest classes").small();
             let hint = format!(
                 "Mean and spread of the two likeliest classes behind the curves: {} blue, {} orange",
@@ -45,17 +45,17 @@ pub(super) fn ui(
                 actions.push(move |app| app.view.class_bands = shown);
             }
         }
-        if context.source == ViewSource::Trial {
+        if data.source == ViewSource::Trial {
             let hint = "Export this plot as SVG or PNG, with the trials compared and a caption (Ctrl+E: all plots)";
             if ui.small_button("Export").on_hover_text(hint).clicked() {
                 let channel = if id == "line pressure" { "line" } else { id };
-                let raw = id == "counts" || context.view.raw;
+                let raw = id == "counts" || data.view.raw;
                 let channels = if raw { Vec::new() } else { vec![channel.to_owned()] };
                 let options = FigureOptions { channels, raw, ..FigureOptions::default() };
                 actions.push(|app| app.export_figure(options));
             }
         }
-        let playback = context.playback;
+        let playback = data.playback;
         let time = |name: &str, t: f64| format!("{name} {t:.3} s");
         let mut times: Vec<String> = Vec::new();
         if let [Some(a), Some(b)] = playback.marks {

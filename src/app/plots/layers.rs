@@ -1,8 +1,7 @@
 //! Layers of a plot over time: phases, gaps, curves, bands, cursor.
 
 use super::{PlotCurve, TimePlot};
-use crate::app::context::PanelContext;
-use crate::app::shown::ComparedTrace;
+use crate::app::shown::{ComparedTrace, DisplayedData};
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use egui::{Color32, Ui};
@@ -16,13 +15,13 @@ const BAND: f32 = 0.3;
 /// Shades the hold, and names the phases.
 pub(super) fn add_phases(
     plot_ui: &mut egui_plot::PlotUi<'_>,
-    context: &PanelContext<'_>,
+    data: &DisplayedData<'_>,
     [from, to]: [f64; 2],
     height: f64,
 ) {
-    let quiet = context.view.theme.colours().quiet_text;
+    let quiet = data.view.theme.colours().quiet_text;
     let width = f64::from(plot_ui.response().rect.width());
-    for span in context.phases {
+    for span in data.phases {
         if span.phase == TouchPhase::Hold {
             plot_ui.add(Span::new("", span.from_s..=span.to_s).fill(veil(quiet, 0.09)).border_width(0.0));
         } else {
@@ -39,13 +38,13 @@ pub(super) fn add_phases(
 }
 
 /// Cursor and marks.
-pub(super) fn add_cursor(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>) {
-    let colours = context.view.theme.colours();
+pub(super) fn add_cursor(plot_ui: &mut egui_plot::PlotUi<'_>, data: &DisplayedData<'_>) {
+    let colours = data.view.theme.colours();
     let line = |t: f64, ink: Color32, width: f32| VLine::new("", t).color(ink).width(width).allow_hover(false);
-    for mark in context.playback.marks.into_iter().flatten() {
+    for mark in data.playback.marks.into_iter().flatten() {
         plot_ui.vline(line(mark, colour(colours.warning), 1.0));
     }
-    match (context.playback.cursor_s, context.shown().time_s()) {
+    match (data.playback.cursor_s, data.time_s()) {
         (Some(t), _) => plot_ui.vline(line(t, colour(colours.accent), 1.5)),
         (None, Some(now)) => plot_ui.vline(line(now, veil(colours.quiet_text, 0.5), 1.0)),
         (None, None) => {}
@@ -71,10 +70,10 @@ pub(super) fn add_spread(plot_ui: &mut egui_plot::PlotUi<'_>, compared: &Compare
 }
 
 /// Draws mean and spread of the two likeliest classes: the likeliest in the accent colour, the second in that of warnings.
-pub(super) fn add_class_bands(plot_ui: &mut egui_plot::PlotUi<'_>, context: &PanelContext<'_>, plot: &TimePlot<'_>) {
-    let colours = context.view.theme.colours();
+pub(super) fn add_class_bands(plot_ui: &mut egui_plot::PlotUi<'_>, data: &DisplayedData<'_>, plot: &TimePlot<'_>) {
+    let colours = data.view.theme.colours();
     for (name, factor) in plot.curves.iter().filter_map(|curve| curve.channel.as_ref()) {
-        let Some(bands) = context.shown().bands_for(name) else { continue };
+        let Some(bands) = data.bands_for(name) else { continue };
         for (band, ink) in bands.iter().zip([colours.accent, colours.warning]) {
             let points: Vec<[f64; 3]> = (0..band.t_s.len())
                 .map(|k| [band.t_s[k], factor * band.low[k], factor * band.high[k]])
@@ -97,8 +96,8 @@ fn fill(plot_ui: &mut egui_plot::PlotUi<'_>, points: &[[f64; 3]], ink: Color32) 
 }
 
 /// Times of the current grasp without readings (s).
-pub(super) fn gaps(context: &PanelContext<'_>) -> Vec<[f64; 2]> {
-    context.traces.current().map(GraspTrace::gaps).unwrap_or_default()
+pub(super) fn gaps(data: &DisplayedData<'_>) -> Vec<[f64; 2]> {
+    data.traces.current().map(GraspTrace::gaps).unwrap_or_default()
 }
 
 /// Distance between the strokes of a hatching (points).

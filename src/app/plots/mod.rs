@@ -11,9 +11,9 @@ mod mouse;
 pub(super) use axes::{static_plot, value_marks};
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::derived::Derivation;
 use crate::app::playback::Seek;
+use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
 use crate::app::view_source::ViewSource;
@@ -61,22 +61,22 @@ const Y_AXIS: f32 = 44.0;
 /// Shortest time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
-pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions, plot: TimePlot<'_>) {
-    let span = context.shown().time_span();
+pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions, plot: TimePlot<'_>) {
+    let span = data.time_span();
     // A time window of a longer trial may show nothing of this one.
     let fits = |[from, to]: &[f64; 2]| *from >= span[0] && to - from >= 0.5 * NARROWEST && *to <= span[1] + 1e-9;
-    let [from, to] = context.view.time_window.filter(fits).unwrap_or(span);
-    let theme = context.view.theme;
-    let derived = context.view.derived.get(plot.id).copied().unwrap_or_default();
+    let [from, to] = data.view.time_window.filter(fits).unwrap_or(span);
+    let theme = data.view.theme;
+    let derived = data.view.derived.get(plot.id).copied().unwrap_or_default();
     if ui.available_height() > ROOM_FOR_HEADER && ui.available_width() > ROOM_FOR_LABELS {
         let channels = plot.curves.iter().filter_map(|curve| Some(curve.channel.as_ref()?.0.as_str()));
         let plotted: Vec<&str> = channels.collect();
-        header::ui(ui, context, actions, (plot.id, &plotted), derived);
+        header::ui(ui, data, actions, (plot.id, &plotted), derived);
     }
     let unit = derived.unit(plot.unit);
     let least = if derived == Derivation::Values { plot.least } else { [0.0, 0.0] };
     let plot = TimePlot { curves: derived::derive(derived, plot.curves), unit: &unit, least, ..plot };
-    let [low, high] = value_range(context, &plot, [from, to]);
+    let [low, high] = value_range(data, &plot, [from, to]);
     let labelled = ui.available_width() > ROOM_FOR_LABELS;
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
     let plotted = f64::from(width - Y_AXIS);
@@ -102,28 +102,28 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
         .custom_x_axes(vec![seconds])
         .y_axis_formatter(|mark: GridMark, _| axes::plain(mark.value))
         .set_margin_fraction(egui::Vec2::ZERO);
-    let gaps = layers::gaps(context);
+    let gaps = layers::gaps(data);
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);
         plot_ui.set_plot_bounds_y(low..=high);
-        layers::add_phases(plot_ui, context, [from, to], high - 0.04 * (high - low));
+        layers::add_phases(plot_ui, data, [from, to], high - 0.04 * (high - low));
         layers::add_gaps(plot_ui, &gaps, theme);
-        for trace in context.traces.earlier() {
+        for trace in data.traces.earlier() {
             layers::add_curves(plot_ui, trace, &plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0);
         }
-        if context.view.class_bands {
-            layers::add_class_bands(plot_ui, context, &plot);
+        if data.view.class_bands {
+            layers::add_class_bands(plot_ui, data, &plot);
         }
-        for compared in context.comparison.traces {
+        for compared in data.comparison.traces {
             let ink = series_colour(compared.colour, theme);
             layers::add_spread(plot_ui, compared, &plot, ink);
             layers::add_curves(plot_ui, &compared.trace, &plot, |_| colour(ink), 1.3);
         }
-        if let Some(trace) = context.traces.current() {
+        if let Some(trace) = data.traces.current() {
             layers::add_bands(plot_ui, trace, &plot, theme);
-            layers::add_curves(plot_ui, trace, &plot, |c| own_ink(context, c), 1.8);
+            layers::add_curves(plot_ui, trace, &plot, |c| own_ink(data, c), 1.8);
         }
-        layers::add_cursor(plot_ui, context);
+        layers::add_cursor(plot_ui, data);
         let bounds = plot_ui.plot_bounds();
         mouse::TimeDrag {
             pointer: plot_ui.pointer_coordinate().map(|p: PlotPoint| p.x),
@@ -135,9 +135,9 @@ pub(super) fn show(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Action
     gaps.iter().for_each(|gap| layers::hatch(ui, &response.transform, *gap, shade));
     if labelled {
         let frame = *response.transform.frame();
-        labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(context, &plot, &response.transform));
+        labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(data, &plot, &response.transform));
     }
-    if let Some(why) = nothing_read(context, &plot) {
+    if let Some(why) = nothing_read(data, &plot) {
         let ink = colour(theme.colours().quiet_text);
         let room = response.response.rect.width() - 60.0;
         let galley = ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, room.max(60.0));
@@ -159,16 +159,16 @@ const ROOM_FOR_HEADER: f32 = 120.0;
 const ROOM_FOR_LABELS: f32 = 380.0;
 
 /// Colour of a curve of the grasp shown: that of its sensor, or the text colour where trials are compared.
-fn own_ink(context: &PanelContext<'_>, curve: &PlotCurve) -> Color32 {
-    let theme = context.view.theme;
-    colour(if context.comparison.traces.is_empty() { curve.trace.colour(theme) } else { theme.colours().text })
+fn own_ink(data: &DisplayedData<'_>, curve: &PlotCurve) -> Color32 {
+    let theme = data.view.theme;
+    colour(if data.comparison.traces.is_empty() { curve.trace.colour(theme) } else { theme.colours().text })
 }
 
 /// Names of all curves, with their values at the cursor.
-fn curve_labels(context: &PanelContext<'_>, plot: &TimePlot<'_>, transform: &PlotTransform) -> Vec<CurveLabel> {
-    let theme = context.view.theme;
-    let Some(now) = context.shown().time_s() else { return Vec::new() };
-    let marks = context.playback.marks;
+fn curve_labels(data: &DisplayedData<'_>, plot: &TimePlot<'_>, transform: &PlotTransform) -> Vec<CurveLabel> {
+    let theme = data.view.theme;
+    let Some(now) = data.time_s() else { return Vec::new() };
+    let marks = data.playback.marks;
     let label = |trace: &GraspTrace, curve: &PlotCurve, ink: Color32| {
         let at = |t: f64| (curve.values)(trace, trace.sample_at(t)?).filter(|value| value.is_finite());
         let value = at(now);
@@ -176,23 +176,23 @@ fn curve_labels(context: &PanelContext<'_>, plot: &TimePlot<'_>, transform: &Plo
         let y = value.map(|value| transform.position_from_point(&PlotPoint::new(now, value)).y);
         CurveLabel { name: curve.name.clone(), ink, value, difference, y }
     };
-    let own = context.traces.current().into_iter();
+    let own = data.traces.current().into_iter();
     let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));
-    let own = own.map(|(trace, curve)| label(trace, curve, own_ink(context, curve)));
-    let others = context.comparison.traces.iter().flat_map(|compared| plot.curves.iter().map(move |c| (compared, c)));
+    let own = own.map(|(trace, curve)| label(trace, curve, own_ink(data, curve)));
+    let others = data.comparison.traces.iter().flat_map(|compared| plot.curves.iter().map(move |c| (compared, c)));
     let others =
         others.map(|(compared, curve)| label(&compared.trace, curve, colour(series_colour(compared.colour, theme))));
     own.chain(others).collect()
 }
 
 /// Text where a connected gripper gives no curve to draw.
-fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
-    let real = match context.source {
+fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
+    let real = match data.source {
         ViewSource::Simulation => false,
         ViewSource::Gripper => true,
-        ViewSource::Trial => context.inspected.is_some_and(|own| own.trial.source == TrialSource::Recorded),
+        ViewSource::Trial => data.inspected.is_some_and(|own| own.trial.source == TrialSource::Recorded),
     };
-    let trace = context.traces.current().filter(|_| real)?;
+    let trace = data.traces.current().filter(|_| real)?;
     let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
     let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
     nothing.then_some(if plot.id == "line pressure" {
@@ -204,10 +204,10 @@ fn nothing_read(context: &PanelContext<'_>, plot: &TimePlot<'_>) -> Option<&'sta
 }
 
 /// Range of the curves within the time shown, with a margin, and at least the plot's least range.
-fn value_range(context: &PanelContext<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
+fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
     let [mut low, mut high] = plot.least;
-    let compared = context.comparison.traces.iter().map(|compared| &compared.trace);
-    for trace in context.traces.earlier().chain(context.traces.current()).chain(compared) {
+    let compared = data.comparison.traces.iter().map(|compared| &compared.trace);
+    for trace in data.traces.earlier().chain(data.traces.current()).chain(compared) {
         for (k, _) in trace.t.iter().enumerate().filter(|(_, t)| (from..=to).contains(*t)) {
             for value in plot.curves.iter().filter_map(|c| (c.values)(trace, k)).filter(|v| v.is_finite()) {
                 low = low.min(value);

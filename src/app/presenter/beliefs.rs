@@ -21,10 +21,10 @@ fn bar_of(row: Rect, unit: f32) -> Rect {
     Rect::from_x_y_ranges(row.left() + NUMBER * unit..=row.right() - SHARE * unit, row.y_range())
 }
 
-impl Page<'_, '_> {
+impl Page<'_> {
     /// The newest answer and its probability.
     pub(super) fn guess_ui(&self, ui: &Ui, view: &IdentificationView, place: Rect) {
-        let (colours, unit) = (self.context.view.theme.colours(), self.unit);
+        let (colours, unit) = (self.app.view.theme.colours(), self.unit);
         let (ink, quiet) = (colour(colours.text), colour(colours.quiet_text));
         let headline = Headline::of(view);
         let (text, p) = headline.text(&view.labels);
@@ -48,7 +48,7 @@ impl Page<'_, '_> {
 
     /// A bar for each grasp of the round, with the threshold across them.
     pub(super) fn beliefs_ui(&self, ui: &Ui, view: &IdentificationView, place: Rect) {
-        let (colours, unit) = (self.context.view.theme.colours(), self.unit);
+        let (colours, unit) = (self.app.view.theme.colours(), self.unit);
         let (head, rows) = place.split_top_bottom_at_y(place.top() + HEAD * unit);
         let known = view.beliefs.len() + usize::from(view.listening);
         let last = view.rule.most_grasps.min(MOST_ROWS).max(known);
@@ -75,7 +75,7 @@ impl Page<'_, '_> {
     }
 
     fn belief_ui(&self, ui: &Ui, view: &IdentificationView, number: usize, row: Rect) {
-        let (colours, unit) = (self.context.view.theme.colours(), self.unit);
+        let (colours, unit) = (self.app.view.theme.colours(), self.unit);
         let over = view.beliefs.len();
         let runs = number == over && view.listening;
         let pmf: Option<&Pmf> = match view.beliefs.get(number) {

@@ -5,9 +5,9 @@ mod beliefs;
 mod verdict;
 mod words;
 
-use crate::app::context::PanelContext;
+use crate::app::features::App;
 use crate::app::features::presenter::Score;
-use crate::app::panels::view3d;
+use crate::app::panels::view3d::{self, View3d};
 use crate::app::theme::{colour, veil};
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{Align2, Color32, FontId, Galley, Rect, Role, Ui, WidgetInfo, vec2};
@@ -34,14 +34,14 @@ const VERDICT: f32 = 5.2;
 const GAP: f32 = 0.6;
 
 /// Draws the window; `message` is news for the user.
-pub(super) fn ui(ui: &Ui, context: &PanelContext<'_>, score: Score, message: Option<&str>) {
+pub(super) fn ui(ui: &Ui, app: &App, score: Score, message: Option<&str>) {
     let rect = ui.max_rect();
     let unit = LETTERS * rect.height();
     let width = (COLUMN * rect.width()).clamp(NARROWEST * unit, WIDEST * unit);
     let (picture, column) = rect.split_left_right_at_x(rect.right() - width);
-    let colours = context.view.theme.colours();
-    let page = Page { context, unit };
-    if !view3d::picture_ui(ui, picture, context, 1.1 * unit / PICTURE_LETTERS) {
+    let colours = app.view.theme.colours();
+    let page = Page { app, unit };
+    if !view3d::picture_ui(ui, picture, &View3d::of(app), 1.1 * unit / PICTURE_LETTERS) {
         let text = page.line(ui, "Loading the object ..", 1.5 * unit, picture.width(), colour(colours.text));
         put(ui, text, picture, Align2::CENTER_CENTER);
     }
@@ -56,15 +56,15 @@ fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
     ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }
 
-struct Page<'a, 'b> {
-    context: &'a PanelContext<'b>,
+struct Page<'a> {
+    app: &'a App,
     /// Height of the smallest letters (points).
     unit: f32,
 }
 
-impl Page<'_, '_> {
+impl Page<'_> {
     fn answer(&self) -> Option<&IdentificationView> {
-        self.context.snapshot?.identification.as_deref()
+        self.app.snapshot()?.identification.as_deref()
     }
 
     /// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
@@ -82,7 +82,7 @@ impl Page<'_, '_> {
     /// At most so many rows; numbers keep their units.
     fn paragraph(&self, ui: &Ui, (text, rows): (&str, usize), letters: f32, width: f32) -> Arc<Galley> {
         let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm");
-        let ink = colour(self.context.view.theme.colours().text);
+        let ink = colour(self.app.view.theme.colours().text);
         let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
         job.wrap.max_rows = rows;
         ui.painter().layout_job(job)
@@ -96,11 +96,11 @@ impl Page<'_, '_> {
 
     /// What there is to say about the picture, beside its legend: news, that the pose is hard, what colours and arrows mean.
     fn picture_ui(&self, ui: &Ui, picture: Rect, message: Option<&str>) {
-        let Some(snapshot) = self.context.snapshot else { return };
+        let Some(snapshot) = self.app.snapshot() else { return };
         let hard = Presentation::is_hard(&snapshot.scene.pose);
         let hard = hard.then(|| words::hard_pose(&snapshot.scene.gripper.mount));
         let encoding = (!snapshot.frame.taxels.is_empty()).then(|| words::ENCODING.to_owned());
-        let colours = self.context.view.theme.colours();
+        let colours = self.app.view.theme.colours();
         let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
         for text in message.map(str::to_owned).into_iter().chain(hard).chain(encoding) {
             let rows = self.paragraph(ui, (&text, 3), self.unit, place.width());
@@ -113,8 +113,8 @@ impl Page<'_, '_> {
     }
 
     fn column_ui(&self, ui: &Ui, column: Rect, score: Score) {
-        let Some(snapshot) = self.context.snapshot else { return };
-        let colours = self.context.view.theme.colours();
+        let Some(snapshot) = self.app.snapshot() else { return };
+        let colours = self.app.view.theme.colours();
         let mut top = column.top();
         let mut part = |height: f32| {
             let place = Rect::from_min_size(egui::pos2(column.left(), top), vec2(column.width(), height * self.unit));
@@ -147,8 +147,8 @@ impl Page<'_, '_> {
 
     /// Picture of a class, or a frame with a question mark.
     fn portrait(&self, ui: &Ui, class: Option<&str>, place: Rect) {
-        let colours = self.context.view.theme.colours();
-        match class.and_then(|class| self.context.thumbnails.get(class)) {
+        let colours = self.app.view.theme.colours();
+        match class.and_then(|class| self.app.thumbnails.get(class)) {
             Some(texture) => egui::Image::new(texture).corner_radius(0.3 * self.unit).paint_at(ui, place),
             None => {
                 let stroke = egui::Stroke::new(2.0, colour(colours.border));

@@ -5,11 +5,11 @@ use crate::app::theme::colour;
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Ui, pos2, vec2};
 use palpate_sim::objects::object_title;
 
-impl Page<'_, '_> {
+impl Page<'_> {
     /// The true object, once there is a verdict.
     pub(super) fn verdict_ui(&self, ui: &Ui, place: Rect) {
-        let (colours, unit) = (self.context.view.theme.colours(), self.unit);
-        let Some(snapshot) = self.context.snapshot else { return };
+        let (colours, unit) = (self.app.view.theme.colours(), self.unit);
+        let Some(snapshot) = self.app.snapshot() else { return };
         let truth = snapshot.truth();
         let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
         let finished = snapshot.status.finished;

@@ -1,12 +1,11 @@
 //! Bar below the library: what can be done with the selected trials.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
 use crate::app::widgets::{text_field, wrapped};
 use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Id, Key, PopupCloseBehavior, RichText, ScrollArea, Ui};
-use palpate_lab::workers::LibraryView;
+use palpate_lab::workers::{LabelView, LibraryView};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialPlace};
@@ -20,8 +19,13 @@ const MENU: f32 = 200.0;
 /// Height of what a menu offers below its field (points).
 const OFFERS: f32 = 150.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
-    let trials = context.picked.trials.as_slice();
+pub(super) fn ui(
+    ui: &mut Ui,
+    trials: &[Arc<LibraryTrial>],
+    labels: Option<&LabelView>,
+    view: &LibraryView,
+    actions: &mut Actions,
+) {
     let gone = trials.iter().all(|trial| trial.row.deleted.is_some());
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
@@ -38,17 +42,22 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, ac
             actions.push(|app| app.library.edit(TrialEdit::Keep));
         }
         if ui.available_width() < WHOLE {
-            menu(ui, "Edit", |ui| edits_ui(ui, context, view, actions));
+            menu(ui, "Edit", |ui| edits_ui(ui, trials, labels, view, actions));
         } else {
-            edits_ui(ui, context, view, actions);
+            edits_ui(ui, trials, labels, view, actions);
         }
     });
 }
 
 /// Everything that changes or exports the selection.
-fn edits_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
-    let trials = context.picked.trials.as_slice();
-    menu(ui, "Label", |ui| label_ui(ui, context, trials, actions));
+fn edits_ui(
+    ui: &mut Ui,
+    trials: &[Arc<LibraryTrial>],
+    labels: Option<&LabelView>,
+    view: &LibraryView,
+    actions: &mut Actions,
+) {
+    menu(ui, "Label", |ui| label_ui(ui, labels, trials, actions));
     menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
@@ -107,7 +116,7 @@ fn word_ui(ui: &mut Ui, name: &str, hint: &str, done: &str) -> Option<String> {
     given
 }
 
-fn label_ui(ui: &mut Ui, context: &PanelContext<'_>, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
+fn label_ui(ui: &mut Ui, labels: Option<&LabelView>, trials: &[Arc<LibraryTrial>], actions: &mut Actions) {
     let recorded = trials.iter().filter(|trial| trial.row.source == TrialSource::Recorded).count();
     let known = trials.len() - recorded;
     if known > 0 {
@@ -125,7 +134,7 @@ fn label_ui(ui: &mut Ui, context: &PanelContext<'_>, trials: &[Arc<LibraryTrial>
     let done = format!("Label {recorded}");
     let mut given = word_ui(ui, "Label of the selection", "name of the object", &done);
     offers(ui, |ui| {
-        for object in context.labels.iter().flat_map(|labels| &labels.progress.objects) {
+        for object in labels.iter().flat_map(|labels| &labels.progress.objects) {
             if ui.button(object_title(&object.name)).clicked() {
                 given = Some(object.name.clone());
                 ui.close();

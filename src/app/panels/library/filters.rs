@@ -2,7 +2,6 @@
 
 use super::columns;
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use egui::{RichText, ScrollArea, Ui};
 use palpate_lab::workers::LibraryView;
 use palpate_sim::objects::object_title;
@@ -11,8 +10,7 @@ use palpate_store::labels::Flag;
 use palpate_store::{Counted, Day, Shown, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
 use palpate_tactile::trial::TrialSource;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
-    let query = &context.picked.query;
+pub(super) fn ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut Actions) {
     let mut wanted = query.clone();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);

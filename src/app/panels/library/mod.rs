@@ -6,38 +6,46 @@ mod filters;
 mod rows;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::colour;
+use crate::app::features::library::{LibraryFeature, LibrarySelection};
+use crate::app::theme::{self, colour};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, text_field};
 use egui::{Frame, Id, Margin, Panel, RichText, Ui};
-use palpate_lab::workers::LibraryView;
+use palpate_lab::workers::{LabelView, LibraryView};
 use palpate_store::TrialQuery;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(view) = context.library else {
+pub(super) fn ui(
+    ui: &mut Ui,
+    library: &LibraryFeature,
+    labels: Option<&LabelView>,
+    pictures: &Thumbnails,
+    actions: &mut Actions,
+) {
+    let Some(view) = &library.view else {
         ui.weak("Reading the store ..");
         actions.push(|app| app.library.find(TrialQuery::default()));
         return;
     };
-    if !context.picked.trials.is_empty() {
-        let fill = colour(context.view.theme.colours().raised);
+    if !library.selection.trials.is_empty() {
+        let fill = colour(theme::of(ui).colours().raised);
         let frame = Frame::new().fill(fill).corner_radius(4).inner_margin(Margin::same(6));
-        Panel::bottom("selected trials").frame(frame).show(ui, |ui| bar::ui(ui, context, view, actions));
+        Panel::bottom("selected trials")
+            .frame(frame)
+            .show(ui, |ui| bar::ui(ui, &library.selection.trials, labels, view, actions));
     }
-    search_ui(ui, context, view, actions);
-    filters::ui(ui, context, view, actions);
-    if context.picked.query.is_filtered() || !view.complete {
-        count_ui(ui, context, view, actions);
+    search_ui(ui, &library.selection, view, actions);
+    filters::ui(ui, &library.selection.query, view, actions);
+    if library.selection.query.is_filtered() || !view.complete {
+        count_ui(ui, &library.selection.query, view, actions);
     }
     if view.found.is_empty() {
-        return empty_ui(ui, context, view);
+        return empty_ui(ui, library.selection.query.is_filtered(), view);
     }
-    rows::ui(ui, context, view, actions);
+    rows::ui(ui, library, pictures, view, actions);
 }
 
 /// Field for words; its text is asked for with every letter.
-fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
-    let picked = context.picked;
+fn search_ui(ui: &mut Ui, picked: &LibrarySelection, view: &LibraryView, actions: &mut Actions) {
     let mut search = picked.query.search.clone();
     let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept));
     let id = Id::unique("library search");
@@ -57,14 +65,13 @@ fn search_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, action
 }
 
 /// How many trials were found; without filters the search field says how many there are.
-fn count_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+fn count_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut Actions) {
     ui.horizontal(|ui| {
         let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept));
         ui.label(RichText::new(text).small().weak());
         if !view.complete {
             ui.label(RichText::new("reading older ones ..").small().weak());
         }
-        let query = &context.picked.query;
         if query.is_filtered() && ui.small_button("Clear").on_hover_text("Remove search and filters").clicked() {
             let cleared = query.cleared();
             actions.push(|app| app.library.find(cleared));
@@ -72,12 +79,12 @@ fn count_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions
     });
 }
 
-fn empty_ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView) {
+fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView) {
     ui.add_space(12.0);
     ui.vertical_centered(|ui| {
         if !view.complete {
             ui.weak("Reading the store ..");
-        } else if context.picked.query.is_filtered() {
+        } else if filtered {
             ui.weak("No trial matches. Clear the search and the filters to see all.");
         } else {
             ui.weak("No trials yet.");

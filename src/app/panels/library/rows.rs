@@ -2,10 +2,10 @@
 
 use super::columns::{self, Shows, cell, fitting, title};
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
-use crate::app::features::library::Reach;
-use crate::app::theme::colour;
+use crate::app::features::library::{LibraryFeature, LibrarySelection, Reach};
+use crate::app::theme::{self, colour};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::sparkline;
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
@@ -24,27 +24,34 @@ const GAP: f32 = 8.0;
 /// Room of the scroll bar (points).
 const SCROLL_BAR: f32 = 10.0;
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, view: &LibraryView, actions: &mut Actions) {
+pub(super) fn ui(
+    ui: &mut Ui,
+    library: &LibraryFeature,
+    pictures: &Thumbnails,
+    view: &LibraryView,
+    actions: &mut Actions,
+) {
+    let picked = &library.selection;
     let room = ui.available_width() - SCROLL_BAR;
     let table = (room >= columns::TABLE).then(|| fitting(room));
     if let Some(columns) = &table {
-        header_ui(ui, context, columns, actions);
+        header_ui(ui, &picked.query, columns, actions);
     }
     let height = if table.is_some() { TABLE_ROW } else { LIST_ROW };
     ui.spacing_mut().item_spacing.y = 0.0;
     let seen = ui.scope_id().with("rows");
     let mut list = ScrollArea::vertical().auto_shrink(false);
-    if let Some(offset) = scroll_offset(ui, seen, context, view, height) {
+    if let Some(offset) = scroll_offset(ui, seen, picked.cursor, view, height) {
         list = list.vertical_scroll_offset(offset);
     }
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
         for trial in &view.found[rows.clone()] {
-            row_ui(ui, context, view, trial, (table.as_deref(), height), actions);
+            row_ui(ui, (picked, pictures), view, trial, (table.as_deref(), height), actions);
         }
         rows
     });
     draw_seen(ui, seen, view, &shown.inner, actions);
-    ui.data_mut(|data| data.insert_temp(seen, (shown.inner.start, shown.inner.end, context.picked.cursor)));
+    ui.data_mut(|data| data.insert_temp(seen, (shown.inner.start, shown.inner.end, picked.cursor)));
 }
 
 /// Asks for the sparklines of rows in sight, once for each set of rows.
@@ -61,9 +68,9 @@ fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, a
 }
 
 /// Offset that brings a newly selected trial into sight.
-fn scroll_offset(ui: &Ui, seen: egui::Id, context: &PanelContext<'_>, view: &LibraryView, height: f32) -> Option<f32> {
+fn scroll_offset(ui: &Ui, seen: egui::Id, cursor: Option<TrialId>, view: &LibraryView, height: f32) -> Option<f32> {
     let (first, end, before) = ui.data(|data| data.get_temp::<(usize, usize, Option<TrialId>)>(seen))?;
-    let cursor = context.picked.cursor.filter(|_| context.picked.cursor != before)?;
+    let cursor = cursor.filter(|_| cursor != before)?;
     let place = view.found.iter().position(|trial| trial.row.id == cursor)?;
     if (first + 1..end.saturating_sub(1)).contains(&place) {
         return None;
@@ -74,9 +81,8 @@ fn scroll_offset(ui: &Ui, seen: egui::Id, context: &PanelContext<'_>, view: &Lib
 }
 
 /// Titles of columns; a click sorts.
-fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, columns: &[(Shows, f32)], actions: &mut Actions) {
-    let colours = context.view.theme.colours();
-    let query = &context.picked.query;
+fn header_ui(ui: &mut Ui, query: &TrialQuery, columns: &[(Shows, f32)], actions: &mut Actions) {
+    let colours = theme::of(ui).colours();
     let (line, _) = ui.allocate_exact_size(vec2(ui.available_width(), 22.0), Sense::hover());
     ui.painter().hline(line.x_range(), line.bottom() - 0.5, egui::Stroke::new(1.0, colour(colours.border)));
     for (shows, rect) in placed(columns, line) {
@@ -124,15 +130,15 @@ fn placed(columns: &[(Shows, f32)], line: Rect) -> Vec<(Shows, Rect)> {
 
 fn row_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    (picked, pictures): (&LibrarySelection, &Thumbnails),
     view: &LibraryView,
     trial: &LibraryTrial,
     (table, height): (Option<&[(Shows, f32)]>, f32),
     actions: &mut Actions,
 ) {
-    let colours = context.view.theme.colours();
+    let colours = theme::of(ui).colours();
     let id = trial.row.id;
-    let selected = context.picked.selected.contains(&id);
+    let selected = picked.selected.contains(&id);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
     let name = format!("Trial {id}, {}", trial.title);
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &name));
@@ -144,13 +150,13 @@ fn row_ui(
             colour(colours.background.mix(colours.accent, share)),
         );
     }
-    if context.picked.cursor == Some(id) {
+    if picked.cursor == Some(id) {
         let edge = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(2.5, height - 6.0));
         ui.painter().rect_filled(edge, 1.0, colour(colours.accent));
     }
     match table {
-        Some(columns) => table_row(ui, context, view, trial, &placed(columns, rect)),
-        None => list_row(ui, context, view, trial, rect),
+        Some(columns) => table_row(ui, pictures, view, trial, &placed(columns, rect)),
+        None => list_row(ui, pictures, view, trial, rect),
     }
     answer(ui, &response, trial, selected, actions);
     response.on_hover_ui(|ui| hint_ui(ui, view, trial));
@@ -225,15 +231,15 @@ fn hint_ui(ui: &mut Ui, view: &LibraryView, trial: &LibraryTrial) {
     }
 }
 
-fn table_row(ui: &Ui, context: &PanelContext<'_>, view: &LibraryView, trial: &LibraryTrial, places: &[(Shows, Rect)]) {
-    let colours = context.view.theme.colours();
+fn table_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &LibraryTrial, places: &[(Shows, Rect)]) {
+    let colours = theme::of(ui).colours();
     for (shows, rect) in places {
         let inner = Rect::from_min_max(rect.min, pos2(rect.right() - GAP, rect.bottom()));
         match shows {
-            Shows::Thumbnail => thumbnail(ui, context, trial, inner.shrink2(vec2(0.0, 3.0))),
+            Shows::Thumbnail => thumbnail(ui, pictures, trial, inner.shrink2(vec2(0.0, 3.0))),
             Shows::Sparkline => {
                 if let Some(lines) = view.sparklines.get(&trial.row.id) {
-                    sparkline(ui, context.view.theme, lines, inner.shrink2(vec2(0.0, 4.0)));
+                    sparkline(ui, lines, inner.shrink2(vec2(0.0, 4.0)));
                 }
             }
             Shows::Text(column) => {
@@ -245,15 +251,15 @@ fn table_row(ui: &Ui, context: &PanelContext<'_>, view: &LibraryView, trial: &Li
 }
 
 /// Two lines: title and date, then the rest in small print.
-fn list_row(ui: &Ui, context: &PanelContext<'_>, view: &LibraryView, trial: &LibraryTrial, rect: Rect) {
-    let colours = context.view.theme.colours();
+fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &LibraryTrial, rect: Rect) {
+    let colours = theme::of(ui).colours();
     let inside = rect.shrink2(vec2(6.0, 4.0));
     let side = inside.height();
     let picture = Rect::from_min_size(inside.min, vec2(side, side));
-    if context.thumbnails.contains_key(&trial.row.object) {
-        thumbnail(ui, context, trial, picture);
+    if pictures.get(&trial.row.object).is_some() {
+        thumbnail(ui, pictures, trial, picture);
     } else if let Some(lines) = view.sparklines.get(&trial.row.id) {
-        sparkline(ui, context.view.theme, lines, picture);
+        sparkline(ui, lines, picture);
     }
     let words = Rect::from_min_max(pos2(picture.right() + GAP, inside.top()), inside.max);
     let date = cell(view, trial, TrialColumn::Date);
@@ -296,8 +302,8 @@ fn ink(colours: &ThemeColours, trial: &LibraryTrial, column: TrialColumn) -> pal
     }
 }
 
-fn thumbnail(ui: &Ui, context: &PanelContext<'_>, trial: &LibraryTrial, place: Rect) {
-    let Some(texture) = context.thumbnails.get(&trial.row.object) else { return };
+fn thumbnail(ui: &Ui, pictures: &Thumbnails, trial: &LibraryTrial, place: Rect) {
+    let Some(texture) = pictures.get(&trial.row.object) else { return };
     let side = place.width().min(place.height());
     let square = Rect::from_center_size(place.center(), vec2(side, side));
     egui::Image::new(texture).corner_radius(3.0).paint_at(ui, square);

@@ -1,26 +1,28 @@
 //! Recognition: a lesson that is running, the answer and its reason, advice on the next grasp, size and shape, the measured
 //! dimensions, a bar for each class with the threshold across them, and the grasps so far.
 
-mod advice;
 mod classes;
-mod lesson;
 mod properties;
 mod strip;
 mod touch;
 pub(in crate::app) mod words;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
+use crate::app::features::tools::GripperTools;
 use crate::app::icons::{self, Icon};
-use crate::app::shown::Recognised;
+use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{accented, colour};
+use crate::app::thumbnails::Thumbnails;
 use crate::app::view_source::ViewSource;
 use crate::app::widgets::number_field;
-use egui::{Align2, Color32, FontId, Galley, Rect, Response, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
+    WidgetInfo, pos2, vec2,
+};
 use palpate_geometry::palette::ThemeColours;
-use palpate_lab::grasping::IdentificationView;
-use palpate_lab::workers::{Command, THRESHOLDS};
+use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
+use palpate_lab::workers::{Command, Job, THRESHOLDS, TeachRequest, TrainedModel};
 use std::sync::Arc;
 use words::{FOREIGN, Headline, percent, reason};
 
@@ -99,12 +101,18 @@ impl Measures {
     }
 }
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(recognised) = context.shown().recognised() else {
+pub(super) fn ui(
+    ui: &mut Ui,
+    data: &DisplayedData<'_>,
+    tools: &GripperTools,
+    pictures: &Thumbnails,
+    actions: &mut Actions,
+) {
+    let Some(recognised) = data.recognised() else {
         ui.weak("Waiting for the first grasp ..");
         return;
     };
-    if context.blind {
+    if data.blind {
         ui.heading("Blind");
         ui.label("The model's prediction is hidden until you label the trial.");
         return;
@@ -113,13 +121,13 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let measures = Measures::fitting(room);
         ui.spacing_mut().item_spacing.y = measures.gap;
-        lesson::ui(ui, context, actions);
+        lesson_ui(ui, &tools.teaching, actions);
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
-                let mut part = Part { context, recognised: &recognised, view: &view, measures, actions };
+                let mut part = Part { data, pictures, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
-                let advised = advice::ui(ui, &part);
+                let advised = part.advice_ui(ui, &tools.advice);
                 if let Some(truth) = &recognised.truth {
                     part.truth_ui(ui, truth);
                 }
@@ -133,19 +141,28 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             None => off_ui(ui, recognised.off),
         }
         ui.horizontal(|ui| {
-            more_ui(ui, context, measures, actions);
-            next_ui(ui, context, measures, actions);
+            more_ui(ui, data, measures, actions);
+            next_ui(ui, data, measures, actions);
         });
     });
 }
 
+/// A lesson that is running: the object that the model learns, and how far it is.
+fn lesson_ui(ui: &mut Ui, teaching: &Job<TeachRequest, TrainedModel>, actions: &mut Actions) {
+    let Some(progress) = teaching.running().map(|running| running.progress) else { return };
+    ui.horizontal(|ui| {
+        actions.on(&ui.button("Stop").on_hover_text("Leave the model as it is"), App::stop_teaching);
+        ui.add(ProgressBar::new(progress.share as f32).desired_width(ui.available_width()).text(progress.words));
+    });
+}
+
 /// Button for one more grasp, where a raised threshold asks for it.
-fn more_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
-    if context.source != ViewSource::Simulation || !context.shown().one_more() {
+fn more_ui(ui: &mut Ui, data: &DisplayedData<'_>, measures: &Measures, actions: &mut Actions) {
+    if data.source != ViewSource::Simulation || !data.one_more() {
         return;
     }
     let hint = "The threshold is above the probability reached: grasp the same object again (M)";
-    let more = egui::Button::new("One more grasp").fill(accented(context.view.theme));
+    let more = egui::Button::new("One more grasp").fill(accented(data.view.theme));
     // Beside the button for another object.
     let width = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
     actions.on(&ui.add_sized([width, measures.button], more).on_hover_text(hint), |app| {
@@ -154,9 +171,9 @@ fn more_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions
 }
 
 /// Button for another object.
-fn next_ui(ui: &mut Ui, context: &PanelContext<'_>, measures: &Measures, actions: &mut Actions) {
-    let fill = accented(context.view.theme);
-    let hint = match context.source {
+fn next_ui(ui: &mut Ui, data: &DisplayedData<'_>, measures: &Measures, actions: &mut Actions) {
+    let fill = accented(data.view.theme);
+    let hint = match data.source {
         ViewSource::Trial => return,
         ViewSource::Simulation => "Grasp another built-in object at random (N)",
         ViewSource::Gripper => "Start over with another object in the hand (N)",
@@ -187,7 +204,8 @@ fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
 
 /// Data of all parts of the panel.
 struct Part<'a, 'b> {
-    context: &'a PanelContext<'b>,
+    data: &'a DisplayedData<'b>,
+    pictures: &'a Thumbnails,
     recognised: &'a Recognised<'a>,
     view: &'a IdentificationView,
     measures: &'static Measures,
@@ -196,18 +214,18 @@ struct Part<'a, 'b> {
 
 impl Part<'_, '_> {
     fn colours(&self) -> ThemeColours {
-        self.context.view.theme.colours()
+        self.data.view.theme.colours()
     }
 
     /// Why the model's answers are not to be trusted on this gripper; none where they are.
     fn distrust(&self) -> Option<&'static str> {
-        let is_real = self.context.shown().board().is_some();
+        let is_real = self.data.board().is_some();
         (self.view.from_perfect_sensors && is_real).then_some(FOREIGN)
     }
 
     /// Picture of a class, or a frame with a question mark.
     fn thumbnail(&self, ui: &Ui, class: &str, place: Rect) {
-        match self.context.thumbnails.get(class) {
+        match self.pictures.get(class) {
             Some(texture) => egui::Image::new(texture).corner_radius(3.0).paint_at(ui, place),
             None => {
                 let stroke = egui::Stroke::new(1.5, colour(self.colours().border));
@@ -255,18 +273,41 @@ impl Part<'_, '_> {
         put(ui, lines, rect, Align2::LEFT_CENTER);
     }
 
+    /// Which grasp next; returns the height of the line (points), 0 without advice.
+    fn advice_ui(&self, ui: &mut Ui, advice: &Job<Arc<RecognisedGrasp>, ObjectMove>) -> f32 {
+        let Some(text) = self.advice(advice) else { return 0.0 };
+        // No line break between number and unit.
+        let text = RichText::new(text.replace(" mm", "\u{a0}mm"))
+            .size(self.measures.reason_letters)
+            .color(colour(self.colours().accent));
+        let hint = "The grasp from which most is expected to be learned, by the readings so far";
+        ui.add(Label::new(text).wrap()).on_hover_text(hint).rect.height() + ui.spacing().item_spacing.y
+    }
+
+    /// The move that the simulation has chosen, or advice to the person at the real gripper.
+    fn advice(&self, advice: &Job<Arc<RecognisedGrasp>, ObjectMove>) -> Option<String> {
+        match self.data.source {
+            ViewSource::Trial => None,
+            ViewSource::Simulation => Some(format!("Guided: gripper {}", self.data.snapshot?.status.guided?)),
+            ViewSource::Gripper => {
+                let undecided = self.view.decision.is_none() && !self.view.listening;
+                let last = self.view.last.as_ref().filter(|_| undecided)?;
+                let advice = advice.last().filter(|advice| Arc::ptr_eq(&*advice.command, last))?;
+                Some(format!("Before the next grasp: {}.", advice.outcome.ok()?))
+            }
+        }
+    }
+
     /// True object, which the simulation knows; set apart from what was recognised.
     fn truth_ui(&mut self, ui: &mut Ui, (truth, title): &(&str, String)) {
         let colours = self.colours();
-        let shown = self.context.view.truth_shown;
+        let shown = self.data.view.truth_shown;
         let right = self.view.is_right(truth).filter(|_| shown);
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
             // A stored trial keeps no secret.
-            None if shown && self.context.source == ViewSource::Trial => {
-                (title.clone(), format!("Truth: {title}"), None)
-            }
+            None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
             None => {
                 let text = if shown { "shown after the decision" } else { "hidden" };
                 (text.to_owned(), format!("Truth: {text}"), None)
@@ -335,7 +376,7 @@ impl Part<'_, '_> {
                         self.actions.push(|app| app.show_panel("why"));
                     }
                     let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
-                    let is_unknown = self.view.is_unknown() && self.context.source == ViewSource::Gripper;
+                    let is_unknown = self.view.is_unknown() && self.data.source == ViewSource::Gripper;
                     if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
                         self.actions.push(|app| app.show_panel("label"));
                     }

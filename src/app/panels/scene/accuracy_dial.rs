@@ -2,8 +2,8 @@
 
 use super::choice;
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::colour;
+use crate::app::features::simulation::SimulationFeature;
+use crate::app::theme::{self, colour};
 use crate::app::widgets::number_field;
 use egui::{RichText, Slider, Ui};
 use palpate_geometry::units::{three_digits, two_digits};
@@ -17,12 +17,12 @@ const FIRST_TOLERANCE: f64 = 1e-5;
 const SLIDER: std::ops::RangeInclusive<f64> = 1e-7..=1e-2;
 
 /// Rows of a grid of two columns.
-pub(super) fn rows(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(super) fn rows(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature, actions: &mut Actions) {
     steps_row(ui, scene);
     tolerance_row(ui, scene);
     method_row(ui, scene);
-    band_row(ui, context, actions);
-    measured_rows(ui, context);
+    band_row(ui, simulation, actions);
+    measured_rows(ui, simulation);
 }
 
 fn steps_row(ui: &mut Ui, scene: &mut Scene) {
@@ -66,8 +66,8 @@ fn method_row(ui: &mut Ui, scene: &mut Scene) {
     choice(ui, "method", &mut scene.solver.integrator, &all);
 }
 
-fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let mut shown = context.snapshot.is_some_and(|snapshot| snapshot.status.error_band);
+fn band_row(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
+    let mut shown = simulation.snapshot.as_ref().is_some_and(|snapshot| snapshot.status.error_band);
     let label = ui.label("error band").on_hover_text(
         "Estimate the numerical error from a finer simulation, and show it in the plots. Restarts the grasp",
     );
@@ -78,8 +78,8 @@ fn band_row(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
 }
 
 /// Cost and error of the accuracy, once measured.
-fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
-    let measured = context.accuracy.filter(|measured| measured.scene == *context.scene);
+fn measured_rows(ui: &mut Ui, simulation: &SimulationFeature) {
+    let measured = simulation.accuracy.as_ref().filter(|measured| measured.scene == simulation.scene);
     let mut row = |name: &str, value: Option<String>, hover: &str| {
         ui.label(name).on_hover_text(hover);
         match value {
@@ -89,10 +89,10 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
         ui.end_row();
     };
     let cost = measured.map(|m| &m.cost);
-    let at_reference = cost.and_then(|cost| Some((cost.cpu_ms, reference_factor(context)?)));
+    let at_reference = cost.and_then(|cost| Some((cost.cpu_ms, reference_factor(simulation)?)));
     row("cost", cost.map(|c| format!("{} ms CPU", three_digits(c.cpu_ms))), "CPU time of a grasp on one thread");
     row("", cost.map(|c| format!("{}× real time", three_digits(c.times_real_time))), "Simulated time over CPU time");
-    if context.scene.solver.accuracy != Accuracy::Reference {
+    if simulation.scene.solver.accuracy != Accuracy::Reference {
         let text =
             at_reference.map(|(ms, factor)| format!("≈ {} ms, {}×", two_digits(ms * factor), two_digits(factor)));
         row("reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
@@ -104,7 +104,7 @@ fn measured_rows(ui: &mut Ui, context: &PanelContext<'_>) {
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);
     row("± force", errors.map(|e| error(e.force_n, "N", e.force_share)), hover);
     if cost.is_some_and(|cost| cost.persists) {
-        let warning = colour(context.view.theme.colours().warning);
+        let warning = colour(theme::of(ui).colours().warning);
         ui.colored_label(warning, "stick-slip").on_hover_text(STICK_SLIP);
         ui.colored_label(warning, "no step removes it").on_hover_text(STICK_SLIP);
         ui.end_row();
@@ -117,15 +117,15 @@ const STICK_SLIP: &str = "A hundredth of the tolerance does not reduce the error
                           gains nothing.";
 
 /// CPU time at `reference` over that of the scene's accuracy, from the stored study.
-fn reference_factor(context: &PanelContext<'_>) -> Option<f64> {
-    let (study, solver) = (context.stored_accuracy?, &context.scene.solver);
+fn reference_factor(simulation: &SimulationFeature) -> Option<f64> {
+    let (study, solver) = (simulation.stored_accuracy.as_ref()?, &simulation.scene.solver);
     if solver.engine != EngineKind::Palpate || solver.method() != IntegrationMethod::Sdirk2 {
         return None;
     }
     study.times_tolerance(
         Accuracy::Reference.step_tolerance(),
         solver.accuracy.step_tolerance(),
-        context.scene.holds_object(),
+        simulation.scene.holds_object(),
     )
 }
 

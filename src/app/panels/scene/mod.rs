@@ -3,18 +3,18 @@
 mod accuracy_dial;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
+use crate::app::features::simulation::SimulationFeature;
 use crate::app::widgets::number_field;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
 use palpate_sim::scene::{Auto, EngineKind, SCENES, Scene, SupportKind};
 
-pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let mut scene = context.scene.clone();
+pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
+    let mut scene = simulation.scene.clone();
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-        section(ui, "Object", true, |ui| object_ui(ui, &mut scene, context));
-        section(ui, "Accuracy", true, |ui| solver_ui(ui, &mut scene, context, actions));
+        section(ui, "Object", true, |ui| object_ui(ui, &mut scene, simulation));
+        section(ui, "Accuracy", true, |ui| solver_ui(ui, &mut scene, simulation, actions));
         section(ui, "Gripper pose", true, |ui| pose_ui(ui, &mut scene));
         section(ui, "Programme", true, |ui| programme_ui(ui, &mut scene));
         section(ui, "Finger", false, |ui| finger_ui(ui, &mut scene));
@@ -31,7 +31,7 @@ pub(super) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions)
             }
         });
     });
-    if scene != *context.scene {
+    if scene != simulation.scene {
         actions.push(|app| app.set_scene(scene));
     }
 }
@@ -108,14 +108,14 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
     ui.end_row();
 }
 
-fn object_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>) {
+fn object_ui(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature) {
     let mut fixed = scene.holds_object();
     choice(ui, "held", &mut fixed, &[(false, "resting freely"), (true, "fixed in place")]);
     if fixed != scene.holds_object() {
         scene.set_object_fixed(fixed);
     }
     let object = &mut scene.object;
-    let card = context.snapshot.and_then(|s| s.object.as_deref());
+    let card = simulation.snapshot.as_ref().and_then(|s| s.object.as_deref());
     let mass = Number { name: "mass", unit: "g", factor: 1e3, range: [0.1, 5000.0], speed: 0.5 };
     automatic(ui, &mass, &mut object.mass, card.map_or(0.05, |c| c.mass));
     let friction = Number { name: "friction", unit: "", factor: 1.0, range: [0.0, 5.0], speed: 0.01 };
@@ -156,10 +156,10 @@ fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
         .ui(ui, &mut scene.timing.duration_s);
 }
 
-fn solver_ui(ui: &mut Ui, scene: &mut Scene, context: &PanelContext<'_>, actions: &mut Actions) {
+fn solver_ui(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature, actions: &mut Actions) {
     let engines = EngineKind::ALL.map(|engine| (engine, engine.name()));
     choice(ui, "engine", &mut scene.solver.engine, &engines);
-    accuracy_dial::rows(ui, scene, context, actions);
+    accuracy_dial::rows(ui, scene, simulation, actions);
     let label = ui.label("sampling");
     let rate = DragValue::new(&mut scene.timing.sample_hz);
     let rate = rate.range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz");

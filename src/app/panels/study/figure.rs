@@ -3,9 +3,9 @@
 use super::plot::plot_ui;
 use super::result_ui;
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::features::App;
-use crate::app::theme::colour;
+use crate::app::features::studies::Studies;
+use crate::app::theme::{self, colour};
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
 use palpate_geometry::drawing::{Figure, LineStyle, Marker};
@@ -18,17 +18,17 @@ const LEAST_WIDTH: f32 = 300.0;
 /// Room below a single row of plots (points).
 const BELOW: f32 = 46.0;
 
-pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(result) = result_ui(ui, context, "study-figure", "figures", actions) else { return };
-    let number = context.studies.figure_of(&result);
-    header_ui(ui, context, &result, number, actions);
+pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, studies, "study-figure", "figures", actions) else { return };
+    let number = studies.figure_of(&result);
+    header_ui(ui, studies, &result, number, actions);
     let Some(linked) = result.figures.get(number) else {
         ui.weak("This result has no figure.");
         return;
     };
-    legend_ui(ui, context.view.theme, &linked.figure);
+    legend_ui(ui, theme::of(ui), &linked.figure);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        plots_ui(ui, context, &result, linked, actions);
+        plots_ui(ui, &result, linked, actions);
         for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
             wrapped(ui, RichText::new(line).small().weak());
         }
@@ -37,12 +37,12 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
 }
 
 /// Title; origins and figures to choose from; the button that exports.
-fn header_ui(ui: &mut Ui, context: &PanelContext<'_>, result: &StudyResult, number: usize, actions: &mut Actions) {
-    let card = context.studies.chosen().card();
+fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize, actions: &mut Actions) {
+    let card = studies.chosen().card();
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         ui.strong(card.title);
-        for other in context.studies.files(card.key).into_iter().flat_map(|files| &files.results) {
+        for other in studies.files(card.key).into_iter().flat_map(|files| &files.results) {
             let chosen = other.origin.is_like(result.origin);
             let button = ui.selectable_label(chosen, RichText::new(other.origin.title()).small());
             if button.on_hover_text(about_origin(other.origin)).clicked() {
@@ -131,13 +131,7 @@ fn legend_ui(ui: &mut Ui, theme: Theme, figure: &Figure) {
 }
 
 /// All plots in rows, as many beside each other as there is room for.
-fn plots_ui(
-    ui: &mut Ui,
-    context: &PanelContext<'_>,
-    result: &StudyResult,
-    linked: &LinkedFigure,
-    actions: &mut Actions,
-) {
+fn plots_ui(ui: &mut Ui, result: &StudyResult, linked: &LinkedFigure, actions: &mut Actions) {
     let plots = &linked.figure.plots;
     let most = if linked.figure.columns == 0 { plots.len() } else { linked.figure.columns };
     let fitting = (ui.available_width() / LEAST_WIDTH) as usize;
@@ -147,7 +141,7 @@ fn plots_ui(
     for (row, chunk) in plots.chunks(columns).enumerate() {
         ui.columns(columns, |uis| {
             for (k, (ui, _)) in uis.iter_mut().zip(chunk).enumerate() {
-                plot_ui(ui, context, result, (linked, row * columns + k), room, actions);
+                plot_ui(ui, result, (linked, row * columns + k), room, actions);
             }
         });
     }

@@ -2,15 +2,15 @@
 
 use super::result_ui;
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::{colour, veil};
+use crate::app::features::studies::Studies;
+use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::paper::{Agreement, Cell, Finding};
 
-pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(result) = result_ui(ui, context, "study-findings", "findings", actions) else { return };
+pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, studies, "study-findings", "findings", actions) else { return };
     let findings = &result.stored.result.findings;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let count = |verdict: Agreement| findings.iter().filter(|finding| finding.verdict == verdict).count();
@@ -24,7 +24,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
                 .weak(),
         );
         for finding in findings {
-            finding_ui(ui, context.view.theme, finding);
+            finding_ui(ui, theme::of(ui), finding);
         }
     });
 }

@@ -1,11 +1,11 @@
 //! List of the studies: state of each; the chosen one with its purpose, its cost, and the buttons that run and stop it.
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::{accented, colour};
+use crate::app::features::studies::Studies;
+use crate::app::theme::{self, accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
-use palpate_geometry::palette::Rgb;
+use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudySize};
 use palpate_lab::workers::{JobProgress, StudyFiles, StudyOrigin, StudyRequest, has_other_units};
 use palpate_store::Store;
@@ -13,17 +13,17 @@ use palpate_store::Store;
 /// Height of a row (points).
 const ROW: f32 = 40.0;
 
-pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
+pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
     if just_opened(ui, "studies") {
         actions.push(|app| app.studies.look());
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for study in PAPER_STUDIES {
             let card = study.card();
-            let chosen = card.key == context.studies.chosen().card().key;
-            row_ui(ui, context, &card, chosen, actions);
+            let chosen = card.key == studies.chosen().card().key;
+            row_ui(ui, studies, &card, chosen, actions);
             if chosen {
-                ui.indent(card.key, |ui| chosen_ui(ui, context, &card, actions));
+                ui.indent(card.key, |ui| chosen_ui(ui, studies, &card, actions));
             }
         }
         ui.add_space(6.0);
@@ -41,10 +41,10 @@ fn run(key: &str, size: StudySize, anew: bool, actions: &mut Actions) {
     actions.push(|app| app.run_study(request));
 }
 
-fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, chosen: bool, actions: &mut Actions) {
-    let colours = context.view.theme.colours();
+fn row_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, chosen: bool, actions: &mut Actions) {
+    let colours = theme::of(ui).colours();
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    let (state, ink) = state(context, card.key);
+    let (state, ink) = state(studies, card.key, &colours);
     let label = format!("{}, {}: {state}", card.title, card.paper);
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, &label));
     if chosen || response.hovered() || response.has_focus() {
@@ -73,25 +73,24 @@ fn row_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, chosen: boo
 }
 
 /// Progress of a study, while it runs.
-fn progress(context: &PanelContext<'_>, key: &str) -> Option<JobProgress> {
-    let JobProgress { share, words } = context.studies.running().filter(|running| running.command.key == key)?.progress;
+fn progress(studies: &Studies, key: &str) -> Option<JobProgress> {
+    let JobProgress { share, words } = studies.running().filter(|running| running.command.key == key)?.progress;
     let words = if words.is_empty() { "begins ..".to_owned() } else { words };
     Some(JobProgress { share, words })
 }
 
 /// State of a study in a few words.
-fn state(context: &PanelContext<'_>, key: &str) -> (String, Rgb) {
-    let colours = context.view.theme.colours();
-    if let Some(progress) = progress(context, key) {
+fn state(studies: &Studies, key: &str, colours: &ThemeColours) -> (String, Rgb) {
+    if let Some(progress) = progress(studies, key) {
         return (progress.words, colours.accent);
     }
-    if context.studies.waits(key) {
+    if studies.waits(key) {
         return ("queued".to_owned(), colours.accent);
     }
-    if context.studies.failed(key).is_some() {
+    if studies.failed(key).is_some() {
         return ("failed".to_owned(), colours.error);
     }
-    let Some(StudyFiles { results, begun, .. }) = context.studies.files(key) else {
+    let Some(StudyFiles { results, begun, .. }) = studies.files(key) else {
         return ("..".to_owned(), colours.quiet_text);
     };
     let stopped = if begun.is_empty() { "" } else { ", another stopped" };
@@ -109,7 +108,7 @@ fn state(context: &PanelContext<'_>, key: &str) -> (String, Rgb) {
 }
 
 /// Purpose and cost of the chosen study, and its buttons.
-fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions: &mut Actions) {
+fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Actions) {
     let key = card.key;
     wrapped(ui, RichText::new(format!("{}.", card.about)));
     let cost = format!(
@@ -117,33 +116,33 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions:
         card.budget
     );
     wrapped(ui, RichText::new(cost).small().weak());
-    let running = progress(context, key);
+    let running = progress(studies, key);
     if let Some(JobProgress { share, words }) = &running {
         ui.add(ProgressBar::new(*share as f32).text(RichText::new(words).small()));
     }
     ui.horizontal_wrapped(|ui| {
-        if running.is_some() || context.studies.waits(key) {
+        if running.is_some() || studies.waits(key) {
             let stop = ui
                 .button("Stop study")
                 .on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
             actions.on(&stop, |app| app.studies.stop());
             return;
         }
-        let begun = |size: StudySize| context.studies.files(key).is_some_and(|files| files.begun.contains(&size));
+        let begun = |size: StudySize| studies.files(key).is_some_and(|files| files.begun.contains(&size));
         for (size, title, shortcut) in
             [(StudySize::Quick, "Run quick", "Enter"), (StudySize::Full, "Run in full", "Shift+Enter")]
         {
             let text = if begun(size) { title.replace("Run", "Resume") } else { title.to_owned() };
             let mut button = Button::new(text);
             if size == StudySize::Quick {
-                button = button.fill(accented(context.view.theme));
+                button = button.fill(accented(theme::of(ui)));
             }
             if ui.add(button).on_hover_text(shortcut).clicked() {
                 run(key, size, false, actions);
             }
         }
     });
-    if let Some((size, cause)) = context.studies.failed(key).filter(|_| running.is_none()) {
+    if let Some((size, cause)) = studies.failed(key).filter(|_| running.is_none()) {
         failure_ui(ui, cause);
         if has_other_units(cause)
             && ui.button("Begin anew").on_hover_text("Forget the finished parts and run the study again").clicked()
@@ -151,16 +150,16 @@ fn chosen_ui(ui: &mut Ui, context: &PanelContext<'_>, card: &StudyCard, actions:
             run(key, *size, true, actions);
         }
     }
-    for cause in context.studies.files(key).into_iter().flat_map(|files| &files.unreadable) {
+    for cause in studies.files(key).into_iter().flat_map(|files| &files.unreadable) {
         failure_ui(ui, cause);
     }
-    ui.collapsing("In the terminal", |ui| command_ui(ui, "this study", &command(context, card)));
+    ui.collapsing("In the terminal", |ui| command_ui(ui, "this study", &command(studies, card)));
     ui.add_space(4.0);
 }
 
 /// Command that runs the study in the same files.
-fn command(context: &PanelContext<'_>, card: &StudyCard) -> String {
-    let store = context.studies.store();
+fn command(studies: &Studies, card: &StudyCard) -> String {
+    let store = studies.store();
     let folder = StudySize::Quick.folder(store);
     let own = if store == Store::default_path() { String::new() } else { format!(" --store \"{}\"", store.display()) };
     format!("palpate study {} --quick{own} --out \"{}\"", card.key, folder.path().display())

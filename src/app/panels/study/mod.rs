@@ -8,7 +8,7 @@ mod plot;
 pub(super) mod tables;
 
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
+use crate::app::features::studies::Studies;
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{RichText, Ui};
 use palpate_lab::study::paper::{Cell, StudyRow, StudyTable};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// Result of the chosen study. Without one the panel says what to do.
 fn result_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
+    studies: &Studies,
     panel: &str,
     what: &str,
     actions: &mut Actions,
@@ -27,11 +27,11 @@ fn result_ui(
     if just_opened(ui, panel) {
         actions.push(|app| app.studies.look());
     }
-    let result = context.studies.result();
+    let result = studies.result();
     if result.is_none() {
-        let card = context.studies.chosen().card();
-        let text = match context.studies.running() {
-            _ if context.studies.files(card.key).is_none() => "Reading the results ..".to_owned(),
+        let card = studies.chosen().card();
+        let text = match studies.running() {
+            _ if studies.files(card.key).is_none() => "Reading the results ..".to_owned(),
             Some(running) if running.command.key == card.key => {
                 format!("{}: its {what} appear here when the run is over.", card.title)
             }

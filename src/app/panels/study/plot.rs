@@ -2,9 +2,8 @@
 
 use super::{about_row_ui, opening};
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
 use crate::app::figure_plot::{self, ShownPlot};
-use crate::app::theme::colour;
+use crate::app::theme::{self, colour};
 use egui::{Rect, RichText, Stroke, StrokeKind, Tooltip, Ui, Vec2};
 use palpate_geometry::drawing::Plot;
 use palpate_lab::study::paper::{FigureLink, FigureMark, LinkedFigure};
@@ -20,7 +19,6 @@ const HEIGHTS: [f32; 2] = [190.0, 380.0];
 
 pub(super) fn plot_ui(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
     result: &StudyResult,
     (linked, number): (&LinkedFigure, usize),
     room: f32,
@@ -38,7 +36,7 @@ pub(super) fn plot_ui(
         (0.7 * ui.available_width()).clamp(least, most).max(room.min(1.2 * most))
     };
     let id = format!("{} {number}", linked.name);
-    let shown = figure_plot::show(ui, context.view.theme, (&id, plot), height, false, |_| false);
+    let shown = figure_plot::show(ui, theme::of(ui), (&id, plot), height, false, |_| false);
     let points: usize = plot.series.iter().map(|series| series.points.len()).sum();
     let text = match &plot.heat {
         Some(heat) => {
@@ -48,7 +46,7 @@ pub(super) fn plot_ui(
     };
     shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, &text));
     let links = linked.links.iter().filter(|link| link.plot == number);
-    pointed_ui(ui, context, result, (plot, &shown), links, actions);
+    pointed_ui(ui, result, (plot, &shown), links, actions);
 }
 
 /// Place of a mark on the screen, and its distance from the pointer.
@@ -69,7 +67,6 @@ fn place(plot: &Plot, shown: &ShownPlot, mark: FigureMark, pointer: egui::Pos2) 
 /// Marks what the pointer means and tells its row; a click opens its trials.
 fn pointed_ui<'a>(
     ui: &mut Ui,
-    context: &PanelContext<'_>,
     result: &StudyResult,
     (plot, shown): (&Plot, &ShownPlot),
     links: impl Iterator<Item = &'a FigureLink>,
@@ -81,7 +78,7 @@ fn pointed_ui<'a>(
     let Some((link, (rect, _))) = nearest else { return };
     let Some(table) = result.stored.result.tables.get(link.table) else { return };
     let Some(row) = table.rows.get(link.row) else { return };
-    let stroke = Stroke::new(2.0, colour(context.view.theme.colours().text));
+    let stroke = Stroke::new(2.0, colour(theme::of(ui).colours().text));
     let painter = ui.painter().with_clip_rect(shown.response.rect.intersect(ui.clip_rect()));
     match link.mark {
         FigureMark::Point(..) => painter.circle_stroke(rect.center(), 7.0, stroke),

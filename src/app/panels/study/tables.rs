@@ -2,8 +2,8 @@
 
 use super::{about_row_ui, opening, result_ui};
 use crate::app::actions::Actions;
-use crate::app::context::PanelContext;
-use crate::app::theme::colour;
+use crate::app::features::studies::Studies;
+use crate::app::theme::{self, colour};
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::study::paper::{Cell, StudyColumn, StudyRow, StudyTable};
@@ -18,10 +18,10 @@ const SIZE: f32 = 12.5;
 /// Rows whose texts decide the widths of columns.
 const MEASURED: usize = 300;
 
-pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, actions: &mut Actions) {
-    let Some(result) = result_ui(ui, context, "study-tables", "tables", actions) else { return };
+pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
+    let Some(result) = result_ui(ui, studies, "study-tables", "tables", actions) else { return };
     let tables = &result.stored.result.tables;
-    let id = egui::Id::unique(("study table", context.studies.chosen().card().key));
+    let id = egui::Id::unique(("study table", studies.chosen().card().key));
     let mut chosen = ui.data_mut(|data| data.get_temp::<usize>(id)).unwrap_or(0).min(tables.len().saturating_sub(1));
     let Some(first) = tables.get(chosen) else {
         ui.weak("This result has no table.");
@@ -40,7 +40,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, context: &PanelContext<'_>, action
     }
     let table = tables.get(chosen).unwrap_or(first);
     ui.add(egui::Label::new(RichText::new(&table.title).strong()).truncate());
-    table_ui(ui, context.view.theme, &result, table, actions);
+    table_ui(ui, theme::of(ui), &result, table, actions);
 }
 
 /// Columns, from their left ends to their right ones, and whether they hold numbers.
