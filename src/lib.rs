@@ -16,7 +16,7 @@
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5250 |
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25750 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
-//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 20750 |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 20100 |
 //! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 1450 |
 //!
 //! # One path for every grasp
@@ -103,7 +103,7 @@
 //! |---|---|
 //! | a built-in object | a function in `src/workshop/sixteen.rs`; `cargo run -p palpate-workshop -- objects` writes its folder |
 //! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in a layout of `src/app/modes/` |
-//! | a mode of the window | a file in `src/app/modes/` and its name in `src/app/modes/mode.rs` |
+//! | a mode of the window | a file in `src/app/modes/` and its name in `src/app/features/view.rs` |
 //! | an action of the window | a method in `src/app/features/`; with a name, a line in `src/app/keys/common.rs` or in its mode |
 //! | a feature of the window | a file in `src/app/features/`, and a field of its [`app::App`] |
 //! | a command | a file in `src/cli/` and a line in its `Command` |

@@ -2,13 +2,11 @@
 
 use palpate_geometry::drawing::{DrawList, Figure};
 use palpate_geometry::palette::Theme;
-use palpate_lab::exchange::{ExchangeError, write_trials};
+use palpate_lab::exchange::write_trials;
 use palpate_lab::inspection::OpenOptions;
-use palpate_lab::workers::{Job, Newer, Wake};
-use palpate_render::{
-    DriverChoice, FigureError, Gpu, GpuError, Picture, PictureError, Renderer, figure_picture, figure_svg,
-};
-use palpate_store::{FileKind, Store, StoreError, write_whole};
+use palpate_lab::workers::{Job, JobError, Newer, Wake};
+use palpate_render::{DriverChoice, Gpu, Picture, Renderer, figure_picture, figure_svg};
+use palpate_store::{FileKind, Store, write_whole};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,60 +22,24 @@ pub enum ExportRequest {
     Trials(PathBuf, Vec<TrialId>, OpenOptions),
 }
 
-/// Reason why nothing was written.
-#[derive(Debug, thiserror::Error)]
-pub enum FileExportError {
-    /// No format has this extension.
-    #[error("cannot write \"{path}\": choose {known}", path = path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-        /// Formats of what is exported.
-        known: &'static str,
-    },
-    /// The file cannot be written.
-    #[error("cannot write \"{path}\": {cause}", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Message of the system.
-        cause: String,
-    },
-    /// The figure cannot be drawn.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    /// The picture cannot be drawn.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// There is no graphics driver.
-    #[error(transparent)]
-    Driver(#[from] GpuError),
-    /// The store cannot be opened.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The trials cannot be written.
-    #[error(transparent)]
-    Trials(#[from] ExchangeError),
-}
-
 impl ExportRequest {
     /// Writes it; the file appears whole or not at all. `stop` ends an export of trials.
-    pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<(), FileExportError> {
+    pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<(), JobError> {
         let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
         let is = |wanted: FileKind| kind == Some(wanted);
-        let unknown = |known: &'static str| FileExportError::UnknownFormat { path: path.to_owned(), known };
+        let unknown = |known: &str| Err(format!("cannot write \"{}\": choose {known}", path.display()).into());
         let bytes = match self {
             Self::Figure(figure, theme, size) if is(FileKind::Svg) => figure_svg(figure, *theme, *size)?.into_bytes(),
             Self::Figure(figure, theme, size) if is(FileKind::Png) => {
                 figure_picture(figure, *theme, *size)?.to_png()?
             }
-            Self::Figure(..) => return Err(unknown("an .svg or a .png file")),
+            Self::Figure(..) => return unknown("an .svg or a .png file"),
             Self::View3d(list, size) if is(FileKind::Png) => {
                 let gpu = Gpu::headless(DriverChoice::Any)?;
                 let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
                 Picture::draw(&gpu, &mut renderer, list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
-            Self::View3d(..) => return Err(unknown("a .png file")),
+            Self::View3d(..) => return unknown("a .png file"),
             Self::Trials(store, ids, options) => {
                 let store = Store::open(store)?;
                 write_trials(&store, ids, options, path, &mut |_, _| !stop.load(Ordering::Relaxed))?;
@@ -85,7 +47,7 @@ impl ExportRequest {
             }
         };
         write_whole(path, kind.unwrap_or(FileKind::Png), &bytes)
-            .map_err(|e| FileExportError::Write { path: path.to_owned(), cause: e.to_string() })
+            .map_err(|cause| format!("cannot write \"{}\": {cause}", path.display()).into())
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::theme::{colour, veil};
+use crate::app::widgets::{capital, choice_ui};
 use egui::{
     Align2, Color32, ColorImage, FontId, Pos2, Rect, Response, Sense, Stroke, TextureFilter, TextureHandle,
     TextureOptions, Ui, WidgetInfo, pos2, vec2,
@@ -277,18 +278,11 @@ fn phase_names(
     }
 }
 
-/// A text with a capital at its beginning.
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
 /// Switch between kPa and N.
 pub(super) fn load_switch(ui: &mut Ui, unit: LoadUnit, actions: &mut Actions) {
     ui.spacing_mut().item_spacing.x = 4.0;
-    for (choice, about) in [(LoadUnit::Pressure, "Loads as pressure"), (LoadUnit::Force, "Loads as force")] {
-        actions.on(&ui.selectable_label(unit == choice, choice.symbol()).on_hover_text(about), move |app| {
-            app.view.load_unit = choice
-        });
+    let abouts = [(LoadUnit::Pressure, "Loads as pressure"), (LoadUnit::Force, "Loads as force")];
+    if let Some(unit) = choice_ui(ui, Some(unit), abouts.map(|(unit, about)| (unit, unit.symbol(), about))) {
+        actions.push(move |app| app.view.load_unit = unit);
     }
 }

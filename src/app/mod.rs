@@ -10,15 +10,14 @@
 //!
 //! | layer | files | content |
 //! |---|---|---|
-//! | base | `theme.rs` `icons.rs` `viewport.rs` `frame_rate.rs` `startup.rs` `traces.rs` `playback.rs` `derived.rs` `modes/mode.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
-//! | messages | `notices.rs` | messages to the user |
-//! | source | `view_source.rs` `files.rs` | source shown, questions of the file dialog |
+//! | base | `theme.rs` `icons.rs` `viewport.rs` `frame_rate.rs` `startup.rs` `traces.rs` `playback.rs` `export.rs` `thumbnails.rs` | look, graphics, time shown |
 //! | view | `features/view.rs` `features/tools.rs` | view state; doctor, fit and training |
 //! | shown | `shown.rs` | simulated, real or stored data at the time shown |
 //! | features | `features/` | state of the window, and what can be done with it |
 //! | actions | `actions.rs` | functions of the state, some with a name and a key |
-//! | parts | `widgets.rs` `plots/` `figure_plot.rs` `heat_map.rs` | building blocks of panels |
-//! | curves | `channel_curves.rs` `shown_grasp.rs` | curves of channels, heat maps of a grasp |
+//! | widgets | `widgets.rs` | widgets that several parts share |
+//! | parts | `plots/` `figure_plot.rs` `heat_map.rs` | building blocks of panels |
+//! | maps | `shown_grasp.rs` | heat maps of a grasp |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | modes | `modes/` | layout and keys of each mode |
 //! | panels | `panels/` `bars/` | one file per panel |
@@ -31,25 +30,21 @@
 //! | to add | write | and register in |
 //! |---|---|---|
 //! | a panel | a file in `panels/` | `panels/mod.rs`, and the layout of a mode |
-//! | a mode | its name in `modes/mode.rs`, its layout and keys in a file of `modes/` | `modes/mod.rs` |
+//! | a mode | its name in `features/view.rs`, its layout and keys in a file of `modes/` | `modes/mod.rs` |
 //! | an action | a method of `App` or of a feature, in `features/` | with a key: `keys/common.rs` or the mode |
 //! | a feature | its state and methods in a file of `features/` | `features/mod.rs`, `workbench.rs` |
 
 mod actions;
 mod bars;
-mod channel_curves;
 mod contact_path;
-mod derived;
 mod export;
 mod features;
 mod figure_plot;
-mod files;
 mod frame_rate;
 mod heat_map;
 mod icons;
 mod keys;
 mod modes;
-mod notices;
 mod offscreen;
 mod palette;
 mod panels;
@@ -65,26 +60,22 @@ mod theme;
 mod thumbnails;
 mod tiling;
 mod traces;
-mod view_source;
 mod viewport;
 mod widgets;
 mod workbench;
 
 pub use actions::Actions;
-pub use derived::Derivation;
-pub use export::{ExportRequest, FileExportError};
+pub use export::ExportRequest;
 pub use features::App;
 pub use features::library::{LibrarySelection, Reach};
 pub use features::studies::Studies;
 pub use features::tools::{GripperTools, GripperToolsSetup};
-pub use features::view::{PathLayer, ViewState};
-pub use modes::mode::Mode;
+pub use features::view::{Derivation, Mode, PathLayer, ViewSource, ViewState};
 pub use offscreen::{FrameCosts, OffscreenError, OffscreenWindow, film_presentation, frame_costs, window_picture};
 pub use panels::{ALL as ALL_PANELS, PanelKind};
 pub use playback::Seek;
 pub use shown::{ComparedTrace, Inspected, Pinned};
 pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
-pub use view_source::ViewSource;
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 

@@ -1,8 +1,7 @@
 //! The whole window as a picture, without a display: the same workbench, drawn into a texture.
 
 use crate::app::features::App;
-use crate::app::features::view::ViewState;
-use crate::app::modes::mode::Mode;
+use crate::app::features::view::{Mode, ViewState};
 use crate::app::playback::Seek;
 use crate::app::startup::ThreadError;
 use crate::app::viewport::wgpu_options;

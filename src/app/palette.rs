@@ -2,16 +2,14 @@
 
 use crate::app::actions::{Act, Actions};
 use crate::app::features::App;
-use crate::app::features::view::SCALES;
-use crate::app::heat_map::capital;
+use crate::app::features::view::{SCALES, ViewSource};
 use crate::app::keys;
 use crate::app::modes;
 use crate::app::panels;
 use crate::app::playback::SPEEDS;
 use crate::app::theme::colour;
-use crate::app::view_source::ViewSource;
-use crate::app::widgets::text_field;
-use egui::{Align2, FontId, Key, ScrollArea, Sense, Ui, vec2};
+use crate::app::widgets::{capital, selectable_row, text_field};
+use egui::{Align2, FontId, Key, ScrollArea, Ui, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
 use palpate_sim::objects::{EMPTY, catalogue};
@@ -103,13 +101,8 @@ pub(super) fn ui(app: &App, actions: &mut Actions) {
 
 fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Response {
     let colours = theme.colours();
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let Entry { group, title, key, .. } = entry;
-    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("{group}: {title}")));
-    if chosen || response.hovered() {
-        let share = if chosen { 0.30 } else { 0.10 };
-        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
-    }
+    let (rect, response) = selectable_row(ui, ROW, chosen, format!("{group}: {title}"));
     let [quiet, ink] = [colours.quiet_text, colours.text].map(colour);
     let small = FontId::proportional(11.5);
     let painter = ui.painter_at(rect.shrink2(vec2(6.0, 0.0)));

@@ -1,13 +1,13 @@
 //! File dialog, inside the window: a path, and the files of its folder. It needs nothing of the desktop.
 
-use crate::app::files::{Answer, Question, Wording};
+use crate::app::features::files::Question;
 use crate::app::widgets::{failure_ui, text_field, wrapped};
 use egui::{Button, Id, Key, Modal, RichText, ScrollArea, Ui};
 use std::path::{Path, PathBuf, is_separator};
 
 /// An open dialog.
 pub(super) struct PathDialog {
-    question: Question,
+    pub(super) question: Question,
     path: String,
     /// Why the path cannot be used.
     refused: Option<String>,
@@ -28,7 +28,7 @@ struct Row {
 /// End of a dialog.
 pub(super) enum Closed {
     Cancelled,
-    Answered(Answer),
+    Answered(PathBuf),
 }
 
 /// Most entries of a folder that are listed.
@@ -37,20 +37,18 @@ const MOST_ROWS: usize = 2000;
 impl PathDialog {
     /// A dialog that begins in `folder`.
     pub(super) fn new(question: Question, folder: &Path) -> Self {
-        let name = question.wording().name.unwrap_or_default();
-        let path = folder.join(name).to_string_lossy().into_owned();
+        let path = folder.join(question.name.as_deref().unwrap_or_default()).to_string_lossy().into_owned();
         Self { question, path, refused: None, replaced: None, listing: None, fresh: true }
     }
 
     /// Draws the dialog; returns its end.
     pub(super) fn ui(&mut self, ctx: &egui::Context) -> Option<Closed> {
-        let wording = self.question.wording();
-        let saves = wording.name.is_some();
+        let (title, saves) = (self.question.title, self.question.name.is_some());
         let mut closed = None;
         let modal = Modal::new(egui::Id::unique("path dialog")).show(ctx, |ui| {
             let room = ui.ctx().content_rect().size();
             ui.set_width((room.x - 60.0).min(560.0));
-            ui.heading(wording.title);
+            ui.heading(title);
             wrapped(ui, RichText::new("Write or paste a path, or choose from its folder.").small().weak());
             let field = text_field(&mut self.path, Id::unique("path of a file")).hint_text("path of a file");
             let response = ui.add(field);
@@ -62,7 +60,7 @@ impl PathDialog {
                 (self.refused, self.replaced) = (None, None);
             }
             let mut done = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-            done |= self.list_ui(ui, &wording, (room.y - 260.0).clamp(60.0, 300.0));
+            done |= self.list_ui(ui, (room.y - 260.0).clamp(60.0, 300.0));
             if let Some(refused) = &self.refused {
                 failure_ui(ui, refused);
             }
@@ -79,7 +77,7 @@ impl PathDialog {
             });
             if done {
                 match self.check(saves) {
-                    Ok(Some(path)) => closed = Some(Closed::Answered(self.question.clone().answer(path))),
+                    Ok(Some(path)) => closed = Some(Closed::Answered(path)),
                     Ok(None) => {}
                     Err(refused) => self.refused = Some(refused),
                 }
@@ -90,14 +88,14 @@ impl PathDialog {
     }
 
     /// Lists the folder of the path; true where a file was chosen twice.
-    fn list_ui(&mut self, ui: &mut Ui, wording: &Wording, height: f32) -> bool {
+    fn list_ui(&mut self, ui: &mut Ui, height: f32) -> bool {
         let (folder, begun) = split(&self.path);
         if self.listing.as_ref().is_none_or(|(listed, _)| *listed != folder) {
-            self.listing = Some((folder.clone(), rows(&folder, wording.extensions)));
+            self.listing = Some((folder.clone(), rows(&folder, self.question.extensions)));
         }
         let Some((_, all)) = &self.listing else { return false };
         // A name that is being typed narrows the list of files to read.
-        let narrows = wording.name.is_none() && !begun.is_empty() && !all.iter().any(|row| row.name == begun);
+        let narrows = self.question.name.is_none() && !begun.is_empty() && !all.iter().any(|row| row.name == begun);
         let begun = begun.to_lowercase();
         let fits = |row: &&Row| !narrows || row.name.to_lowercase().starts_with(&begun);
         let listed: Vec<Row> = all.iter().filter(fits).cloned().collect();
@@ -122,7 +120,8 @@ impl PathDialog {
             }
         });
         if let Some(path) = chosen {
-            let name = wording.name.as_deref().filter(|_| path.as_os_str().to_string_lossy().ends_with(is_separator));
+            let name =
+                self.question.name.as_deref().filter(|_| path.as_os_str().to_string_lossy().ends_with(is_separator));
             self.path = path.join(name.unwrap_or_default()).to_string_lossy().into_owned();
             (self.refused, self.replaced, self.fresh) = (None, None, true);
             if name.is_none() && !path.is_dir() {
@@ -197,18 +196,11 @@ fn rows(folder: &Path, extensions: &[&str]) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::export::ExportRequest;
-    use palpate_geometry::drawing::Figure;
-    use palpate_geometry::palette::Theme;
-
-    fn picture() -> Question {
-        Question::Export(Box::new(ExportRequest::Figure(Figure::default(), Theme::Light, [1, 1])))
-    }
-
+    use crate::app::features::files::tests::question;
     #[test]
     fn a_path_is_checked_before_it_is_used() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut dialog = PathDialog::new(picture(), folder.path());
+        let mut dialog = PathDialog::new(question(Some("palpate.svg")), folder.path());
         let own = folder.path().join("palpate.svg");
         assert_eq!(dialog.check(true), Ok(Some(own.clone())));
         // An existing file is replaced only after a second look.

@@ -1,10 +1,9 @@
 //! Source of the data that plots, 3-D view and recognition show: the simulated gripper, the real one, or a stored trial;
 //! and the time of them that is shown.
 
-use crate::app::features::view::ViewState;
+use crate::app::features::view::{ViewSource, ViewState};
 use crate::app::playback::Playback;
 use crate::app::traces::{GraspTrace, TraceHistory};
-use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::{IdentificationView, LEAD_S};
 use palpate_lab::inspection::{Alignment, OpenTrial, PhaseSpan, TouchPhase, phases_of_frames};
 use palpate_lab::picture::Stage;

@@ -1,9 +1,9 @@
 //! Pads and fingers of the grasp that is shown, live or stored, as heat maps: at the time shown, and over all its time.
 
+use crate::app::features::view::ViewSource;
 use crate::app::heat_map::{MapsKey, ShownMaps, shown_maps};
 use crate::app::shown::DisplayedData;
 use crate::app::traces::GraspTrace;
-use crate::app::view_source::ViewSource;
 use egui::Ui;
 use palpate_geometry::units::three_digits;
 use palpate_lab::inspection::PhaseSpan;

@@ -5,18 +5,61 @@ use crate::app::features::App;
 use crate::app::theme::{self, colour};
 use egui::text_edit::TextEditState;
 use egui::{
-    AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Stroke, TextEdit, Ui, UiBuilder,
-    Widget, pos2,
+    AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense, Stroke, TextEdit, Ui,
+    UiBuilder, Widget, WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::Trace;
-use palpate_lab::workers::{GripperCommand, Job, JobProgress};
+use palpate_lab::workers::{GripperCommand, Job, JobFailure};
 use palpate_store::labels::Sparkline;
 use std::fmt::Display;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Text that wraps.
 pub(super) fn wrapped(ui: &mut Ui, text: RichText) {
     ui.add(Label::new(text).wrap());
+}
+
+/// Remark that wraps.
+pub(super) fn remark_ui(ui: &mut Ui, text: impl Into<String>) {
+    wrapped(ui, RichText::new(text).weak());
+}
+
+/// Warning that wraps.
+pub(super) fn warning_ui(ui: &mut Ui, text: impl Into<String>) {
+    wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+}
+
+/// A text with a capital at its beginning.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Row that can be chosen, with its name for screen readers.
+pub(super) fn selectable_row(ui: &mut Ui, height: f32, chosen: bool, name: impl ToString) -> (Rect, Response) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, chosen, name.to_string()));
+    if chosen || response.hovered() || response.has_focus() {
+        let (colours, share) = (theme::of(ui).colours(), if chosen { 0.30 } else { 0.10 });
+        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
+    }
+    (rect, response)
+}
+
+/// Choices beside each other, each with a hint; the one that was clicked.
+pub(super) fn choice_ui<T: PartialEq + Copy>(
+    ui: &mut Ui,
+    now: Option<T>,
+    choices: impl IntoIterator<Item = (T, &'static str, &'static str)>,
+) -> Option<T> {
+    let mut clicked = None;
+    for (choice, name, hint) in choices {
+        if ui.selectable_label(now == Some(choice), name).on_hover_text(hint).clicked() {
+            clicked = Some(choice);
+        }
+    }
+    clicked
 }
 
 /// Why something failed, in red.
@@ -24,41 +67,28 @@ pub(super) fn failure_ui(ui: &mut Ui, cause: impl Display) {
     wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color));
 }
 
-/// Progress of a job, a remark below it, and a button that stops it; true once that is clicked. `hint` says what stopping
-/// does.
-pub(super) fn progress_ui(ui: &mut Ui, progress: &JobProgress, remark: Option<&str>, hint: &str) -> bool {
-    ui.add(ProgressBar::new(progress.share as f32).text(&progress.words));
-    if let Some(remark) = remark {
-        wrapped(ui, RichText::new(remark).strong());
-    }
-    ui.button("Stop").on_hover_text(hint).clicked()
-}
-
-/// A job in a panel: its controls or, while it runs, its progress and a button that stops it by an action; below, its last
-/// result or failure.
+/// A job in a panel: its controls or, while it runs, its progress, a remark, and a button that stops it, with a hint that says
+/// what that does. Returns its last outcome, to be shown below.
 pub(super) fn job_ui<C, O>(
     ui: &mut Ui,
     job: &Job<C, O>,
-    (hint, stop): (&str, fn(&mut App)),
+    (remark, hint, stop): (Option<&str>, &str, fn(&mut App)),
     actions: &mut Actions,
     controls: impl FnOnce(&mut Ui, &mut Actions),
-    result: impl FnOnce(&mut Ui, &O, &mut Actions),
-) {
+) -> Option<Result<Arc<O>, JobFailure>> {
     // Read first: a job that ends meanwhile shows its outcome in the next frame, not beside its progress.
     let last = job.last();
-    match job.running() {
-        Some(running) => {
-            if progress_ui(ui, &running.progress, None, hint) {
-                actions.push(stop);
+    match job.running().map(|running| running.progress) {
+        Some(progress) => {
+            ui.add(ProgressBar::new(progress.share as f32).text(progress.words));
+            if let Some(remark) = remark {
+                wrapped(ui, RichText::new(remark).strong());
             }
+            actions.on(&ui.button("Stop").on_hover_text(hint), stop);
         }
         None => controls(ui, actions),
     }
-    match last.map(|ended| ended.outcome) {
-        Some(Ok(outcome)) => result(ui, &outcome, actions),
-        Some(Err(cause)) => failure_ui(ui, cause),
-        None => {}
-    }
+    last.map(|ended| ended.outcome)
 }
 
 /// Field for a line of text, as wide as there is room. Its id is fixed: it keeps the keyboard while widgets above it come
@@ -88,7 +118,7 @@ pub(super) fn command_ui(ui: &mut Ui, purpose: &str, command: &str) {
         ui.add(Label::new(RichText::new(command).monospace()).wrap());
         let copy = ui.add(Button::new("Copy"));
         let label = format!("Copy the command for {purpose}");
-        copy.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+        copy.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
         if copy.on_hover_text("Copy it for a terminal").clicked() {
             ui.copy_text(command.to_owned());
         }
@@ -128,7 +158,7 @@ pub(super) fn stop_button(ui: &mut Ui, actions: &mut Actions) {
     let text = RichText::new("STOP  Esc").strong().color(colour(colours.background));
     let button = Button::new(text).fill(colour(colours.error));
     let response = ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers and end the trial (Esc)");
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Stop and vent"));
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Stop and vent"));
     actions.on(&response, |app| _ = app.gripper.send(GripperCommand::Vent));
 }
 

@@ -8,6 +8,7 @@ use crate::app::features::gripper::GripperFeature;
 use crate::app::features::inspect::InspectFeature;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::LibraryFeature;
+use crate::app::features::notices::Notices;
 use crate::app::features::presenter::PresenterFeature;
 use crate::app::features::recognition::RecognitionFeature;
 use crate::app::features::simulation::SimulationFeature;
@@ -17,7 +18,6 @@ use crate::app::features::view::ViewState;
 use crate::app::frame_rate::FrameRate;
 use crate::app::keys;
 use crate::app::modes;
-use crate::app::notices::{Notices, Remedy};
 use crate::app::palette;
 use crate::app::panels::PanelKind;
 use crate::app::path_dialog::{Closed, PathDialog};
@@ -33,8 +33,8 @@ use egui_tiles::Tile;
 use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::workers::{
-    Explain, Explainer, GripperSetup, GripperWorker, LabelCommand, LabelWorker, LibraryWorker, MeasuredAccuracy,
-    SimWorker, SimWorkerSetup, Snapshot, Wake, effects_job, examine_port, explain_scene, fit_trials, open_trial_job,
+    Explain, Explainer, GripperSetup, GripperWorker, LabelWorker, LibraryWorker, MeasuredAccuracy, SimWorker,
+    SimWorkerSetup, Snapshot, Wake, effects_job, examine_port, explain_scene, fit_trials, open_trial_job,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
@@ -239,7 +239,7 @@ impl Workbench {
             return self.present(ui);
         }
         if let Some(remedy) = self.app.notices.line(ui, self.app.view.theme) {
-            self.act(|app| carry_out(app, remedy));
+            self.act(remedy);
         }
         let mut actions = Actions::default();
         // The layout changes while it is drawn, so it is taken out for that time.
@@ -258,7 +258,7 @@ impl Workbench {
                 layout.make_active(|id, _| id == chosen);
             }
         });
-        keys::sheet(&ctx, app.view.keys_shown, mode, &mut actions);
+        keys::sheet(app, mode, &mut actions);
         palette::ui(app, &mut actions);
         drop_hint(&ctx);
         self.app.view.layouts.insert(mode, layout);
@@ -271,7 +271,7 @@ impl Workbench {
         let message = self.app.notices.current(ui.ctx()).map(str::to_owned);
         let mut actions = Actions::default();
         keys::pressed(&self.app, &mut actions);
-        presenter::ui(ui, &self.app, self.app.presenter.score(), message.as_deref());
+        presenter::ui(ui, &self.app, message.as_deref());
         self.run(actions);
     }
 
@@ -289,15 +289,14 @@ impl Workbench {
 
     /// Draws the file dialog, while there is one.
     fn ask_for_file(&mut self) {
-        let files = &mut self.app.files;
-        if let Some(question) = files.take_question() {
-            self.path_dialog = Some(PathDialog::new(question, &files.folder()));
+        if let Some(question) = self.app.files.question.take() {
+            self.path_dialog = Some(PathDialog::new(question, &self.app.files.folder()));
         }
         let closed = self.path_dialog.as_mut().and_then(|dialog| dialog.ui(&self.app.ctx));
         if let Some(closed) = closed {
-            self.path_dialog = None;
-            if let Closed::Answered(answer) = closed {
-                self.app.files.answer(answer);
+            let question = self.path_dialog.take().map(|dialog| dialog.question);
+            if let (Closed::Answered(path), Some(question)) = (closed, question) {
+                self.app.answer(question, path);
             }
             self.app.ctx.request_repaint();
         }
@@ -314,17 +313,5 @@ impl Workbench {
                 return;
             }
         }
-    }
-}
-
-/// Carries out a remedy.
-fn carry_out(app: &mut App, remedy: Remedy) {
-    match remedy {
-        Remedy::UseHull => app.use_hull(),
-        Remedy::TreatAsMillimetres => app.set_object_scale(1e-3),
-        Remedy::TreatAsMetres => app.set_object_scale(1.0),
-        Remedy::LocateFile => app.ask_for_object(),
-        Remedy::Calibrate => app.show_panel("calibration"),
-        Remedy::UndoLabel => app.edit_labels(LabelCommand::Undo),
     }
 }

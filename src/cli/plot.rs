@@ -94,6 +94,7 @@ pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(),
         (420 * columns.max(2)).min(1260) as u32,
         (330 * rows + 40 + 15 * figure.note.lines().count()).min(2048) as u32,
     ]);
-    ExportRequest::Figure(figure, arguments.theme, size).write(out, &AtomicBool::new(false))?;
+    let request = ExportRequest::Figure(figure, arguments.theme, size);
+    request.write(out, &AtomicBool::new(false)).map_err(|cause| -> Failure { cause })?;
     say(out.display())
 }

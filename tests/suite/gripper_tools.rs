@@ -438,6 +438,8 @@ fn a_finger_is_fitted_and_used_without_the_mouse() {
                 }
                 std::thread::sleep(Duration::from_millis(2));
             }
+            // Not within the frames of the key, so that the picture is always that of the first frame with the outcome.
+            std::thread::sleep(Duration::from_millis(300));
             Ok(made_up_fit(trials))
         });
         let setup = BenchSetup { size: [320.0, 860.0], fit, fill: recorded, ..BenchSetup::default() };

@@ -1,19 +1,18 @@
 //! Bar above the panels (modes and data source) and below (time, or the running trial).
 
-mod gripper;
 mod timeline;
 mod trial;
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
+use crate::app::features::gripper::control_title;
 use crate::app::features::simulation::LoggedGrasp;
+use crate::app::features::view::{Mode, ViewSource};
 use crate::app::icons::{self, Icon};
 use crate::app::modes;
-use crate::app::modes::mode::Mode;
 use crate::app::playback::{SPEEDS, Seek};
 use crate::app::theme::{accented, colour, veil};
-use crate::app::view_source::ViewSource;
-use crate::app::widgets::{number_field, stop_button};
+use crate::app::widgets::{choice_ui, number_field, stop_button};
 use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
 use palpate_geometry::palette::{Rgb, Theme};
@@ -44,7 +43,7 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
             }
             modes_ui(ui, app, actions);
             // Before what may be cut off.
-            gripper::ui(ui, app, actions);
+            gripper_ui(ui, app, actions);
             sources_ui(ui, app, actions);
             if app.view.source == ViewSource::Simulation {
                 simulated_ui(ui, app);
@@ -156,6 +155,44 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         && icons::button(ui, Icon::Cross, "Close the trial", "Close the trial and show the live gripper").clicked()
     {
         actions.push(App::close_trial);
+    }
+}
+
+/// State of the real gripper, in every mode: who actuates it, and whether trials begin automatically.
+fn gripper_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let Some(gripper) = app.gripper_view().filter(|gripper| gripper.is_connected()) else { return };
+    let colours = app.view.theme.colours();
+    let watching = gripper.watching.is_some();
+    let narrow = ui.available_width() < 640.0;
+    let trials = match (watching, narrow) {
+        (true, true) => "auto",
+        (true, false) => "trials: automatic",
+        (false, true) => "key R",
+        (false, false) => "trials: key R",
+    };
+    let ink = if watching { colours.warning } else { colours.quiet_text };
+    let about = match watching {
+        true => "Trials begin and end with the movement of the fingers. W in Label mode, or a click, ends that",
+        false => "Trials begin with R. W in Label mode, or a click, detects them automatically",
+    };
+    let text = RichText::new(trials).small().color(colour(ink));
+    actions.on(&ui.selectable_label(watching, text).on_hover_text(about), App::toggle_watch);
+    let text = RichText::new(drive_text(app, gripper, narrow)).small().color(colour(colours.text));
+    let about = "Who sets the pressure of the next trial: you by hand, or the board; untimed trials last until Q. \
+                 M in Label mode, or a click, changes it";
+    actions.on(&ui.selectable_label(false, text).on_hover_text(about), App::next_control);
+}
+
+/// Actuation, and line pressure where it is known.
+fn drive_text(app: &App, gripper: &GripperView, narrow: bool) -> String {
+    let running = gripper.trial.as_ref().map(|trial| trial.request.control);
+    let control = control_title(running.unwrap_or(app.view.control));
+    if narrow {
+        return control.to_owned();
+    }
+    match gripper.latest.as_ref().and_then(|latest| latest.line_bar) {
+        Some(bar) => format!("drive: {control}, {bar:.2} bar"),
+        None => format!("drive: {control}"),
     }
 }
 
@@ -290,14 +327,20 @@ fn recording(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
     if ui.available_width() > NAMED {
         ui.weak("Record into");
     }
-    for (place, name, hint) in [
-        (TrialPlace::DemoLog, "Demo log", "Keep the last 1000 grasps. They can be looked at, but are in no data set"),
-        (TrialPlace::Store, "Store", "Store every finished grasp as a trial, which data sets use"),
-    ] {
-        let chosen = status.recording == Some(place);
-        if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
-            actions.push(move |app| app.simulation.send(Command::SetRecording(Some(place))));
-        }
+    let chosen = choice_ui(
+        ui,
+        status.recording,
+        [
+            (
+                TrialPlace::DemoLog,
+                "Demo log",
+                "Keep the last 1000 grasps. They can be looked at, but are in no data set",
+            ),
+            (TrialPlace::Store, "Store", "Store every finished grasp as a trial, which data sets use"),
+        ],
+    );
+    if let Some(place) = chosen.filter(|place| status.recording != Some(*place)) {
+        actions.push(move |app| app.simulation.send(Command::SetRecording(Some(place))));
     }
     keep_ui(ui, app, actions);
     let mut grasps = status.grasps.max(1);

@@ -2,10 +2,10 @@
 //! simulated grasp alike.
 
 use crate::app::actions::Actions;
+use crate::app::features::view::ViewSource;
 use crate::app::playback::Seek;
 use crate::app::shown::{DisplayedData, Inspected};
 use crate::app::theme::{colour, veil};
-use crate::app::view_source::ViewSource;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
 use palpate_lab::inspection::PhaseSpan;

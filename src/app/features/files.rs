@@ -2,8 +2,6 @@
 
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
-use crate::app::files::{Answer, Question};
-use crate::app::notices::Notices;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{FigureOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
@@ -12,11 +10,28 @@ use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// File to ask for, and what is done with it.
+pub(in crate::app) struct Question {
+    pub(in crate::app) title: &'static str,
+    /// Extensions of the files.
+    pub(in crate::app) extensions: &'static [&'static str],
+    /// Name proposed for a file to write; none for one to read.
+    pub(in crate::app) name: Option<String>,
+    then: Box<dyn FnOnce(&mut App, PathBuf)>,
+}
+
+impl Question {
+    /// The path; a file to write gets an extension where it has none.
+    fn whole(&self, path: PathBuf) -> PathBuf {
+        let writes = self.name.is_some() && path.extension().is_none();
+        if writes { path.with_extension(self.extensions[0]) } else { path }
+    }
+}
+
 /// State of files in the window.
-pub struct FileFeature {
-    /// File to ask for.
-    question: Option<Question>,
-    answer: Option<Answer>,
+pub(in crate::app) struct FileFeature {
+    /// File that is to be asked for now.
+    pub(in crate::app) question: Option<Question>,
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
     exports: Job<(PathBuf, ExportRequest), ()>,
@@ -24,12 +39,7 @@ pub struct FileFeature {
 
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake) -> Self {
-        Self { question: None, answer: None, folder: None, exports: export_job(wake) }
-    }
-
-    /// File that is to be asked for now.
-    pub(in crate::app) fn take_question(&mut self) -> Option<Question> {
-        self.question.take()
+        Self { question: None, folder: None, exports: export_job(wake) }
     }
 
     /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
@@ -38,19 +48,25 @@ impl FileFeature {
         self.folder.clone().filter(|folder| folder.is_dir()).or_else(home).unwrap_or_default()
     }
 
-    /// Takes in the answer of the dialog.
-    pub(in crate::app) fn answer(&mut self, answer: Answer) {
-        self.answer = Some(answer);
-    }
-
-    /// Asks for a file.
-    pub(in crate::app) fn ask(&mut self, question: Question) {
-        self.question = Some(question);
+    fn ask(
+        &mut self,
+        title: &'static str,
+        extensions: &'static [&'static str],
+        name: Option<String>,
+        then: impl FnOnce(&mut App, PathBuf) + 'static,
+    ) {
+        self.question = Some(Question { title, extensions, name, then: Box::new(then) });
     }
 
     /// Asks where to write this.
     pub(in crate::app) fn export(&mut self, request: ExportRequest) {
-        self.ask(Question::Export(Box::new(request)));
+        let (title, extensions) = match request {
+            ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
+            ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
+            ExportRequest::Trials(..) => ("Export trials", &["mcap", "npz"][..]),
+        };
+        let name = Some(format!("palpate.{}", extensions[0]));
+        self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
     }
 }
 
@@ -58,18 +74,15 @@ impl FileFeature {
 const FIGURE_SIZE: [u32; 2] = [900, 560];
 
 impl App {
-    /// Takes in the answer of the dialog and dropped files since the last frame.
+    /// Takes in the answer of the dialog.
+    pub(in crate::app) fn answer(&mut self, question: Question, path: PathBuf) {
+        let path = question.whole(path);
+        self.files.folder = path.parent().map(Path::to_owned);
+        (question.then)(self, path);
+    }
+
+    /// Takes in dropped files and ended exports since the last frame.
     pub(super) fn poll_files(&mut self) {
-        if let Some(answer) = self.files.answer.take() {
-            let (Answer::Open(path) | Answer::SaveScene(path, _) | Answer::Export(path, _)) = &answer;
-            self.files.folder = path.parent().map(Path::to_owned);
-            match answer {
-                Answer::Open(path) => self.open(&path.to_string_lossy()),
-                Answer::SaveScene(path, scene) => save_scene(&path, &scene, &mut self.notices),
-                Answer::Export(path, request) => _ = self.files.exports.start((path, *request)),
-            }
-            self.ctx.request_repaint();
-        }
         for ended in self.files.exports.take() {
             match ended.outcome {
                 Ok(_written) => self.notices.info(format!("Saved as {}.", ended.command.0.display())),
@@ -83,11 +96,23 @@ impl App {
 
     /// Opens an object or a scene.
     pub fn ask_for_object(&mut self) {
-        self.files.ask(Question::Object);
+        let extensions = &["urdf", "obj", "stl", "xml", "toml"];
+        self.files.ask("Open object or scene", extensions, None, |app, path| app.open(&path.to_string_lossy()));
     }
 
     pub(in crate::app) fn save_scene(&mut self) {
-        self.files.ask(Question::SaveScene(Box::new(self.simulation.scene.clone())));
+        self.save_scene_as(self.simulation.scene.clone());
+    }
+
+    pub(in crate::app) fn save_scene_as(&mut self, scene: Scene) {
+        let stem = Path::new(&scene.object.source).file_stem().and_then(|stem| stem.to_str()).unwrap_or("palpate");
+        let name = Some(format!("{stem}_scene.toml"));
+        self.files.ask("Save scene", &["toml"], name, move |app, path| {
+            match write_whole(&path, FileKind::Scene, scene.to_toml().as_bytes()) {
+                Ok(()) => app.notices.info(format!("Scene saved as {}.", path.display())),
+                Err(error) => app.notices.error(format!("Cannot write {}: {error}", path.display())),
+            }
+        });
     }
 
     /// Exports a figure of the trial that is open and of those compared with it.
@@ -122,13 +147,6 @@ impl App {
     }
 }
 
-fn save_scene(path: &Path, scene: &Scene, notices: &mut Notices) {
-    match write_whole(path, FileKind::Scene, scene.to_toml().as_bytes()) {
-        Ok(()) => notices.info(format!("Scene saved as {}.", path.display())),
-        Err(error) => notices.error(format!("Cannot write {}: {error}", path.display())),
-    }
-}
-
 /// Hint over the window while a file is dragged over it.
 pub(in crate::app) fn drop_hint(ctx: &egui::Context) {
     if ctx.input(|i| i.raw.hovered_files.is_empty()) {
@@ -141,4 +159,23 @@ pub(in crate::app) fn drop_hint(ctx: &egui::Context) {
     let font = egui::FontId::proportional(22.0);
     let text = "Drop a URDF, OBJ, STL or scene file to grasp it";
     painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
+}
+
+#[cfg(test)]
+pub(in crate::app) mod tests {
+    use super::*;
+
+    /// Asks for a file, or where to write one of this name.
+    pub(in crate::app) fn question(name: Option<&str>) -> Question {
+        let name = name.map(str::to_owned);
+        Question { title: "", extensions: &["svg", "png"], name, then: Box::new(|_, _| ()) }
+    }
+
+    #[test]
+    fn files_to_write_have_an_extension() {
+        let whole = |name, path: &str| question(name).whole(PathBuf::from(path));
+        assert_eq!(whole(Some("palpate.svg"), "/tmp/mine"), Path::new("/tmp/mine.svg"));
+        assert_eq!(whole(Some("palpate.svg"), "/tmp/mine.png"), Path::new("/tmp/mine.png"));
+        assert_eq!(whole(None, "/tmp/part"), Path::new("/tmp/part"));
+    }
 }

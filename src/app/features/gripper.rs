@@ -1,8 +1,8 @@
 //! The real gripper: its thread and its traces, and the simulation that closes its fingers with it.
 
 use super::App;
+use super::view::ViewSource;
 use crate::app::traces::TraceHistory;
-use crate::app::view_source::ViewSource;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, TrialView};

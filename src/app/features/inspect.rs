@@ -1,12 +1,10 @@
 //! Inspection: the stored trial that is open, trials beside it for comparison, and the time that is shown.
 
 use super::App;
-use super::view::ViewState;
-use crate::app::modes::mode::Mode;
+use super::view::{Mode, ViewSource, ViewState};
 use crate::app::playback::{Playback, Seek};
 use crate::app::shown::{ComparedTrace, Inspected, Pinned};
 use crate::app::traces::{GraspTrace, TraceHistory};
-use crate::app::view_source::ViewSource;
 use palpate_lab::inspection::{Alignment, Keep, MeanTrial, OpenOptions, OpenTrial, PhaseSpan, TouchPhase};
 use palpate_lab::workers::{Command, Job, OpenRequest};
 use palpate_learn::Models;

@@ -1,7 +1,7 @@
 //! Labelling in the window: hands actions to the [`LabellingSession`] and carries out its effects.
 
 use super::App;
-use crate::app::modes::mode::Mode;
+use super::view::Mode;
 use palpate_lab::workers::{
     Command, GripperCommand, LabelCommand, LabelView, LabelWorker, LabellingAction, LabellingEffect, LabellingSession,
     SessionContext, TrialInSight,

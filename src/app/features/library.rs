@@ -1,7 +1,6 @@
 //! The trial library in the window: its query, the selection of trials, and edits of them.
 
 use super::App;
-use crate::app::notices::Notices;
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialQuery};
@@ -102,17 +101,6 @@ impl LibraryFeature {
         Self { worker, view: None, selection: LibrarySelection::default(), seen: Arc::default(), kept: None }
     }
 
-    /// Shows outcomes, and forgets trials that are gone.
-    pub(super) fn poll(&mut self, notices: &mut Notices) {
-        self.view = self.worker.view();
-        let Some(view) = &self.view else { return };
-        if !Arc::ptr_eq(&self.seen, &view.found) {
-            self.selection.look(&view.found);
-            self.seen = Arc::clone(&view.found);
-        }
-        self.worker.notices().for_each(|notice| notices.show(notice));
-    }
-
     /// Shows the trials that match.
     pub fn find(&mut self, query: TrialQuery) {
         // The first answer may be on its way.
@@ -170,6 +158,18 @@ impl LibraryFeature {
 }
 
 impl App {
+    /// Shows outcomes, and forgets trials that are gone.
+    pub(super) fn poll_library(&mut self) {
+        let Self { library: LibraryFeature { worker, view, selection, seen, .. }, notices, .. } = self;
+        *view = worker.view();
+        let Some(view) = view else { return };
+        if !Arc::ptr_eq(seen, &view.found) {
+            selection.look(&view.found);
+            *seen = Arc::clone(&view.found);
+        }
+        worker.notices().for_each(|notice| notices.show(notice));
+    }
+
     /// Moves the keyboard to the search field, and adds text typed ahead.
     pub(in crate::app) fn search_library(&mut self, typed: &str) {
         self.show_panel("library");

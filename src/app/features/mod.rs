@@ -8,6 +8,7 @@ pub(super) mod gripper;
 pub(super) mod inspect;
 pub(super) mod labelling;
 pub(super) mod library;
+pub(super) mod notices;
 pub(super) mod presenter;
 pub(super) mod recognition;
 pub(super) mod simulation;
@@ -16,16 +17,15 @@ pub(super) mod tools;
 pub(super) mod view;
 
 use crate::app::frame_rate::FrameRate;
-use crate::app::notices::Notices;
 use crate::app::shown::{ComparedTrials, DisplayedData};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::traces::{GraspTrace, TraceHistory};
-use crate::app::view_source::ViewSource;
 use files::FileFeature;
 use gripper::GripperFeature;
 use inspect::InspectFeature;
 use labelling::LabellingFeature;
 use library::LibraryFeature;
+use notices::Notices;
 use palpate_lab::workers::{GripperView, LabelView, Snapshot};
 use presenter::PresenterFeature;
 use recognition::RecognitionFeature;
@@ -33,7 +33,7 @@ use simulation::SimulationFeature;
 use std::path::PathBuf;
 use studies::Studies;
 use tools::GripperTools;
-use view::ViewState;
+use view::{ViewSource, ViewState};
 
 /// State of the window: all its features.
 pub struct App {
@@ -56,7 +56,7 @@ pub struct App {
     pub studies: Studies,
     pub(super) presenter: PresenterFeature,
     /// Opening and saving.
-    pub files: FileFeature,
+    pub(super) files: FileFeature,
     pub(super) thumbnails: Thumbnails,
     /// Name of the graphics driver; absent when the 3-D view cannot be drawn.
     pub(super) driver: Option<String>,
@@ -134,7 +134,7 @@ impl App {
         self.poll_presenter();
         self.poll_gripper();
         self.poll_labelling();
-        self.library.poll(&mut self.notices);
+        self.poll_library();
         self.poll_studies();
         self.poll_recognition();
         self.poll_files();

@@ -1,7 +1,7 @@
 //! Presenter mode: object after object in random poses, with a score. Its grasps go into the demo log.
 
 use super::App;
-use crate::app::view_source::ViewSource;
+use super::view::ViewSource;
 use palpate_lab::grasping::Presentation;
 use palpate_lab::workers::{Command, Snapshot};
 use palpate_sim::scene::{PoseSpread, Scene};
@@ -35,7 +35,7 @@ pub(in crate::app) struct PresenterFeature {
     /// Presentations so far: each has another order of objects.
     presentations: u64,
     presentation: Presentation,
-    score: Score,
+    pub(in crate::app) score: Score,
     /// Number of the grasp that was judged last.
     judged: u64,
     /// The round that was judged last, by the number of the grasp before it, and its verdict.
@@ -47,11 +47,6 @@ pub(in crate::app) struct PresenterFeature {
 }
 
 impl PresenterFeature {
-    /// Verdicts so far.
-    pub(in crate::app) fn score(&self) -> Score {
-        self.score
-    }
-
     /// Counts a verdict; one after a further grasp replaces that of its round.
     fn judge(&mut self, snapshot: &Snapshot) {
         self.judged = snapshot.grasp;

@@ -2,8 +2,7 @@
 
 use super::App;
 use super::tools::GripperTools;
-use super::view::ViewState;
-use crate::app::view_source::ViewSource;
+use super::view::{ViewSource, ViewState};
 use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::workers::{Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Model, Models, Shipped};

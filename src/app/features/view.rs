@@ -1,10 +1,7 @@
 //! View state: camera, theme, layout and settings of the window. Remembered between runs, never written into a trial.
 
 use super::App;
-use crate::app::derived::Derivation;
-use crate::app::modes::mode::Mode;
 use crate::app::theme;
-use crate::app::view_source::ViewSource;
 use egui_tiles::Tree;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
@@ -82,6 +79,71 @@ pub struct ViewState {
     pub scale: f32,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
+}
+
+/// Mode of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// Grasp and recognise, live.
+    #[default]
+    Demo,
+    /// Look back: open, replay, compare and explain stored trials.
+    Inspect,
+    /// Record and label trials of the real gripper.
+    Label,
+    /// Run the studies of the paper and look at their figures.
+    Study,
+}
+
+/// Source of the data that are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ViewSource {
+    /// The simulated gripper.
+    #[default]
+    Simulation,
+    /// The real gripper.
+    Gripper,
+    /// The stored trial that is open.
+    Trial,
+}
+
+/// What a plot shows of its channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Derivation {
+    /// Their values.
+    #[default]
+    Values,
+    /// Left and right finger together.
+    Sum,
+    /// Left finger less the right one.
+    Difference,
+    /// Change per second.
+    Derivative,
+}
+
+impl Derivation {
+    /// All.
+    pub const ALL: [Self; 4] = [Self::Values, Self::Sum, Self::Difference, Self::Derivative];
+
+    /// Name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Values => "values",
+            Self::Sum => "left + right",
+            Self::Difference => "left − right",
+            Self::Derivative => "change per second",
+        }
+    }
+
+    /// Unit of the derived values.
+    pub(in crate::app) fn unit(self, unit: &str) -> String {
+        match self {
+            Self::Values | Self::Sum | Self::Difference => unit.to_owned(),
+            Self::Derivative => format!("{unit}/s"),
+        }
+    }
 }
 
 /// Contact path on the object: not drawn, or by what it is coloured.

@@ -2,10 +2,9 @@
 
 use crate::app::actions::{Act, command, key, key_where};
 use crate::app::features::App;
-use crate::app::modes::mode::Mode;
+use crate::app::features::view::{Mode, ViewSource};
 use crate::app::panels::view3d;
 use crate::app::playback::{Seek, next_speed};
-use crate::app::view_source::ViewSource;
 use egui::{Key, Modifiers};
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;

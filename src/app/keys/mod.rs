@@ -5,8 +5,8 @@ mod common;
 
 use crate::app::actions::{Act, Actions};
 use crate::app::features::App;
+use crate::app::features::view::Mode;
 use crate::app::modes;
-use crate::app::modes::mode::Mode;
 pub(super) use common::COMMANDS;
 use common::GROUPS;
 use egui::{Key, RichText, Ui};
@@ -127,7 +127,8 @@ fn typed_ahead(ctx: &egui::Context, waits: bool) -> Option<String> {
 const COLUMN: f32 = 380.0;
 
 /// Sheet of keys and mouse actions.
-pub(super) fn sheet(ctx: &egui::Context, shown: bool, mode: Mode, actions: &mut Actions) {
+pub(super) fn sheet(app: &App, mode: Mode, actions: &mut Actions) {
+    let (ctx, shown) = (&app.ctx, app.view.keys_shown);
     let mut open = shown;
     let room = ctx.content_rect().size() - egui::vec2(60.0, 90.0);
     let columns = if room.x > 2.0 * COLUMN + 30.0 { 2 } else { 1 };

@@ -1,9 +1,9 @@
 //! Inspect mode: look back on stored trials.
 
-use super::mode::Mode;
 use super::{ModeKind, split, tabs};
 use crate::app::actions::{Act, key};
 use crate::app::features::App;
+use crate::app::features::view::Mode;
 use crate::app::playback::Seek;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};

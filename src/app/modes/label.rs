@@ -1,9 +1,9 @@
 //! Label mode: record and label trials of the real gripper, from the keyboard.
 
-use super::mode::Mode;
 use super::{ModeKind, split, tabs};
 use crate::app::actions::{Act, key};
 use crate::app::features::App;
+use crate::app::features::view::Mode;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 use palpate_lab::workers::LabellingAction;

@@ -1,16 +1,15 @@
-//! Modes of the window: the same data, other panels and keys. To add one, add its name in `mode.rs`, a file with its
+//! Modes of the window: the same data, other panels and keys. To add one, add its name to [`Mode`], a file with its
 //! [`ModeKind`], and a line in [`ALL`].
 
 mod demo;
 mod inspect;
 mod label;
-pub(super) mod mode;
 mod study;
 
 use crate::app::actions::Act;
 use crate::app::features::App;
+use crate::app::features::view::Mode;
 use egui_tiles::{Linear, LinearDir, Tile, TileId, Tiles, Tree};
-use mode::Mode;
 
 /// Kind of a mode.
 pub(super) struct ModeKind {

@@ -1,9 +1,9 @@
 //! Study mode: run the studies of the paper, look at their figures, and open the trials behind them.
 
-use super::mode::Mode;
 use super::{ModeKind, split, tabs};
 use crate::app::actions::{Act, key, key_where};
 use crate::app::features::App;
+use crate::app::features::view::Mode;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
 use palpate_lab::study::paper::StudySize;

@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::plots::static_plot;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{ANY_PORT, failure_ui, text_field, wrapped};
+use crate::app::widgets::{ANY_PORT, failure_ui, remark_ui, text_field, warning_ui, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
@@ -52,11 +52,7 @@ fn begin_ui(
         Some(Err(cause)) => failure_ui(ui, cause),
         None => {}
     }
-    wrapped(
-        ui,
-        RichText::new("Calibrate each sensor at known angles or forces, to turn its counts into angles and forces.")
-            .weak(),
-    );
+    remark_ui(ui, "Calibrate each sensor at known angles or forces, to turn its counts into angles and forces.");
     ui.add_space(4.0);
     Grid::new("calibration form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         ui.label("Sensor");
@@ -98,7 +94,7 @@ fn begin_ui(
 fn running_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
     let RunningCalibration { plan, procedure, fit, closing, .. } = running;
     let procedure = procedure.as_ref();
-    wrapped(ui, RichText::new(format!("\"{}\", {}", plan.part, plan.sensor.label())).weak());
+    remark_ui(ui, format!("\"{}\", {}", plan.part, plan.sensor.label()));
     wrapped(ui, RichText::new(&running.instruction).strong());
     let counts = procedure.and_then(Procedure::latest).map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
     let state = match procedure.map(Procedure::settled) {
@@ -111,17 +107,17 @@ fn running_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) 
     let calibration = fit.as_ref().and_then(|fit| fit.as_deref().ok());
     ui.horizontal_wrapped(|ui| buttons_ui(ui, running, calibration.is_some(), actions));
     if let Some(why) = &running.not_taken {
-        wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, why);
     }
     match fit {
         Some(Ok(calibration)) => {
             wrapped(ui, RichText::new(calibration.summary()));
             for warning in &calibration.warnings {
-                wrapped(ui, RichText::new(warning).color(ui.visuals().warn_fg_color));
+                warning_ui(ui, warning);
             }
         }
-        Some(Err(why)) => wrapped(ui, RichText::new(why.to_string()).weak()),
-        None => wrapped(ui, RichText::new("no points yet").weak()),
+        Some(Err(why)) => remark_ui(ui, why.to_string()),
+        None => remark_ui(ui, "no points yet"),
     }
     if let Some(calibration) = calibration {
         let (kind, theme) = (SensorKind::of(plan.sensor), theme::of(ui));

@@ -2,12 +2,12 @@
 //! class is drawn.
 
 use crate::app::actions::Actions;
+use crate::app::features::view::ViewSource;
 use crate::app::icons::{self, Icon};
 use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
-use crate::app::view_source::ViewSource;
-use crate::app::widgets::wrapped;
-use egui::{Color32, Label, RichText, ScrollArea, Sense, Ui, vec2};
+use crate::app::widgets::{choice_ui, remark_ui};
+use egui::{Color32, Label, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::series_colour;
 use palpate_lab::inspection::Alignment;
 
@@ -16,17 +16,14 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     if comparison.pinned.is_empty() {
         let text = "No trial is compared. Select trials in the library and press P, or choose Compare: each is drawn over \
                     the one shown, in a colour of its own.";
-        wrapped(ui, RichText::new(text).weak());
+        remark_ui(ui, text);
         return;
     }
     ui.horizontal_wrapped(|ui| {
         ui.label("Aligned at");
-        for alignment in Alignment::ALL {
-            let chosen = comparison.alignment == alignment;
-            actions
-                .on(&ui.selectable_label(chosen, alignment.name()).on_hover_text("Origin of time (M)"), move |app| {
-                    app.inspect.alignment = alignment
-                });
+        let choices = Alignment::ALL.map(|alignment| (alignment, alignment.name(), "Origin of time (M)"));
+        if let Some(alignment) = choice_ui(ui, Some(comparison.alignment), choices) {
+            actions.push(move |app| app.inspect.alignment = alignment);
         }
     });
     let mut spread = comparison.spread;

@@ -2,9 +2,10 @@
 //! command to copy.
 
 use crate::app::actions::Actions;
+use crate::app::features::App;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{command_ui, failure_ui, port_field, progress_ui, wrapped};
+use crate::app::widgets::{capital, command_ui, failure_ui, job_ui, port_field, remark_ui, warning_ui, wrapped};
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
@@ -27,27 +28,19 @@ pub(super) fn ui(
         if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
             return crosstalk_running_ui(ui, crosstalk, running, actions);
         }
-        // Read first, as in `job_ui`.
-        let last = doctor.last();
-        match doctor.running() {
-            Some(running) => {
-                let remark = "Now bend each finger and press each pad.";
-                if progress_ui(ui, &running.progress, Some(remark), "End and report so far") {
-                    actions.push(|app| app.tools.doctor.stop());
-                }
-            }
-            None => begin_ui(ui, actions),
-        }
+        let remark = Some("Now bend each finger and press each pad.");
+        let stop = (remark, "End and report so far", (|app| app.tools.doctor.stop()) as fn(&mut App));
+        let last = job_ui(ui, doctor, stop, actions, begin_ui);
         if let Some((crosstalk, ended)) = crosstalk.and_then(|view| Some((view, view.ended.as_ref()?))) {
             crosstalk_ended_ui(ui, crosstalk, ended);
         }
-        match last.map(|ended| ended.outcome) {
+        match last {
             Some(Ok(report)) => examination_ui(ui, theme::of(ui), &report),
             Some(Err(cause)) => failure_ui(ui, cause),
             None => {
                 ui.add_space(6.0);
                 let about: Vec<&str> = CHECKS.iter().map(|check| check.about).collect();
-                wrapped(ui, RichText::new(format!("Checks that {}.", about.join(", "))).weak());
+                remark_ui(ui, format!("Checks that {}.", about.join(", ")));
             }
         }
         ui.add_space(6.0);
@@ -68,13 +61,13 @@ fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
             _ = app.gripper.send(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)))
         });
     });
-    wrapped(ui, RichText::new(hint).weak());
+    remark_ui(ui, hint);
 }
 
 /// Wiring of the board.
 fn wiring_ui(ui: &mut Ui) {
     let [volt, bleeding] = WIRING_RULES;
-    wrapped(ui, RichText::new(volt).color(ui.visuals().warn_fg_color));
+    warning_ui(ui, volt);
     Grid::new("wiring").num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
         for title in ["pin", "to 3.3 V", "to ground"] {
             ui.weak(title);
@@ -88,12 +81,9 @@ fn wiring_ui(ui: &mut Ui) {
         }
     });
     wrapped(ui, RichText::new(bleeding));
-    wrapped(
+    remark_ui(
         ui,
-        RichText::new(
-            "The first command prints the full wiring and the line format, the second writes the Arduino sketch.",
-        )
-        .weak(),
+        "The first command prints the full wiring and the line format, the second writes the Arduino sketch.",
     );
     for (mends, command) in
         [("wiring", "palpate doctor --wiring".to_owned()), ("the sketch", format!("palpate doctor --sketch {SKETCH}"))]
@@ -104,9 +94,9 @@ fn wiring_ui(ui: &mut Ui) {
 
 fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Actions) {
     if let Some([step, of]) = running.step {
-        wrapped(ui, RichText::new(format!("Crosstalk test, sensor {step} of {of}")).weak());
+        remark_ui(ui, format!("Crosstalk test, sensor {step} of {of}"));
     }
-    wrapped(ui, RichText::new(format!("{}.", sentence(&running.instruction))).strong());
+    wrapped(ui, RichText::new(format!("{}.", capital(&running.instruction))).strong());
     ui.horizontal_wrapped(|ui| {
         for (text, about, command) in [
             ("Skip", "Continue with the next sensor", CrosstalkCommand::Skip),
@@ -161,11 +151,11 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {
     ui.add_space(6.0);
     let sound = is_sound(&examination.findings);
     let ink = if sound { ui.visuals().strong_text_color() } else { ui.visuals().error_fg_color };
-    wrapped(ui, RichText::new(sentence(&summary(&examination.findings))).heading().color(ink));
+    wrapped(ui, RichText::new(capital(&summary(&examination.findings))).heading().color(ink));
     if let Some(port) = &examination.port {
         let early = if examination.cut_short { ", then stopped" } else { "" };
         let text = format!("{port}, {:.0} s of readings{early}", examination.listened_s);
-        wrapped(ui, RichText::new(text).weak());
+        remark_ui(ui, text);
     }
     ui.add_space(2.0);
     // Problems first; among equals, the order of the checks.
@@ -180,12 +170,6 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {
     for finding in findings {
         finding_ui(ui, theme, finding);
     }
-}
-
-/// Capitalises the first letter.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 fn finding_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {

@@ -5,6 +5,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::theme::{self, colour, veil};
+use crate::app::widgets::capital;
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
@@ -197,7 +198,7 @@ impl Row<'_> {
                 lines.push(format!("The numbers below are {BEFORE}."));
             }
             lines.push(format!("It {}.", explained.cost_in_words()));
-            lines.push(format!("{}.", capitalised(&explained.change_in_words(explanation.contact_onset_s))));
+            lines.push(format!("{}.", capital(&explained.change_in_words(explanation.contact_onset_s))));
         }
         let indented = egui::Margin { left: (LAMP + GAP) as i8, bottom: 6, ..egui::Margin::ZERO };
         egui::Frame::new().inner_margin(indented).show(ui, |ui| {
@@ -212,12 +213,7 @@ impl Row<'_> {
 /// Reason of a decision with its number.
 fn reason(planned: &PlannedEffect) -> String {
     let relation = if planned.number > planned.threshold { ">" } else { "≤" };
-    format!("{} ({} {relation} {})", capitalised(&planned.reason), three_digits(planned.number), planned.threshold)
-}
-
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+    format!("{} ({} {relation} {})", capital(&planned.reason), three_digits(planned.number), planned.threshold)
 }
 
 /// Off, auto, on as three cells; returns the one that was clicked.

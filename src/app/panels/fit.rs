@@ -2,12 +2,10 @@
 //! the fitted finger.
 
 use crate::app::actions::Actions;
-use crate::app::features::App;
 use crate::app::features::tools::GripperTools;
-use crate::app::files::Question;
 use crate::app::plots::static_plot;
 use crate::app::theme::{self, colour, veil};
-use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
+use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
@@ -28,14 +26,17 @@ pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, scene: &Scene, actions: &mut
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let hint =
             "Fits the simulated finger to trials of the real one: a few empty closes, and grasps of a fixed object.";
-        wrapped(ui, RichText::new(hint).weak());
+        remark_ui(ui, hint);
         let controls = |ui: &mut Ui, actions: &mut Actions| match tools.trials.last().map(|ended| ended.outcome) {
-            None => wrapped(ui, RichText::new("loading trials ..").weak()),
+            None => remark_ui(ui, "loading trials .."),
             Some(Ok(rows)) => choice_ui(ui, &rows, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
         };
-        let stop = ("Cancel; nothing changes", (|app| app.tools.fit.stop()) as fn(&mut App));
-        job_ui(ui, &tools.fit, stop, actions, controls, |ui, fitted, actions| fitted_ui(ui, scene, fitted, actions));
+        match job_ui(ui, &tools.fit, (None, "Cancel; nothing changes", |app| app.tools.fit.stop()), actions, controls) {
+            Some(Ok(fitted)) => fitted_ui(ui, scene, &fitted, actions),
+            Some(Err(cause)) => failure_ui(ui, cause),
+            None => {}
+        }
     });
 }
 
@@ -104,12 +105,12 @@ fn fitted_ui(ui: &mut Ui, now: &Scene, fitted: &FittedFinger, actions: &mut Acti
             });
         }
         if ui.button("Save as scene ..").on_hover_text("Scene of the first trial with this finger, as TOML").clicked() {
-            let scene = Box::new(scene.clone());
-            actions.push(|app| app.files.ask(Question::SaveScene(scene)));
+            let scene = scene.clone();
+            actions.push(|app| app.save_scene_as(scene));
         }
     });
     for remark in fit.remarks.iter().chain(warnings) {
-        wrapped(ui, RichText::new(remark).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, remark);
     }
     estimates_ui(ui, theme::of(ui), &fit.estimates);
     courses_ui(ui, theme::of(ui), fit);
@@ -127,7 +128,7 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
     let end = widest.clamp(BAR_ENDS[0], BAR_ENDS[1]);
     ui.add_space(4.0);
     let text = format!("95 % intervals; bars span ±{:.0} % of the value", 100.0 * end);
-    wrapped(ui, RichText::new(text).weak());
+    remark_ui(ui, text);
     ui.spacing_mut().interact_size.y = 16.0;
     for estimate in estimates {
         let known = match estimate.known {
@@ -182,7 +183,7 @@ fn bar_ui(ui: &mut Ui, [low, high]: [f32; 2], ink: egui::Color32, estimate: &Est
 /// Recorded and fitted curvature over time, and residuals, trial by trial.
 fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
     ui.add_space(6.0);
-    wrapped(ui, RichText::new("Thick: recorded. Thin: fitted. Dashed: right finger.").weak());
+    remark_ui(ui, "Thick: recorded. Thin: fitted. Dashed: right finger.");
     for (number, left) in fit.remainders.iter().enumerate() {
         wrapped(ui, RichText::new(remainder_text(left)));
         let own = |course: &&Course| course.name == left.name;

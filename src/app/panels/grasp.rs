@@ -1,7 +1,7 @@
 //! This grasp in numbers: object, present readings, and result of the last grasp.
 
 use crate::app::actions::Actions;
-use crate::app::channel_curves::shows;
+use crate::app::plots::shows;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
 use crate::app::widgets::wrapped;

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::gripper::{CONTROLS, control_title};
 use crate::app::theme::{self, accented, colour, veil};
-use crate::app::widgets::{command_ui, failure_ui, stop_button, text_field, wrapped};
+use crate::app::widgets::{command_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui, wrapped};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::units::three_digits;
@@ -31,9 +31,9 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
         }
-        wrapped(ui, RichText::new("The Doctor panel in Label mode examines port and board.").weak());
+        remark_ui(ui, "The Doctor panel in Label mode examines port and board.");
     } else {
-        wrapped(ui, RichText::new("No gripper connected. Everything works with the simulated one too.").weak());
+        remark_ui(ui, "No gripper connected. Everything works with the simulated one too.");
     }
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(theme::of(ui)));
@@ -103,7 +103,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
     let port = format!("{}, {}", link.port.path.display(), link.port.title);
     wrapped(ui, RichText::new(port).small());
     if link.state != LinkState::Listening {
-        wrapped(ui, RichText::new(link.state.sentence()).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, link.state.sentence());
     }
     let cadence = &link.cadence;
     Grid::new("health").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
@@ -135,7 +135,7 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
         failure_ui(ui, text);
     }
     for text in link.wiring_remarks() {
-        wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, text);
     }
 }
 

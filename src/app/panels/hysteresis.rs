@@ -1,8 +1,7 @@
 //! Hysteresis: the load of each pad over the curvature of its finger; closing and releasing run on different paths where the
 //! finger or the object gives way.
 
-use crate::app::channel_curves::{colour_of, shows};
-use crate::app::plots::value_marks;
+use crate::app::plots::{colour_of, shows, value_marks};
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;

@@ -5,7 +5,7 @@ use crate::app::features::gripper::instruction;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{focus_field, text_field, wrapped};
+use crate::app::widgets::{focus_field, remark_ui, selectable_row, text_field, warning_ui, wrapped};
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
@@ -89,10 +89,7 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
         }
         None => {
             ui.heading("Plan complete");
-            wrapped(
-                ui,
-                RichText::new("Export with Ctrl+E, train in the panel Training, or extend the panel Plan.").weak(),
-            );
+            remark_ui(ui, "Export with Ctrl+E, train in the panel Training, or extend the panel Plan.");
         }
     }
     ui.add_space(4.0);
@@ -103,10 +100,7 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
             app.label(LabellingAction::Record)
         });
     } else {
-        wrapped(
-            ui,
-            RichText::new("Connect the gripper: Ctrl+G, or the panel Gripper below.").color(ui.visuals().warn_fg_color),
-        );
+        warning_ui(ui, "Connect the gripper: Ctrl+G, or the panel Gripper below.");
     }
 }
 
@@ -271,13 +265,8 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
 /// Object to choose: key, picture, name.
 fn object_row(ui: &mut Ui, pictures: &Thumbnails, place: usize, name: &str, chosen: bool, new: bool) -> egui::Response {
     let colours = theme::of(ui).colours();
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 23.0), Sense::click());
     let title = if new { format!("{name} (new)") } else { object_title(name) };
-    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, format!("Label {title}")));
-    if chosen || response.hovered() || response.has_focus() {
-        let share = if chosen { 0.30 } else { 0.10 };
-        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
-    }
+    let (rect, response) = selectable_row(ui, 23.0, chosen, format!("Label {title}"));
     let builder =
         egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));
     let mut inside = ui.new_child(builder);

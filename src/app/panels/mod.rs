@@ -5,23 +5,19 @@ mod accuracy;
 mod calibration;
 mod compared;
 mod console;
-mod counts;
-mod curvature;
+mod curves;
 mod doctor;
 mod effects;
 mod fit;
-mod force;
 mod grasp;
 mod gripper;
 mod hysteresis;
 mod journal;
 mod label;
 mod library;
-mod line_pressure;
 mod objects;
 mod pads;
 mod plan;
-mod pressure;
 pub(super) mod recognition;
 mod scene;
 mod sensors;
@@ -58,10 +54,10 @@ pub const ALL: [PanelKind; 34] = [
         objects::ui(ui, &app.simulation.scene.object.source, &app.view.recent, &app.thumbnails, actions);
     }),
     panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
-    panel("curvature", "Curvature", |ui, app, actions| curvature::ui(ui, &app.shown(), actions)),
-    panel("pressure", "Pressure", |ui, app, actions| pressure::ui(ui, &app.shown(), actions)),
-    panel("force", "Force", |ui, app, actions| force::ui(ui, &app.shown(), actions)),
-    panel("line", "Line pressure", |ui, app, actions| line_pressure::ui(ui, &app.shown(), actions)),
+    panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),
+    panel("pressure", "Pressure", |ui, app, actions| curves::pressure_ui(ui, &app.shown(), actions)),
+    panel("force", "Force", |ui, app, actions| curves::force_ui(ui, &app.shown(), actions)),
+    panel("line", "Line pressure", |ui, app, actions| curves::line_pressure_ui(ui, &app.shown(), actions)),
     panel("recognition", "Recognition", |ui, app, actions| {
         recognition::ui(ui, &app.shown(), &app.tools, &app.thumbnails, actions);
     }),
@@ -82,7 +78,7 @@ pub const ALL: [PanelKind; 34] = [
     }),
     panel("journal", "Journal", |ui, app, actions| journal::ui(ui, app.labels(), actions)),
     panel("gripper", "Gripper", |ui, app, actions| gripper::ui(ui, app.gripper_view(), app.view.control, actions)),
-    panel("counts", "Counts", |ui, app, actions| counts::ui(ui, &app.shown(), actions)),
+    panel("counts", "Counts", |ui, app, actions| curves::counts_ui(ui, &app.shown(), actions)),
     panel("console", "Console", |ui, app, _| console::ui(ui, app.gripper_view())),
     panel("calibration", "Calibration", |ui, app, actions| calibration::ui(ui, app.gripper_view(), actions)),
     panel("doctor", "Doctor", |ui, app, actions| doctor::ui(ui, &app.tools.doctor, app.gripper_view(), actions)),

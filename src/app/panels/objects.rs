@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::text_field;
+use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_sim::objects::{EMPTY, catalogue};
 
@@ -51,12 +51,7 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
 /// Row of an object: picture, title, and a line below.
 fn row(ui: &mut Ui, chosen: bool, texture: Option<&egui::TextureHandle>, title: &str, below: &str) -> egui::Response {
     let colours = theme::of(ui).colours();
-    let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width(), THUMBNAIL + 6.0), Sense::click());
-    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, chosen, title));
-    if chosen || response.hovered() || response.has_focus() {
-        let share = if chosen { 0.30 } else { 0.10 };
-        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
-    }
+    let (rect, response) = selectable_row(ui, THUMBNAIL + 6.0, chosen, title);
     let mut inside = ui.new_child(
         egui::UiBuilder::new()
             .max_rect(rect.shrink2(egui::vec2(4.0, 3.0)))

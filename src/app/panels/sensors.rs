@@ -4,7 +4,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::view::ViewState;
 
-use crate::app::widgets::{just_opened, wrapped};
+use crate::app::widgets::{choice_ui, just_opened, remark_ui, wrapped};
 use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
 use palpate_lab::workers::{Job, TrainingData};
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
@@ -42,23 +42,26 @@ pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), Tr
         });
         ui.horizontal_wrapped(|ui| {
             ui.label("Signals");
-            for (signals, name, hint) in [
-                (SignalDefinition::Parts, "parts", "What strips and pads measure, as on a real gripper"),
-                (
-                    SignalDefinition::Contact,
-                    "contact",
-                    "Simulation only: circle through all joints, force over the participation area of the contact",
-                ),
-                (
-                    SignalDefinition::Hull,
-                    "hull",
-                    "Simulation only: force over the convex hull of the contacts, as in the paper (section IV-A1); \
+            let signals = choice_ui(
+                ui,
+                Some(sensors.signals),
+                [
+                    (SignalDefinition::Parts, "parts", "What strips and pads measure, as on a real gripper"),
+                    (
+                        SignalDefinition::Contact,
+                        "contact",
+                        "Simulation only: circle through all joints, force over the participation area of the contact",
+                    ),
+                    (
+                        SignalDefinition::Hull,
+                        "hull",
+                        "Simulation only: force over the convex hull of the contacts, as in the paper (section IV-A1); \
                      undefined for points and rows",
-                ),
-            ] {
-                if ui.selectable_label(sensors.signals == signals, name).on_hover_text(hint).clicked() {
-                    sensors = sensors.clone().with_signals(signals);
-                }
+                    ),
+                ],
+            );
+            if let Some(signals) = signals {
+                sensors = sensors.clone().with_signals(signals);
             }
         });
         ui.horizontal_wrapped(|ui| {
@@ -167,25 +170,27 @@ fn poses_ui(ui: &mut Ui, scene: &Scene, actions: &mut Actions) {
         }
     });
     if now.is_none() {
-        wrapped(ui, RichText::new("The scene has poses of its own.").weak());
+        remark_ui(ui, "The scene has poses of its own.");
     }
     ui.horizontal_wrapped(|ui| {
         ui.label("Between grasps");
-        for (between, name, hint) in [
-            (Between::Reposed, "re-posed", "Every grasp draws its pose anew"),
-            (Between::AsReleased, "as released", "The object stays as the grasp before left it"),
-            (
-                Between::Guided,
-                "guided",
-                "The object stays; the gripper comes from where most is expected to be learned about it",
-            ),
-        ] {
-            let chosen = scene.pose.between == between;
-            if ui.selectable_label(chosen, name).on_hover_text(hint).clicked() && !chosen {
-                let mut scene = scene.clone();
-                scene.pose.between = between;
-                actions.push(|app| app.set_scene(scene));
-            }
+        let between = choice_ui(
+            ui,
+            Some(scene.pose.between),
+            [
+                (Between::Reposed, "re-posed", "Every grasp draws its pose anew"),
+                (Between::AsReleased, "as released", "The object stays as the grasp before left it"),
+                (
+                    Between::Guided,
+                    "guided",
+                    "The object stays; the gripper comes from where most is expected to be learned about it",
+                ),
+            ],
+        );
+        if let Some(between) = between.filter(|between| *between != scene.pose.between) {
+            let mut scene = scene.clone();
+            scene.pose.between = between;
+            actions.push(|app| app.set_scene(scene));
         }
     });
 }

@@ -2,11 +2,12 @@
 //! fingers. A click or drag moves the cursor.
 
 use crate::app::actions::Actions;
+use crate::app::features::view::ViewSource;
 use crate::app::heat_map::{OverTime, cells_width, height_beside, load_switch, over_time_ui};
 use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
-use crate::app::view_source::ViewSource;
+use crate::app::widgets::choice_ui;
 use egui::{RichText, Ui, vec2};
 use palpate_lab::inspection::{FigureOptions, HeatKind};
 use palpate_lab::picture::BendUnit;
@@ -20,12 +21,10 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     ui.horizontal(|ui| {
         load_switch(ui, load_unit, actions);
         ui.separator();
-        for (choice, about) in
-            [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")]
-        {
-            actions.on(&ui.selectable_label(bend_unit == choice, choice.symbol()).on_hover_text(about), move |app| {
-                app.view.bend_unit = choice
-            });
+        let abouts = [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")];
+        let units = abouts.map(|(unit, about)| (unit, unit.symbol(), about));
+        if let Some(unit) = choice_ui(ui, Some(bend_unit), units) {
+            actions.push(move |app| app.view.bend_unit = unit);
         }
         if data.source == ViewSource::Trial {
             ui.separator();

@@ -5,7 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::tools::{DEFAULT_METHOD, GripperTools, TRAINING_SEED};
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{failure_ui, job_ui, just_opened, wrapped};
+use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::study::{HELD_BACK, LEAST_TRIALS, LabelledClass, in_table_order};
@@ -27,15 +27,17 @@ pub(super) fn ui(
     let data = tools.data.outcome();
     let data = data.as_deref();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let stop = ("Cancel; nothing is saved", (|app| app.tools.training.stop()) as fn(&mut App));
         let controls = |ui: &mut Ui, actions: &mut Actions| begin_ui(ui, data, actions);
-        job_ui(ui, &tools.training, stop, actions, controls, |ui, finished, actions| {
-            finished_ui(ui, chosen, finished, actions);
-        });
+        let stop = (None, "Cancel; nothing is saved", (|app| app.tools.training.stop()) as fn(&mut App));
+        match job_ui(ui, &tools.training, stop, actions, controls) {
+            Some(Ok(finished)) => finished_ui(ui, chosen, &finished, actions),
+            Some(Err(cause)) => failure_ui(ui, cause),
+            None => {}
+        }
         match data.map(|data| &data.classes) {
             Some(Ok(classes)) => classes_ui(ui, model, classes, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
-            None => wrapped(ui, RichText::new("loading labelled trials ..").weak()),
+            None => remark_ui(ui, "loading labelled trials .."),
         }
         models_ui(ui, chosen, data, actions);
     });
@@ -68,10 +70,10 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
     if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
         let share = 100.0 * HELD_BACK;
         let text = format!("{about}. {share:.0} % of each object's trials are held back for evaluation.");
-        wrapped(ui, RichText::new(text).weak());
+        remark_ui(ui, text);
     }
     if let Some(why) = too_little {
-        wrapped(ui, RichText::new(why).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, why);
     }
     ui.data_mut(|data| data.insert_temp(id, chosen));
 }
@@ -85,22 +87,22 @@ fn finished_ui(ui: &mut Ui, chosen: Option<&Path>, finished: &FinishedTraining, 
     let [learned, held_back] = judged.trials;
     let title = method(&trained.model.card.method).map_or("", |method| method.title);
     let text = format!("{title}: trained on {learned} trials, evaluated on {held_back} others; 95 % interval");
-    wrapped(ui, RichText::new(text).weak());
+    remark_ui(ui, text);
     for class in &judged.too_few {
         let text = format!("\"{}\" left out: {} usable trials, {LEAST_TRIALS} needed", class.name, class.trials);
-        wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, text);
     }
     let data = &trained.model.card.data;
     if data.left_out > 0 {
         let text = format!("{} trials left out: {}", data.left_out, counted(&data.left_out_for));
-        wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, text);
     }
     for mixed in &data.mixed {
-        wrapped(ui, RichText::new(format!("Mixed {mixed}")).color(ui.visuals().warn_fg_color));
+        warning_ui(ui, format!("Mixed {mixed}"));
     }
     if trained.model.card.rejection.is_none() {
         let text = "This model cannot answer \"unknown\": that takes more trials.";
-        wrapped(ui, RichText::new(text).weak());
+        remark_ui(ui, text);
     }
     confusion_ui(ui, theme::of(ui), &judged.evaluation.confusion, &trained.model.card.labels);
     use_ui(ui, chosen, Some(&trained.path), "Use for the real gripper", actions);
@@ -129,10 +131,10 @@ fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], act
     let all: usize = classes.iter().map(|class| class.trials).sum();
     wrapped(ui, RichText::new("Labelled trials").strong());
     if classes.is_empty() {
-        wrapped(ui, RichText::new("None yet. Record trials of the real gripper and label them.").weak());
+        remark_ui(ui, "None yet. Record trials of the real gripper and label them.");
         return;
     }
-    wrapped(ui, RichText::new(format!("{all} trials of {} objects", classes.len())).weak());
+    remark_ui(ui, format!("{all} trials of {} objects", classes.len()));
     let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {

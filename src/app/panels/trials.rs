@@ -3,8 +3,8 @@
 use crate::app::actions::Actions;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::sparkline;
-use egui::{Align2, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use crate::app::widgets::{selectable_row, sparkline};
+use egui::{Align2, FontId, Rect, RichText, ScrollArea, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::LabelledTrial;
@@ -75,16 +75,9 @@ fn row_ui(
     actions: &mut Actions,
 ) {
     let (id, colours) = (trial.id, theme::of(ui).colours());
-    let (rect, response) =
-        ui.allocate_exact_size(vec2(ui.available_width(), ROW - ui.spacing().item_spacing.y), Sense::click());
     let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
-    response.widget_info(|| {
-        egui::WidgetInfo::selected(egui::Role::Button, true, current, format!("Trial {}, {name}", trial.id))
-    });
-    if current || response.hovered() || response.has_focus() {
-        let share = if current { 0.30 } else { 0.10 };
-        ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));
-    }
+    let height = ROW - ui.spacing().item_spacing.y;
+    let (rect, response) = selectable_row(ui, height, current, format!("Trial {}, {name}", trial.id));
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
     sparkline(ui, &trial.sparkline, picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);

@@ -5,7 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{self, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::wrapped;
+use crate::app::widgets::{capital, remark_ui, wrapped};
 use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::inspection::TouchPhase;
@@ -44,7 +44,7 @@ pub(super) fn ui(
     let request = match data.grasp_to_explain() {
         Ok(request) => request,
         Err(nothing) => {
-            wrapped(ui, RichText::new(nothing).weak());
+            remark_ui(ui, nothing);
             return;
         }
     };
@@ -62,16 +62,10 @@ pub(super) fn ui(
             }
             Err(cause) => {
                 ui.heading("No explanation");
-                wrapped(ui, RichText::new(capitalised(&cause.to_string())));
+                wrapped(ui, RichText::new(capital(&cause.to_string()) + "."));
             }
         }
     });
-}
-
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(char::to_uppercase).into_iter().flatten();
-    first.chain(letters).collect::<String>() + "."
 }
 
 fn evidence_ui(ui: &mut Ui, why: &Attribution) {
@@ -258,7 +252,7 @@ fn nearest_ui(
 
 fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, actions: &mut Actions) {
     if report.trials.is_empty() {
-        wrapped(ui, RichText::new("No stored trial has these channels. Record grasps, or run palpate collect.").weak());
+        remark_ui(ui, "No stored trial has these channels. Record grasps, or run palpate collect.");
         return;
     }
     let colours = theme::of(ui).colours();

@@ -1,7 +1,7 @@
 //! Curves derived from others: sum and difference of both fingers, and the change over time.
 
 use super::PlotCurve;
-use crate::app::derived::Derivation;
+use crate::app::features::view::Derivation;
 use std::rc::Rc;
 
 /// The derived curves; those of one finger that has no other are left out of sums and differences.

@@ -1,9 +1,8 @@
 //! Line above a plot: derived curves, raw counts, classes, export, times of cursor and marks.
 
 use crate::app::actions::Actions;
-use crate::app::derived::Derivation;
+use crate::app::features::view::{Derivation, ViewSource};
 use crate::app::shown::DisplayedData;
-use crate::app::view_source::ViewSource;
 use egui::Ui;
 use palpate_lab::inspection::FigureOptions;
 use palpate_sim::objects::object_title;

@@ -2,6 +2,7 @@
 //! time window; wheel: zoom about the pointer; double click: the whole grasp.
 
 mod axes;
+mod channels;
 mod derived;
 mod header;
 mod labels;
@@ -9,14 +10,14 @@ mod layers;
 mod mouse;
 
 pub(super) use axes::{static_plot, value_marks};
+pub(super) use channels::{channel_curves, colour_of, shows};
 
 use crate::app::actions::Actions;
-use crate::app::derived::Derivation;
+use crate::app::features::view::{Derivation, ViewSource};
 use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
-use crate::app::view_source::ViewSource;
 use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;

@@ -2,7 +2,6 @@
 //! each grasp and why, and shows the true object at last. Nothing is smaller than a 36th of the window's height.
 
 mod beliefs;
-mod verdict;
 mod words;
 
 use crate::app::features::App;
@@ -10,8 +9,9 @@ use crate::app::features::presenter::Score;
 use crate::app::panels::view3d::{self, View3d};
 use crate::app::theme::{colour, veil};
 use egui::text::{LayoutJob, TextWrapping};
-use egui::{Align2, Color32, FontId, Galley, Rect, Role, Ui, WidgetInfo, vec2};
+use egui::{Align2, Color32, FontId, Galley, Pos2, Rect, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::grasping::{IdentificationView, Presentation};
+use palpate_sim::objects::object_title;
 use std::sync::Arc;
 
 /// Smallest letters: a share of the window's height.
@@ -34,7 +34,7 @@ const VERDICT: f32 = 5.2;
 const GAP: f32 = 0.6;
 
 /// Draws the window; `message` is news for the user.
-pub(super) fn ui(ui: &Ui, app: &App, score: Score, message: Option<&str>) {
+pub(super) fn ui(ui: &Ui, app: &App, message: Option<&str>) {
     let rect = ui.max_rect();
     let unit = LETTERS * rect.height();
     let width = (COLUMN * rect.width()).clamp(NARROWEST * unit, WIDEST * unit);
@@ -47,7 +47,7 @@ pub(super) fn ui(ui: &Ui, app: &App, score: Score, message: Option<&str>) {
     }
     ui.painter().rect_filled(column, 0.0, colour(colours.raised));
     page.picture_ui(ui, picture, message);
-    page.column_ui(ui, column.shrink(unit), score);
+    page.column_ui(ui, column.shrink(unit));
 }
 
 /// Paints a text aligned within a place.
@@ -112,12 +112,12 @@ impl Page<'_> {
         }
     }
 
-    fn column_ui(&self, ui: &Ui, column: Rect, score: Score) {
+    fn column_ui(&self, ui: &Ui, column: Rect) {
         let Some(snapshot) = self.app.snapshot() else { return };
         let colours = self.app.view.theme.colours();
         let mut top = column.top();
         let mut part = |height: f32| {
-            let place = Rect::from_min_size(egui::pos2(column.left(), top), vec2(column.width(), height * self.unit));
+            let place = Rect::from_min_size(pos2(column.left(), top), vec2(column.width(), height * self.unit));
             top = place.bottom() + GAP * self.unit;
             place
         };
@@ -136,6 +136,7 @@ impl Page<'_> {
         }
         let (column, verdict) = column.split_top_bottom_at_y(column.bottom() - VERDICT * self.unit);
         self.verdict_ui(ui, verdict);
+        let score = self.app.presenter.score;
         if score != Score::default() {
             let text = format!("{} right, {} wrong", score.right, score.wrong);
             let place = column.with_min_y(column.bottom() - SCORE * self.unit);
@@ -151,12 +152,60 @@ impl Page<'_> {
         match class.and_then(|class| self.app.thumbnails.get(class)) {
             Some(texture) => egui::Image::new(texture).corner_radius(0.3 * self.unit).paint_at(ui, place),
             None => {
-                let stroke = egui::Stroke::new(2.0, colour(colours.border));
+                let stroke = Stroke::new(2.0, colour(colours.border));
                 ui.painter().rect_stroke(place, 0.3 * self.unit, stroke, egui::StrokeKind::Inside);
                 let letters = (0.6 * place.height()).max(self.unit);
                 let mark = self.line(ui, "?", letters, place.width(), colour(colours.quiet_text));
                 put(ui, mark, place, Align2::CENTER_CENTER);
             }
         }
+    }
+
+    /// The true object, once there is a verdict.
+    fn verdict_ui(&self, ui: &Ui, place: Rect) {
+        let (colours, unit) = (self.app.view.theme.colours(), self.unit);
+        let Some(snapshot) = self.app.snapshot() else { return };
+        let truth = snapshot.truth();
+        let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
+        let finished = snapshot.status.finished;
+        let right = self.answer().filter(|_| finished).and_then(|view| view.is_right(truth));
+        let (word, ink) = match right {
+            Some(true) => ("Right", colours.good),
+            Some(false) => ("Wrong", colours.error),
+            None if finished => ("No verdict", colours.quiet_text),
+            None => ("What is it?", colours.quiet_text),
+        };
+        let edge = Rect::from_min_max(place.left_top() - vec2(0.0, 0.5 * unit), place.right_top());
+        let stroke = Stroke::new(0.12 * unit, colour(if right.is_some() { ink } else { colours.border }));
+        ui.painter().hline(edge.x_range(), edge.top(), stroke);
+        let side = place.height();
+        self.portrait(ui, Some(truth).filter(|_| finished), Rect::from_min_size(place.min, vec2(side, side)));
+        let lines = place.with_min_x(place.left() + side + unit);
+        let (head, below) = lines.split_top_bottom_at_y(lines.top() + 0.56 * side);
+        let mut words = head;
+        if let Some(right) = right {
+            let middle = pos2(head.left() + 1.4 * unit, head.center().y);
+            ui.painter().circle_filled(middle, 1.4 * unit, colour(ink));
+            mark(ui, right, middle, unit, colour(colours.background));
+            words = head.with_min_x(head.left() + 3.4 * unit);
+        }
+        put(ui, self.line(ui, word, 2.2 * unit, words.width(), colour(ink)), words, Align2::LEFT_CENTER);
+        let name = if finished { format!("It is: {title}") } else { "Shown once it decides.".to_owned() };
+        let quiet = colour(if finished { colours.text } else { colours.quiet_text });
+        put(ui, self.line(ui, &name, 1.4 * unit, below.width(), quiet), below, Align2::LEFT_CENTER);
+        let spoken = if finished { format!("{word}: it is {title}") } else { word.to_owned() };
+        self.speak(ui, "truth", lines, &spoken);
+    }
+}
+
+/// A tick or a cross, as large as the letters around it.
+fn mark(ui: &Ui, right: bool, middle: Pos2, unit: f32, ink: Color32) {
+    let stroke = Stroke::new(0.36 * unit, ink);
+    let at = |x: f32, y: f32| middle + vec2(x, y) * unit;
+    if right {
+        ui.painter().line(vec![at(-0.62, 0.05), at(-0.18, 0.5), at(0.66, -0.46)], stroke);
+    } else {
+        ui.painter().line_segment([at(-0.5, -0.5), at(0.5, 0.5)], stroke);
+        ui.painter().line_segment([at(-0.5, 0.5), at(0.5, -0.5)], stroke);
     }
 }

@@ -10,11 +10,11 @@ pub(in crate::app) mod words;
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::tools::GripperTools;
+use crate::app::features::view::ViewSource;
 use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{accented, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::view_source::ViewSource;
 use crate::app::widgets::number_field;
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,

@@ -1,40 +1,26 @@
 //! Messages to the user: a line below the time bar, which covers nothing, with a button where something can be done; and the
 //! last messages, in a menu.
 
+use super::App;
 use crate::app::theme::colour;
 use egui::{Frame, Label, Margin, Panel, RichText, Ui};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::workers::Notice;
+use palpate_lab::workers::{LabelCommand, Notice};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// What can be done about a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Remedy {
-    /// Take the convex hull of a mesh that cannot be repaired.
-    UseHull,
-    /// Read the lengths of the object's file as millimetres.
-    TreatAsMillimetres,
-    /// Read them as metres.
-    TreatAsMetres,
-    /// Choose another file.
-    LocateFile,
-    /// Open the calibration panel.
-    Calibrate,
-    /// Undo the last change of labels.
-    UndoLabel,
-}
+/// What can be done about a message: a phrase of the messages that it helps with, its button, and what that does.
+struct Remedy(&'static str, &'static str, fn(&mut App));
 
-/// Remedies by a phrase of the messages that they help with, and their buttons.
-const REMEDIES: [(&str, &str, Remedy); 8] = [
-    ("object.collision = \"hull\"", "Use its hull", Remedy::UseHull),
-    ("set object.scale to decide", "Treat as mm", Remedy::TreatAsMillimetres),
-    ("set object.scale to decide", "Treat as m", Remedy::TreatAsMetres),
-    ("cannot read \"", "Choose a file ..", Remedy::LocateFile),
-    ("cannot read the mesh", "Choose a file ..", Remedy::LocateFile),
-    ("not calibrated", "Calibrate ..", Remedy::Calibrate),
-    ("no calibration", "Calibrate ..", Remedy::Calibrate),
-    ("Ctrl+Z brings it back", "Undo", Remedy::UndoLabel),
+const REMEDIES: [Remedy; 8] = [
+    Remedy("object.collision = \"hull\"", "Use its hull", App::use_hull),
+    Remedy("set object.scale to decide", "Treat as mm", |app| app.set_object_scale(1e-3)),
+    Remedy("set object.scale to decide", "Treat as m", |app| app.set_object_scale(1.0)),
+    Remedy("cannot read \"", "Choose a file ..", App::ask_for_object),
+    Remedy("cannot read the mesh", "Choose a file ..", App::ask_for_object),
+    Remedy("not calibrated", "Calibrate ..", |app| app.show_panel("calibration")),
+    Remedy("no calibration", "Calibrate ..", |app| app.show_panel("calibration")),
+    Remedy("Ctrl+Z brings it back", "Undo", |app| app.edit_labels(LabelCommand::Undo)),
 ];
 
 /// Messages that are kept.
@@ -66,14 +52,14 @@ struct Shown {
 
 /// Messages of the window.
 #[derive(Default)]
-pub(super) struct Notices {
+pub(in crate::app) struct Notices {
     shown: Vec<Shown>,
     messages: VecDeque<String>,
 }
 
 /// Remedies for a message.
-fn remedies(text: &str) -> impl Iterator<Item = (&'static str, Remedy)> + '_ {
-    REMEDIES.iter().filter(|(phrase, ..)| text.contains(phrase)).map(|(_, button, remedy)| (*button, *remedy))
+fn remedies(text: &str) -> impl Iterator<Item = &'static Remedy> + '_ {
+    REMEDIES.iter().filter(|Remedy(phrase, ..)| text.contains(phrase))
 }
 
 impl Notices {
@@ -92,7 +78,7 @@ impl Notices {
     }
 
     /// Shows a notice of a thread.
-    pub(super) fn show(&mut self, notice: Notice) {
+    pub(in crate::app) fn show(&mut self, notice: Notice) {
         match notice {
             Notice::Info(text) => self.info(text),
             Notice::Warning(text) => self.warning(text),
@@ -105,20 +91,20 @@ impl Notices {
         }
     }
 
-    pub(super) fn info(&mut self, text: impl Into<String>) {
+    pub(in crate::app) fn info(&mut self, text: impl Into<String>) {
         self.tell(Level::Info, text.into());
     }
 
-    pub(super) fn warning(&mut self, text: impl Into<String>) {
+    pub(in crate::app) fn warning(&mut self, text: impl Into<String>) {
         self.tell(Level::Warning, text.into());
     }
 
-    pub(super) fn error(&mut self, text: impl Into<String>) {
+    pub(in crate::app) fn error(&mut self, text: impl Into<String>) {
         self.tell(Level::Error, text.into());
     }
 
     /// Last messages, oldest first.
-    pub(super) fn messages(&self) -> &VecDeque<String> {
+    pub(in crate::app) fn messages(&self) -> &VecDeque<String> {
         &self.messages
     }
 
@@ -133,14 +119,14 @@ impl Notices {
     }
 
     /// The message to show now where there is no line: warnings about single grasps are left out.
-    pub(super) fn current(&mut self, ctx: &egui::Context) -> Option<&str> {
+    pub(in crate::app) fn current(&mut self, ctx: &egui::Context) -> Option<&str> {
         self.first(ctx)?;
         let shown = self.shown.iter().filter(|shown| shown.level != Level::Warning);
         shown.max_by_key(|shown| shown.level).map(|shown| shown.text.as_str())
     }
 
-    /// Draws the line; returns the remedy that was chosen.
-    pub(super) fn line(&mut self, ui: &mut Ui, theme: Theme) -> Option<Remedy> {
+    /// Draws the line; returns what the remedy that was chosen does.
+    pub(in crate::app) fn line(&mut self, ui: &mut Ui, theme: Theme) -> Option<fn(&mut App)> {
         let first = self.first(ui.ctx());
         let colours = theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 2));
@@ -168,9 +154,9 @@ impl Notices {
                             }
                         });
                     }
-                    for (button, remedy) in remedies(text) {
-                        if ui.button(RichText::new(button).small()).clicked() {
-                            chosen = Some(remedy);
+                    for Remedy(_, button, does) in remedies(text) {
+                        if ui.button(RichText::new(*button).small()).clicked() {
+                            chosen = Some(*does);
                         }
                     }
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
@@ -213,11 +199,11 @@ mod tests {
 
     #[test]
     fn warnings_carry_the_buttons_that_help() {
-        let of = |text: &str| remedies(text).map(|(_, remedy)| remedy).collect::<Vec<_>>();
+        let of = |text: &str| remedies(text).map(|Remedy(_, button, _)| *button).collect::<Vec<_>>();
         let open = MeshError::Open { holes: 1, widest_mm: 20.0 };
-        assert_eq!(of(&open.to_string()), [Remedy::UseHull]);
-        assert_eq!(of(&MeshError::NotOrientable.to_string()), [Remedy::UseHull]);
-        assert_eq!(of("Trial 3 stored."), []);
+        assert_eq!(of(&open.to_string()), ["Use its hull"]);
+        assert_eq!(of(&MeshError::NotOrientable.to_string()), ["Use its hull"]);
+        assert!(of("Trial 3 stored.").is_empty());
         // The messages are those of the loader, so that a change of its words is noticed here.
         let folder = tempfile::tempdir().expect("a folder");
         let load = |name: &str| {
@@ -225,13 +211,13 @@ mod tests {
             scene.object.source = folder.path().join(name).to_string_lossy().into_owned();
             scene.load_object()
         };
-        assert_eq!(of(&load("gone.obj").expect_err("no file").to_string()), [Remedy::LocateFile]);
+        assert_eq!(of(&load("gone.obj").expect_err("no file").to_string()), ["Choose a file .."]);
         let corners = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\n";
         let cube = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
         std::fs::write(folder.path().join("large.obj"), cube).expect("writes");
         let large = load("large.obj").expect("loads").expect("an object");
         let scale = large.warnings.iter().find(|warning| warning.contains("scale")).expect("a warning of its size");
-        assert_eq!(of(scale), [Remedy::TreatAsMillimetres, Remedy::TreatAsMetres]);
-        assert_eq!(of("trial 7 discarded; Ctrl+Z brings it back"), [Remedy::UndoLabel]);
+        assert_eq!(of(scale), ["Treat as mm", "Treat as m"]);
+        assert_eq!(of("trial 7 discarded; Ctrl+Z brings it back"), ["Undo"]);
     }
 }

@@ -1,6 +1,6 @@
-//! Curves of the channels of one quantity, for the plots.
+//! Curves of the channels of one quantity.
 
-use crate::app::plots::PlotCurve;
+use super::PlotCurve;
 use crate::app::shown::DisplayedData;
 use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
@@ -10,7 +10,7 @@ use palpate_tactile::{Channel, Quantity, SignalDefinition, Span};
 
 /// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and
 /// their unit; or the raw counts of their sensors, where those are chosen.
-pub(super) fn channel_curves<'a>(
+pub(in crate::app) fn channel_curves<'a>(
     data: &DisplayedData<'_>,
     quantity: Quantity,
     (factor, unit): (f64, &'a str),
@@ -62,7 +62,7 @@ fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) ->
 }
 
 /// True where a channel measures a quantity; a contact pressure does in place of a pad's.
-pub(super) fn shows(quantity: Quantity, channel: &Channel) -> bool {
+pub(in crate::app) fn shows(quantity: Quantity, channel: &Channel) -> bool {
     channel.quantity == quantity || (quantity.is_pressure() && channel.quantity.is_pressure())
 }
 
@@ -74,7 +74,7 @@ fn label(channel: &Channel) -> String {
 }
 
 /// Colour by quantity and span.
-pub(super) fn colour_of(channel: &Channel) -> Trace {
+pub(in crate::app) fn colour_of(channel: &Channel) -> Trace {
     let distal = channel.span.ends().0 >= 0.5;
     match (channel.quantity, distal) {
         (Quantity::Curvature, false) => Trace::Curvature,

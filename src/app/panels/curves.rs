@@ -1,0 +1,70 @@
+//! Curves over time: curvature, pressure and force of both fingers, line pressure, and raw counts.
+
+use crate::app::actions::Actions;
+use crate::app::plots::{PlotCurve, TimePlot, channel_curves, show};
+use crate::app::shown::DisplayedData;
+use egui::Ui;
+use palpate_geometry::palette::Trace;
+use palpate_tactile::Quantity;
+use palpate_tactile::board::Sensor;
+
+pub(super) fn curvature_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let (curves, unit) = channel_curves(data, Quantity::Curvature, (1.0, "1/m"));
+    show(ui, data, actions, TimePlot { id: "curvature", unit, curves, least: [0.0, 8.0] });
+}
+
+pub(super) fn pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let (curves, unit) = channel_curves(data, Quantity::Pressure, (1e-3, "kPa"));
+    show(ui, data, actions, TimePlot { id: "pressure", unit, curves, least: [0.0, 10.0] });
+}
+
+pub(super) fn force_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let (curves, unit) = channel_curves(data, Quantity::Force, (1.0, "N"));
+    show(ui, data, actions, TimePlot { id: "force", unit, curves, least: [0.0, 0.5] });
+}
+
+pub(super) fn line_pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let curve = PlotCurve {
+        name: "line".to_owned(),
+        trace: Trace::Line,
+        dashed: false,
+        values: Box::new(|trace, k| trace.line_bar.get(k).copied()),
+        half_width: Box::new(|_, _| None),
+        channel: None,
+    };
+    show(ui, data, actions, TimePlot { id: "line pressure", unit: "bar", curves: vec![curve], least: [0.0, 1.0] });
+}
+
+/// Raw ADC counts of the real gripper's board, channel by channel.
+pub(super) fn counts_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let Some(board) = data.board() else {
+        ui.weak("Raw ADC counts. Connect the board in the panel Gripper, or open a trial of it.");
+        return;
+    };
+    let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
+    let curves = board.channels.iter().enumerate().map(|(place, name)| {
+        let sensor = Sensor::ALL.into_iter().find(|sensor| board.channel_of(*sensor) == Some(place));
+        let (trace, dashed) = look(sensor, place);
+        PlotCurve {
+            name: name.clone(),
+            trace,
+            dashed,
+            values: Box::new(move |trace, k| trace.channels.get(derived + place)?.get(k).map(|v| f64::from(*v))),
+            half_width: Box::new(|_, _| None),
+            channel: None,
+        }
+    });
+    let curves = curves.collect();
+    show(ui, data, actions, TimePlot { id: "counts", unit: "counts", curves, least: [0.0, 100.0] });
+}
+
+/// Colour and dash: those of the sensor; other channels take turns.
+fn look(sensor: Option<Sensor>, place: usize) -> (Trace, bool) {
+    match sensor {
+        Some(Sensor::FlexLeft) => (Trace::Curvature, false),
+        Some(Sensor::FlexRight) => (Trace::Curvature, true),
+        Some(Sensor::PadLeft) => (Trace::Pressure, false),
+        Some(Sensor::PadRight) => (Trace::Pressure, true),
+        None => ([Trace::Line, Trace::CurvatureDistal, Trace::PressureDistal][place % 3], place % 2 == 1),
+    }
+}
