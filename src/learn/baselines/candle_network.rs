@@ -8,7 +8,6 @@
 use crate::arrays::Arrays;
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
-use crate::mirror::mirror;
 use crate::model::{LoadError, ModelCard};
 use crate::network::Preparation;
 use crate::pmf::Pmf;
@@ -167,7 +166,7 @@ impl<N: CandleNetwork> Candle<N> {
         fitting.refuse_settings()?;
         let duration_s = data.median_duration_s().max(0.05);
         let preparation = Preparation::fit(data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0));
-        let mirror = mirror_of_inputs(&data.channels, &preparation);
+        let mirror = preparation.mirror(&data.channels);
         let epochs = if fitting.quick { N::EPOCHS.div_ceil(2) } else { N::EPOCHS };
         let mut learned = Learned { preparation, mirror, revision: N::REVISION, epochs, temperature: 1.0 };
         let sequences: Vec<Vec<f32>> = data.examples.iter().map(|e| inputs(&learned, &e.grasp)).collect();
@@ -230,13 +229,6 @@ fn inputs(learned: &Learned, grasp: &Sequence) -> Vec<f32> {
     let last = (rows.len() / width.max(1)).checked_sub(1);
     let at = |step: usize, input: usize| last.map_or(0.0, |last| rows[step.min(last) * width + input]);
     (0..width).flat_map(|input| (0..STEPS).map(move |step| at(step, input))).collect()
-}
-
-/// Counterpart of each input on the other finger; `None` if grasps cannot be mirrored.
-pub(super) fn mirror_of_inputs(channels: &[String], preparation: &Preparation) -> Option<Vec<usize>> {
-    let own = mirror(channels)?;
-    let counterpart = |input: usize| input / own.len() * own.len() + own[input % own.len()];
-    Some((0..preparation.width()).map(counterpart).collect())
 }
 
 /// The same inputs with left and right exchanged.

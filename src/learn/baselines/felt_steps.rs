@@ -1,6 +1,6 @@
 //! Inputs of networks that answer from the beginning of a grasp on: time steps of which only the first have been felt.
 
-use super::candle_network::{STEPS, add_noise, mirror_of_inputs, mirrored};
+use super::candle_network::{STEPS, add_noise, mirrored};
 use crate::data::{Dataset, Sequence};
 use crate::gaps;
 use crate::network::Preparation;
@@ -39,7 +39,7 @@ impl FeltSteps {
     pub(super) fn fit(data: &Dataset) -> Self {
         let duration_s = data.median_duration_s().max(0.05);
         let preparation = Preparation::fit(data, (STEPS as f32 / duration_s).clamp(0.1, 1000.0));
-        let mirror = mirror_of_inputs(&data.channels, &preparation);
+        let mirror = preparation.mirror(&data.channels);
         Self { channels: data.channels.clone(), preparation, mirror }
     }
 

@@ -16,7 +16,7 @@ use std::ops::Range;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Calibrated {
     pub(super) layer: MacroLayer,
-    /// `[groups][steps]`; the last step applies to later ones.
+    /// `[groups][steps]`; the last step applies to later ones. Empty without calibration.
     pub(super) temperatures: Vec<Vec<f32>>,
 }
 
@@ -25,8 +25,8 @@ pub(super) struct Calibrated {
 pub(super) struct Plan<'a> {
     pub(super) shape: MacroShape,
     pub(super) training: &'a Training,
-    /// Part of each sequence; part 0 is held out for calibration.
-    pub(super) held_out: &'a [usize],
+    /// Part of each sequence; part 0 is held out for calibration. `None` for networks that are not calibrated.
+    pub(super) held_out: Option<&'a [usize]>,
     pub(super) seed: u64,
     /// Progress of the whole fit at the start and end of this one.
     pub(super) share: Range<f64>,
@@ -36,9 +36,9 @@ pub(super) struct Plan<'a> {
 pub(super) type HeldOut = Vec<Option<Vec<f32>>>;
 
 /// Some of the sequences of a stage.
-pub(super) struct Subset<'a> {
-    pub(super) inputs: &'a StageInputs,
-    pub(super) kept: Vec<usize>,
+struct Subset<'a> {
+    inputs: &'a StageInputs,
+    kept: Vec<usize>,
 }
 
 impl TrainingSet for Subset<'_> {
@@ -63,10 +63,13 @@ impl Calibrated {
         fitting: &Fitting<'_>,
     ) -> Result<(Self, HeldOut), LearnError> {
         let (middle, seed) = (0.5 * (plan.share.start + plan.share.end), plan.seed);
-        let first = Plan { share: plan.share.start..middle, ..plan.clone() };
-        let fold_of = plan.held_out;
-        let layer = first.train(inputs, fitting, seed, &|k| fold_of[k] != 0)?;
         let mut held_out: HeldOut = vec![None; inputs.count()];
+        let Some(fold_of) = plan.held_out else {
+            let layer = plan.train(inputs, fitting, seed, &|_| true)?;
+            return Ok((Self { layer, temperatures: Vec::new() }, held_out));
+        };
+        let first = Plan { share: plan.share.start..middle, ..plan.clone() };
+        let layer = first.train(inputs, fitting, seed, &|k| fold_of[k] != 0)?;
         for (k, held) in held_out.iter_mut().enumerate().filter(|(k, _)| fold_of[*k] == 0) {
             *held = Some(scores_at_every_step(&layer, &inputs.sequences[k]));
         }
@@ -120,6 +123,16 @@ impl Calibrated {
         self.layer.shape()
     }
 
+    /// Scores of one sequence after each of its steps, `[steps][outputs]`.
+    pub(super) fn scores(&self, x: &[f32]) -> Vec<f32> {
+        scores_at_every_step(&self.layer, x)
+    }
+
+    /// PMF of each group after the last step of a sequence; `None` for an empty one.
+    pub(super) fn pmfs_after(&self, x: &[f32]) -> Option<Vec<Pmf>> {
+        pmfs_at_the_end(&self.scores(x), &self.shape().groups, &self.temperatures)
+    }
+
     /// Calibrated PMF of each group from the scores after a step.
     pub(super) fn pmfs(&self, scores: &[f32], step: usize) -> Vec<Pmf> {
         calibrated_pmfs(scores, &self.shape().groups, &self.temperatures, step)
@@ -148,7 +161,7 @@ impl Plan<'_> {
 }
 
 /// Callback of the training loop: reports progress, and stops on request.
-pub(super) fn progress_of<'a>(
+fn progress_of<'a>(
     fitting: &'a Fitting<'_>,
     from: f64,
     share: f64,
@@ -169,17 +182,23 @@ fn calibrated_pmfs(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>], 
     let mut rest = scores;
     groups
         .iter()
-        .zip(temperatures)
-        .map(|(&classes, of_group)| {
+        .enumerate()
+        .map(|(group, &classes)| {
             let (own, others) = rest.split_at(classes);
             rest = others;
-            let temperature = temperature(of_group, step);
+            let temperature = temperatures.get(group).map_or(1.0, |of_group| temperature(of_group, step));
             Pmf::from_scores(own.iter().map(|s| f64::from(*s) / temperature))
         })
         .collect()
 }
 
-/// Scores of one sequence after each of its steps, `[steps][outputs]`.
+/// PMF of each group from scores after every step, `[steps][outputs]`, at the last one; `None` without steps.
+pub(super) fn pmfs_at_the_end(scores: &[f32], groups: &[usize], temperatures: &[Vec<f32>]) -> Option<Vec<Pmf>> {
+    let outputs: usize = groups.iter().sum();
+    let last = (scores.len() / outputs).checked_sub(1)?;
+    Some(calibrated_pmfs(&scores[last * outputs..], groups, temperatures, last))
+}
+
 fn scores_at_every_step(layer: &MacroLayer, x: &[f32]) -> Vec<f32> {
     let mut live = LiveMacroLayer::new(layer);
     x.chunks_exact(layer.shape().inputs).flat_map(|row| live.step(row, &[]).to_vec()).collect()

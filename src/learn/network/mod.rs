@@ -3,9 +3,8 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `tactile_network.rs` | the recognisers: macro-layer, dual-stage LSTM, iterated dual-stage LSTM |
-//! | `paper_network.rs` | the same as the paper has them, without our additions |
-//! | `recipe.rs` | settings of a network and its training |
+//! | `two_stage.rs` | the recognisers: macro-layer, dual-stage LSTM, iterated dual-stage LSTM |
+//! | `recipe.rs` | settings of a network and its training: strict as in the paper, or tuned |
 //! | `preparation.rs` | readings to inputs: time steps and scaling |
 //! | `training_set.rs` | inputs of a stage and their augmentation |
 //! | `calibrated.rs` | networks with calibrated probabilities, cross-fitting |
@@ -19,20 +18,18 @@ mod gemm;
 mod gradient_tests;
 mod lstm;
 mod macro_layer;
-mod paper_network;
 mod preparation;
 mod recipe;
-mod tactile_network;
 mod training;
 mod training_set;
+mod two_stage;
 
 use crate::arrays::Arrays;
 use crate::data::Dataset;
 use crate::fitting::{Fitting, LearnError};
 use crate::model::{LoadError, ModelCard};
 use crate::recogniser::Recogniser;
-use paper_network::PaperNetwork;
-use tactile_network::TactileNetwork;
+use two_stage::TwoStageNetwork;
 
 pub(crate) use gemm::{Matrix, multiply};
 pub use macro_layer::{Batch, Block, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
@@ -50,20 +47,12 @@ pub(crate) fn fit(
     method: &'static str,
     fitting: &Fitting<'_>,
 ) -> Result<Box<dyn Recogniser>, LearnError> {
-    Ok(if recipe.strict {
-        Box::new(PaperNetwork::fit(data, recipe, method, fitting)?)
-    } else {
-        Box::new(TactileNetwork::fit(data, recipe, method, fitting)?)
-    })
+    Ok(Box::new(TwoStageNetwork::fit(data, recipe, method, fitting)?))
 }
 
 /// Restores a network from a model file.
 pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Box<dyn Recogniser>, LoadError> {
-    Ok(if card.settings["recipe"]["strict"] == true {
-        Box::new(PaperNetwork::load(card, arrays)?)
-    } else {
-        Box::new(TactileNetwork::load(card, arrays)?)
-    })
+    Ok(Box::new(TwoStageNetwork::load(card, arrays)?))
 }
 
 /// Everything that decides a fit, besides the data, the seed and the options of the fit.

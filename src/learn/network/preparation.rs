@@ -7,6 +7,7 @@
 
 use crate::data::{Dataset, Sequence};
 use crate::gaps;
+use crate::mirror::mirror;
 use serde::{Deserialize, Serialize};
 
 /// Mapping from readings to inputs.
@@ -62,6 +63,13 @@ impl Preparation {
     pub(super) fn standardising(data: &Dataset, rate_hz: f32) -> Self {
         let scales = columns(data, rate_hz).iter_mut().map(|column| standardised(column, 0.0)).collect();
         Self { rate_hz, scales, course: Vec::new(), factors: Vec::new() }
+    }
+
+    /// Counterpart of each input on the other finger; `None` if grasps cannot be mirrored.
+    pub(crate) fn mirror(&self, channels: &[String]) -> Option<Vec<usize>> {
+        let own = mirror(channels)?;
+        let counterpart = |input: usize| input / own.len() * own.len() + own[input % own.len()];
+        Some((0..self.width()).map(counterpart).collect())
     }
 
     /// Number of inputs per step.
