@@ -67,73 +67,46 @@ pub struct Array {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Arrays(pub BTreeMap<String, Array>);
 
-/// Reason for refusing an array of a model file.
+/// Reason why a model, or an array of its file, cannot be used, as a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ArrayError {
-    /// A required array is absent.
-    #[error("array \"{name}\" is missing")]
-    Missing {
-        /// Array name.
-        name: String,
-    },
-    /// An array that the method does not use.
-    #[error("array \"{name}\" of shape {found:?} is not part of this method")]
-    Unexpected {
-        /// Array name.
-        name: String,
-        /// Its shape.
-        found: Vec<usize>,
-    },
-    /// Wrong element type.
-    #[error("array \"{name}\" holds {found} instead of {expected}")]
-    Kind {
-        /// Array name.
-        name: String,
-        /// Type in the file.
-        found: String,
-        /// Required type.
-        expected: &'static str,
-    },
-    /// Wrong shape.
-    #[error("array \"{name}\" has shape {found:?} instead of {expected:?}")]
-    Shape {
-        /// Array name.
-        name: String,
-        /// Shape in the file.
-        found: Vec<usize>,
-        /// Required shape.
-        expected: Vec<usize>,
-    },
-    /// Shape that contradicts another array.
-    #[error("array \"{name}\" has shape {found:?}, but array \"{other}\" requires {expected:?}")]
-    Mismatch {
-        /// Array name.
-        name: String,
-        /// Shape in the file.
-        found: Vec<usize>,
-        /// Array that determines the shape.
-        other: &'static str,
-        /// Shape it requires.
-        expected: Vec<usize>,
-    },
-    /// NaN or infinite element.
-    #[error("element {index} of array \"{name}\" is not finite")]
-    NotFinite {
-        /// Array name.
-        name: String,
-        /// Index among the elements.
-        index: usize,
-    },
-    /// Element out of range.
-    #[error("element {index} of array \"{name}\" must be {expected}")]
-    Value {
-        /// Array name.
-        name: String,
-        /// Index among the elements.
-        index: usize,
-        /// Allowed values.
-        expected: &'static str,
-    },
+#[error("{0}")]
+pub struct ModelError(pub String);
+
+impl ModelError {
+    /// Wraps the error of a library.
+    pub(crate) fn failed(cause: impl std::fmt::Display) -> Self {
+        Self(cause.to_string())
+    }
+
+    /// A file that holds no complete model.
+    pub(crate) fn malformed(name: &str, cause: impl std::fmt::Display) -> Self {
+        Self(format!("\"{name}\" is not a complete Palpate model: {cause}; train or copy it again"))
+    }
+
+    /// A file whose card and parameters contradict each other or the method.
+    pub(crate) fn invalid(name: &str, cause: &Self) -> Self {
+        Self(format!("\"{name}\" is not a valid Palpate model: {cause}; train or copy it again"))
+    }
+
+    /// A part of the card, as a noun phrase, that is invalid or contradicts the channels or labels.
+    pub(crate) fn card(part: &str) -> Self {
+        Self(format!("{part} on its card is invalid or does not match its channels and labels"))
+    }
+
+    /// An array of the wrong shape.
+    pub(crate) fn shape(name: &str, found: &[usize], expected: &[usize]) -> Self {
+        Self(format!("array \"{name}\" has shape {found:?} instead of {expected:?}"))
+    }
+
+    /// An element out of range.
+    pub(crate) fn value(name: &str, index: usize, expected: &str) -> Self {
+        Self(format!("element {index} of array \"{name}\" must be {expected}"))
+    }
+
+    /// Elements of the wrong type.
+    pub(crate) fn kind(name: &str, found: &str, expected: &str) -> Self {
+        Self(format!("array \"{name}\" holds {found} instead of {expected}"))
+    }
 }
 
 impl Arrays {
@@ -180,111 +153,106 @@ impl Arrays {
     }
 
     /// Finite single-precision numbers of a shape.
-    pub fn f32s(&self, name: &str, shape: &[usize]) -> Result<&[f32], ArrayError> {
+    pub fn f32s(&self, name: &str, shape: &[usize]) -> Result<&[f32], ModelError> {
         match &self.of_shape(name, shape)?.numbers {
             Numbers::F32(values) => Ok(values),
-            other => Err(wrong_kind(name, other, "f32")),
+            other => Err(ModelError::kind(name, other.kind(), "f32")),
         }
     }
 
     /// Finite single-precision numbers, `[rows][columns]` with any number of rows.
-    pub fn f32_rows(&self, name: &str, columns: usize) -> Result<&[f32], ArrayError> {
+    pub fn f32_rows(&self, name: &str, columns: usize) -> Result<&[f32], ModelError> {
         let rows = self.array(name)?.numbers.len() / columns.max(1);
         self.f32s(name, &[rows, columns])
     }
 
     /// Vector of finite single-precision numbers.
-    pub fn f32_vector(&self, name: &str) -> Result<&[f32], ArrayError> {
+    pub fn f32_vector(&self, name: &str) -> Result<&[f32], ModelError> {
         self.f32s(name, &[self.array(name)?.numbers.len()])
     }
 
     /// Vector of finite double-precision numbers.
-    pub fn f64_vector(&self, name: &str) -> Result<&[f64], ArrayError> {
+    pub fn f64_vector(&self, name: &str) -> Result<&[f64], ModelError> {
         match &self.of_shape(name, &[self.array(name)?.numbers.len()])?.numbers {
             Numbers::F64(values) => Ok(values),
-            other => Err(wrong_kind(name, other, "f64")),
+            other => Err(ModelError::kind(name, other.kind(), "f64")),
         }
     }
 
     /// Vector of integers.
-    pub fn integers(&self, name: &str) -> Result<&[i64], ArrayError> {
+    pub fn integers(&self, name: &str) -> Result<&[i64], ModelError> {
         match &self.of_shape(name, &[self.array(name)?.numbers.len()])?.numbers {
             Numbers::I64(values) => Ok(values),
-            other => Err(wrong_kind(name, other, "i64")),
+            other => Err(ModelError::kind(name, other.kind(), "i64")),
         }
     }
 
     /// Small integers of a shape.
-    pub fn small(&self, name: &str, shape: &[usize]) -> Result<&[i16], ArrayError> {
+    pub fn small(&self, name: &str, shape: &[usize]) -> Result<&[i16], ModelError> {
         match &self.of_shape(name, shape)?.numbers {
             Numbers::I16(values) => Ok(values),
-            other => Err(wrong_kind(name, other, "i16")),
+            other => Err(ModelError::kind(name, other.kind(), "i16")),
         }
     }
 
     /// Vector of indices below a bound.
-    pub fn indices(&self, name: &str, below: usize, expected: &'static str) -> Result<Vec<usize>, ArrayError> {
+    pub fn indices(&self, name: &str, below: usize, expected: &str) -> Result<Vec<usize>, ModelError> {
         let index = |(index, value): (usize, &i64)| {
             let value = usize::try_from(*value).ok().filter(|value| *value < below);
-            value.ok_or_else(|| ArrayError::Value { name: name.to_owned(), index, expected })
+            value.ok_or_else(|| ModelError::value(name, index, expected))
         };
         self.integers(name)?.iter().enumerate().map(index).collect()
     }
 
     /// Refuses an array whose shape contradicts another array.
-    pub fn require(&self, name: &str, shape: &[usize], other: &'static str) -> Result<(), ArrayError> {
+    pub fn require(&self, name: &str, shape: &[usize], other: &str) -> Result<(), ModelError> {
         let found = &self.array(name)?.shape;
         if found == shape {
             return Ok(());
         }
-        Err(ArrayError::Mismatch { name: name.to_owned(), found: found.clone(), other, expected: shape.to_vec() })
+        Err(ModelError(format!("array \"{name}\" has shape {found:?}, but array \"{other}\" requires {shape:?}")))
     }
 
     /// Refuses arrays that a recogniser made from these would not save in the same form.
-    pub fn require_same_form(&self, saved: &Self) -> Result<(), ArrayError> {
+    pub fn require_same_form(&self, saved: &Self) -> Result<(), ModelError> {
         for (name, array) in &self.0 {
-            let (name, found) = (name.clone(), array.shape.clone());
-            match saved.0.get(&name) {
-                None => return Err(ArrayError::Unexpected { name, found }),
-                Some(own) if own.shape != found => {
-                    return Err(ArrayError::Shape { name, found, expected: own.shape.clone() });
+            let found = &array.shape;
+            match saved.0.get(name) {
+                None => {
+                    return Err(ModelError(format!("array \"{name}\" of shape {found:?} is not part of this method")));
                 }
+                Some(own) if own.shape != *found => return Err(ModelError::shape(name, found, &own.shape)),
                 Some(_) => {}
             }
         }
         Ok(())
     }
 
-    fn array(&self, name: &str) -> Result<&Array, ArrayError> {
-        self.0.get(name).ok_or_else(|| ArrayError::Missing { name: name.to_owned() })
+    fn array(&self, name: &str) -> Result<&Array, ModelError> {
+        self.0.get(name).ok_or_else(|| ModelError(format!("array \"{name}\" is missing")))
     }
 
-    fn of_shape(&self, name: &str, shape: &[usize]) -> Result<&Array, ArrayError> {
+    fn of_shape(&self, name: &str, shape: &[usize]) -> Result<&Array, ModelError> {
         let array = self.array(name)?;
         if array.shape != shape {
-            let (name, found) = (name.to_owned(), array.shape.clone());
-            return Err(ArrayError::Shape { name, found, expected: shape.to_vec() });
+            return Err(ModelError::shape(name, &array.shape, shape));
         }
         match array.numbers.first_not_finite() {
-            Some(index) => Err(ArrayError::NotFinite { name: name.to_owned(), index }),
+            Some(index) => Err(ModelError(format!("element {index} of array \"{name}\" is not finite"))),
             None => Ok(array),
         }
     }
-}
-
-fn wrong_kind(name: &str, found: &Numbers, expected: &'static str) -> ArrayError {
-    ArrayError::Kind { name: name.to_owned(), found: found.kind().to_owned(), expected }
 }
 
 /// Refuses the first element that is out of range.
 pub(crate) fn check_each<T>(
     name: &str,
     values: &[T],
-    expected: &'static str,
+    expected: &str,
     is_allowed: impl Fn(&T) -> bool,
-) -> Result<(), ArrayError> {
+) -> Result<(), ModelError> {
     match values.iter().position(|value| !is_allowed(value)) {
-        Some(index) => Err(ArrayError::Value { name: name.to_owned(), index, expected }),
+        Some(index) => Err(ModelError::value(name, index, expected)),
         None => Ok(()),
     }
 }

@@ -3,8 +3,8 @@
 use crate::evaluation::{MOST_GRASPS, answer, evaluate, product_of_experts, rounds};
 use crate::metrics::{Bootstrap, Confusion};
 use crate::{
-    ArrayError, Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, LoadError, METHODS, Method, Model,
-    ModelCard, ModelError, Numbers, Pmf, Sequence, Shipped, Signatures, StopRule, method,
+    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, METHODS, Method, Model, ModelCard, ModelError,
+    Numbers, Pmf, Sequence, Shipped, Signatures, StopRule, method,
 };
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -229,13 +229,14 @@ fn unsuitable_data_are_refused_with_a_reason() {
             assert_eq!(method.train(&data, &fitting).err(), Some(LearnError::Stopped));
             let settings = serde_json::json!({ "unitz": 3 }).as_object().cloned().expect("an object");
             let fitting = Fitting { settings, ..quick(1) };
-            assert!(matches!(method.train(&data, &fitting), Err(LearnError::Setting { name, .. }) if name == "unitz"));
+            let refused = method.train(&data, &fitting).map(|model| model.card).expect_err("refused").to_string();
+            assert!(refused.starts_with("setting unitz: "), "{refused}");
         }
     }
     let mut bare = data;
     bare.labels.classes.iter_mut().for_each(|class| (class.size, class.shape) = (None, None));
     let error = method("ds-lstm").expect("in the list").train(&bare, &quick(1)).err();
-    assert!(matches!(error, Some(LearnError::NoProperties { .. })));
+    assert!(error.is_some_and(|error| error.to_string().contains("learns size and shape first")));
     assert!(method("macro-layer").expect("in the list").train(&bare, &quick(1)).is_ok());
 }
 
@@ -246,7 +247,8 @@ fn methods_of_two_stages_need_size_and_shape() {
     for method in &METHODS {
         let two_stages = method.recipe.is_some_and(|recipe| recipe().two_stages);
         let refused = method.train(&bare, &quick(1)).err();
-        assert_eq!(matches!(refused, Some(LearnError::NoProperties { .. })), two_stages, "{}", method.key);
+        let needs_them = refused.is_some_and(|error| error.to_string().contains("learns size and shape first"));
+        assert_eq!(needs_them, two_stages, "{}", method.key);
     }
 }
 
@@ -306,7 +308,7 @@ fn methods_of_one_stage_learn_from_both_sets() {
         assert!(with_second.recogniser.arrays() == joined.recogniser.arrays(), "{key}");
         let other = Dataset { channels: vec!["grip".to_owned(); 4], ..second.clone() };
         let refused = method.train(&first, &Fitting { second: Some(&other), ..quick(1) }).err();
-        assert_eq!(refused, Some(LearnError::SecondDiffers), "{key}");
+        assert!(refused.is_some_and(|error| error.to_string().contains("other channels or labels")), "{key}");
     }
 }
 
@@ -361,7 +363,8 @@ fn truncated_or_altered_models_are_refused() {
         assert!(with(&|card| card.channels.push("grip".to_owned())).is_err(), "{}", method.key);
         assert!(with(&|card| card.settings = serde_json::Value::Null).is_err(), "{}", method.key);
         let unknown = with(&|card| card.method = "oracle".to_owned());
-        assert!(matches!(unknown, Err(ModelError::UnknownMethod { method, .. }) if method == "oracle"));
+        let unknown = unknown.expect_err("unknown").to_string();
+        assert!(unknown.contains("uses the method \"oracle\", which this version does not know"), "{unknown}");
         let removed = with(&|card| card.method = "committee".to_owned()).expect_err("removed").to_string();
         assert!(removed.contains("\"committee\", which was removed after version 0.1.0"), "{removed}");
         let other = ["curvature_left", "curvature_right", "force_left", "grip"].map(str::to_owned);
@@ -471,34 +474,33 @@ fn with_arrays(bytes: &[u8], change: impl FnOnce(&mut crate::Arrays)) -> Result<
 
 #[test]
 fn damaged_arrays_are_refused_by_name_and_shape() {
+    let invalid = |cause: &str| ModelError::invalid("changed", &ModelError(cause.to_owned()));
     for (key, bytes) in SAVED {
         let names: Vec<String> =
             Model::from_bytes(key, bytes).expect("valid").recogniser.arrays().0.keys().cloned().collect();
         let refused = |name: &str, what: &str, change: &dyn Fn(&mut crate::Array)| {
             let result = with_arrays(bytes, |arrays| change(arrays.0.get_mut(name).expect("in the file")));
             match result {
-                Err(ModelError::Invalid { cause: LoadError::Array(error), .. }) => {
-                    let text = error.to_string();
-                    assert!(text.contains(&format!("\"{name}\"")), "{key}, {name} {what}: {text}");
-                    error
+                Err(ModelError(text)) => {
+                    let is_of_array = text.contains("array") && text.contains(&format!("\"{name}\""));
+                    assert!(is_of_array, "{key}, {name} {what}: {text}");
+                    text
                 }
-                other => panic!("{key}, {name} {what}: {other:?}"),
+                Ok(_) => panic!("{key}, {name} {what}: read"),
             }
         };
         for name in &names {
             let missing = with_arrays(bytes, |arrays| drop(arrays.0.remove(name)));
-            let expected = LoadError::Array(ArrayError::Missing { name: name.clone() });
-            assert_eq!(missing.err(), Some(ModelError::Invalid { name: "changed".to_owned(), cause: expected }));
+            assert_eq!(missing.err(), Some(invalid(&format!("array \"{name}\" is missing"))));
 
-            let is_shape = |error: &ArrayError, shape: &[usize]| {
-                matches!(error, ArrayError::Shape { found, expected, .. } | ArrayError::Mismatch { found, expected, .. }
-                    if found == shape && expected != shape)
-            };
             let mut shape = Vec::new();
             with_arrays(bytes, |arrays| shape.clone_from(&arrays.0[name].shape)).expect("unchanged");
             shape.insert(0, 1);
             let error = refused(name, "with another axis", &|array| array.shape.insert(0, 1));
-            assert!(is_shape(&error, &shape), "{key}: {error}");
+            let other = |word: &str| error.contains(word) && !error.contains(&format!("{word}{shape:?}"));
+            let is_shape =
+                error.contains(&format!("has shape {shape:?}")) && (other("instead of ") || other("requires "));
+            assert!(is_shape, "{key}: {error}");
 
             refused(name, "with a repeated first element or row", &|array| {
                 let row: usize = array.shape[1..].iter().product();
@@ -540,12 +542,10 @@ fn damaged_arrays_are_refused_by_name_and_shape() {
                     Numbers::I16(_) => {}
                 };
                 let error = refused(name, "with a number that is not finite", &change);
-                let is_value = matches!(error, ArrayError::NotFinite { .. } | ArrayError::Value { .. });
-                assert!(is_value, "{key}: {error}");
+                assert!(error.contains(": element "), "{key}: {error}");
             }
         }
         let extra = with_arrays(bytes, |arrays| arrays.put("extra", &[2], vec![0.0; 2]));
-        let expected = LoadError::Array(ArrayError::Unexpected { name: "extra".to_owned(), found: vec![2] });
-        assert_eq!(extra.err(), Some(ModelError::Invalid { name: "changed".to_owned(), cause: expected }), "{key}");
+        assert_eq!(extra.err(), Some(invalid("array \"extra\" of shape [2] is not part of this method")), "{key}");
     }
 }

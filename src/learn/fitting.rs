@@ -32,7 +32,9 @@ impl Fitting<'_> {
     pub(crate) fn joined<'d>(&self, data: &'d Dataset) -> Result<Cow<'d, Dataset>, LearnError> {
         let Some(second) = self.second else { return Ok(Cow::Borrowed(data)) };
         if second.channels != data.channels || second.labels != data.labels {
-            return Err(LearnError::SecondDiffers);
+            return Err(LearnError::Refused(
+                "the grasps for stage two have other channels or labels than those for stage one".to_owned(),
+            ));
         }
         let mut both = data.clone();
         both.examples.extend_from_slice(&second.examples);
@@ -42,10 +44,7 @@ impl Fitting<'_> {
 
     /// Returns an error if settings are given to a method without settings.
     pub(crate) fn refuse_settings(&self) -> Result<(), LearnError> {
-        let refused = |name: &String| {
-            let cause = "this method has no settings".to_owned();
-            Err(LearnError::Setting { name: name.clone(), cause })
-        };
+        let refused = |name: &String| Err(LearnError::setting(name, "this method has no settings"));
         self.settings.keys().next().map_or(Ok(()), refused)
     }
 }
@@ -53,88 +52,37 @@ impl Fitting<'_> {
 /// Reason why a recogniser could not be fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LearnError {
-    /// All grasps have the same class.
-    #[error("the data contain only one class, \"{class}\"; add grasps of other objects")]
-    OneClass {
-        /// Class name.
-        class: String,
-    },
-    /// The data set is empty.
-    #[error("the data set contains no grasps; `palpate collect` and `palpate record` make some")]
-    NoData,
-    /// A class with too few grasps.
-    #[error("class \"{class}\" has only {found} grasps, {needed} are needed; record more or leave the class out")]
-    TooFew {
-        /// Class name.
-        class: String,
-        /// Grasps in the data set.
-        found: usize,
-        /// Grasps needed.
-        needed: usize,
-    },
-    /// A method with two stages, but no class has a size and a shape.
-    #[error(
-        "{method} learns size and shape first, but no class in these data has them; add columns \"size\" and \
-         \"shape\", or train another method"
-    )]
-    NoProperties {
-        /// Title of the method.
-        method: &'static str,
-    },
-    /// Other readings than those of the geometry encoder.
-    #[error(
-        "the geometry encoder reads {needs}, but these grasps have {found}; read them through layout C1, or train \
-         extra-trees, which needs no encoder"
-    )]
-    Encoder {
-        /// Channels that it reads.
-        needs: String,
-        /// Channels of the grasps.
-        found: String,
-    },
-    /// A model that cannot learn new objects without its training grasps.
-    #[error(
-        "this model ({method}) cannot learn new objects by itself; use one of the method geometry-network, such as those that \
-         come with Palpate, or train again with grasps of all objects"
-    )]
-    LearnsNothingNew {
-        /// Title of the method.
-        method: String,
-    },
-    /// Grasps for stage two with other channels or labels.
-    #[error("the grasps for stage two have other channels or labels than those for stage one")]
-    SecondDiffers,
-    /// A feature that is NaN or infinite.
-    #[error("feature {feature} of training row {row} is not a finite number; remove the trial with gaps")]
-    NotFinite {
-        /// Row, from 0.
-        row: usize,
-        /// Feature, from 0.
-        feature: usize,
-    },
-    /// An unknown setting or one out of range.
-    #[error("setting {name}: {cause}")]
-    Setting {
-        /// Setting name.
-        name: String,
-        /// Problem.
-        cause: String,
-    },
     /// Stopped by the caller.
     #[error("training stopped; no model was saved")]
     Stopped,
-    /// A library failed.
-    #[error("training failed: {cause}")]
-    Failed {
-        /// Message of the library.
-        cause: String,
-    },
+    /// Unsuitable data or settings, or a failure, as a sentence.
+    #[error("{0}")]
+    Refused(String),
 }
 
 impl LearnError {
+    /// An empty data set.
+    pub fn no_data() -> Self {
+        Self::Refused("the data set contains no grasps; `palpate collect` and `palpate record` make some".to_owned())
+    }
+
+    /// An unknown setting or one out of range.
+    pub fn setting(name: &str, cause: impl std::fmt::Display) -> Self {
+        Self::Refused(format!("setting {name}: {cause}"))
+    }
+
+    /// Readings of other channels than those of the geometry encoder.
+    pub(crate) fn encoder(needs: &[String], found: &[String]) -> Self {
+        let (needs, found) = (needs.join(", "), found.join(", "));
+        Self::Refused(format!(
+            "the geometry encoder reads {needs}, but these grasps have {found}; read them through layout C1, or train \
+             extra-trees, which needs no encoder"
+        ))
+    }
+
     /// Wraps the error of a library.
     pub(crate) fn failed(cause: impl std::fmt::Display) -> Self {
-        Self::Failed { cause: cause.to_string() }
+        Self::Refused(format!("training failed: {cause}"))
     }
 }
 
@@ -142,13 +90,18 @@ impl LearnError {
 pub(crate) fn check_enough(data: &Dataset, needed: usize) -> Result<(), LearnError> {
     let counts: Vec<(usize, usize)> =
         data.by_class().iter().map(Vec::len).enumerate().filter(|(_, count)| *count > 0).collect();
+    let name = |class: usize| &data.labels.classes[class].name;
     match counts.as_slice() {
-        [] => Err(LearnError::NoData),
-        [(class, _)] => Err(LearnError::OneClass { class: data.labels.classes[*class].name.clone() }),
+        [] => Err(LearnError::no_data()),
+        [(class, _)] => Err(LearnError::Refused(format!(
+            "the data contain only one class, \"{}\"; add grasps of other objects",
+            name(*class)
+        ))),
         _ => match counts.iter().find(|(_, found)| *found < needed) {
-            Some(&(class, found)) => {
-                Err(LearnError::TooFew { class: data.labels.classes[class].name.clone(), found, needed })
-            }
+            Some(&(class, found)) => Err(LearnError::Refused(format!(
+                "class \"{}\" has only {found} grasps, {needed} are needed; record more or leave the class out",
+                name(class)
+            ))),
             None => Ok(()),
         },
     }

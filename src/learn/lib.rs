@@ -17,6 +17,7 @@
 //! | 1 | `split`, `learned` | splits into training and test trials; the grasps that a model learned |
 //! | 1 | `temperature` | calibration of probabilities |
 //! | 1 | `tensor_file` | safetensors files |
+//! | 1 | `rows` | training rows of features, and models that classify them |
 //! | 1 | `gaps` | readings that are not finite numbers |
 //! | 1 | `signatures` | mean and spread of each class over time |
 //! | 2 | `features` | a grasp as a row of features |
@@ -78,6 +79,7 @@ mod model_file;
 pub mod network;
 mod pmf;
 mod recogniser;
+mod rows;
 mod signatures;
 mod split;
 #[cfg(test)]
@@ -85,7 +87,7 @@ mod split_tests;
 mod temperature;
 mod tensor_file;
 
-pub use arrays::{Array, ArrayError, Arrays, Numbers};
+pub use arrays::{Array, Arrays, ModelError, Numbers};
 pub use baselines::{
     Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Shipped, Touch,
 };
@@ -95,7 +97,7 @@ pub use fitting::{Fitting, LearnError};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;
-pub use model::{LoadError, Model, ModelCard, ModelError, REMOVED_METHODS};
+pub use model::{Model, ModelCard, REMOVED_METHODS};
 pub use model_file::Models;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};

@@ -1,13 +1,13 @@
 //! Table of recognition methods. To add one, add a line to [`METHODS`].
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::baselines::{Candle, Convolution, GeometryNetwork, Tabular, TabularKind, Warping};
 use crate::belief::StopRule;
 use crate::data::{Class, Dataset, fnv_1a};
 use crate::fitting::{Fitting, LearnError};
 use crate::gaps;
 use crate::learned::LearnedGrasps;
-use crate::model::{LoadError, Model, ModelCard};
+use crate::model::{Model, ModelCard};
 use crate::network::{self, Recipe};
 use crate::recogniser::{Pupil, Recogniser};
 use crate::signatures::Signatures;
@@ -28,7 +28,7 @@ pub enum MethodKind {
 }
 
 type Fit = fn(&Dataset, &Fitting<'_>) -> Result<Box<dyn Recogniser>, LearnError>;
-type Load = fn(&ModelCard, &Arrays) -> Result<Box<dyn Recogniser>, LoadError>;
+type Load = fn(&ModelCard, &Arrays) -> Result<Box<dyn Recogniser>, ModelError>;
 
 /// Recognition method.
 #[derive(Clone, Copy, Debug)]
@@ -176,7 +176,10 @@ impl Model {
     fn pupil(&self) -> Result<&dyn Pupil, LearnError> {
         self.recogniser.as_pupil().ok_or_else(|| {
             let title = method(&self.card.method).map_or(self.card.method.as_str(), |method| method.title);
-            LearnError::LearnsNothingNew { method: title.to_owned() }
+            LearnError::Refused(format!(
+                "this model ({title}) cannot learn new objects by itself; use one of the method geometry-network, such as \
+                 those that come with Palpate, or train again with grasps of all objects"
+            ))
         })
     }
 
@@ -185,7 +188,7 @@ impl Model {
     pub fn taught(&self, grasps: &Dataset, fitting: &Fitting<'_>) -> Result<Self, LearnError> {
         let known = &self.card.labels;
         let labels = known.with(&grasps.labels);
-        let lessons = grasps.relabelled(&labels).ok_or(LearnError::NoData)?;
+        let lessons = grasps.relabelled(&labels).ok_or_else(LearnError::no_data)?;
         let pupil = self.pupil()?;
         let (recogniser, train_cpu_s) = on_one_thread(|| pupil.taught(&lessons.with_further(), fitting))?;
         let signatures = self.signatures.as_ref().map(|own| own.with_new_classes(&gaps::filled_data(&lessons)));

@@ -1,9 +1,8 @@
 //! A trained model: a recogniser and its card.
 
-use crate::arrays::ArrayError;
+use crate::arrays::ModelError;
 use crate::belief::{Rejection, StopRule};
 use crate::data::{DataCard, Labels};
-use crate::fitting::LearnError;
 use crate::learned::LearnedGrasps;
 use crate::pmf::Pmf;
 use crate::recogniser::Recogniser;
@@ -11,7 +10,6 @@ use crate::signatures::Signatures;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Beginning of the names of channels with the contact pressure, which only simulations have.
@@ -70,8 +68,9 @@ pub struct ModelCard {
 
 impl ModelCard {
     /// Reads the method's own settings from the card.
-    pub(crate) fn settings_as<T: DeserializeOwned>(&self) -> Result<T, LoadError> {
-        serde_json::from_value(self.settings.clone()).map_err(|error| LoadError::Settings { cause: error.to_string() })
+    pub(crate) fn settings_as<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
+        serde_json::from_value(self.settings.clone())
+            .map_err(|error| ModelError(format!("invalid settings on its card: {error}")))
     }
 }
 
@@ -124,7 +123,7 @@ impl Model {
             difference += ". Contact pressure exists only in simulations: no real gripper can run this model. Train one \
                            on the pads' pressure (--signals parts); simulated grasps need --signals contact";
         }
-        Err(ModelError::Channels { difference })
+        Err(ModelError(format!("the model needs other channels: {difference}")))
     }
 }
 
@@ -164,90 +163,10 @@ impl ModelCard {
     }
 }
 
-/// Reason why a recogniser could not be restored from a model file.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LoadError {
-    /// An array is missing, unexpected, of the wrong shape or has invalid elements.
-    #[error(transparent)]
-    Array(#[from] ArrayError),
-    /// The settings on the card cannot be read.
-    #[error("invalid settings on its card: {cause}")]
-    Settings {
-        /// Message of the parser.
-        cause: String,
-    },
-    /// A setting out of range.
-    #[error(transparent)]
-    Recipe(#[from] LearnError),
-    /// A part of the card is invalid or contradicts the channels or labels.
-    #[error("{part} on its card is invalid or does not match its channels and labels")]
-    Card {
-        /// The part, as a noun phrase.
-        part: &'static str,
-    },
-    /// A library failed.
-    #[error("{cause}")]
-    Failed {
-        /// Message of the library.
-        cause: String,
-    },
-}
-
-/// Reason why a model cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ModelError {
-    /// The file cannot be read.
-    #[error("cannot read the model \"{path}\": {cause}", path = path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Message of the operating system.
-        cause: String,
-    },
-    /// The file cannot be written.
-    #[error("cannot write \"{path}\": {cause}", path = path.display())]
-    Unwritable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Message of the operating system.
-        cause: String,
-    },
-    /// Not a complete safetensors file with a card.
-    #[error("\"{name}\" is not a complete Palpate model: {cause}; train or copy it again")]
-    Malformed {
-        /// File name.
-        name: String,
-        /// Problem.
-        cause: String,
-    },
-    /// Card and parameters contradict each other or the method.
-    #[error("\"{name}\" is not a valid Palpate model: {cause}; train or copy it again")]
-    Invalid {
-        /// File name.
-        name: String,
-        /// Problem.
-        cause: LoadError,
-    },
-    /// A method unknown to this version.
-    #[error("\"{name}\" uses the method \"{method}\", {}", why_unknown(method))]
-    UnknownMethod {
-        /// File name.
-        name: String,
-        /// Key of the method.
-        method: String,
-    },
-    /// Other channels than the model was trained on.
-    #[error("the model needs other channels: {difference}")]
-    Channels {
-        /// Missing and unknown channels.
-        difference: String,
-    },
-}
-
 /// Methods of version 0.1.0 that are gone; stored results still name them.
 pub const REMOVED_METHODS: [&str; 4] = ["committee", "rusboost-samme", "measures-svm", "measures-forest"];
 
-fn why_unknown(method: &str) -> &'static str {
+pub(crate) fn why_unknown(method: &str) -> &'static str {
     if REMOVED_METHODS.contains(&method) {
         "which was removed after version 0.1.0; train a model with another method (`palpate train --list`)"
     } else {

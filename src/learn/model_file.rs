@@ -1,11 +1,12 @@
 //! Models on disk: a safetensors file with the card in its header. A copy of the card is written beside it as JSON for
 //! people.
 
+use crate::arrays::ModelError;
 use crate::baselines::Shipped;
 use crate::data::{Class, Labels, fnv_1a};
 use crate::learned::LearnedGrasps;
 use crate::methods::method;
-use crate::model::{LoadError, Model, ModelCard, ModelError};
+use crate::model::{Model, ModelCard, why_unknown};
 use crate::signatures::Signatures;
 use crate::tensor_file::{self, TensorFile};
 use std::path::{Path, PathBuf};
@@ -83,36 +84,35 @@ impl Models {
     }
 }
 
-fn malformed(name: &str, cause: impl std::fmt::Display) -> ModelError {
-    ModelError::Malformed { name: name.to_owned(), cause: cause.to_string() }
+fn unreadable(path: &Path, cause: &std::io::Error) -> ModelError {
+    ModelError(format!("cannot read the model \"{}\": {cause}", path.display()))
 }
 
 impl Model {
     /// Encodes the model as a safetensors file.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
-        let card = serde_json::to_string(&self.card).map_err(|e| malformed(&self.card.method, e))?;
+        let card = serde_json::to_string(&self.card).map_err(|e| ModelError::malformed(&self.card.method, e))?;
         let mut arrays = self.recogniser.arrays();
         if let Some(signatures) = &self.signatures {
             signatures.put_into(&mut arrays);
         }
-        tensor_file::encode(card, &arrays).map_err(|cause| malformed(&self.card.method, cause))
+        tensor_file::encode(card, &arrays).map_err(|cause| ModelError::malformed(&self.card.method, cause))
     }
 
     /// Card for people, as JSON; it stands beside the model.
     pub fn card_text(&self) -> Result<String, ModelError> {
         // The file itself lists the grasps that were learned; nobody reads their hashes.
         let card = ModelCard { learned: LearnedGrasps::default(), ..self.card.clone() };
-        let text = serde_json::to_string_pretty(&card).map_err(|e| malformed(&self.card.method, e))?;
+        let text = serde_json::to_string_pretty(&card).map_err(|e| ModelError::malformed(&self.card.method, e))?;
         Ok(text + "\n")
     }
 
     /// Reads a model from a file.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
-        let unreadable =
-            |cause: std::io::Error| ModelError::Unreadable { path: path.to_owned(), cause: cause.to_string() };
+        let unreadable = |cause: std::io::Error| unreadable(path, &cause);
         let size = std::fs::metadata(path).map_err(unreadable)?.len();
         if size > LARGEST_FILE {
-            return Err(malformed(&path.display().to_string(), format!("{size} bytes is too large")));
+            return Err(ModelError::malformed(&path.display().to_string(), format!("{size} bytes is too large")));
         }
         Self::from_bytes(&path.display().to_string(), &std::fs::read(path).map_err(unreadable)?)
     }
@@ -122,17 +122,19 @@ impl Model {
     /// Refuses files that are damaged, and arrays that are missing, unexpected, of the wrong type or shape, or not
     /// finite; the error names the array.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, ModelError> {
-        let file = TensorFile::decode(bytes).map_err(|cause| malformed(name, cause))?;
-        let card = ModelCard::parse(&file.card).map_err(|e| malformed(name, format!("invalid card: {e}")))?;
+        let file = TensorFile::decode(bytes).map_err(|cause| ModelError::malformed(name, cause))?;
+        let card =
+            ModelCard::parse(&file.card).map_err(|e| ModelError::malformed(name, format!("invalid card: {e}")))?;
         let Some(method) = method(&card.method) else {
-            return Err(ModelError::UnknownMethod { name: name.to_owned(), method: card.method });
+            let (method, why) = (&card.method, why_unknown(&card.method));
+            return Err(ModelError(format!("\"{name}\" uses the method \"{method}\", {why}")));
         };
-        let load = || -> Result<_, LoadError> {
+        let load = || -> Result<_, ModelError> {
             card.labels.check()?;
             let mut arrays = file.arrays()?;
             let signatures = match &card.signature_grasps {
                 Some(grasps) if grasps.len() != card.labels.classes.len() => {
-                    return Err(LoadError::Card { part: "the number of grasps in the signatures" });
+                    return Err(ModelError::card("the number of grasps in the signatures"));
                 }
                 Some(grasps) => Some(Signatures::take_from(&mut arrays, &card.channels, grasps)?),
                 None => None,
@@ -141,20 +143,20 @@ impl Model {
             arrays.require_same_form(&recogniser.arrays())?;
             Ok((recogniser, signatures))
         };
-        let (recogniser, signatures) = load().map_err(|cause| ModelError::Invalid { name: name.to_owned(), cause })?;
+        let (recogniser, signatures) = load().map_err(|cause| ModelError::invalid(name, &cause))?;
         Ok(Self { card, recogniser: Arc::from(recogniser), signatures: signatures.map(Arc::new) })
     }
 }
 
 impl Labels {
     /// Refuses labels from a file that have no class, or a class with an unknown size or shape.
-    fn check(&self) -> Result<(), LoadError> {
+    fn check(&self) -> Result<(), ModelError> {
         let known = |class: &Class| {
             class.size.is_none_or(|size| size < self.sizes.len())
                 && class.shape.is_none_or(|shape| shape < self.shapes.len())
         };
         if self.classes.is_empty() || !self.classes.iter().all(known) {
-            return Err(LoadError::Card { part: "the list of classes" });
+            return Err(ModelError::card("the list of classes"));
         }
         Ok(())
     }
@@ -169,9 +171,8 @@ impl ModelCard {
     /// Reads the card beside a model file.
     pub fn beside(model: &Path) -> Result<Self, ModelError> {
         let path = Self::path_beside(model);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|error| ModelError::Unreadable { path: path.clone(), cause: error.to_string() })?;
-        Self::parse(&text).map_err(|error| malformed(&path.display().to_string(), error))
+        let text = std::fs::read_to_string(&path).map_err(|error| unreadable(&path, &error))?;
+        Self::parse(&text).map_err(|error| ModelError::malformed(&path.display().to_string(), error))
     }
 
     /// One-line summary: `Macro-layer, 4 classes, 128 grasps, macro F1 0.93`.

@@ -6,7 +6,7 @@
 //! grasps. At a time that some grasps of a class do not reach, the others count; where none reaches it, the class keeps
 //! its last value.
 
-use crate::arrays::{Array, ArrayError, Arrays, check_each};
+use crate::arrays::{Array, Arrays, ModelError, check_each};
 use crate::data::{Dataset, Sequence};
 
 /// Number of times.
@@ -181,7 +181,7 @@ impl Signatures {
     }
 
     /// Takes the arrays of a model file with these channels and training grasps of each class.
-    pub(crate) fn take_from(arrays: &mut Arrays, channels: &[String], grasps: &[usize]) -> Result<Self, ArrayError> {
+    pub(crate) fn take_from(arrays: &mut Arrays, channels: &[String], grasps: &[usize]) -> Result<Self, ModelError> {
         let mut own = Arrays::default();
         let arrays_taken: Vec<(String, Array)> =
             [TIMES, MEAN, SPREAD].iter().filter_map(|name| arrays.0.remove_entry(*name)).collect();
@@ -192,7 +192,7 @@ impl Signatures {
         check_each(SPREAD, spread, "at least zero", |spread| *spread >= 0.0)?;
         let falls = t_s.windows(2).position(|pair| pair[1] < pair[0]).or((t_s.is_empty()).then_some(0));
         match falls {
-            Some(index) => Err(ArrayError::Value { name: TIMES.to_owned(), index, expected: "in ascending order" }),
+            Some(index) => Err(ModelError::value(TIMES, index, "in ascending order")),
             None => Ok(Self::with(channels.to_vec(), grasps.to_vec(), t_s, mean.to_vec(), spread.to_vec())),
         }
     }

@@ -38,69 +38,16 @@ pub struct Split {
     pub test: Vec<usize>,
 }
 
-/// Reason why a data set cannot be split.
+/// Reason why a data set cannot be split, as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SplitError {
-    /// No trials.
-    #[error("no trials to split")]
-    Nothing,
-    /// A class with too few different grasps.
-    #[error(
-        "object \"{class}\" has {grasps} different grasp(s) in {trials} trial(s), {needed} are needed: copies of one \
-         grasp cannot be both learned and tested. Collect more grasps, or leave the object out with --objects"
-    )]
-    TooFew {
-        /// Name of the class.
-        class: String,
-        /// Number of different grasps.
-        grasps: usize,
-        /// Number of trials.
-        trials: usize,
-        /// Number of different grasps needed.
-        needed: usize,
-    },
-    /// A class whose object was placed too seldom.
-    #[error(
-        "object \"{class}\" was placed {placings} time(s) for {grasps} grasps, {needed} are needed: grasps that follow \
-         each other on one object cannot be both learned and tested. Place it anew between grasps, or leave it out with \
-         --objects"
-    )]
-    TooFewPlacings {
-        /// Name of the class.
-        class: String,
-        /// Number of different grasps.
-        grasps: usize,
-        /// Number of successions of grasps.
-        placings: usize,
-        /// Number of successions needed.
-        needed: usize,
-    },
-    /// A class whose trials all have the same pose.
-    #[error("all trials of \"{class}\" have the same pose; leaving a pose out needs at least two")]
-    OnePose {
-        /// Name of the class.
-        class: String,
-    },
-    /// The same grasp for training and for testing.
-    #[error("trials {first} and {other} are the same grasp; one is for training, the other for testing")]
-    Duplicate {
-        /// Number of the training trial.
-        first: i64,
-        /// Number of the test trial.
-        other: i64,
-    },
-    /// Shares that do not make a split.
-    #[error("shares must sum to 100, with some for training and some for testing; write 40/40/20 or 80/0/20")]
-    Shares,
+#[error("{0}")]
+pub struct SplitError(String);
+
+impl SplitError {
     /// Fewer than two folds.
-    #[error("cross-validation needs at least two folds")]
-    Folds,
-    /// A text that names no plan.
-    #[error("unknown split \"{text}\"; write 40/40/20, folds:5, first:50, first:50:100 or leave-a-pose-out")]
-    Unknown {
-        /// The text.
-        text: String,
-    },
+    pub fn folds() -> Self {
+        Self("cross-validation needs at least two folds".to_owned())
+    }
 }
 
 /// Way to split a data set.
@@ -133,7 +80,9 @@ pub fn check_apart<'a>(
     let learned: BTreeMap<u64, i64> = train.into_iter().map(|example| (example.content, example.id)).collect();
     let shared = |test: &Example| Some((*learned.get(&test.content)?, test.id));
     match test.into_iter().find_map(shared) {
-        Some((first, other)) => Err(SplitError::Duplicate { first, other }),
+        Some((first, other)) => Err(SplitError(format!(
+            "trials {first} and {other} are the same grasp; one is for training, the other for testing"
+        ))),
         None => Ok(()),
     }
 }
@@ -242,14 +191,18 @@ impl FromStr for SplitPlan {
     type Err = SplitError;
 
     fn from_str(text: &str) -> Result<Self, SplitError> {
-        let unknown = || SplitError::Unknown { text: text.to_owned() };
+        let unknown = || {
+            SplitError(format!(
+                "unknown split \"{text}\"; write 40/40/20, folds:5, first:50, first:50:100 or leave-a-pose-out"
+            ))
+        };
         let count = |text: &str| text.parse::<usize>().map_err(|_no_number| unknown());
         if text == "leave-a-pose-out" {
             return Ok(Self::LeavePoseOut);
         }
         match text.split(':').collect::<Vec<_>>()[..] {
             ["folds", folds] => match count(folds)? {
-                0 | 1 => Err(SplitError::Folds),
+                0 | 1 => Err(SplitError::folds()),
                 folds => Ok(Self::Folds { folds }),
             },
             ["first", train] => Ok(Self::FirstOfEach { train: count(train)?, test: None }),
@@ -271,7 +224,7 @@ impl FromStr for SplitPlan {
 /// Indices of the different grasps of each class, oldest first: of trials with equal content, only the first.
 fn different_grasps(data: &Dataset, needed: usize) -> Result<Vec<Vec<usize>>, SplitError> {
     if data.examples.is_empty() {
-        return Err(SplitError::Nothing);
+        return Err(SplitError("no trials to split".to_owned()));
     }
     let mut met = BTreeSet::new();
     let by_class = data.by_class();
@@ -281,7 +234,12 @@ fn different_grasps(data: &Dataset, needed: usize) -> Result<Vec<Vec<usize>>, Sp
         let first: Vec<usize> = members.into_iter().filter(|k| is_first[*k]).collect();
         // Classes of the labels without trials take no part.
         if trials > 0 && first.len() < needed {
-            return Err(SplitError::TooFew { class: class.name.clone(), grasps: first.len(), trials, needed });
+            return Err(SplitError(format!(
+                "object \"{}\" has {} different grasp(s) in {trials} trial(s), {needed} are needed: copies of one grasp \
+                 cannot be both learned and tested. Collect more grasps, or leave the object out with --objects",
+                class.name,
+                first.len()
+            )));
         }
         Ok(first)
     });
@@ -292,19 +250,24 @@ fn checked(shares: [f64; 3]) -> Result<(), SplitError> {
     let [train, _, test] = shares;
     let sum: f64 = shares.iter().sum();
     let valid = shares.iter().all(|share| *share >= 0.0) && (sum - 1.0).abs() < 1e-6 && train > 0.0 && test > 0.0;
-    if valid { Ok(()) } else { Err(SplitError::Shares) }
+    if valid {
+        return Ok(());
+    }
+    let cause = "shares must sum to 100, with some for training and some for testing; write 40/40/20 or 80/0/20";
+    Err(SplitError(cause.to_owned()))
 }
 
 /// Refuses classes with too few successions: random plans hand them out whole.
 fn check_placings(data: &Dataset, successions: &[Vec<Vec<usize>>], needed: usize) -> Result<(), SplitError> {
     let mut classes = successions.iter().zip(&data.labels.classes);
     match classes.find(|(chains, _)| (1..needed).contains(&chains.len())) {
-        Some((chains, class)) => Err(SplitError::TooFewPlacings {
-            class: class.name.clone(),
-            grasps: chains.iter().map(Vec::len).sum(),
-            placings: chains.len(),
-            needed,
-        }),
+        Some((chains, class)) => Err(SplitError(format!(
+            "object \"{}\" was placed {} time(s) for {} grasps, {needed} are needed: grasps that follow each other on one \
+             object cannot be both learned and tested. Place it anew between grasps, or leave it out with --objects",
+            class.name,
+            chains.len(),
+            chains.iter().map(Vec::len).sum::<usize>()
+        ))),
         None => Ok(()),
     }
 }
@@ -339,7 +302,7 @@ fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
 
 fn by_folds(drawn: &Drawn, folds: usize) -> Result<Vec<Split>, SplitError> {
     if folds < 2 {
-        return Err(SplitError::Folds);
+        return Err(SplitError::folds());
     }
     // More folds than successions would be empty.
     let folds = folds.min(drawn.iter().map(Vec::len).sum());
@@ -371,7 +334,10 @@ fn by_pose(data: &Dataset, grasps: &[Vec<usize>]) -> Result<Vec<Split>, SplitErr
     let one_pose = |members: &&Vec<usize>| members.windows(2).all(|pair| pose(pair[0]) == pose(pair[1]));
     if let Some(members) = grasps.iter().filter(|members| !members.is_empty()).find(one_pose) {
         let class = data.examples[members[0]].class;
-        return Err(SplitError::OnePose { class: data.labels.classes[class].name.clone() });
+        let class = &data.labels.classes[class].name;
+        return Err(SplitError(format!(
+            "all trials of \"{class}\" have the same pose; leaving a pose out needs at least two"
+        )));
     }
     let poses: BTreeSet<u32> = grasps.iter().flatten().map(|k| pose(*k)).collect();
     let split_of = |left_out: u32| {

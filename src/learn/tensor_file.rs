@@ -1,6 +1,6 @@
 //! Safetensors files: named arrays, with a card as JSON in the header.
 
-use crate::arrays::{Array, ArrayError, Arrays, Numbers};
+use crate::arrays::{Array, Arrays, ModelError, Numbers};
 use safetensors::{Dtype, SafeTensors, View};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -32,7 +32,7 @@ impl<'b> TensorFile<'b> {
     }
 
     /// Reads the arrays.
-    pub fn arrays(&self) -> Result<Arrays, ArrayError> {
+    pub fn arrays(&self) -> Result<Arrays, ModelError> {
         fn numbers<T, const N: usize>(bytes: &[u8], from: fn([u8; N]) -> T) -> Vec<T> {
             bytes.as_chunks::<N>().0.iter().map(|bytes| from(*bytes)).collect()
         }
@@ -46,7 +46,7 @@ impl<'b> TensorFile<'b> {
                 Dtype::I16 => Numbers::I16(numbers(bytes, i16::from_le_bytes)),
                 other => {
                     let found = format!("{other:?}").to_lowercase();
-                    return Err(ArrayError::Kind { name: name.to_owned(), found, expected: "f32, f64, i64 or i16" });
+                    return Err(ModelError::kind(name, &found, "f32, f64, i64 or i16"));
                 }
             };
             arrays.0.insert(name.to_owned(), Array { shape: tensor.shape().to_vec(), numbers });

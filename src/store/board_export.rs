@@ -5,14 +5,15 @@
 //! (bar)`, `phase`. A missing number is an empty field; `missing_before` is the number of readings missing before the
 //! row, `?` where unknown.
 
-use super::csv_export::{CsvError, number, write_file};
+use super::csv_export::{number, write_file};
 use super::file_kind::FileKind;
+use super::store_error::ExportError;
 use palpate_tactile::board::Reading;
 use palpate_tactile::trial::{BoardLog, PhaseMark};
 use std::path::Path;
 
 /// Writes one row per reading.
-pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), CsvError> {
+pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), ExportError> {
     let channels = &trial.course.board.channels;
     write_file(path, FileKind::Csv, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();

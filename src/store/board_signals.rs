@@ -66,7 +66,7 @@ impl Store {
         let release_s = from(Phase::Release, closing_s.unwrap_or(f64::NEG_INFINITY));
         let serving = self.calibrations().serving(Some(id), asked)?;
         let readout = Readout::new(&trial.course.board, &serving.calibrations)
-            .map_err(|cause| StoreError::BadInfo { id, cause: cause.to_string() })?;
+            .map_err(|cause| StoreError::bad_info(id, cause))?;
         let mut derived = readout.derive(&trial.readings, closing_s);
         derived.warnings.extend(serving.warnings.iter().cloned());
         let marks = trial.course.phases.iter().filter_map(|mark| Some((mark.from_s - began, mark.line_bar?)));

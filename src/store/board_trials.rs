@@ -102,7 +102,7 @@ impl Store {
             .read_chunks(id, &READINGS, |row| Ok((row.get::<_, Vec<u8>>(0)?, row.get_ref(1)?.as_bytes()?.to_vec())))?;
         let mut log = BoardLog { course: about.course, ..BoardLog::default() };
         for (chunk, (readings, gaps)) in chunks {
-            let damaged = |what: &str| StoreError::BadInfo { id, cause: format!("{what} of its part {chunk}") };
+            let damaged = |what: &str| StoreError::bad_info(id, format!("{what} of its part {chunk}"));
             log.readings.extend(decode_readings(&readings).ok_or_else(|| damaged("the readings"))?);
             log.gaps.extend(serde_json::from_slice::<Vec<Gap>>(&gaps).map_err(|_json| damaged("the gaps"))?);
         }
@@ -121,7 +121,7 @@ impl Store {
         let columns = |row: &Row<'_>| Ok((row.get::<_, String>(0)?, row.get::<_, bool>(1)?));
         let found = self.connection.query_row(sql, [id], columns).optional();
         let Some((about, intact)) = found.map_err(|e| row_fault(self.path(), id, &e))? else { return Ok(None) };
-        let about = serde_json::from_str(&about).map_err(|e| StoreError::BadInfo { id, cause: e.to_string() })?;
+        let about = serde_json::from_str(&about).map_err(|e| StoreError::bad_info(id, e))?;
         if intact { Ok(Some(about)) } else { Err(StoreError::altered(id)) }
     }
 
@@ -139,7 +139,7 @@ impl Store {
             std::iter::from_fn(|| read_record(&mut records).transpose()).try_for_each(|record| record.map(drop));
         match whole {
             Ok(()) => Ok(Some(file)),
-            Err(error) => Err(StoreError::BadInfo { id, cause: error.to_string() }),
+            Err(error) => Err(StoreError::bad_info(id, error)),
         }
     }
 }

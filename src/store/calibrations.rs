@@ -49,6 +49,10 @@ pub struct Serving {
 
 const COLUMNS: &str = "id, uid, version, created, withdrawn, record";
 
+fn no_calibration(id: CalibrationId) -> StoreError {
+    StoreError::Refused(format!("no calibration {id} in the store; `palpate calibrate list` shows all"))
+}
+
 /// A stored calibration; an error where its record cannot be read.
 fn of_row(row: &Row<'_>) -> rusqlite::Result<Result<StoredCalibration, StoreError>> {
     let (id, uid, version) = (row.get(0)?, row.get(1)?, row.get(2)?);
@@ -56,7 +60,9 @@ fn of_row(row: &Row<'_>) -> rusqlite::Result<Result<StoredCalibration, StoreErro
     let record = serde_json::from_str(&row.get::<_, String>(5)?);
     Ok(match record {
         Ok(record) => Ok(StoredCalibration { id, uid, version, created, withdrawn, record }),
-        Err(error) => Err(StoreError::BadCalibration { id, cause: error.to_string() }),
+        Err(error) => Err(StoreError::Refused(format!(
+            "calibration {id} is damaged: {error}. Withdraw it with `palpate calibrate withdraw {id}`"
+        ))),
     })
 }
 
@@ -102,7 +108,7 @@ impl CalibrationRepository<'_> {
     pub fn get(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE id = ?1");
         let found = self.store.connection.query_row(&sql, [id], of_row).optional().map_err(|e| self.store.fault(&e))?;
-        found.unwrap_or(Err(StoreError::NoCalibration { id }))
+        found.unwrap_or_else(|| Err(no_calibration(id)))
     }
 
     /// All calibrations, or those of one part, oldest first.
@@ -123,7 +129,7 @@ impl CalibrationRepository<'_> {
         let transaction = self.store.write()?;
         let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| self.store.fault(&e))?;
         self.store.commit(transaction)?;
-        if changed == 0 { Err(StoreError::NoCalibration { id }) } else { Ok(()) }
+        if changed == 0 { Err(no_calibration(id)) } else { Ok(()) }
     }
 
     /// Mounts a part in a place from now on.
@@ -322,7 +328,9 @@ pub(super) mod tests {
         // Older ones come first, whatever their version here.
         assert_eq!(of_a[0].record, strip("A", 20e3));
         assert!(of_a[0].withdrawn.is_some() && of_a[0].version == 2 && of_a[2].version == 1);
-        assert!(matches!(there.calibrations().withdraw(99, true), Err(StoreError::NoCalibration { id: 99 })));
+        assert!(
+            there.calibrations().withdraw(99, true).is_err_and(|error| error.to_string().contains("no calibration 99"))
+        );
         Ok(())
     }
 

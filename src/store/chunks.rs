@@ -1,7 +1,7 @@
 //! Chunks of a trial, read back in their order and checked: none is damaged, missing, or of another trial.
 
 use super::checksum::{Chunks, FRAMES};
-use super::frame_blob::decode_frames;
+use super::frame_blob::{BlobError, decode_frames};
 use super::store::Store;
 use super::store_error::StoreError;
 use palpate_sim::frame::Frame;
@@ -12,9 +12,13 @@ impl Store {
     /// Frames of a simulated trial.
     pub(super) fn load_frames(&self, id: TrialId) -> Result<Vec<Frame>, StoreError> {
         let (chunks, samples) = self.read_chunks(id, &FRAMES, |row| row.get::<_, Vec<u8>>(0))?;
+        let damaged = |chunk: i64, cause: &BlobError| StoreError::Damaged {
+            id,
+            what: format!("trial {id} is damaged in its part {chunk}: {cause}"),
+        };
         let mut frames = Vec::new();
         for (chunk, bytes) in chunks {
-            frames.extend(decode_frames(&bytes).map_err(|cause| StoreError::Damaged { id, chunk, cause })?);
+            frames.extend(decode_frames(&bytes).map_err(|cause| damaged(chunk, &cause))?);
         }
         all_there(id, FRAMES.what, frames.len(), samples)?;
         Ok(frames)
@@ -44,7 +48,7 @@ impl Store {
             wanted = (row.get(count).map_err(fault)?, row.get(samples).map_err(fault)?);
             let Some(chunk) = row.get(number).map_err(fault)? else { break };
             if !row.get::<_, bool>(intact).map_err(fault)? {
-                return Err(StoreError::Checksum { id, what, chunk });
+                return Err(StoreError::checksum(id, what, chunk));
             }
             chunks.push((chunk, read(row).map_err(fault)?));
         }
@@ -54,6 +58,9 @@ impl Store {
 }
 
 /// Refuses a trial that has lost something.
-pub(super) fn all_there(id: TrialId, what: &'static str, found: usize, wanted: i64) -> Result<(), StoreError> {
-    if i64::try_from(found) == Ok(wanted) { Ok(()) } else { Err(StoreError::Incomplete { id, what, found, wanted }) }
+pub(super) fn all_there(id: TrialId, what: &str, found: usize, wanted: i64) -> Result<(), StoreError> {
+    if i64::try_from(found) == Ok(wanted) {
+        return Ok(());
+    }
+    Err(StoreError::Damaged { id, what: format!("trial {id} is damaged: {found} of its {wanted} {what} are left") })
 }

@@ -7,6 +7,7 @@
 
 use super::file_kind::FileKind;
 use super::new_file::NewFile;
+use super::store_error::ExportError;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, Sway};
 use palpate_sim::scene::Scene;
@@ -14,26 +15,18 @@ use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, Signals};
 use std::path::{Path, PathBuf};
 
-/// Error of writing a CSV file.
-#[derive(Debug, thiserror::Error)]
-pub enum CsvError {
-    /// The file or its folder cannot be written.
-    #[error("cannot write \"{path}\": {cause}", path = path.display())]
-    Write {
-        /// Path of the file.
-        path: PathBuf,
-        /// Message of the system.
-        cause: String,
-    },
-}
-
 /// Path of the file with the contacts, beside a trial's file: `trial.csv` has `trial.contacts.csv`.
 pub fn contacts_path(path: &Path) -> PathBuf {
     path.with_extension("contacts.csv")
 }
 
 /// Writes one row per sample.
-pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, sensors: &Sensors) -> Result<(), CsvError> {
+pub fn write_trial_csv(
+    path: &Path,
+    trial: &SimulatedTrial,
+    scene: &Scene,
+    sensors: &Sensors,
+) -> Result<(), ExportError> {
     write_file(path, FileKind::Csv, |out| {
         let sway = trial.frames().iter().any(|frame| frame.sways != [Sway::NONE; 2]);
         out.write_record(header(scene, sensors, trial, sway))?;
@@ -45,7 +38,7 @@ pub fn write_trial_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene, senso
 }
 
 /// Writes an imported trial: time, then its channels unchanged.
-pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError> {
+pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), ExportError> {
     write_file(path, FileKind::Csv, |out| {
         out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
         for (sample, t) in signals.t_s.iter().enumerate() {
@@ -59,7 +52,7 @@ pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), CsvError>
 /// Writes one row per loaded taxel and sample: its position in the world and the force on it.
 ///
 /// Positions are those of the undeformed skin, which is indented by at most the pad's thickness.
-pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), CsvError> {
+pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), ExportError> {
     let header = [
         "t_s",
         "finger",
@@ -99,7 +92,7 @@ pub(super) fn write_file(
     path: &Path,
     kind: FileKind,
     fill: impl FnOnce(&mut csv::Writer<NewFile>) -> csv::Result<()>,
-) -> Result<(), CsvError> {
+) -> Result<(), ExportError> {
     let write = || -> std::io::Result<()> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)?;
@@ -108,7 +101,7 @@ pub(super) fn write_file(
         fill(&mut out)?;
         out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.finish()
     };
-    write().map_err(|cause| CsvError::Write { path: path.to_owned(), cause: cause.to_string() })
+    write().map_err(|cause| ExportError::cannot_write(path, &cause))
 }
 
 /// Shortest text that reads back as the same number.

@@ -37,21 +37,6 @@ pub enum FileKind {
     Svg,
 }
 
-/// Reason why a name is not written to.
-#[derive(Debug, thiserror::Error)]
-enum Refusal {
-    #[error("it is a store of trials; choose another name")]
-    Store,
-    #[error("it belongs to the store \"{}\"; choose another name", .0.display())]
-    PartOfStore(PathBuf),
-    #[error("it is a folder; choose the name of a file")]
-    Folder,
-    #[error("it is neither a file nor a folder; choose another name")]
-    Device,
-    #[error("there is a file of this name which is no {0}; choose another name, or move it away")]
-    Other(&'static str),
-}
-
 /// Bytes at the beginning of a file by which its kind is known.
 const HEAD: u64 = 4096;
 
@@ -151,25 +136,30 @@ pub fn check_target(path: &Path, kind: FileKind) -> io::Result<()> {
     refusal(path, kind)?.map_or(Ok(()), |refusal| Err(io::Error::other(refusal)))
 }
 
-fn refusal(path: &Path, kind: FileKind) -> io::Result<Option<Refusal>> {
+/// Reason why a name is not written to.
+fn refusal(path: &Path, kind: FileKind) -> io::Result<Option<String>> {
     if is_store(path)? {
-        return Ok(Some(Refusal::Store));
+        return Ok(Some("it is a store of trials; choose another name".to_owned()));
     }
     if let Some(store) = store_with_part(path) {
-        return Ok(Some(Refusal::PartOfStore(store)));
+        let store = store.display();
+        return Ok(Some(format!("it belongs to the store \"{store}\"; choose another name")));
     }
     let there = match symlink_metadata(path) {
         Err(cause) if cause.kind() == ErrorKind::NotFound => return Ok(None),
         there => there?.file_type(),
     };
     Ok(if there.is_dir() {
-        Some(Refusal::Folder)
+        Some("it is a folder; choose the name of a file".to_owned())
     } else if there.is_symlink() {
         None
     } else if !there.is_file() {
-        Some(Refusal::Device)
+        Some("it is neither a file nor a folder; choose another name".to_owned())
     } else {
-        (!kind.begins(&head(path, HEAD)?)).then(|| Refusal::Other(kind.title()))
+        let other = || {
+            format!("there is a file of this name which is no {}; choose another name, or move it away", kind.title())
+        };
+        (!kind.begins(&head(path, HEAD)?)).then(other)
     })
 }
 

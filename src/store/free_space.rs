@@ -23,7 +23,13 @@ fn judge(store: &Path, free: u64, needed: f64) -> Result<(), StoreError> {
         return Ok(());
     }
     let mega = |bytes: f64| (bytes * 1e-6).ceil() as u64;
-    Err(StoreError::NoRoom { path: store.to_owned(), free_mb: mega(free as f64), needed_mb: mega(needed + RESERVE) })
+    Err(StoreError::Refused(format!(
+        "the disk with the store \"{}\" has {} MB free; the trial may need {} MB and was not begun. Free some space, or \
+         choose another disk with --store",
+        store.display(),
+        mega(free as f64),
+        mega(needed + RESERVE)
+    )))
 }
 
 #[cfg(test)]

@@ -104,9 +104,9 @@ impl Store {
             .map_err(|e| row_fault(self.path(), id, &e))?;
         let Some((channels, samples, intact, count)) = found else { return Ok(None) };
         if !intact {
-            return Err(StoreError::Checksum { id, what: "channels", chunk: 0 });
+            return Err(StoreError::checksum(id, "channels", 0));
         }
-        let bad = |cause: String| StoreError::BadInfo { id, cause };
+        let bad = |cause: String| StoreError::bad_info(id, cause);
         let channels = serde_json::from_slice(&channels).map_err(|e| bad(e.to_string()))?;
         let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
         all_there(id, "samples", signals.len(), count)?;

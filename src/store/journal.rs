@@ -338,7 +338,10 @@ impl JournalRepository<'_> {
             let (Some(id), Some(inverse)) = (entry.trial, entry.change.inverse()) else { continue };
             let links = Links { undoes: Some(uid), batch: batch.as_deref() };
             if !change(&transaction, id, &inverse, links).map_err(fault)? {
-                return Err(StoreError::ChangedMeanwhile { id, change: entry.change.sentence() });
+                let change = entry.change.sentence();
+                return Err(StoreError::Refused(format!(
+                    "cannot undo \"{change}\" of trial {id}: the trial has changed since"
+                )));
             }
         }
         self.store.commit(transaction)?;

@@ -6,7 +6,7 @@ use super::demo_log::TrialPlace;
 use super::journal::{Change, Links, append, change, new_batch};
 use super::store::{Store, json, source_named};
 use super::store_error::{StoreError, row_fault};
-use crate::labels::{ClassNameError, Edited, Guess, LabelPlan, TrialEdit, class_name};
+use crate::labels::{Edited, Guess, LabelError, LabelPlan, TrialEdit, class_name, shown_name};
 use palpate_tactile::trial::{CorrectedPhases, TrialId, TrialSource};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
@@ -75,7 +75,9 @@ impl LabelRepository<'_> {
                 let to = note.trim().to_owned();
                 let length = to.chars().count();
                 if length > LONGEST_NOTE {
-                    return Err(StoreError::LongNote { length, most: LONGEST_NOTE });
+                    return Err(StoreError::Refused(format!(
+                        "the note has {length} characters, {LONGEST_NOTE} are allowed; keep longer texts in a file"
+                    )));
                 }
                 self.change_trials(ids, |_, state| Ok(Some(Change::Note { from: state.note, to: to.clone() })))
             }
@@ -129,7 +131,9 @@ impl LabelRepository<'_> {
     pub fn set_guess(&self, id: TrialId, model: &str, pmf: &[(String, f64)]) -> Result<(), StoreError> {
         let sum: f64 = pmf.iter().map(|(_, p)| p).sum();
         if !((sum - 1.0).abs() < PMF_TOLERANCE && pmf.iter().all(|(_, p)| (0.0..=1.0 + PMF_TOLERANCE).contains(p))) {
-            return Err(StoreError::BadGuess { model: model.to_owned(), sum });
+            return Err(StoreError::Refused(format!(
+                "the prediction of \"{model}\" is not stored: its probabilities are outside 0 to 1, or sum to {sum}"
+            )));
         }
         let guess = Guess { model: model.to_owned(), pmf: pmf.to_vec() };
         self.change_trials(&[id], |_, _state| Ok(Some(Change::Guess { guess: guess.clone() }))).map(drop)
@@ -140,7 +144,7 @@ impl LabelRepository<'_> {
         let sql = "SELECT model, pmf FROM guesses WHERE trial = ?1";
         let columns = |row: &Row<'_>| Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?));
         let found = self.store.connection.query_row(sql, [id], columns).optional().map_err(|e| self.store.fault(&e))?;
-        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: format!("its prediction: {e}") };
+        let bad = |e: serde_json::Error| StoreError::bad_info(id, format!("its prediction: {e}"));
         found.map(|(model, pmf)| Ok(Guess { model, pmf: serde_json::from_str(&pmf).map_err(bad)? })).transpose()
     }
 
@@ -208,7 +212,7 @@ impl LabelRepository<'_> {
                 return Err(StoreError::altered(*id));
             }
             let wanted = match follows(*id, state) {
-                Err(StoreError::NotOfBoard { .. }) if edited.known + 1 < ids.len() => {
+                Err(StoreError::NotOfBoard(_)) if edited.known + 1 < ids.len() => {
                     edited.known += 1;
                     continue;
                 }
@@ -232,14 +236,17 @@ fn label_change(id: TrialId, state: LabelState, to: String) -> Result<Option<Cha
     let LabelState { rig, object, .. } = state;
     let origin = source_named(id, &rig)?;
     if origin != TrialSource::Recorded {
-        return Err(StoreError::NotOfBoard { id, object, origin });
+        return Err(StoreError::NotOfBoard(format!(
+            "trial {id} is of \"{}\" and comes from \"{origin}\": only trials of the real gripper can be labelled",
+            shown_name(&object)
+        )));
     }
     let from = Some(object).filter(|name| !name.is_empty());
     Ok(Some(Change::Label { from, to: Some(to) }))
 }
 
 /// Tags as they are stored.
-fn checked(tags: &[String]) -> Result<Vec<String>, ClassNameError> {
+fn checked(tags: &[String]) -> Result<Vec<String>, LabelError> {
     tags.iter().map(|tag| class_name(tag)).collect()
 }
 

@@ -12,15 +12,15 @@
 //! trials are left out.
 
 use super::board_export::write_board_csv;
-use super::csv_export::{CsvError, number};
+use super::csv_export::number;
 use super::file_kind::FileKind;
 use super::new_file::{NewFolder, write_whole};
 use super::store::Store;
-use super::store_error::StoreError;
+use super::store_error::{ExportError, StoreError};
 use crate::labels::LabelledTrial;
 use palpate_sim::objects::catalogue;
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{Channel, LayoutError, SignalDefinition, Signals, whole_fingers};
+use palpate_tactile::{Channel, SignalDefinition, Signals, whole_fingers};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufWriter;
@@ -39,29 +39,6 @@ pub struct Exported {
     pub left_out: Vec<(TrialId, String)>,
 }
 
-/// Error of an export.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// Error of the store.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// Error of a file or folder.
-    #[error(transparent)]
-    File(#[from] CsvError),
-    /// The layout does not fit the gripper of a trial.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The folder is not empty.
-    #[error("\"{folder}\" is not empty; choose an empty or new folder", folder = folder.display())]
-    NotEmpty {
-        /// Path of the folder.
-        folder: PathBuf,
-    },
-    /// No trial is labelled.
-    #[error("no trial of the real gripper is labelled; label one with `palpate trials label ID NAME`")]
-    Nothing,
-}
-
 type Out = csv::Writer<BufWriter<File>>;
 
 /// Name of an object as part of a file name.
@@ -75,7 +52,7 @@ pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<boo
     write_board_csv(path, &trial)?;
     let bytes = path.with_extension("bytes");
     let received = store.board_bytes(id)?.unwrap_or_default();
-    write_whole(&bytes, FileKind::Capture, &received).map_err(|e| cannot(&bytes, &e))?;
+    write_whole(&bytes, FileKind::Capture, &received).map_err(|e| ExportError::cannot_write(&bytes, &e))?;
     Ok(true)
 }
 
@@ -84,14 +61,16 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
     let trials = store.labels().trials()?;
     let rows: Vec<&LabelledTrial> = trials.iter().filter(|trial| trial.counts()).collect();
     if rows.is_empty() {
-        return Err(ExportError::Nothing);
+        let cause = "no trial of the real gripper is labelled; label one with `palpate trials label ID NAME`";
+        return Err(ExportError::Refused(cause.to_owned()));
     }
     if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
-        return Err(ExportError::NotEmpty { folder: folder.to_owned() });
+        let folder = folder.display();
+        return Err(ExportError::Refused(format!("\"{folder}\" is not empty; choose an empty or new folder")));
     }
-    let new = NewFolder::create(folder).map_err(|e| cannot(folder, &e))?;
+    let new = NewFolder::create(folder).map_err(|e| ExportError::cannot_write(folder, &e))?;
     let mut left_out = write_all(store, &rows, new.unfinished())?;
-    new.finish().map_err(|e| cannot(folder, &e))?;
+    new.finish().map_err(|e| ExportError::cannot_write(folder, &e))?;
     let derived = rows.len() - left_out.len();
     let damaged = trials.iter().filter(|trial| trial.damaged && !trial.discarded);
     left_out.extend(damaged.map(|trial| (trial.id, StoreError::altered(trial.id).to_string())));
@@ -100,15 +79,15 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportE
 
 fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
     let raw = folder.join("raw");
-    std::fs::create_dir_all(&raw).map_err(|e| cannot(&raw, &e))?;
+    std::fs::create_dir_all(&raw).map_err(|e| ExportError::cannot_write(&raw, &e))?;
     let channels = whole_fingers(SignalDefinition::Parts);
     let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
     let mut list_out = create(&list)?;
     let mut signals_out = create(&signals)?;
-    list_out.write_record(LIST_COLUMNS).map_err(|e| cannot(&list, &e))?;
+    list_out.write_record(LIST_COLUMNS).map_err(|e| ExportError::cannot_write(&list, &e))?;
     let with_units = channels.iter().map(|channel| format!("{} [{}]", channel.name(), channel.quantity.unit()));
     let header = ["trial", "label", "size", "shape", "t_s"].into_iter().map(str::to_owned).chain(with_units);
-    signals_out.write_record(header).map_err(|e| cannot(&signals, &e))?;
+    signals_out.write_record(header).map_err(|e| ExportError::cannot_write(&signals, &e))?;
     let mut left_out = Vec::new();
     for row in rows {
         let label = row.object.as_deref().unwrap_or_default();
@@ -121,15 +100,18 @@ fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Ve
             written => written?,
         };
         let read = store.board_signals(row.id, &[])?.unwrap_or_default();
-        list_out.write_record(list_row(row, &read.serving.ids, &name)).map_err(|e| cannot(&list, &e))?;
+        list_out
+            .write_record(list_row(row, &read.serving.ids, &name))
+            .map_err(|e| ExportError::cannot_write(&list, &e))?;
         let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
         match read.grasp(&wanted) {
-            Some(chosen) => write_signals(&mut signals_out, row, label, &chosen).map_err(|e| cannot(&signals, &e))?,
+            Some(chosen) => write_signals(&mut signals_out, row, label, &chosen)
+                .map_err(|e| ExportError::cannot_write(&signals, &e))?,
             None => left_out.push((row.id, read.derived.warnings.join("; "))),
         }
     }
-    list_out.flush().map_err(|e| cannot(&list, &e))?;
-    signals_out.flush().map_err(|e| cannot(&signals, &e))?;
+    list_out.flush().map_err(|e| ExportError::cannot_write(&list, &e))?;
+    signals_out.flush().map_err(|e| ExportError::cannot_write(&signals, &e))?;
     Ok(left_out)
 }
 
@@ -191,9 +173,5 @@ fn write_signals(out: &mut Out, row: &LabelledTrial, label: &str, signals: &Sign
 }
 
 fn create(path: &Path) -> Result<Out, ExportError> {
-    Ok(csv::Writer::from_writer(BufWriter::new(File::create(path).map_err(|e| cannot(path, &e))?)))
-}
-
-fn cannot(path: &Path, error: &dyn std::fmt::Display) -> ExportError {
-    ExportError::File(CsvError::Write { path: path.to_owned(), cause: error.to_string() })
+    Ok(csv::Writer::from_writer(BufWriter::new(File::create(path).map_err(|e| ExportError::cannot_write(path, &e))?)))
 }

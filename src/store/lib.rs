@@ -96,8 +96,8 @@ pub use board_export::write_board_csv;
 pub use board_signals::BoardSignals;
 pub use board_trials::{BoardChunk, BoardInfo};
 pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCalibration};
-pub use csv_export::{CsvError, contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
-pub use csv_import::{Import, ImportError, ImportFault, ImportedTrial, read_trials, read_trials_csv};
+pub use csv_export::{contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
+pub use csv_import::{Import, ImportError, ImportedTrial, read_trials, read_trials_csv};
 pub use demo_log::{DEMO_LOG_TRIALS, TrialPlace};
 pub use file_kind::{FileKind, check_target};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
@@ -105,7 +105,7 @@ pub use free_space::check_space;
 pub use identity::Stored;
 pub use journal::{Change, JournalEntry, JournalRepository};
 pub use label_repository::{LabelRepository, LabelRevision};
-pub use labelled_export::{ExportError, Exported, export_board_trial, export_labelled, file_name_of};
+pub use labelled_export::{Exported, export_board_trial, export_labelled, file_name_of};
 pub use library::{
     Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
 };
@@ -113,7 +113,7 @@ pub use merge::Merged;
 pub use new_file::{NewFile, NewFolder, write_whole};
 pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
-pub use store_error::StoreError;
+pub use store_error::{ExportError, StoreError};
 pub use tares::{PartTare, StoredTare};
 pub use trial_export::export_trial;
 pub use trial_rows::TrialRow;

@@ -143,8 +143,7 @@ impl Store {
     /// twice adds nothing the second time; they get new numbers.
     pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
         if !other.is_file() {
-            let cause = "no such file".to_owned();
-            return Err(StoreError::Open { path: other.to_owned(), cause });
+            return Err(StoreError::open(other, "no such file"));
         }
         // Opening it says why it cannot be read.
         let theirs = Self::open(other)?;
@@ -194,7 +193,7 @@ mod tests {
         for id in 1..=3 {
             assert!(all.load(id)?.frames() == trial.frames());
         }
-        assert!(matches!(all.merge_from(&path("gone.sqlite")), Err(StoreError::Open { .. })));
+        assert!(all.merge_from(&path("gone.sqlite")).is_err_and(|error| error.to_string().contains("no such file")));
         assert!(!path("gone.sqlite").exists());
         Ok(())
     }

@@ -19,7 +19,7 @@ impl OpenFile {
     /// The file at an absolute path, which has just been opened.
     pub(super) fn at(path: PathBuf) -> Result<Self, StoreError> {
         let file = std::fs::metadata(&path);
-        let file = file.map_err(|e| StoreError::Open { path: path.clone(), cause: e.to_string() })?;
+        let file = file.map_err(|e| StoreError::open(&path, e))?;
         Ok(Self { path, identity: identity(&file), length: Cell::new(file.len()) })
     }
 

@@ -3,45 +3,12 @@
 //! fine.
 
 use palpate_tactile::calibration::{Point, SensorKind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Error of reading points.
+/// Error of reading points, as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PointsError {
-    /// The file cannot be read.
-    #[error("cannot read the points \"{path}\": {cause}", path = path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Message of the system.
-        cause: String,
-    },
-    /// A required column is missing.
-    #[error(
-        "\"{path}\" has no column {wanted}; its first line must name the columns, as in \"{wanted},counts\" (it has: {found})",
-        path = path.display()
-    )]
-    NoColumn {
-        /// Path of the file.
-        path: PathBuf,
-        /// Name of the column.
-        wanted: &'static str,
-        /// Names of the columns that exist.
-        found: String,
-    },
-    /// A field without a number.
-    #[error("\"{path}\", line {line}: {column} is \"{text}\", which is not a number", path = path.display())]
-    NotANumber {
-        /// Path of the file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: u64,
-        /// Name of the column.
-        column: String,
-        /// Content of the field.
-        text: String,
-    },
-}
+#[error("{0}")]
+pub struct PointsError(String);
 
 /// Most rows of a file of points.
 const MOST_ROWS: usize = 10_000;
@@ -56,14 +23,18 @@ fn stimulus_columns(kind: SensorKind) -> &'static [(&'static str, f64)] {
 
 /// Reads calibration points for a kind of sensor.
 pub fn read_points_csv(path: &Path, kind: SensorKind) -> Result<Vec<Point>, PointsError> {
-    let unreadable = |cause: String| PointsError::Unreadable { path: path.to_owned(), cause };
+    let name = path.display();
+    let unreadable = |cause: String| PointsError(format!("cannot read the points \"{name}\": {cause}"));
     let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
     let headers = reader.headers().map_err(|e| unreadable(e.to_string()))?.clone();
     let column = |name: &str| headers.iter().position(|header| header.eq_ignore_ascii_case(name));
     let missing = |wanted: &'static str| {
         let found = headers.iter().collect::<Vec<_>>().join(", ");
-        PointsError::NoColumn { path: path.to_owned(), wanted, found }
+        PointsError(format!(
+            "\"{name}\" has no column {wanted}; its first line must name the columns, as in \"{wanted},counts\" (it has: \
+             {found})"
+        ))
     };
     let known = stimulus_columns(kind);
     let stimulus = known.iter().find_map(|(name, factor)| Some((column(name)?, *factor)));
@@ -76,11 +47,9 @@ pub fn read_points_csv(path: &Path, kind: SensorKind) -> Result<Vec<Point>, Poin
         let line = row.position().map_or(0, csv::Position::line);
         let number = |column: usize| {
             let text = row.get(column).unwrap_or_default();
-            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| PointsError::NotANumber {
-                path: path.to_owned(),
-                line,
-                column: headers.get(column).unwrap_or_default().to_owned(),
-                text: text.to_owned(),
+            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
+                let column = headers.get(column).unwrap_or_default();
+                PointsError(format!("\"{name}\", line {line}: {column} is \"{text}\", which is not a number"))
             })
         };
         points.push(Point {

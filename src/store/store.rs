@@ -49,14 +49,17 @@ impl Store {
     /// Opens a store; creates it and its folder where they do not exist.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| StoreError::Folder { path: folder.to_owned(), cause: e.to_string() })?;
+            std::fs::create_dir_all(folder).map_err(|e| {
+                let folder = folder.display();
+                StoreError::Refused(format!(
+                    "cannot create the folder \"{folder}\" for the store: {e}; choose another place with --store"
+                ))
+            })?;
         }
-        let refused = |cause| StoreError::Open { path: path.to_owned(), cause };
         // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
-        let file = std::path::absolute(path).map_err(|e| refused(e.to_string()))?;
+        let file = std::path::absolute(path).map_err(|e| StoreError::open(path, e))?;
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = Connection::open_with_flags(&file, flags).map_err(|e| refused(plain(&e)))?;
+        let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;
         let mut store = Self { connection, path: path.to_owned(), file: OpenFile::at(file)?, warnings: Vec::new() };
         store.prepare()?;
         Ok(store)
@@ -138,14 +141,22 @@ impl Store {
             .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
             .map_err(|e| self.fault(&e))?;
         let (application, version) = (read("application_id")?, read("user_version")?);
+        let path = self.path.display();
         if application != APPLICATION_ID && tables > 0 {
-            return Err(StoreError::Foreign { path: self.path.clone() });
+            return Err(StoreError::foreign(&self.path));
         }
         if version > SCHEMA_VERSION {
-            return Err(StoreError::Newer { path: self.path.clone(), found: version, known: SCHEMA_VERSION });
+            return Err(StoreError::Refused(format!(
+                "\"{path}\" was written by a newer Palpate (store version {version}, this program reads up to \
+                 {SCHEMA_VERSION}); update Palpate"
+            )));
         }
         if version < SCHEMA_VERSION && tables > 0 {
-            return Err(StoreError::Older { path: self.path.clone(), found: version, known: SCHEMA_VERSION });
+            return Err(StoreError::Refused(format!(
+                "\"{path}\" was made by an earlier development version of Palpate (store version {version}, this program \
+                 reads {SCHEMA_VERSION}). Commit 29b20e5 still converts it: git checkout 29b20e5 && cargo run --release -- \
+                 trials list --store \"{path}\""
+            )));
         }
         Ok(())
     }
@@ -308,10 +319,10 @@ impl Store {
     /// One trial with its data.
     pub fn load(&self, id: TrialId) -> Result<Trial, StoreError> {
         let StoredHeader { source, header, simulation } = self.load_header(id)?;
-        let missing = |what: &str| StoreError::BadInfo { id, cause: format!("it has no {what}") };
+        let missing = |what: &str| StoreError::bad_info(id, format!("it has no {what}"));
         let data = match source {
             TrialSource::Simulated => {
-                let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
+                let bad = |e: serde_json::Error| StoreError::bad_info(id, e);
                 let [pose, quality, plan] = simulation;
                 TrialData::Simulated(SimulatedData {
                     world_from_gripper: serde_json::from_str(&pose).map_err(bad)?,
@@ -340,16 +351,16 @@ impl Store {
         match columns.header(id) {
             header if intact => header,
             Ok(_) => Err(StoreError::altered(id)),
-            Err(error) => Err(StoreError::BadInfo { id, cause: error.to_string() }),
+            Err(error) => Err(StoreError::bad_info(id, error)),
         }
     }
 
     pub(super) fn no_trial(&self, id: TrialId) -> StoreError {
         let sql = "SELECT deleted IS NOT NULL FROM trials WHERE id = ?1";
         match self.connection.query_row(sql, [id], |row| row.get::<_, bool>(0)) {
-            Ok(true) => StoreError::NoTrial { id, hint: ": it was deleted; `palpate trials restore` brings it back" },
-            Ok(false) => StoreError::NotDeleted { id },
-            Err(_) => StoreError::NoTrial { id, hint: "" },
+            Ok(true) => StoreError::no_trial(id, ": it was deleted; `palpate trials restore` brings it back"),
+            Ok(false) => StoreError::Refused(format!("trial {id} is not deleted: nothing to restore")),
+            Err(_) => StoreError::no_trial(id, ""),
         }
     }
 
@@ -420,13 +431,14 @@ impl HeaderColumns {
 
     fn header(self, id: TrialId) -> Result<StoredHeader, StoreError> {
         let [collection, earlier, phases, origin] = self.optional;
-        let bad = |e: serde_json::Error| StoreError::BadInfo { id, cause: e.to_string() };
+        let scene = |cause| StoreError::Refused(format!("the scene stored with trial {id} cannot be read: {cause}"));
+        let bad = |e: serde_json::Error| StoreError::bad_info(id, e);
         let header = TrialHeader {
             object: self.object,
             seed: self.seed.cast_unsigned(),
             collection,
             // An empty text, as imported trials have, is the default scene.
-            scene: Scene::from_toml(&self.scene).map_err(|cause| StoreError::Scene { id, cause })?,
+            scene: Scene::from_toml(&self.scene).map_err(scene)?,
             warnings: serde_json::from_str(&self.warnings).map_err(bad)?,
             version: self.version,
             earlier: earlier.as_deref().and_then(|earlier| serde_json::from_str(earlier).ok()),
@@ -439,7 +451,11 @@ impl HeaderColumns {
 
 /// Source of a trial by its stored name.
 pub(super) fn source_named(id: TrialId, name: &str) -> Result<TrialSource, StoreError> {
-    name.parse().map_err(|UnknownSource(name)| StoreError::UnknownSource { id, name })
+    name.parse().map_err(|UnknownSource(name)| {
+        StoreError::Refused(format!(
+            "trial {id} comes from \"{name}\", which this version does not know; update Palpate"
+        ))
+    })
 }
 
 fn insert_simulated(

@@ -115,7 +115,7 @@ fn deleting_can_be_undone_until_purged() -> Result<(), StoreError> {
     let folder = folder();
     let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
     let (a, b) = (store.insert(&trial(3))?.id(), store.insert(&trial(4))?.id());
-    assert!(matches!(store.delete(&[a, 99]), Err(StoreError::NoTrial { id: 99, .. })));
+    assert!(store.delete(&[a, 99]).is_err_and(|error| error.to_string().contains("no trial 99")));
     assert_eq!(store.list(false)?.len(), 2, "all or none");
     store.delete(&[a])?;
     assert_eq!(store.list(false)?.len(), 1);
@@ -134,24 +134,26 @@ fn foreign_newer_older_and_damaged_files_are_refused() -> Result<(), Box<dyn std
     let folder = folder();
     let text = folder.path().join("notes.txt");
     std::fs::write(&text, "no database at all, but long enough to be looked at as one would be".repeat(20))?;
-    assert!(matches!(Store::open(&text), Err(StoreError::Foreign { .. })));
+    let refused =
+        |path: &std::path::Path, why: &str| Store::open(path).is_err_and(|error| error.to_string().contains(why));
+    assert!(refused(&text, "is not a store of Palpate"));
 
     let other = folder.path().join("other.sqlite");
     Connection::open(&other)?.execute_batch("CREATE TABLE mine (x)")?;
-    assert!(matches!(Store::open(&other), Err(StoreError::Foreign { .. })));
+    assert!(refused(&other, "is not a store of Palpate"));
 
     let newer = folder.path().join("newer.sqlite");
     Store::open(&newer)?;
     Connection::open(&newer)?.pragma_update(None, "user_version", 99)?;
-    assert!(matches!(Store::open(&newer), Err(StoreError::Newer { found: 99, .. })));
+    assert!(refused(&newer, "newer Palpate (store version 99,"));
     Connection::open(&newer)?.pragma_update(None, "user_version", 14)?;
-    assert!(matches!(Store::open(&newer), Err(StoreError::Older { found: 14, .. })));
+    assert!(refused(&newer, "earlier development version of Palpate (store version 14,"));
 
     let damaged = folder.path().join("damaged.sqlite");
     let id = Store::open(&damaged)?.insert(&trial(5))?.id();
     Connection::open(&damaged)?.execute("UPDATE chunks SET frames = x'00', checksum = NULL WHERE number = 1", [])?;
     let error = Store::open(&damaged)?.load(id).expect_err("damaged");
-    assert!(matches!(error, StoreError::Checksum { chunk: 1, .. }), "also in a row without a checksum");
+    assert!(error.to_string().contains("part 1, do not match"), "also in a row without a checksum");
     Ok(())
 }
 

@@ -2,8 +2,9 @@
 
 use super::csv_export::{contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
 use super::file_kind::FileKind;
-use super::labelled_export::{ExportError, export_board_trial, file_name_of};
+use super::labelled_export::{export_board_trial, file_name_of};
 use super::store::Store;
+use super::store_error::ExportError;
 use crate::labels::shown_name;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};

@@ -172,10 +172,7 @@ fn the_truth_can_be_hidden() {
 
 #[test]
 fn without_a_model_everything_else_works_and_it_says_so() {
-    let mut bench = bench(BenchSetup {
-        models: Err(ModelError::Channels { difference: "it is broken".to_owned() }),
-        ..BenchSetup::default()
-    });
+    let mut bench = bench(BenchSetup { models: Err(ModelError("it is broken".to_owned())), ..BenchSetup::default() });
     assert!(bench.workbench().messages().iter().any(|text| text.contains("it is broken")));
     assert!(says(&bench, "Recognition is off"));
     bench.tell(|app| app.simulation.send(Command::SetGrasps(2)));

@@ -50,7 +50,7 @@ pub fn save_model(model: &Model, path: &Path) -> Result<(), ModelError> {
 }
 
 fn unwritable(path: &Path, cause: &dyn std::fmt::Display) -> ModelError {
-    ModelError::Unwritable { path: path.to_owned(), cause: cause.to_string() }
+    ModelError(format!("cannot write \"{}\": {cause}", path.display()))
 }
 
 /// Model file with its description.

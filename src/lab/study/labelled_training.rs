@@ -153,7 +153,7 @@ impl LabelledTraining<'_> {
         let all = enough.iter().map(|class| class.trials).sum();
         let data = without_small_classes(&data, all, &mut too_few)?;
         let splits = SplitPlan::Shares([1.0 - HELD_BACK, 0.0, HELD_BACK]).splits(&data, self.seed, 1)?;
-        let split = splits.first().ok_or(LearnError::NoData)?;
+        let split = splits.first().ok_or_else(LearnError::no_data)?;
         let (learned, held_back) = (data.part(&split.train), data.part(&split.test));
         let mut model = self.fitted(&learned)?;
         let evaluation = self.judged(&model, &learned, &held_back)?;

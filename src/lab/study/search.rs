@@ -43,7 +43,7 @@ pub fn search(
 ) -> Result<Vec<SearchRow>, SearchError> {
     if method.recipe.is_none() {
         let cause = "only networks have settings to search for".to_owned();
-        return Err(LearnError::Setting { name: "search".to_owned(), cause }.into());
+        return Err(LearnError::setting("search", cause).into());
     }
     let mut points = vec![given.clone()];
     for (name, values) in GRID.iter().filter(|(name, _)| !given.contains_key(*name)) {

@@ -6,7 +6,7 @@ use super::messages::{Notice, Wake};
 use super::own_store::OwnStore;
 use super::worker::Worker;
 use crate::labelling::{Disagreement, disagreements};
-use palpate_store::labels::{LabelPlan, LabelledTrial, NextTrial, PlanError, Progress};
+use palpate_store::labels::{LabelError, LabelPlan, LabelledTrial, NextTrial, Progress};
 use palpate_store::{ExportError, Exported, JournalEntry, LabelRevision, Store, StoreError, export_labelled};
 use palpate_tactile::trial::TrialId;
 use std::path::{Path, PathBuf};
@@ -166,7 +166,7 @@ fn exported(store: &Store, folder: &Path) -> Result<String, ExportError> {
 
 fn change_plan(
     store: &mut Store,
-    change: impl FnOnce(&mut LabelPlan) -> Result<(), PlanError>,
+    change: impl FnOnce(&mut LabelPlan) -> Result<(), LabelError>,
 ) -> Result<(), StoreError> {
     let mut plan = store.labels().plan()?;
     change(&mut plan)?;

@@ -23,8 +23,7 @@ pub fn open_trial_job(store: PathBuf, wake: Wake) -> Job<OpenRequest, OpenTrial>
         let reader = match &mut reader {
             Some(reader) => reader,
             None if !store.exists() => {
-                let nothing = StoreError::NoTrial { id: *id, hint: ": the store is empty" };
-                return Err(nothing.into());
+                return Err(StoreError::no_trial(*id, ": the store is empty").into());
             }
             empty @ None => empty.insert(Store::open(&store)?),
         };

@@ -5,10 +5,10 @@
 //! image with some noise; answers average both views. A last network learns from all grasps; the temperature of its
 //! probabilities comes from one that learned without a sixth of them.
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
-use crate::model::{LoadError, ModelCard};
+use crate::model::ModelCard;
 use crate::network::Preparation;
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
@@ -130,12 +130,11 @@ impl<N: CandleNetwork> Variables<N> {
     }
 
     /// Sets the variables to the arrays of a model file, whose names begin with a prefix.
-    pub(super) fn read(&self, arrays: &Arrays, prefix: &str) -> std::result::Result<(), LoadError> {
+    pub(super) fn read(&self, arrays: &Arrays, prefix: &str) -> std::result::Result<(), ModelError> {
         for (name, var) in &self.by_name {
             let values = arrays.f32s(&format!("{prefix}{name}"), var.dims())?;
             let values = Tensor::from_slice(values, var.dims(), &Device::Cpu);
-            let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
-            values.and_then(|values| var.set(&values)).map_err(failed)?;
+            values.and_then(|values| var.set(&values)).map_err(ModelError::failed)?;
         }
         Ok(())
     }
@@ -198,25 +197,24 @@ impl<N: CandleNetwork> Candle<N> {
     }
 
     /// Restores a recogniser from a model file.
-    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> std::result::Result<Self, ModelError> {
         let learned: Learned = card.settings_as()?;
         if learned.revision != N::REVISION {
-            return Err(LoadError::Card { part: "the version of the network" });
+            return Err(ModelError::card("the version of the network"));
         }
         if !learned.preparation.is_sound(card.channels.len()) {
-            return Err(LoadError::Card { part: "the input scaling" });
+            return Err(ModelError::card("the input scaling"));
         }
         let width = learned.preparation.width();
         let is_place = |to: &usize| *to < width;
         if !learned.mirror.as_ref().is_none_or(|m| m.len() == width && m.iter().all(is_place)) {
-            return Err(LoadError::Card { part: "the mirror image" });
+            return Err(ModelError::card("the mirror image"));
         }
         if !TEMPERATURES.allows(learned.temperature) {
-            return Err(LoadError::Card { part: "the temperature" });
+            return Err(ModelError::card("the temperature"));
         }
-        let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
         let (classes, mut random) = (card.labels.classes.len(), ChaCha8Rng::seed_from_u64(0));
-        let network = Variables::<N>::new(width, classes, &mut random).map_err(failed)?;
+        let network = Variables::<N>::new(width, classes, &mut random).map_err(ModelError::failed)?;
         network.read(arrays, "")?;
         Ok(Self { learned, classes, network })
     }

@@ -2,12 +2,11 @@
 
 use super::felt_steps::Columns;
 use super::geometry::{GeometryEncoder, Shipped};
-use super::row_model::Rows;
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::data::{Dataset, Sequence};
 use crate::features::Features;
 use crate::fitting::LearnError;
-use crate::model::LoadError;
+use crate::rows::Rows;
 use std::sync::Arc;
 
 /// Features of a grasp, with those of the geometry encoder for classifiers that read them.
@@ -53,15 +52,14 @@ impl ReadEncoder {
     /// The shipped encoder for grasps of this data set.
     pub(super) fn shipped_for(data: &Dataset) -> Result<Self, LearnError> {
         let encoder = Shipped::of(&data.about).encoder().map_err(LearnError::failed)?;
-        let needs = encoder.channels().join(", ");
-        let found = || data.channels.join(", ");
-        Self::on(encoder, &data.channels).ok_or_else(|| LearnError::Encoder { needs, found: found() })
+        let refused = LearnError::encoder(encoder.channels(), &data.channels);
+        Self::on(encoder, &data.channels).ok_or(refused)
     }
 
     /// Restores the encoder of a model file.
-    pub(super) fn load(settings: &serde_json::Value, channels: &[String], arrays: &Arrays) -> Result<Self, LoadError> {
+    pub(super) fn load(settings: &serde_json::Value, channels: &[String], arrays: &Arrays) -> Result<Self, ModelError> {
         let encoder = Arc::new(GeometryEncoder::load_from(settings, arrays, ENCODER)?);
-        Self::on(encoder, channels).ok_or(LoadError::Card { part: "the geometry encoder" })
+        Self::on(encoder, channels).ok_or_else(|| ModelError::card("the geometry encoder"))
     }
 
     /// The encoder on readings of these channels; none where they lack one of its own.

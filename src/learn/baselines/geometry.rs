@@ -8,11 +8,10 @@ use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{FeltSteps, LEAST_FELT, STAGES, Views, end_of_stage, stage_of};
 use super::measures::{Geometry, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Touch};
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::data::{DataCard, Dataset, Example, Sequence, fnv_1a};
 use crate::features::Levels;
 use crate::fitting::{Fitting, LearnError};
-use crate::model::{LoadError, ModelError};
 use crate::pmf::Pmf;
 use crate::tensor_file::{self, TensorFile};
 use candle_core::{Device, Result, Tensor};
@@ -149,7 +148,7 @@ impl GeometryEncoder {
         fitting: &Fitting<'_>,
     ) -> std::result::Result<Self, LearnError> {
         if touches.is_empty() {
-            return Err(LearnError::NoData);
+            return Err(LearnError::no_data());
         }
         let scales = (0..MEASURES).map(|k| scale_of(k, touches)).collect();
         let mut objects: Vec<usize> = touches.iter().map(|touch| touch.object).collect();
@@ -176,7 +175,7 @@ impl GeometryEncoder {
     }
 
     /// Restores an encoder from its settings and arrays.
-    pub fn load(settings: &serde_json::Value, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+    pub fn load(settings: &serde_json::Value, arrays: &Arrays) -> std::result::Result<Self, ModelError> {
         let encoder = Self::load_from(settings, arrays, "")?;
         arrays.require_same_form(&encoder.arrays())?;
         Ok(encoder)
@@ -187,32 +186,30 @@ impl GeometryEncoder {
         settings: &serde_json::Value,
         arrays: &Arrays,
         prefix: &str,
-    ) -> std::result::Result<Self, LoadError> {
+    ) -> std::result::Result<Self, ModelError> {
         let learned: Learned = serde_json::from_value(settings.clone())
-            .map_err(|error| LoadError::Settings { cause: error.to_string() })?;
+            .map_err(|error| ModelError(format!("invalid settings on its card: {error}")))?;
         learned.check()?;
-        let failed = |error: candle_core::Error| LoadError::Failed { cause: error.to_string() };
         let outputs = 2 * MEASURES + learned.shapes.len();
         let mut random = ChaCha8Rng::seed_from_u64(0);
-        let network = Variables::new(learned.steps.inputs(), outputs, &mut random).map_err(failed)?;
+        let network = Variables::new(learned.steps.inputs(), outputs, &mut random).map_err(ModelError::failed)?;
         network.read(arrays, prefix)?;
         Ok(Self { learned, network })
     }
 
     /// Decodes a file of [`GeometryEncoder::to_bytes`]. `name` is the file name in errors.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> std::result::Result<Self, ModelError> {
-        let malformed = |cause: String| ModelError::Malformed { name: name.to_owned(), cause };
-        let file = TensorFile::decode(bytes).map_err(malformed)?;
-        let settings = serde_json::from_str(&file.card).map_err(|error| malformed(format!("invalid card: {error}")))?;
-        let arrays = file.arrays().map_err(LoadError::from);
-        let loaded = arrays.and_then(|arrays| Self::load(&settings, &arrays));
-        loaded.map_err(|cause| ModelError::Invalid { name: name.to_owned(), cause })
+        let file = TensorFile::decode(bytes).map_err(|cause| ModelError::malformed(name, cause))?;
+        let settings = serde_json::from_str(&file.card)
+            .map_err(|error| ModelError::malformed(name, format!("invalid card: {error}")))?;
+        let loaded = file.arrays().and_then(|arrays| Self::load(&settings, &arrays));
+        loaded.map_err(|cause| ModelError::invalid(name, &cause))
     }
 
     /// Encodes the encoder as a safetensors file.
     pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, ModelError> {
-        let malformed = |cause: String| ModelError::Malformed { name: "a geometry encoder".to_owned(), cause };
-        tensor_file::encode(self.settings().to_string(), &self.arrays()).map_err(malformed)
+        tensor_file::encode(self.settings().to_string(), &self.arrays())
+            .map_err(|cause| ModelError::malformed("a geometry encoder", cause))
     }
 
     /// Settings for [`GeometryEncoder::load`].
@@ -344,8 +341,8 @@ impl GeometryEncoder {
 }
 
 impl Learned {
-    fn check(&self) -> std::result::Result<(), LoadError> {
-        let part = |part: &'static str| Err(LoadError::Card { part });
+    fn check(&self) -> std::result::Result<(), ModelError> {
+        let part = |part| Err(ModelError::card(part));
         let all_finite = |rows: &[Vec<f64>]| rows.iter().flatten().all(|x| x.is_finite());
         if self.revision != Encoder::REVISION {
             part("the version of the encoder")

@@ -12,10 +12,10 @@ use super::felt_steps::{Columns, FeltSteps, STAGES, Views, end_of_stage, stage_o
 use super::geometry::Shipped;
 use super::kept_grasps::KeptGrasps;
 use super::other::{as_one_of_many, balanced_weights, other_weight};
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
-use crate::model::{LoadError, ModelCard};
+use crate::model::ModelCard;
 use crate::pmf::Pmf;
 use crate::recogniser::{LiveRecogniser, Pupil, Recogniser, Verdict};
 use crate::temperature::{Calibration, Temperatures};
@@ -81,14 +81,12 @@ const TEMPERATURES: Temperatures = Temperatures { range: 0.2..=5.0, count: 60 };
 fn epochs_of(fitting: &Fitting<'_>) -> std::result::Result<Option<usize>, LearnError> {
     let unknown = |name: &String| name != "epochs";
     if let Some(name) = fitting.settings.keys().find(|name| unknown(name)) {
-        let cause = "this method has one setting, epochs".to_owned();
-        return Err(LearnError::Setting { name: name.clone(), cause });
+        return Err(LearnError::setting(name, "this method has one setting, epochs"));
     }
     let Some(value) = fitting.settings.get("epochs") else { return Ok(None) };
     let epochs = value.as_u64().filter(|epochs| (1..=10_000).contains(epochs));
-    let cause =
-        || LearnError::Setting { name: "epochs".to_owned(), cause: "write a number from 1 to 10000".to_owned() };
-    epochs.map(|epochs| Some(epochs as usize)).ok_or_else(cause)
+    let refused = || LearnError::setting("epochs", "write a number from 1 to 10000");
+    epochs.map(|epochs| Some(epochs as usize)).ok_or_else(refused)
 }
 
 impl CandleNetwork for Head {
@@ -114,10 +112,8 @@ impl GeometryNetwork {
         check_enough(data, 2)?;
         let set = epochs_of(fitting)?;
         let encoder = Shipped::of(&data.about).encoder().map_err(LearnError::failed)?;
-        let columns = Columns::of(encoder.channels(), &data.channels).ok_or_else(|| LearnError::Encoder {
-            needs: encoder.channels().join(", "),
-            found: data.channels.join(", "),
-        })?;
+        let columns = Columns::of(encoder.channels(), &data.channels)
+            .ok_or_else(|| LearnError::encoder(encoder.channels(), &data.channels))?;
         let steps = encoder.steps().clone();
         let views: Vec<Views> = data.examples.iter().map(|e| steps.views(&columns.pick(&e.grasp))).collect();
         let [least, most] = PASSES;
@@ -156,7 +152,7 @@ impl GeometryNetwork {
         let Fitted { learned, network, kept, .. } = &*self.0;
         let steps = learned.steps.clone();
         let columns = Columns::of(&steps.channels, &data.channels)
-            .ok_or_else(|| LearnError::Encoder { needs: steps.channels.join(", "), found: data.channels.join(", ") })?;
+            .ok_or_else(|| LearnError::encoder(&steps.channels, &data.channels))?;
         let (mut truth, mut views): (Vec<usize>, Vec<Views>) = kept.views(&steps).unzip();
         truth.extend(data.examples.iter().map(|example| example.class));
         views.extend(data.examples.iter().map(|example| steps.views(&columns.pick(&example.grasp))));
@@ -198,24 +194,23 @@ impl GeometryNetwork {
     }
 
     /// Restores a recogniser from a model file.
-    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> std::result::Result<Self, LoadError> {
+    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> std::result::Result<Self, ModelError> {
         let learned: Learned = card.settings_as()?;
         let columns = Columns::of(&learned.steps.channels, &card.channels);
-        let part = |part: &'static str| LoadError::Card { part };
         if learned.revision != Head::REVISION {
-            return Err(part("the version of the network"));
+            return Err(ModelError::card("the version of the network"));
         }
         if let Some(fault) = learned.steps.fault() {
-            return Err(part(fault));
+            return Err(ModelError::card(fault));
         }
         if learned.calibrations.len() != STAGES || !learned.calibrations.iter().all(|own| own.is_sound(&TEMPERATURES)) {
-            return Err(part("the calibration"));
+            return Err(ModelError::card("the calibration"));
         }
-        let columns = columns.ok_or(part("the list of channels"))?;
+        let columns = columns.ok_or_else(|| ModelError::card("the list of channels"))?;
         let (classes, other) = (card.labels.classes.len(), card.labels.other());
         let mut random = ChaCha8Rng::seed_from_u64(0);
-        let network = Variables::<Head>::new(learned.steps.inputs(), classes, &mut random)
-            .map_err(|error| LoadError::Failed { cause: error.to_string() })?;
+        let network =
+            Variables::<Head>::new(learned.steps.inputs(), classes, &mut random).map_err(ModelError::failed)?;
         network.read(arrays, "")?;
         let kept = KeptGrasps::read(arrays, learned.kept, &learned.steps, classes)?;
         Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))

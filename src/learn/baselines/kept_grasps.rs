@@ -2,7 +2,7 @@
 
 use super::candle_network::STEPS;
 use super::felt_steps::{FeltSteps, Views};
-use crate::arrays::{ArrayError, Arrays};
+use crate::arrays::{Arrays, ModelError};
 
 /// Most readings that are kept of each class.
 const KEPT: usize = 100;
@@ -69,7 +69,7 @@ impl KeptGrasps {
         count: usize,
         steps: &FeltSteps,
         number_of_classes: usize,
-    ) -> Result<Self, ArrayError> {
+    ) -> Result<Self, ModelError> {
         if count == 0 {
             return Ok(Self::default());
         }

@@ -14,7 +14,6 @@ mod kept_grasps;
 mod measures;
 mod neighbours;
 mod other;
-mod row_model;
 mod smo;
 mod svm;
 mod tabular;

@@ -1,8 +1,7 @@
 //! Nearest neighbours of a row of features, among all training rows.
 
-use super::row_model::{RowModel, Rows};
-use crate::arrays::Arrays;
-use crate::model::LoadError;
+use crate::arrays::{Arrays, ModelError};
+use crate::rows::{RowModel, Rows};
 
 /// Number of neighbours that vote.
 const VOTERS: usize = 7;
@@ -24,7 +23,7 @@ impl Neighbours {
         Self { rows: rows.values.clone(), labels: rows.labels.clone(), columns: rows.columns, classes: rows.classes }
     }
 
-    pub(super) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, LoadError> {
+    pub(super) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ModelError> {
         let labels = arrays.indices("neighbours.labels", classes, "a class")?;
         arrays.require("neighbours.rows", &[labels.len(), columns], "neighbours.labels")?;
         let rows = arrays.f32s("neighbours.rows", &[labels.len(), columns])?.to_vec();

@@ -1,11 +1,10 @@
 //! Support vector machines with a Gaussian kernel, one for each pair of classes.
 
-use super::row_model::{RowModel, Rows};
 use super::smo;
-use crate::arrays::{ArrayError, Arrays};
+use crate::arrays::{Arrays, ModelError};
 use crate::fitting::{Fitting, LearnError};
-use crate::model::LoadError;
 use crate::network::{Matrix, multiply};
+use crate::rows::{RowModel, Rows};
 
 /// Penalty C of margin violations.
 const COST: f64 = 100.0;
@@ -93,15 +92,12 @@ impl Svm {
         format!("Gaussian kernel, gamma {:.3e}, C {COST}, one against one, {vectors} support vectors", self.gamma)
     }
 
-    pub(super) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, LoadError> {
+    pub(super) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ModelError> {
         let vectors = arrays.f32_rows("svm.vectors", columns)?;
         let gamma = match *arrays.f64_vector("svm.gamma")? {
             [gamma] if gamma > 0.0 => gamma,
-            [_] => Err(ArrayError::Value { name: "svm.gamma".to_owned(), index: 0, expected: "positive" })?,
-            ref other => {
-                let (name, found) = ("svm.gamma".to_owned(), vec![other.len()]);
-                Err(ArrayError::Shape { name, found, expected: vec![1] })?
-            }
+            [_] => Err(ModelError::value("svm.gamma", 0, "positive"))?,
+            ref other => Err(ModelError::shape("svm.gamma", &[other.len()], &[1]))?,
         };
         let biases = arrays.f64_vector("svm.biases")?;
         arrays.require("svm.pairs", &[3 * biases.len()], "svm.biases")?;
@@ -111,8 +107,7 @@ impl Svm {
         for (k, (pair, bias)) in pairs.iter().zip(biases).enumerate() {
             let [negative, positive, terms] = pair.map(|x| usize::try_from(x).unwrap_or(usize::MAX));
             if negative >= classes || positive >= classes || terms > MOST_TERMS {
-                let (name, expected) = ("svm.pairs".to_owned(), "two classes and a number of terms");
-                Err(ArrayError::Value { name, index: 3 * k, expected })?;
+                Err(ModelError::value("svm.pairs", 3 * k, "two classes and a number of terms"))?;
             }
             length += terms;
             machines.push((Machine { pair: [negative, positive], bias: *bias, terms: Vec::new() }, terms));

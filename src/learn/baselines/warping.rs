@@ -1,11 +1,11 @@
 //! Nearest neighbours by dynamic time warping (Sakoe and Chiba 1978): sequences are compared after stretching time,
 //! within a band, so that they match best.
 
-use crate::arrays::{Arrays, check_each};
+use crate::arrays::{Arrays, ModelError, check_each};
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
 use crate::mirror::mirror;
-use crate::model::{LoadError, ModelCard};
+use crate::model::ModelCard;
 use crate::network::Preparation;
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
@@ -57,15 +57,15 @@ impl Warping {
     }
 
     /// Restores a recogniser from a model file.
-    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
+    pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, ModelError> {
         let learned: Learned = card.settings_as()?;
         let (channels, classes) = (card.channels.len(), card.labels.classes.len());
         if !learned.preparation.is_sound(channels) {
-            return Err(LoadError::Card { part: "the input scaling" });
+            return Err(ModelError::card("the input scaling"));
         }
         let mirrored = learned.mirror.as_ref().is_none_or(|m| m.len() == channels && m.iter().all(|to| *to < channels));
         if !mirrored || !(1..=1000).contains(&learned.voters) || learned.band > 10_000 {
-            return Err(LoadError::Card { part: "the definition of neighbours" });
+            return Err(ModelError::card("the definition of neighbours"));
         }
         let labels = arrays.indices("labels", classes, "a class")?;
         arrays.require("lengths", &[labels.len()], "labels")?;

@@ -7,8 +7,9 @@ use super::split::Target;
 use super::tree::{Cuts, FeatureSampling, Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_class_trees, save_trees};
 use super::{Examples, normalise, random_of};
-use crate::arrays::{ArrayError, Arrays, check_each};
+use crate::arrays::{Arrays, ModelError, check_each};
 use crate::fitting::LearnError;
+use crate::rows::RowModel;
 use rand::RngExt;
 
 /// Settings of a [`Forest`]. Default: [`ForestSettings::random_forest`].
@@ -104,17 +105,29 @@ impl Forest {
         Self { columns, classes, trees, leaf_weights, node_weights }
     }
 
-    /// True if it answers on rows of which some values are unknown.
-    pub(crate) fn answers_in_part(&self) -> bool {
-        !self.leaf_weights.is_empty()
+    /// Restores a forest from a model file.
+    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ModelError> {
+        let trees = load_class_trees(arrays, columns, classes)?;
+        let leaf_weights = match arrays.0.contains_key(LEAF_WEIGHTS) {
+            true => {
+                let leaves = trees.iter().map(|tree| tree.values.len() / tree.width).sum();
+                let weights = arrays.f32s(LEAF_WEIGHTS, &[leaves])?.to_vec();
+                check_each(LEAF_WEIGHTS, &weights, "a weight above 0", |x| x.is_finite() && *x > 0.0)?;
+                weights
+            }
+            false => Vec::new(),
+        };
+        Ok(Self::new([columns, classes], trees, leaf_weights))
     }
+}
 
+impl RowModel for Forest {
     /// Probability of each class: mean share over all trees. NaN stands for an unknown value: there, both sides of a cut count,
     /// by the training rows that fell there.
     ///
     /// # Panics
     /// If the row has another number of features than the training rows.
-    pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
+    fn predict(&self, row: &[f32]) -> Vec<f64> {
         assert_eq!(row.len(), self.columns, "values of a row");
         let mut shares = vec![0.0; self.classes];
         if self.answers_in_part() && row.iter().any(|x| x.is_nan()) {
@@ -131,27 +144,17 @@ impl Forest {
         shares
     }
 
+    /// True if it answers on rows of which some values are unknown.
+    fn answers_in_part(&self) -> bool {
+        !self.leaf_weights.is_empty()
+    }
+
     /// Adds the trees to the arrays of a model file.
-    pub(crate) fn save(&self, arrays: &mut Arrays) {
+    fn save(&self, arrays: &mut Arrays) {
         save_trees(&self.trees, self.columns, self.classes, arrays);
         if self.answers_in_part() {
             arrays.put(LEAF_WEIGHTS, &[self.leaf_weights.len()], self.leaf_weights.clone());
         }
-    }
-
-    /// Restores a forest from a model file.
-    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
-        let trees = load_class_trees(arrays, columns, classes)?;
-        let leaf_weights = match arrays.0.contains_key(LEAF_WEIGHTS) {
-            true => {
-                let leaves = trees.iter().map(|tree| tree.values.len() / tree.width).sum();
-                let weights = arrays.f32s(LEAF_WEIGHTS, &[leaves])?.to_vec();
-                check_each(LEAF_WEIGHTS, &weights, "a weight above 0", |x| x.is_finite() && *x > 0.0)?;
-                weights
-            }
-            false => Vec::new(),
-        };
-        Ok(Self::new([columns, classes], trees, leaf_weights))
     }
 }
 

@@ -10,8 +10,9 @@ use super::split::{Item, Target};
 use super::tree::{Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_classes, load_trees, save_trees};
 use super::{Examples, check_boosting, drawn, random_of, softmax};
-use crate::arrays::{ArrayError, Arrays};
+use crate::arrays::{Arrays, ModelError};
 use crate::fitting::LearnError;
+use crate::rows::RowModel;
 use rand_chacha::ChaCha8Rng;
 
 /// Settings of [`GradientBoosting`].
@@ -75,11 +76,26 @@ impl GradientBoosting {
         Ok(fitting.model)
     }
 
+    /// Restores a model from a model file.
+    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ModelError> {
+        let trees = load_trees(arrays, columns, classes, 1)?;
+        let prior = arrays.f64_vector("trees.prior")?.to_vec();
+        arrays.require("trees.present", &[prior.len()], "trees.prior")?;
+        let present = load_classes(arrays, "trees.present", classes)?;
+        if trees.len() % present.len() != 0 {
+            let rounds = trees.len() / present.len();
+            arrays.require("trees.tree_nodes", &[rounds * present.len()], "trees.present")?;
+        }
+        Ok(Self { columns, classes, present, prior, trees })
+    }
+}
+
+impl RowModel for GradientBoosting {
     /// Probability of each class.
     ///
     /// # Panics
     /// If the row has another number of features than the training rows.
-    pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
+    fn predict(&self, row: &[f32]) -> Vec<f64> {
         assert_eq!(row.len(), self.columns, "values of a row");
         let mut scores = self.prior.clone();
         for round in self.trees.chunks_exact(scores.len()) {
@@ -96,23 +112,10 @@ impl GradientBoosting {
     }
 
     /// Adds the model to the arrays of a model file.
-    pub(crate) fn save(&self, arrays: &mut Arrays) {
+    fn save(&self, arrays: &mut Arrays) {
         arrays.put_integers("trees.present", self.present.iter().copied());
         arrays.put_f64("trees.prior", self.prior.clone());
         save_trees(&self.trees, self.columns, self.classes, arrays);
-    }
-
-    /// Restores a model from a model file.
-    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
-        let trees = load_trees(arrays, columns, classes, 1)?;
-        let prior = arrays.f64_vector("trees.prior")?.to_vec();
-        arrays.require("trees.present", &[prior.len()], "trees.prior")?;
-        let present = load_classes(arrays, "trees.present", classes)?;
-        if trees.len() % present.len() != 0 {
-            let rounds = trees.len() / present.len();
-            arrays.require("trees.tree_nodes", &[rounds * present.len()], "trees.present")?;
-        }
-        Ok(Self { columns, classes, present, prior, trees })
     }
 }
 

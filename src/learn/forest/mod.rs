@@ -49,7 +49,11 @@ impl<'a> Table<'a> {
     /// Refuses features that are not finite.
     pub(crate) fn check_finite(&self) -> Result<(), LearnError> {
         match self.values.iter().position(|value| !value.is_finite()) {
-            Some(at) => Err(LearnError::NotFinite { row: at / self.columns, feature: at % self.columns }),
+            Some(at) => Err(LearnError::Refused(format!(
+                "feature {} of training row {} is not a finite number; remove the trial with gaps",
+                at % self.columns,
+                at / self.columns
+            ))),
             None => Ok(()),
         }
     }
@@ -173,7 +177,7 @@ mod tests {
         assert_eq!(GOOD.check(), Ok(()));
         assert_eq!(GOOD.rows(), [0]);
         let bad = Examples { table: Table { values: &[0.0, 0.0, f32::NAN, 0.0], columns: 2 }, ..GOOD };
-        assert_eq!(bad.check(), Err(LearnError::NotFinite { row: 1, feature: 0 }));
+        assert!(bad.check().is_err_and(|error| error.to_string().starts_with("feature 0 of training row 1")));
     }
 
     #[test]

@@ -7,8 +7,9 @@ use super::split::Target;
 use super::tree::{FeatureSampling, Ground, Tree, TreeSettings};
 use super::tree_arrays::{load_class_trees, load_classes, save_trees};
 use super::{Examples, check_boosting, drawn, normalise, random_of};
-use crate::arrays::{ArrayError, Arrays, check_each};
+use crate::arrays::{Arrays, ModelError, check_each};
 use crate::fitting::LearnError;
+use crate::rows::RowModel;
 use rand_chacha::ChaCha8Rng;
 
 /// Settings of [`RusBoost`].
@@ -55,36 +56,11 @@ impl RusBoost {
         Ok(boost(examples, settings))
     }
 
-    /// Probability of each class: the weighted mean share.
-    ///
-    /// # Panics
-    /// If the row has another number of features than the training rows.
-    pub(crate) fn predict(&self, row: &[f32]) -> Vec<f64> {
-        assert_eq!(row.len(), self.columns, "values of a row");
-        let mut sums = vec![0.0; self.classes];
-        for (tree, weight) in self.trees.iter().zip(&self.tree_weights) {
-            for (sum, share) in sums.iter_mut().zip(tree.leaf(row)) {
-                *sum += weight * f64::from(*share);
-            }
-        }
-        normalise(&mut sums);
-        sums
-    }
-
-    /// Adds the model to the arrays of a model file.
-    pub(crate) fn save(&self, arrays: &mut Arrays) {
-        arrays.put_integers("trees.form", [M2_FORM]);
-        arrays.put_integers("trees.present", self.present.iter().copied());
-        arrays.put_f64("trees.words", self.tree_weights.clone());
-        save_trees(&self.trees, self.columns, self.classes, arrays);
-    }
-
     /// Restores a model from a model file.
-    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ArrayError> {
+    pub(crate) fn load(arrays: &Arrays, columns: usize, classes: usize) -> Result<Self, ModelError> {
         let form = arrays.indices("trees.form", M2_FORM + 1, "0")?;
         if form.len() != 1 {
-            let (name, found) = ("trees.form".to_owned(), vec![form.len()]);
-            return Err(ArrayError::Shape { name, found, expected: vec![1] });
+            return Err(ModelError::shape("trees.form", &[form.len()], &[1]));
         }
         arrays.require("trees.words", &[arrays.integers("trees.tree_nodes")?.len()], "trees.tree_nodes")?;
         let trees = load_class_trees(arrays, columns, classes)?;
@@ -100,9 +76,35 @@ impl RusBoost {
         let expected = "the classes that the leaves have shares of";
         let named = load_classes(arrays, "trees.present", classes)?;
         if let Some(index) = named.iter().zip(&present).position(|(named, present)| named != present) {
-            return Err(ArrayError::Value { name: "trees.present".to_owned(), index, expected });
+            return Err(ModelError::value("trees.present", index, expected));
         }
         Ok(Self { columns, classes, present, trees, tree_weights: tree_weights.to_vec() })
+    }
+}
+
+impl RowModel for RusBoost {
+    /// Probability of each class: the weighted mean share.
+    ///
+    /// # Panics
+    /// If the row has another number of features than the training rows.
+    fn predict(&self, row: &[f32]) -> Vec<f64> {
+        assert_eq!(row.len(), self.columns, "values of a row");
+        let mut sums = vec![0.0; self.classes];
+        for (tree, weight) in self.trees.iter().zip(&self.tree_weights) {
+            for (sum, share) in sums.iter_mut().zip(tree.leaf(row)) {
+                *sum += weight * f64::from(*share);
+            }
+        }
+        normalise(&mut sums);
+        sums
+    }
+
+    /// Adds the model to the arrays of a model file.
+    fn save(&self, arrays: &mut Arrays) {
+        arrays.put_integers("trees.form", [M2_FORM]);
+        arrays.put_integers("trees.present", self.present.iter().copied());
+        arrays.put_f64("trees.words", self.tree_weights.clone());
+        save_trees(&self.trees, self.columns, self.classes, arrays);
     }
 }
 

@@ -2,6 +2,7 @@
 //! number below.
 
 use super::*;
+use crate::rows::RowModel as _;
 use std::ops::Range;
 
 pub(super) const COLUMNS: usize = 10;

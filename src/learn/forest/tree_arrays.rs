@@ -12,7 +12,7 @@
 //! | `trees.leaf_weights` | of forests: weight of the training rows in each leaf |
 
 use super::tree::{Node, Tree};
-use crate::arrays::{ArrayError, Arrays, check_each};
+use crate::arrays::{Arrays, ModelError, check_each};
 
 /// Adds the arrays of trees.
 pub(super) fn save_trees(trees: &[Tree], columns: usize, classes: usize, arrays: &mut Arrays) {
@@ -36,22 +36,18 @@ pub(super) fn save_trees(trees: &[Tree], columns: usize, classes: usize, arrays:
 }
 
 /// Reads trees whose leaves hold the share of each class.
-pub(super) fn load_class_trees(arrays: &Arrays, columns: usize, classes: usize) -> Result<Vec<Tree>, ArrayError> {
+pub(super) fn load_class_trees(arrays: &Arrays, columns: usize, classes: usize) -> Result<Vec<Tree>, ModelError> {
     /// Shares summed to 1 before they were rounded to single precision.
     const ROUNDING: f64 = 1e-4;
     let trees = load_trees(arrays, columns, classes, classes)?;
     if trees.is_empty() {
-        let name = "trees.tree_nodes".to_owned();
-        return Err(ArrayError::Shape { name, found: vec![0], expected: vec![1] });
+        return Err(ModelError::shape("trees.tree_nodes", &[0], &[1]));
     }
     let values = arrays.f32_vector("trees.leaf_values")?;
     check_each("trees.leaf_values", values, "a share from 0", |share| *share >= 0.0)?;
     let sum = |shares: &[f32]| shares.iter().copied().map(f64::from).sum::<f64>();
     match values.chunks_exact(classes).position(|shares| (sum(shares) - 1.0).abs() > ROUNDING) {
-        Some(leaf) => {
-            let (name, expected) = ("trees.leaf_values".to_owned(), "the first of shares that sum to 1");
-            Err(ArrayError::Value { name, index: leaf * classes, expected })
-        }
+        Some(leaf) => Err(ModelError::value("trees.leaf_values", leaf * classes, "the first of shares that sum to 1")),
         None => Ok(trees),
     }
 }
@@ -62,17 +58,15 @@ pub(super) fn load_trees(
     columns: usize,
     classes: usize,
     width: usize,
-) -> Result<Vec<Tree>, ArrayError> {
+) -> Result<Vec<Tree>, ModelError> {
     let shape = arrays.integers("trees.shape")?;
     if shape.len() != 2 {
-        let name = "trees.shape".to_owned();
-        return Err(ArrayError::Shape { name, found: vec![shape.len()], expected: vec![2] });
+        return Err(ModelError::shape("trees.shape", &[shape.len()], &[2]));
     }
     let mut of_card = [columns, classes].into_iter();
     let matches_card = |size: &i64| of_card.next().is_some_and(|own| usize::try_from(*size) == Ok(own));
     if let Some(index) = shape.iter().map(matches_card).position(|matches| !matches) {
-        let (name, expected) = ("trees.shape".to_owned(), "the number of features and classes of the card");
-        return Err(ArrayError::Value { name, index, expected });
+        return Err(ModelError::value("trees.shape", index, "the number of features and classes of the card"));
     }
     let feature = arrays.integers("trees.feature")?;
     arrays.require("trees.threshold", &[feature.len()], "trees.feature")?;
@@ -109,12 +103,12 @@ struct Cursor<'a> {
 }
 
 impl Cursor<'_> {
-    fn tree(&mut self, count: usize) -> Result<Tree, ArrayError> {
+    fn tree(&mut self, count: usize) -> Result<Tree, ModelError> {
         let (mut nodes, mut leaves) = (Vec::with_capacity(count), 0_u32);
         for at in 0..count {
             let index = self.nodes_read + at;
             let link = self.link[index];
-            let refuse = |name: &str, expected| Err(ArrayError::Value { name: name.to_owned(), index, expected });
+            let refuse = |name: &str, expected| Err(ModelError::value(name, index, expected));
             if self.feature[index] == -1 {
                 if link != i64::from(leaves) {
                     return refuse("trees.link", "the number of the leaf in its tree");
@@ -140,14 +134,14 @@ impl Cursor<'_> {
 }
 
 /// Reads class indices that ascend.
-pub(super) fn load_classes(arrays: &Arrays, name: &str, classes: usize) -> Result<Vec<usize>, ArrayError> {
+pub(super) fn load_classes(arrays: &Arrays, name: &str, classes: usize) -> Result<Vec<usize>, ModelError> {
     let expected = "a class greater than the one before";
     let found = arrays.indices(name, classes, expected)?;
     if let Some(at) = found.windows(2).position(|pair| pair[0] >= pair[1]) {
-        return Err(ArrayError::Value { name: name.to_owned(), index: at + 1, expected });
+        return Err(ModelError::value(name, at + 1, expected));
     }
     if found.is_empty() {
-        return Err(ArrayError::Shape { name: name.to_owned(), found: vec![0], expected: vec![1] });
+        return Err(ModelError::shape(name, &[0], &[1]));
     }
     Ok(found)
 }
@@ -155,11 +149,12 @@ pub(super) fn load_classes(arrays: &Arrays, name: &str, classes: usize) -> Resul
 #[cfg(test)]
 mod tests {
     use super::super::*;
-    use crate::arrays::{ArrayError, Arrays, Numbers};
+    use crate::arrays::{Arrays, ModelError, Numbers};
     use crate::fitting::LearnError;
+    use crate::rows::RowModel as _;
 
     /// Loads a model of ten columns and six classes, and predicts a row.
-    type Load = fn(&Arrays) -> Result<Vec<f64>, ArrayError>;
+    type Load = fn(&Arrays) -> Result<Vec<f64>, ModelError>;
 
     fn models() -> Result<[(Arrays, Load); 3], LearnError> {
         const COLUMNS: usize = scikit_learn_tests::COLUMNS;

@@ -9,8 +9,7 @@
 use super::gates;
 use super::gemm::{Matrix, multiply};
 use super::lstm::{LiveLstm, LiveState, LstmGradients, LstmWeights, LstmWorkspace};
-use crate::arrays::Arrays;
-use crate::model::LoadError;
+use crate::arrays::{Arrays, ModelError};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -227,12 +226,12 @@ impl MacroLayer {
     }
 
     /// Restores a layer from the arrays of a model file, which begin with its name.
-    pub(super) fn load(shape: &MacroShape, name: &str, arrays: &Arrays) -> Result<Self, LoadError> {
+    pub(super) fn load(shape: &MacroShape, name: &str, arrays: &Arrays) -> Result<Self, ModelError> {
         let mut values = Vec::new();
         for block in shape.blocks() {
             values.extend(arrays.f32s(&format!("{name}.{}", block.name), &block.shape)?);
         }
-        Self::from_values(shape.clone(), values).ok_or(LoadError::Card { part: "the shape of the network" })
+        Self::from_values(shape.clone(), values).ok_or_else(|| ModelError::card("the shape of the network"))
     }
 
     /// Adds the layer to the arrays of a model file.

@@ -24,10 +24,10 @@ mod training;
 mod training_set;
 mod two_stage;
 
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::data::Dataset;
 use crate::fitting::{Fitting, LearnError};
-use crate::model::{LoadError, ModelCard};
+use crate::model::ModelCard;
 use crate::recogniser::Recogniser;
 use two_stage::TwoStageNetwork;
 
@@ -51,7 +51,7 @@ pub(crate) fn fit(
 }
 
 /// Restores a network from a model file.
-pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Box<dyn Recogniser>, LoadError> {
+pub(crate) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Box<dyn Recogniser>, ModelError> {
     Ok(Box::new(TwoStageNetwork::load(card, arrays)?))
 }
 

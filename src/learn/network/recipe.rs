@@ -217,13 +217,11 @@ impl Recipe {
             let known = value.get(name).is_some();
             let place = if known { value.get_mut(name) } else { value["training"].get_mut(name) };
             let Some(place) = place.filter(|place| !place.is_object()) else {
-                let cause = "no such setting; `palpate train --print-settings` lists them".to_owned();
-                return Err(LearnError::Setting { name: name.clone(), cause });
+                return Err(LearnError::setting(name, "no such setting; `palpate train --print-settings` lists them"));
             };
             *place = wanted.clone();
         }
-        serde_json::from_value(value)
-            .map_err(|e| LearnError::Setting { name: "of the network".to_owned(), cause: e.to_string() })
+        serde_json::from_value(value).map_err(|e| LearnError::setting("of the network", e))
     }
 
     /// Refuses values out of range.
@@ -232,8 +230,7 @@ impl Recipe {
             if (least..=most).contains(&value) {
                 Ok(())
             } else {
-                let cause = format!("{value} is not between {least} and {most}");
-                Err(LearnError::Setting { name: name.to_owned(), cause })
+                Err(LearnError::setting(name, format!("{value} is not between {least} and {most}")))
             }
         };
         let training = &self.training;
@@ -252,8 +249,7 @@ impl Recipe {
         within("early_share", f64::from(training.early_share), 0.0, 1.0)?;
         within("longest_gradient", training.longest_gradient, 1e-6, 1e6)?;
         if self.strict && self.cross_fitted {
-            let cause = "a strict network is not cross-fitted".to_owned();
-            return Err(LearnError::Setting { name: "strict".to_owned(), cause });
+            return Err(LearnError::setting("strict", "a strict network is not cross-fitted"));
         }
         Ok(())
     }

@@ -31,11 +31,11 @@ use super::macro_layer::{MacroLayer, MacroShape};
 use super::preparation::{Binner, Preparation};
 use super::recipe::Recipe;
 use super::training_set::{Earlier, StageInputs};
-use crate::arrays::Arrays;
+use crate::arrays::{Arrays, ModelError};
 use crate::belief::{Rejection, StopRule, agreement};
 use crate::data::{Dataset, Sequence};
 use crate::fitting::{Fitting, LearnError, check_enough};
-use crate::model::{LoadError, ModelCard};
+use crate::model::ModelCard;
 use crate::pmf::Pmf;
 use crate::recogniser::{LiveRecogniser, Properties, Recogniser, Verdict};
 use rand::{RngExt, SeedableRng};
@@ -109,7 +109,10 @@ impl TwoStageNetwork {
             None => check_enough(data, 2 * halves)?,
         }
         if recipe.two_stages && !data.labels.have_properties() {
-            return Err(LearnError::NoProperties { method });
+            return Err(LearnError::Refused(format!(
+                "{method} learns size and shape first, but no class in these data has them; add columns \"size\" and \
+                 \"shape\", or train another method"
+            )));
         }
         let preparation = match recipe.strict {
             true => Preparation::standardising(data, recipe.rate_hz),
@@ -143,17 +146,17 @@ impl TwoStageNetwork {
     }
 
     /// Restores a network from a model file.
-    pub(super) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, LoadError> {
+    pub(super) fn load(card: &ModelCard, arrays: &Arrays) -> Result<Self, ModelError> {
         let learned: Learned = card.settings_as()?;
         let Recipe { strict, iterated, .. } = learned.recipe;
-        learned.recipe.check()?;
+        learned.recipe.check().map_err(ModelError::failed)?;
         let channels = card.channels.len();
         let is_sound = match strict {
             true => learned.preparation.is_sound_and_standardising(channels),
             false => learned.preparation.is_sound(channels),
         };
         if !is_sound {
-            return Err(LoadError::Card { part: "the input scaling" });
+            return Err(ModelError::card("the input scaling"));
         }
         let labels = &card.labels;
         let readings = learned.preparation.width();
@@ -165,7 +168,7 @@ impl TwoStageNetwork {
         let before = if iterated { labels.classes.len() } else { 0 };
         let stage_two = read("stage_two", &learned.stage_two, readings + beside + before, &[labels.classes.len()])?;
         if stage_two.shape().with_prior != (iterated && !strict) {
-            return Err(LoadError::Card { part: "the second stage" });
+            return Err(ModelError::card("the second stage"));
         }
         Ok(Self { learned, stage_one, stage_two, rejection: card.rejection.clone() })
     }
@@ -229,7 +232,7 @@ fn read_network(
     (card, strict): (&NetworkCard, bool),
     inputs: usize,
     groups: &[usize],
-) -> Result<Calibrated, LoadError> {
+) -> Result<Calibrated, ModelError> {
     let (shape, temperatures) = match card {
         NetworkCard::Strict(shape) => (shape, Vec::new()),
         NetworkCard::Calibrated { shape, temperatures } => (shape, temperatures.clone()),
@@ -238,7 +241,7 @@ fn read_network(
         && temperatures.len() == if strict { 0 } else { groups.len() }
         && temperatures.iter().flatten().all(|t| t.is_finite() && *t > 0.0);
     if !valid {
-        return Err(LoadError::Card { part: "the shape of the network" });
+        return Err(ModelError::card("the shape of the network"));
     }
     Ok(Calibrated { layer: MacroLayer::load(shape, name, arrays)?, temperatures })
 }

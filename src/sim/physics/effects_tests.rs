@@ -1,6 +1,6 @@
 //! Effects within the step: off means absent, and each that acts on the fingers against its closed form.
 
-use super::closed_form::{Run, bare, torque};
+use super::closed_form_tests::{Run, bare, torque};
 use super::contact::Against;
 use super::detect::detect;
 use super::effects::{plan, plan_of};

@@ -21,7 +21,7 @@ mod balance;
 mod chain;
 mod clearances;
 #[cfg(test)]
-mod closed_form;
+mod closed_form_tests;
 mod contact;
 mod contact_springs;
 mod coupling;

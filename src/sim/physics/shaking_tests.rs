@@ -1,7 +1,7 @@
 //! A shaken hand against mechanics by hand: m a on what it holds, a finger that sways as a cantilever, a world that
 //! stays where it is.
 
-use super::closed_form::{Run, bare};
+use super::closed_form_tests::{Run, bare};
 use super::step::Drive;
 use super::{Placement, Simulation};
 use crate::gripper::Phase;

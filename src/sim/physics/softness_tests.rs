@@ -1,6 +1,6 @@
 //! Soft objects against the closed form of springs in series, and against finite elements.
 
-use super::closed_form::{Run, bare};
+use super::closed_form_tests::{Run, bare};
 use super::detect::detect;
 use super::step::lay_out;
 use crate::gripper::PadLaw;

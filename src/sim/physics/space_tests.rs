@@ -1,6 +1,6 @@
 //! Fingers that bend sideways and twist, against closed forms of beams, and against fingers that do not.
 
-use super::closed_form::{Run, bare, torque};
+use super::closed_form_tests::{Run, bare, torque};
 use super::contact::Against;
 use super::coupling::{fill_coupling, prepare_coupling};
 use super::detect::detect;

@@ -3,7 +3,7 @@
 
 use super::resample::{self, three_digits};
 use super::rows::{Fault, RawTrial, Rows, no_channels, too_many_values};
-use super::{ImportFault, ImportedTrial, MOST_SAMPLES, MOST_VALUES, brief};
+use super::{ImportedTrial, MOST_SAMPLES, MOST_VALUES, brief};
 use palpate_tactile::Signals;
 
 /// Most memory for the names of the channels of all trials (bytes); a thousand times what a large study takes.
@@ -49,14 +49,13 @@ fn kept<'a, T>(all: &'a [T], keep: &'a [bool]) -> impl Iterator<Item = &'a T> {
 }
 
 /// Every trial carries the names of its channels: long names in many trials take much memory.
-fn check_names(channels: &[String], trials: usize) -> Result<(), ImportFault> {
+fn check_names(channels: &[String], trials: usize) -> Result<(), String> {
     let each: usize = channels.iter().map(|name| name.len() + size_of::<String>()).sum();
     if trials.saturating_mul(each) > MOST_NAME_BYTES {
-        let problem = format!(
+        return Err(format!(
             "{trials} trials with {} channels each are too many; split the file or shorten the channels' names",
             channels.len()
-        );
-        return Err(ImportFault::TooLarge { problem });
+        ));
     }
     Ok(())
 }
@@ -149,7 +148,7 @@ fn even_samples(trial: &RawTrial, rate_hz: f64) -> Result<usize, Fault> {
 }
 
 fn fault(trial: &RawTrial, problem: String) -> Fault {
-    ImportFault::Trial { trial: brief(&trial.name), problem }.at(trial.line)
+    (Some(trial.line), format!("trial \"{}\" {problem}", brief(&trial.name)))
 }
 
 fn warn_of_lengths(trials: &[ImportedTrial], warnings: &mut Vec<String>) {

@@ -90,74 +90,8 @@ pub struct ImportError {
     pub name: String,
     /// Line, counted from 1, where the fault has one.
     pub line: Option<u64>,
-    /// The fault.
-    pub fault: ImportFault,
-}
-
-/// Fault of an imported file. `problem` is a sentence with the place and advice.
-#[derive(Debug, thiserror::Error)]
-pub enum ImportFault {
-    /// The file cannot be opened or read.
-    #[error("{0}")]
-    Unreadable(#[from] std::io::Error),
-    /// Bytes in another encoding.
-    #[error("the column \"{column}\" holds bytes that are not UTF-8; save the file as \"CSV UTF-8\"")]
-    NotUtf8 {
-        /// Name of the column.
-        column: String,
-    },
-    /// A file, row, trial or name beyond the limits.
-    #[error("{problem}")]
-    TooLarge {
-        /// Problem.
-        problem: String,
-    },
-    /// No header, or no row below it.
-    #[error("the file has no {what}; it should have a header and below it one row per sample")]
-    Empty {
-        /// The missing part.
-        what: &'static str,
-    },
-    /// Missing, repeated or invalid columns.
-    #[error("{problem}")]
-    Header {
-        /// Problem.
-        problem: String,
-    },
-    /// A row with too many or too few fields.
-    #[error("the row has {found} fields but the header has {expected}; look for a missing or extra separator")]
-    UnevenRow {
-        /// Fields of the row.
-        found: usize,
-        /// Fields of the header.
-        expected: usize,
-    },
-    /// An invalid name, time, word or reading.
-    #[error("{problem}")]
-    Field {
-        /// Problem.
-        problem: String,
-    },
-    /// A row that contradicts an earlier one: falling time, another label, size or shape.
-    #[error("{problem}")]
-    Contradiction {
-        /// Contradiction.
-        problem: String,
-    },
-    /// A trial that is too short, has an empty channel or a wild time.
-    #[error("trial \"{trial}\" {problem}")]
-    Trial {
-        /// Name of the trial.
-        trial: String,
-        /// Problem.
-        problem: String,
-    },
-}
-
-impl ImportFault {
-    fn at(self, line: u64) -> (Option<u64>, Self) {
-        (Some(line), self)
-    }
+    /// The fault, as a sentence with advice.
+    pub fault: String,
 }
 
 /// Reads a file of grasps.
@@ -167,7 +101,7 @@ pub fn read_trials_csv(path: &Path) -> Result<Import, ImportError> {
     let fault = match opened {
         Ok((length, _)) if length > LARGEST_FILE => rows::file_too_large(),
         Ok((_, file)) => return read_trials(file, &name),
-        Err(cause) => cause.into(),
+        Err(cause) => cause.to_string(),
     };
     Err(ImportError { name, line: None, fault })
 }

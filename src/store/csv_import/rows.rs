@@ -1,8 +1,8 @@
 //! Rows of a file gathered into trials. Every row is checked as it comes, and only numbers are kept.
 
 use super::{
-    FARTHEST_TIME_S, ImportFault, LARGEST_FILE, LONGEST_NAME, LONGEST_ROW, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS,
-    MOST_VALUES, brief,
+    FARTHEST_TIME_S, LARGEST_FILE, LONGEST_NAME, LONGEST_ROW, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS, MOST_VALUES,
+    brief,
 };
 use csv::ByteRecord;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::str::FromStr;
 
 /// A fault with its line.
-pub(super) type Fault = (Option<u64>, ImportFault);
+pub(super) type Fault = (Option<u64>, String);
 
 /// Sizes of an object.
 const SIZES: [&str; 2] = ["tiny", "large"];
@@ -62,14 +62,15 @@ pub(super) struct Rows {
 /// Reads all rows below a header.
 pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result<Rows, Fault> {
     let mut reader = BufReader::with_capacity(64 << 10, reader);
-    let separator = separator(reader.fill_buf().map_err(|e| (None, e.into()))?);
+    let separator = separator(reader.fill_buf().map_err(|e| (None, e.to_string()))?);
     let source = Limited { bytes: reader.bytes(), after_return: false, ended: false, total: 0, row: 0 };
     let mut reader =
         csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(source);
     let mut record = ByteRecord::new();
-    let empty = |what| (None, ImportFault::Empty { what });
-    let line = next_row(&mut reader, &mut record)?.ok_or(empty("header"))?;
-    let mut rows = Rows::below(&record, separator != b',', warnings).map_err(|fault| fault.at(line))?;
+    let empty =
+        |what: &str| (None, format!("the file has no {what}; it should have a header and below it one row per sample"));
+    let line = next_row(&mut reader, &mut record)?.ok_or_else(|| empty("header"))?;
+    let mut rows = Rows::below(&record, separator != b',', warnings).map_err(|fault| (Some(line), fault))?;
     while let Some(line) = next_row(&mut reader, &mut record)? {
         rows.add(line, &record)?;
     }
@@ -88,10 +89,8 @@ fn next_row<R: Read>(reader: &mut csv::Reader<Limited<R>>, record: &mut ByteReco
             Ok(false) => return Ok(None),
             Ok(true) if is_blank(record) => {}
             Ok(true) => return Ok(Some(line)),
-            Err(csv::ErrorKind::Io(cause)) => {
-                return Err((None, cause.downcast::<ImportFault>().unwrap_or_else(ImportFault::Unreadable)));
-            }
-            Err(other) => return Err((None, std::io::Error::other(format!("{other:?}")).into())),
+            Err(csv::ErrorKind::Io(cause)) => return Err((None, cause.to_string())),
+            Err(other) => return Err((None, format!("{other:?}"))),
         }
     }
 }
@@ -127,44 +126,41 @@ fn without_unit(text: &str) -> (&str, Option<&str>) {
 }
 
 /// A name without the blanks around it; it may be empty.
-fn name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, ImportFault> {
-    let text = std::str::from_utf8(field).map_err(|_utf8| ImportFault::NotUtf8 { column: column.to_owned() })?;
+fn name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, String> {
+    let text = std::str::from_utf8(field).map_err(|_utf8| {
+        format!("the column \"{column}\" holds bytes that are not UTF-8; save the file as \"CSV UTF-8\"")
+    })?;
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
     let length = text.chars().count();
     if length > LONGEST_NAME {
-        let problem =
-            format!("the name in \"{column}\" has {length} characters, the limit is {LONGEST_NAME}; shorten it");
-        return Err(ImportFault::TooLarge { problem });
+        return Err(format!(
+            "the name in \"{column}\" has {length} characters, the limit is {LONGEST_NAME}; shorten it"
+        ));
     }
     if text.chars().any(char::is_control) {
         let text = brief(text);
-        return Err(field_fault(format!(
+        return Err(format!(
             "the name \"{text}\" in \"{column}\" has a line break or another control character in it; remove it"
-        )));
+        ));
     }
     Ok(text)
 }
 
 /// A name that must not be empty.
-fn filled_name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, ImportFault> {
+fn filled_name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, String> {
     match name(field, column)? {
         "" => Err(empty_field(column)),
         text => Ok(text),
     }
 }
 
-fn empty_field(column: &str) -> ImportFault {
-    field_fault(format!("the column \"{column}\" is empty; every row names its trial, label and time"))
-}
-
-fn field_fault(problem: String) -> ImportFault {
-    ImportFault::Field { problem }
+fn empty_field(column: &str) -> String {
+    format!("the column \"{column}\" is empty; every row names its trial, label and time")
 }
 
 impl Rows {
     /// Finds the columns in a header.
-    fn below(header: &ByteRecord, decimal_comma: bool, warnings: &mut Vec<String>) -> Result<Self, ImportFault> {
-        let fault = |problem: String| Err(ImportFault::Header { problem });
+    fn below(header: &ByteRecord, decimal_comma: bool, warnings: &mut Vec<String>) -> Result<Self, String> {
         let names = header.iter().map(|f| name(f, "header")).collect::<Result<Vec<_>, _>>()?;
         let names: Vec<(&str, Option<&str>)> = names.into_iter().map(without_unit).collect();
         let place = |wanted: &str| names.iter().position(|(name, _)| name.eq_ignore_ascii_case(wanted));
@@ -174,7 +170,7 @@ impl Rows {
             let mut found: Vec<String> = names.iter().filter(|n| !n.0.is_empty()).map(|n| brief(n.0)).collect();
             found.truncate(20);
             let (missing, found) = (missing.join(" and no "), found.join(", "));
-            return fault(format!(
+            return Err(format!(
                 "there is no column {missing}. Required are trial, label, t_s (in seconds) and one column per sensor \
                  channel; the file has {found}"
             ));
@@ -182,7 +178,7 @@ impl Rows {
         if let Some(unit) = names[time].1
             && !["s", "sec", "second", "seconds"].iter().any(|s| unit.eq_ignore_ascii_case(s))
         {
-            return fault(format!("the unit of t_s is \"{}\"; times must be in seconds", brief(unit)));
+            return Err(format!("the unit of t_s is \"{}\"; times must be in seconds", brief(unit)));
         }
         let words = [place("size"), place("shape")];
         let known = [Some(trial), Some(label), Some(time), words[0], words[1]];
@@ -192,13 +188,12 @@ impl Rows {
             let reserved = ["trial", "label", "t_s", "size", "shape"].iter().find(|r| r.eq_ignore_ascii_case(name));
             if reserved.is_some() || channels.iter().any(|other| other.name == *name) {
                 let name = brief(reserved.unwrap_or(name));
-                return fault(format!(
+                return Err(format!(
                     "two columns are called \"{name}\"; rename or remove one (units in brackets do not count)"
                 ));
             }
             if channels.len() == MOST_CHANNELS {
-                let problem = format!("there are more than {MOST_CHANNELS} columns of readings; remove some");
-                return Err(ImportFault::TooLarge { problem });
+                return Err(format!("there are more than {MOST_CHANNELS} columns of readings; remove some"));
             }
             channels.push(ChannelColumn { place: at, name: (*name).to_owned(), numeric: false, text: None });
         }
@@ -220,10 +215,16 @@ impl Rows {
         let expected = self.width;
         // Empty fields beyond the header are the spreadsheet's.
         if record.len() < expected || record.iter().skip(expected).any(|field| !field.trim_ascii().is_empty()) {
-            return Err(ImportFault::UnevenRow { found: record.len(), expected }.at(line));
+            let found = record.len();
+            return Err((
+                Some(line),
+                format!(
+                    "the row has {found} fields but the header has {expected}; look for a missing or extra separator"
+                ),
+            ));
         }
         let row = self.row(line, record)?;
-        self.store(line, record, &row).map_err(|fault| fault.at(line))
+        self.store(line, record, &row).map_err(|fault| (Some(line), fault))
     }
 
     /// Reads the channels. A column may hold text as long as it holds no number.
@@ -236,12 +237,14 @@ impl Rows {
             let value = match number::<f32>(field, self.decimal_comma) {
                 _ if missing => f32::NAN,
                 Some(value) if value.is_infinite() => {
-                    return Err(field_fault(format!(
-                        "\"{}\" in the column \"{}\" is infinite or beyond 3.4e38; correct it, or leave the field empty",
-                        brief(field),
-                        brief(&channel.name)
-                    ))
-                    .at(line));
+                    return Err((
+                        Some(line),
+                        format!(
+                            "\"{}\" in the column \"{}\" is infinite or beyond 3.4e38; correct it, or leave the field empty",
+                            brief(field),
+                            brief(&channel.name)
+                        ),
+                    ));
                 }
                 Some(value) => value,
                 None => {
@@ -258,11 +261,13 @@ impl Rows {
                 } else {
                     "; decimal commas need a semicolon or a tab between the fields"
                 };
-                return Err(field_fault(format!(
-                    "\"{text}\" in the column \"{}\" is not a number; correct it, or leave the field empty{advice}",
-                    brief(&channel.name)
-                ))
-                .at(line));
+                return Err((
+                    Some(line),
+                    format!(
+                        "\"{text}\" in the column \"{}\" is not a number; correct it, or leave the field empty{advice}",
+                        brief(&channel.name)
+                    ),
+                ));
             }
             row.push(value);
         }
@@ -270,7 +275,7 @@ impl Rows {
     }
 
     /// Adds readings to their trial, or replaces those of the same time.
-    fn store(&mut self, line: u64, record: &ByteRecord, row: &[f32]) -> Result<(), ImportFault> {
+    fn store(&mut self, line: u64, record: &ByteRecord, row: &[f32]) -> Result<(), String> {
         let at = self.trial(line, record)?;
         self.check_words(record)?;
         let now = self.time(&record[self.required[2]])?;
@@ -279,24 +284,21 @@ impl Rows {
         let name = || brief(&trial.name);
         match trial.t_s.last() {
             Some(before) if *before > now => {
-                return Err(ImportFault::Contradiction {
-                    problem: format!(
-                        "in trial \"{}\" the time falls from {before} s to {now} s; sort its rows, and give every grasp \
+                return Err(format!(
+                    "in trial \"{}\" the time falls from {before} s to {now} s; sort its rows, and give every grasp \
                          a trial name of its own",
-                        name()
-                    ),
-                });
+                    name()
+                ));
             }
             Some(before) if *before >= now => {
                 trial.repeated += 1;
                 trial.values.truncate(trial.values.len() - row.len());
             }
             _ if trial.t_s.len() == MOST_SAMPLES => {
-                let problem = format!(
+                return Err(format!(
                     "trial \"{}\" has more than {MOST_SAMPLES} samples; give every grasp a trial name of its own",
                     name()
-                );
-                return Err(ImportFault::TooLarge { problem });
+                ));
             }
             _ if readings > MOST_VALUES => return Err(too_many_values()),
             _ => {
@@ -309,13 +311,12 @@ impl Rows {
     }
 
     /// The trial of a row.
-    fn trial(&mut self, line: u64, record: &ByteRecord) -> Result<usize, ImportFault> {
+    fn trial(&mut self, line: u64, record: &ByteRecord) -> Result<usize, String> {
         let name = filled_name(&record[self.required[0]], "trial")?;
         let label = filled_name(&record[self.required[1]], "label")?;
         let Some(at) = self.by_name.get(name).copied() else {
             if self.trials.len() == MOST_TRIALS {
-                let problem = format!("there are more than {MOST_TRIALS} trials; split the file");
-                return Err(ImportFault::TooLarge { problem });
+                return Err(format!("there are more than {MOST_TRIALS} trials; split the file"));
             }
             self.by_name.insert(name.to_owned(), self.trials.len());
             let (name, label) = (name.to_owned(), label.to_owned());
@@ -323,20 +324,18 @@ impl Rows {
             return Ok(self.trials.len() - 1);
         };
         if self.trials[at].label != label {
-            return Err(ImportFault::Contradiction {
-                problem: format!(
-                    "the label of trial \"{}\" changes from \"{}\" to \"{}\"; one trial is one grasp of one object",
-                    brief(name),
-                    brief(&self.trials[at].label),
-                    brief(label)
-                ),
-            });
+            return Err(format!(
+                "the label of trial \"{}\" changes from \"{}\" to \"{}\"; one trial is one grasp of one object",
+                brief(name),
+                brief(&self.trials[at].label),
+                brief(label)
+            ));
         }
         Ok(at)
     }
 
     /// A label has one size and one shape; an empty field leaves it to other rows.
-    fn check_words(&mut self, record: &ByteRecord) -> Result<(), ImportFault> {
+    fn check_words(&mut self, record: &ByteRecord) -> Result<(), String> {
         let label = filled_name(&record[self.required[1]], "label")?;
         if !self.labels.contains_key(label) {
             self.labels.insert(label.to_owned(), [None, None]);
@@ -351,26 +350,22 @@ impl Rows {
             }
             let Some(now) = allowed.iter().find(|word| word.eq_ignore_ascii_case(text)) else {
                 let (text, allowed) = (brief(text), allowed.join(", "));
-                return Err(field_fault(format!(
-                    "\"{text}\" is not a {column}; allowed are {allowed}, or an empty field"
-                )));
+                return Err(format!("\"{text}\" is not a {column}; allowed are {allowed}, or an empty field"));
             };
             let before = *known.get_or_insert(now);
             if before != *now {
-                return Err(ImportFault::Contradiction {
-                    problem: format!(
-                        "the {column} of \"{}\" is \"{before}\" in earlier rows and \"{now}\" here; a label has one \
+                return Err(format!(
+                    "the {column} of \"{}\" is \"{before}\" in earlier rows and \"{now}\" here; a label has one \
                          {column}, so correct the word or use two labels",
-                        brief(label)
-                    ),
-                });
+                    brief(label)
+                ));
             }
         }
         Ok(())
     }
 
     /// A time (s).
-    fn time(&self, field: &[u8]) -> Result<f64, ImportFault> {
+    fn time(&self, field: &[u8]) -> Result<f64, String> {
         let field = String::from_utf8_lossy(field);
         let field = field.trim();
         if field.is_empty() {
@@ -378,26 +373,24 @@ impl Rows {
         }
         match number::<f64>(field, self.decimal_comma) {
             Some(t) if t.abs() <= FARTHEST_TIME_S => Ok(t),
-            Some(t) if t.is_finite() => Err(field_fault(format!(
+            Some(t) if t.is_finite() => Err(format!(
                 "the time {t} s is beyond {FARTHEST_TIME_S} s; times are in seconds, not in milliseconds or microseconds"
-            ))),
-            _ => Err(field_fault(format!("the time \"{}\" is not a number of seconds", brief(field)))),
+            )),
+            _ => Err(format!("the time \"{}\" is not a number of seconds", brief(field))),
         }
     }
 }
 
-pub(super) fn no_channels() -> ImportFault {
-    let problem = "no column holds numbers apart from t_s; add one column per sensor channel".to_owned();
-    ImportFault::Header { problem }
+pub(super) fn no_channels() -> String {
+    "no column holds numbers apart from t_s; add one column per sensor channel".to_owned()
 }
 
-pub(super) fn too_many_values() -> ImportFault {
-    let problem = format!("there are more than {MOST_VALUES} readings in all; split the file or remove channels");
-    ImportFault::TooLarge { problem }
+pub(super) fn too_many_values() -> String {
+    format!("there are more than {MOST_VALUES} readings in all; split the file or remove channels")
 }
 
-pub(super) fn file_too_large() -> ImportFault {
-    ImportFault::TooLarge { problem: format!("the file is larger than {} GiB; split it", LARGEST_FILE >> 30) }
+pub(super) fn file_too_large() -> String {
+    format!("the file is larger than {} GiB; split it", LARGEST_FILE >> 30)
 }
 
 /// A number; with decimal commas `0,5` is one half.
@@ -442,8 +435,9 @@ impl<R: Read> Read for Limited<R> {
         }
         if self.row > LONGEST_ROW {
             let limit = LONGEST_ROW >> 20;
-            let problem = format!("the row is longer than {limit} MiB; look for an unclosed quotation mark");
-            return Err(std::io::Error::other(ImportFault::TooLarge { problem }));
+            return Err(std::io::Error::other(format!(
+                "the row is longer than {limit} MiB; look for an unclosed quotation mark"
+            )));
         }
         Ok(count)
     }

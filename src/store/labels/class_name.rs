@@ -7,27 +7,10 @@ use unicode_normalization::UnicodeNormalization as _;
 /// Most characters of a name.
 pub const LONGEST_NAME: usize = 80;
 
-/// A text that cannot be a label.
+/// A text that cannot be a label, or a plan that cannot be, as a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ClassNameError {
-    /// Blanks only.
-    #[error("a label cannot be empty; write a name, or \"empty\" for the empty hand")]
-    Empty,
-    /// Too long.
-    #[error("the label \"{beginning}...\" has {length} characters; {LONGEST_NAME} are allowed")]
-    TooLong {
-        /// Its beginning.
-        beginning: String,
-        /// Its length (characters).
-        length: usize,
-    },
-    /// A control character, such as a tab or a line break.
-    #[error("the label {name:?} holds a control character; write it on one line without tabs")]
-    Control {
-        /// Beginning of the name.
-        name: String,
-    },
-}
+#[error("{0}")]
+pub struct LabelError(pub(super) String);
 
 /// Two objects under the name of one class.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -88,18 +71,19 @@ impl Classes {
 }
 
 /// Checks a label and trims the blanks around it.
-pub fn class_name(text: &str) -> Result<String, ClassNameError> {
+pub fn class_name(text: &str) -> Result<String, LabelError> {
     let name = text.trim();
     let length = name.chars().count();
-    if name.is_empty() {
-        Err(ClassNameError::Empty)
+    let beginning = |characters: usize| name.chars().take(characters).collect::<String>();
+    Err(LabelError(if name.is_empty() {
+        "a label cannot be empty; write a name, or \"empty\" for the empty hand".to_owned()
     } else if name.contains(char::is_control) {
-        Err(ClassNameError::Control { name: name.chars().take(LONGEST_NAME).collect() })
+        format!("the label {:?} holds a control character; write it on one line without tabs", beginning(LONGEST_NAME))
     } else if length > LONGEST_NAME {
-        Err(ClassNameError::TooLong { beginning: name.chars().take(20).collect(), length })
+        format!("the label \"{}...\" has {length} characters; {LONGEST_NAME} are allowed", beginning(20))
     } else {
-        Ok(name.to_owned())
-    }
+        return Ok(name.to_owned());
+    }))
 }
 
 /// Name of a trial's object for display: unlabelled trials have an empty name in the store.
@@ -136,9 +120,10 @@ mod tests {
     fn a_name_is_trimmed_and_nonsense_is_refused() {
         assert_eq!(class_name("  big ball\n"), Ok("big ball".to_owned()));
         assert_eq!(class_name(&"é".repeat(80)), Ok("é".repeat(80)));
-        assert_eq!(class_name(" \t "), Err(ClassNameError::Empty));
-        assert!(matches!(class_name(&"x".repeat(81)), Err(ClassNameError::TooLong { length: 81, .. })));
-        assert!(matches!(class_name("a\tb"), Err(ClassNameError::Control { .. })));
+        let refused = |text: &str, why: &str| class_name(text).is_err_and(|error| error.to_string().contains(why));
+        assert!(refused(" \t ", "cannot be empty"));
+        assert!(refused(&"x".repeat(81), "has 81 characters"));
+        assert!(refused("a\tb", "control character"));
         assert_eq!((shown_name(""), shown_name("lemon")), ("unlabelled", "lemon"));
         assert_eq!(
             (shown_title(""), shown_title("bigball")),

@@ -4,7 +4,7 @@
 //! The order matters: sensors warm up and creep, and with objects in blocks a recogniser learns the time instead of the
 //! object. So the object with the smallest share done comes next, and none comes twice in a row while another is left.
 
-use super::class_name::{ClassNameError, Classes, class_name, compared};
+use super::class_name::{Classes, LabelError, class_name, compared};
 use super::labelled_trial::LabelledTrial;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::PoseSpread;
@@ -45,43 +45,15 @@ impl Default for LabelPlan {
     }
 }
 
-/// Error of a plan.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlanError {
-    /// A name that cannot be a label.
-    #[error(transparent)]
-    Name(#[from] ClassNameError),
-    /// Too many trials, or none.
-    #[error("{wanted} trials of \"{name}\" are not possible: choose 1 to {MOST_WANTED}, or remove it from the plan")]
-    Count {
-        /// Name of the object.
-        name: String,
-        /// Number of trials.
-        wanted: u32,
-    },
-    /// An object that is in the plan twice.
-    #[error("\"{name}\" is in the plan twice")]
-    Twice {
-        /// Name of the object.
-        name: String,
-    },
-    /// An object that is not in the plan.
-    #[error("\"{name}\" is not in the plan; `palpate plan` shows it")]
-    NotPlanned {
-        /// Name of the object.
-        name: String,
-    },
-}
-
 impl LabelPlan {
     /// The same plan with trimmed names; refused where a name cannot be a label, a count is out of range, or an object
     /// comes twice.
-    pub fn checked(&self) -> Result<Self, PlanError> {
+    pub fn checked(&self) -> Result<Self, LabelError> {
         let mut sound = Self { objects: Vec::new() };
         for PlannedObject { name, wanted } in &self.objects {
             let name = class_name(name)?;
             if sound.objects.iter().any(|object| compared(&object.name) == compared(&name)) {
-                return Err(PlanError::Twice { name });
+                return Err(LabelError(format!("\"{name}\" is in the plan twice")));
             }
             sound.set(&name, *wanted)?;
         }
@@ -89,10 +61,12 @@ impl LabelPlan {
     }
 
     /// Sets how many trials of an object are wanted; a new one is added at the end.
-    pub fn set(&mut self, name: &str, wanted: u32) -> Result<(), PlanError> {
+    pub fn set(&mut self, name: &str, wanted: u32) -> Result<(), LabelError> {
         let name = class_name(name)?;
         if !(1..=MOST_WANTED).contains(&wanted) {
-            return Err(PlanError::Count { name, wanted });
+            return Err(LabelError(format!(
+                "{wanted} trials of \"{name}\" are not possible: choose 1 to {MOST_WANTED}, or remove it from the plan"
+            )));
         }
         match self.objects.iter_mut().find(|object| compared(&object.name) == compared(&name)) {
             Some(object) => object.wanted = wanted,
@@ -102,9 +76,10 @@ impl LabelPlan {
     }
 
     /// Removes an object from the plan; its trials stay.
-    pub fn remove(&mut self, name: &str) -> Result<(), PlanError> {
+    pub fn remove(&mut self, name: &str) -> Result<(), LabelError> {
         let at = self.objects.iter().position(|object| compared(&object.name) == compared(name));
-        self.objects.remove(at.ok_or_else(|| PlanError::NotPlanned { name: name.trim().to_owned() })?);
+        let missing = || LabelError(format!("\"{}\" is not in the plan; `palpate plan` shows it", name.trim()));
+        self.objects.remove(at.ok_or_else(missing)?);
         Ok(())
     }
 
@@ -303,16 +278,18 @@ mod tests {
     #[test]
     fn a_plan_that_cannot_be_is_refused() {
         let mut plan = LabelPlan { objects: Vec::new() };
-        assert!(matches!(plan.set("mug", 0), Err(PlanError::Count { .. })));
-        assert!(matches!(plan.set("mug", 1001), Err(PlanError::Count { .. })));
-        assert!(matches!(plan.set("\n", 5), Err(PlanError::Name(ClassNameError::Empty))));
+        let refused =
+            |result: Result<(), LabelError>, why: &str| result.is_err_and(|error| error.to_string().contains(why));
+        assert!(refused(plan.set("mug", 0), "0 trials of \"mug\" are not possible"));
+        assert!(refused(plan.set("mug", 1001), "are not possible"));
+        assert!(refused(plan.set("\n", 5), "cannot be empty"));
         plan.set(" mug ", 5).expect("sound");
         plan.set("mug", 7).expect("sound");
         assert_eq!(plan.objects, [PlannedObject { name: "mug".to_owned(), wanted: 7 }]);
         assert_eq!(plan.checked().as_ref(), Ok(&plan));
         let twice = LabelPlan { objects: [plan.objects.clone(), plan.objects.clone()].concat() };
-        assert!(matches!(twice.checked(), Err(PlanError::Twice { .. })));
-        assert!(matches!(plan.remove("cup"), Err(PlanError::NotPlanned { .. })));
+        assert!(refused(twice.checked().map(drop), "in the plan twice"));
+        assert!(refused(plan.remove("cup"), "is not in the plan"));
         assert_eq!(plan.remove("mug"), Ok(()));
         assert!(LabelPlan::default().checked().is_ok() && LabelPlan::default().objects.len() == 16);
     }

@@ -131,7 +131,7 @@ impl KnownTouches {
             let grasps = readings.chunks_exact((KEPT * width).max(1)).map(grasp);
             Ok(classes.into_iter().zip(poses).zip(grasps).map(|((class, pose), grasp)| (class, pose, grasp)).collect())
         };
-        let grasps = read().map_err(|cause: palpate_learn::ArrayError| failed(&cause))?;
+        let grasps = read().map_err(|cause: palpate_learn::ModelError| failed(&cause))?;
         Ok(Self { card, grasps })
     }
 }

@@ -97,7 +97,7 @@ impl TestPart {
     /// Training and test set.
     pub(super) fn split(self, data: &Dataset, seed: u64) -> Result<[Dataset; 2], StudyError> {
         let splits = SplitPlan::Folds { folds: self.of }.splits(data, seed, 1)?;
-        let split = splits.get(self.part).ok_or(StudyError::Split(SplitError::Folds))?.limited(data, self.train);
+        let split = splits.get(self.part).ok_or(StudyError::Split(SplitError::folds()))?.limited(data, self.train);
         Ok([data.part(&split.train), data.part(&split.test)])
     }
 }

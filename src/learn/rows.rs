@@ -4,21 +4,21 @@ use crate::arrays::Arrays;
 use std::fmt::Debug;
 
 /// Training rows.
-pub(super) struct Rows {
+pub(crate) struct Rows {
     /// Features, `[rows][columns]`.
-    pub(super) values: Vec<f32>,
+    pub(crate) values: Vec<f32>,
     /// Features of a row.
-    pub(super) columns: usize,
+    pub(crate) columns: usize,
     /// Class of each row.
-    pub(super) labels: Vec<usize>,
+    pub(crate) labels: Vec<usize>,
     /// Weight of each row; none where all are equal. Nearest neighbours and support vector machines do without.
-    pub(super) weights: Option<Vec<f64>>,
+    pub(crate) weights: Option<Vec<f64>>,
     /// Number of classes.
-    pub(super) classes: usize,
+    pub(crate) classes: usize,
 }
 
 /// Fitted classifier of rows.
-pub(super) trait RowModel: Debug + Send + Sync {
+pub(crate) trait RowModel: Debug + Send + Sync {
     /// Weight of each class for a row of features, not negative and not normalised.
     fn predict(&self, row: &[f32]) -> Vec<f64>;
 
