@@ -8,13 +8,13 @@
 //!
 //! | package | folder | holds | uses | most lines |
 //! |---|---|---|---|---|
-//! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | | 2450 |
-//! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` | 9500 |
-//! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | frames or counts in, channels out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3100 |
-//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | | 8800 |
-//! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5400 |
-//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5250 |
-//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25750 |
+//! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | | 2400 |
+//! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` | 9250 |
+//! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | frames or counts in, channels out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
+//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | | 8350 |
+//! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5350 |
+//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5100 |
+//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25800 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
 //! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 20100 |
 //! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 1450 |

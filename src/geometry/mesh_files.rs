@@ -23,41 +23,16 @@ pub struct ColouredPart {
     pub finish: Finish,
 }
 
-/// Error of reading a mesh file.
+/// Reason why a mesh file cannot be used, as a sentence.
 #[derive(Debug, thiserror::Error)]
-pub enum MeshFileError {
-    /// The file type is not one we read.
-    #[error("\"{name}\" is a {kind} file; Palpate reads meshes from .obj and .stl (export it as one of these)")]
-    Unsupported {
-        /// File name.
-        name: String,
-        /// Its extension, or "typeless".
-        kind: String,
-    },
-    /// The file could not be opened.
-    #[error("cannot read the mesh \"{name}\": {cause}")]
-    Unreadable {
-        /// File name.
-        name: String,
-        /// Message of the operating system.
-        cause: String,
-    },
-    /// The contents are not what the file type promises.
-    #[error("the mesh \"{name}\" is damaged: {cause}")]
-    Damaged {
-        /// File name.
-        name: String,
-        /// Cause.
-        cause: String,
-    },
-    /// Too big to be meant.
-    #[error("the mesh \"{name}\" is too large: {what}; reduce it in a modelling tool")]
-    TooLarge {
-        /// File name.
-        name: String,
-        /// Its size and the limit.
-        what: String,
-    },
+#[error("{0}")]
+pub struct MeshFileError(String);
+
+impl MeshFileError {
+    /// A file that cannot be opened.
+    pub fn unreadable(name: &str, cause: impl std::fmt::Display) -> Self {
+        Self(format!("cannot read the mesh \"{name}\": {cause}"))
+    }
 }
 
 /// Reads `name` through `read`, which returns a file's bytes given its path relative to wherever `name` lives, so
@@ -68,13 +43,12 @@ pub fn read_mesh(
 ) -> Result<Vec<ColouredPart>, MeshFileError> {
     let extension = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     if extension != "obj" && extension != "stl" {
-        return Err(MeshFileError::Unsupported {
-            name: name.to_owned(),
-            kind: if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") },
-        });
+        let kind = if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") };
+        return Err(MeshFileError(format!(
+            "\"{name}\" is a {kind} file; Palpate reads meshes from .obj and .stl (export it as one of these)"
+        )));
     }
-    let bytes =
-        read(name).map_err(|cause| MeshFileError::Unreadable { name: name.to_owned(), cause: cause.to_string() })?;
+    let bytes = read(name).map_err(|cause| MeshFileError::unreadable(name, cause))?;
     if bytes.len() > LARGEST_FILE {
         return Err(too_large(name, bytes.len() >> 20, "MiB", LARGEST_FILE >> 20));
     }
@@ -91,11 +65,13 @@ pub fn read_mesh(
 }
 
 fn too_large(name: &str, found: usize, unit: &str, limit: usize) -> MeshFileError {
-    MeshFileError::TooLarge { name: name.to_owned(), what: format!("{found} {unit}, the limit is {limit}") }
+    MeshFileError(format!(
+        "the mesh \"{name}\" is too large: {found} {unit}, the limit is {limit}; reduce it in a modelling tool"
+    ))
 }
 
 fn damaged(name: &str, cause: &dyn std::fmt::Display) -> MeshFileError {
-    MeshFileError::Damaged { name: name.to_owned(), cause: cause.to_string() }
+    MeshFileError(format!("the mesh \"{name}\" is damaged: {cause}"))
 }
 
 fn parse_obj(
@@ -250,7 +226,7 @@ mod tests {
         let mut bytes = vec![0; 84];
         bytes[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
         let result = read_mesh("a.stl", &in_memory(vec![("a.stl", bytes)]));
-        assert!(matches!(result, Err(MeshFileError::Damaged { .. })));
+        assert!(result.is_err_and(|error| error.to_string().contains("is damaged")));
     }
 
     #[test]

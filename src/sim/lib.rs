@@ -47,7 +47,7 @@
 //! # Features
 //!
 //! `rapier` (on by default) adds the second engine and the resting faces of objects. Without it, scenes that need
-//! either are refused with [`scene::SceneError::NeedsRapier`]. `bench` builds the benchmark: `cargo run --release
+//! either are refused. `bench` builds the benchmark: `cargo run --release
 //! -p palpate-sim --no-default-features --features bench`.
 
 pub mod frame;

@@ -215,45 +215,20 @@ impl Channel {
     }
 }
 
-/// Error of a sensor layout.
+/// Reason why a layout or its signals cannot be used, as a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum LayoutError {
-    /// The name is not in the catalogue.
-    #[error(
-        "unknown sensor layout \"{name}\"; choose C1 to C8, or with --signals contact also C1+F to C8+F, with force"
-    )]
-    Unknown {
-        /// The name given.
-        name: String,
-    },
-    /// Force beside a pad's pressure.
-    #[error(
-        "{layout}+F would hold each pad twice, for its pressure is its force over its area: choose {layout}, or \
-         --signals contact for force beside the contact pressure of simulations"
-    )]
-    ForceTwice {
-        /// The layout, without force.
-        layout: &'static str,
-    },
+#[error("{0}")]
+pub struct LayoutError(String);
+
+impl LayoutError {
     /// Parts of a real gripper do not measure contact pressure.
-    #[error(
-        "physical-like sensors are the parts of a real gripper, which do not measure contact pressure: choose --signals \
-         parts, or --sensors virtual"
-    )]
-    NoSuchPart,
-    /// A pressure sensor would cover no taxel.
-    #[error(
-        "layout {layout} has {sensors} pressure sensors per finger, but the pad has only {rows} rows of taxels: \
-         raise gripper.pad.rows or choose a coarser layout"
-    )]
-    EmptySpan {
-        /// The layout.
-        layout: String,
-        /// Sensors per finger.
-        sensors: usize,
-        /// Taxel rows.
-        rows: usize,
-    },
+    pub fn no_such_part() -> Self {
+        Self(
+            "physical-like sensors are the parts of a real gripper, which do not measure contact pressure: choose --signals \
+             parts, or --sensors virtual"
+                .to_owned(),
+        )
+    }
 }
 
 /// Curvature, pressure and force of each finger, which any gripper has.
@@ -272,7 +247,9 @@ impl SensorLayout {
         };
         match CATALOGUE.iter().find(|layout| layout.name == base) {
             Some(layout) => Ok(Self { force, ..layout.clone() }),
-            None => Err(LayoutError::Unknown { name: name.to_owned() }),
+            None => Err(LayoutError(format!(
+                "unknown sensor layout \"{name}\"; choose C1 to C8, or with --signals contact also C1+F to C8+F, with force"
+            ))),
         }
     }
 
@@ -280,7 +257,11 @@ impl SensorLayout {
     pub fn learnt(name: &str, signals: SignalDefinition) -> Result<Self, LayoutError> {
         let layout = Self::named(name)?;
         match signals {
-            SignalDefinition::Parts if layout.force => Err(LayoutError::ForceTwice { layout: layout.name }),
+            SignalDefinition::Parts if layout.force => Err(LayoutError(format!(
+                "{0}+F would hold each pad twice, for its pressure is its force over its area: choose {0}, or --signals \
+                 contact for force beside the contact pressure of simulations",
+                layout.name
+            ))),
             _ => Ok(layout),
         }
     }
@@ -302,7 +283,11 @@ impl SensorLayout {
         let grid = gripper.taxels();
         let covered = |span: &Span| (0..grid.rows).any(|r| span.holds((r as f64 + 0.5) / grid.rows as f64));
         if !pressure.iter().all(covered) {
-            return Err(LayoutError::EmptySpan { layout: self.full_name(), sensors: pressure.len(), rows: grid.rows });
+            let (layout, sensors, rows) = (self.full_name(), pressure.len(), grid.rows);
+            return Err(LayoutError(format!(
+                "layout {layout} has {sensors} pressure sensors per finger, but the pad has only {rows} rows of taxels: raise \
+                 gripper.pad.rows or choose a coarser layout"
+            )));
         }
         let mut channels = Vec::new();
         let mut add = |quantity: Quantity, spans: &[Span]| {
@@ -419,10 +404,8 @@ mod tests {
     fn too_fine_and_unknown_layouts_are_refused() {
         let mut gripper = GripperModel::default();
         gripper.finger.joints = 80;
-        assert!(matches!(
-            CATALOGUE[3].channels(&gripper, SignalDefinition::Parts),
-            Err(LayoutError::EmptySpan { sensors: 80, .. })
-        ));
+        let too_fine = CATALOGUE[3].channels(&gripper, SignalDefinition::Parts).expect_err("80 joints").to_string();
+        assert!(too_fine.contains("has 80 pressure sensors"), "{too_fine}");
         let unknown = SensorLayout::named("C9").expect_err("there are eight").to_string();
         assert!(unknown.contains("with --signals contact also C1+F"), "{unknown}");
         assert!(SensorLayout::named("c1+f").is_ok_and(|layout| layout.force));

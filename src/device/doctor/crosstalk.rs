@@ -52,16 +52,10 @@ pub struct Bleed {
     pub bleeds: bool,
 }
 
-/// Why a board cannot be tested.
+/// Why a board cannot be tested, as a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CrosstalkError {
-    /// No sensors on one of the fingers.
-    #[error("the crosstalk test needs sensors on both fingers; the board has {channels}")]
-    OneFinger {
-        /// Its channels.
-        channels: String,
-    },
-}
+#[error("{0}")]
+pub struct CrosstalkError(String);
 
 /// Guided crosstalk test, independent of any port: readings in, instructions out.
 #[derive(Clone, Debug)]
@@ -105,7 +99,10 @@ impl CrosstalkTest {
         let sensors: Vec<(Sensor, usize)> =
             Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
         if ![0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
-            return Err(CrosstalkError::OneFinger { channels: board.channels.join(", ") });
+            let channels = board.channels.join(", ");
+            return Err(CrosstalkError(format!(
+                "the crosstalk test needs sensors on both fingers; the board has {channels}"
+            )));
         }
         Ok(Self {
             sensors,

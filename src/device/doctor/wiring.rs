@@ -52,42 +52,39 @@ pub fn wires() -> [Wire; 4] {
     })
 }
 
-/// Error when writing the sketch.
+/// Reason why the sketch was not written, as a sentence.
 #[derive(Debug, thiserror::Error)]
-pub enum SketchError {
-    /// A different file exists.
-    #[error("\"{path}\" exists and differs: nothing was written. Choose another folder")]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file system.
-    #[error("cannot write \"{path}\": {cause}. Choose a folder that you may write to")]
-    System {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: std::io::Error,
-    },
+#[error("{0}")]
+pub struct SketchError(String);
+
+impl SketchError {
+    fn cannot_write(path: &Path, cause: &std::io::Error) -> Self {
+        Self(format!("cannot write \"{}\": {cause}. Choose a folder that you may write to", path.display()))
+    }
 }
 
 /// Writes the sketch into a folder, which is created where it is missing, and returns its files. Writes nothing where a
 /// different file exists.
 pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, SketchError> {
-    fs::create_dir_all(folder).map_err(|cause| SketchError::System { path: folder.to_owned(), cause })?;
+    fs::create_dir_all(folder).map_err(|cause| SketchError::cannot_write(folder, &cause))?;
     let files = SKETCH_FILES.map(|(name, text)| (folder.join(name), text));
     let mut missing = Vec::new();
     for (path, text) in &files {
         match fs::read(path) {
             Ok(there) if there == text.as_bytes() => {}
-            Ok(_) => return Err(SketchError::Exists { path: path.clone() }),
+            Ok(_) => {
+                let path = path.display();
+                return Err(SketchError(format!(
+                    "\"{path}\" exists and differs: nothing was written. Choose another folder"
+                )));
+            }
             Err(error) if error.kind() == ErrorKind::NotFound => missing.push((path, text)),
-            Err(cause) => return Err(SketchError::System { path: path.clone(), cause }),
+            Err(cause) => return Err(SketchError::cannot_write(path, &cause)),
         }
     }
     for (path, text) in missing {
         let written = fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
-        written.map_err(|cause| SketchError::System { path: path.clone(), cause })?;
+        written.map_err(|cause| SketchError::cannot_write(path, &cause))?;
     }
     Ok(files.map(|(path, _)| path).to_vec())
 }
@@ -115,10 +112,11 @@ mod tests {
         assert!(fs::read_to_string(&written[0])?.contains("gripper_logic.h"));
         fs::write(&written[1], "mine")?;
         fs::remove_file(&written[0])?;
-        assert!(matches!(write_sketch(&at), Err(SketchError::Exists { .. })));
+        assert!(write_sketch(&at).is_err_and(|error| error.to_string().contains("exists and differs")));
         assert!(!written[0].exists() && fs::read_to_string(&written[1])? == "mine");
         fs::write(folder.path().join("file"), "")?;
-        assert!(matches!(write_sketch(&folder.path().join("file/due")), Err(SketchError::System { .. })));
+        let refused = write_sketch(&folder.path().join("file/due"));
+        assert!(refused.is_err_and(|error| error.to_string().starts_with("cannot write")));
         Ok(())
     }
 }

@@ -137,21 +137,7 @@ pub struct FaultError {
     /// The fault.
     pub text: String,
     /// Problem.
-    pub problem: FaultProblem,
-}
-
-/// Problem of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FaultProblem {
-    /// No time.
-    #[error("has no time")]
-    NoTime,
-    /// An unknown name.
-    #[error("is not one of {names}", names = TABLE.map(|row| row.name).join(", "))]
-    Unknown,
-    /// A wrong number.
-    #[error("has an invalid number")]
-    Number,
+    pub problem: String,
 }
 
 /// Parses a list of faults.
@@ -160,15 +146,16 @@ pub fn parse_faults(text: &str) -> Result<Vec<EmulatedFault>, FaultError> {
     text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse).collect()
 }
 
-fn parse_fault(text: &str) -> Result<EmulatedFault, FaultProblem> {
-    let (named, times) = text.split_once('@').ok_or(FaultProblem::NoTime)?;
+fn parse_fault(text: &str) -> Result<EmulatedFault, String> {
+    let (named, times) = text.split_once('@').ok_or("has no time")?;
     let (name, value) = named.split_once('=').map_or((named, None), |(name, value)| (name, Some(value)));
     // Its name in version 0.1.0.
     let name = if name == "rail" { FaultKind::Saturated.name() } else { name };
-    let row = TABLE.iter().find(|row| row.name == name).ok_or(FaultProblem::Unknown)?;
+    let unknown = || format!("is not one of {}", TABLE.map(|row| row.name).join(", "));
+    let row = TABLE.iter().find(|row| row.name == name).ok_or_else(unknown)?;
     let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
     let number = |text: Option<&str>, usual: f64| match text {
-        Some(text) => text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or(FaultProblem::Number),
+        Some(text) => text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or("has an invalid number"),
         None => Ok(usual),
     };
     let from_s = number(Some(from), 0.0)?;

@@ -23,11 +23,11 @@ mod script;
 mod tests;
 mod uart;
 
-pub use faults::{EmulatedFault, FaultError, FaultKind, FaultProblem, fault_help, parse_faults};
+pub use faults::{EmulatedFault, FaultError, FaultKind, fault_help, parse_faults};
 pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
 pub use hand::HandPlan;
 pub use parts::{HiddenParts, PadSetup, PartsError, Stimulus, StripSetup};
 #[cfg(unix)]
 pub use port::{PortSetup, ServeError, serve};
-pub use script::{ScriptError, Step, StepProblem, parse_script};
+pub use script::{ScriptError, Step, parse_script};
 pub use uart::misread;

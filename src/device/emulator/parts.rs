@@ -77,10 +77,11 @@ impl HiddenParts {
 
     /// Refuses values that no part has.
     pub fn check(&self) -> Result<(), PartsError> {
-        let positive = |name: &'static str, value: f64| {
-            let fine = value.is_finite() && value > 0.0;
-            if fine { Ok(()) } else { Err(PartsError::NotPositive { name, value }) }
+        let refuse = |is_fine: bool, name: &str, value: f64, wanted: &str| {
+            if is_fine { Ok(()) } else { Err(PartsError(format!("{name} is {value}; it must {wanted}"))) }
         };
+        let positive =
+            |name: &str, value: f64| refuse(value.is_finite() && value > 0.0, name, value, "be a positive number");
         for strip in &self.strips {
             positive("flat_ohm", strip.part.flat_ohm)?;
             positive("rise_per_rad", strip.part.rise_per_rad)?;
@@ -94,7 +95,7 @@ impl HiddenParts {
             positive("divider_ohm", pad.divider_ohm)?;
             positive("reaching", pad.part.reaching)?;
         }
-        if self.noise_counts >= 0.0 { Ok(()) } else { Err(PartsError::Negative { value: self.noise_counts }) }
+        refuse(self.noise_counts >= 0.0, "noise_counts", self.noise_counts, "not be negative")
     }
 
     /// The four sensors, read so many times a second (1/s).
@@ -113,24 +114,10 @@ impl HiddenParts {
     }
 }
 
-/// A value that no part has.
+/// A value that no part has, as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PartsError {
-    /// It must be a positive number.
-    #[error("{name} is {value}; it must be a positive number")]
-    NotPositive {
-        /// Which value.
-        name: &'static str,
-        /// The value.
-        value: f64,
-    },
-    /// Noise must not be negative.
-    #[error("noise_counts is {value}; it must not be negative")]
-    Negative {
-        /// The value.
-        value: f64,
-    },
-}
+#[error("{0}")]
+pub struct PartsError(String);
 
 /// Load that bending puts on a pad, least and most (N m). Assumed: 0.07 to 0.3 N when the finger is closed on nothing
 /// at 1 bar (14 1/m), so that it shows above the threshold of some pads and not of others.

@@ -38,29 +38,15 @@ pub struct PortSetup {
     pub boot_s: f64,
 }
 
-/// Error of the emulator's port.
+/// Reason why the emulator cannot be served, as a sentence.
 #[derive(Debug, thiserror::Error)]
-pub enum ServeError {
-    /// The path is taken.
-    #[error("{path} exists and is not a link to a terminal. Choose another name, or remove it")]
-    Taken {
-        /// The path.
-        path: PathBuf,
-    },
-    /// The link cannot be created.
-    #[error("cannot create the link {path}: {cause}. Choose an existing, writable folder")]
-    Link {
-        /// The path.
-        path: PathBuf,
-        /// Cause.
-        cause: std::io::Error,
-    },
-    /// No pseudo-terminal.
-    #[error("cannot open a pseudo-terminal: {0}")]
-    Terminal(#[from] serialport::Error),
-    /// The writing thread cannot start.
-    #[error("cannot start a thread: {0}")]
-    Thread(std::io::Error),
+#[error("{0}")]
+pub struct ServeError(String);
+
+impl From<serialport::Error> for ServeError {
+    fn from(cause: serialport::Error) -> Self {
+        Self(format!("cannot open a pseudo-terminal: {cause}"))
+    }
 }
 
 /// Runs the gripper on a pseudo-terminal until `stop` is set; `turn` is called every millisecond or so.
@@ -195,7 +181,12 @@ impl Link {
         match std::fs::symlink_metadata(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => {}
             Ok(_) if leads_to_a_terminal(path) => {}
-            _ => return Err(ServeError::Taken { path: path.to_owned() }),
+            _ => {
+                let path = path.display();
+                return Err(ServeError(format!(
+                    "{path} exists and is not a link to a terminal. Choose another name, or remove it"
+                )));
+            }
         }
         Ok(Self { path: path.to_owned() })
     }
@@ -205,7 +196,10 @@ impl Link {
         let mut beside = self.path.clone().into_os_string();
         beside.push(format!(".{}", std::process::id()));
         let made = symlink(terminal, &beside).and_then(|()| std::fs::rename(&beside, &self.path));
-        made.map_err(|cause| ServeError::Link { path: self.path.clone(), cause })
+        made.map_err(|cause| {
+            let path = self.path.display();
+            ServeError(format!("cannot create the link {path}: {cause}. Choose an existing, writable folder"))
+        })
     }
 
     fn remove(&self) {
@@ -255,7 +249,7 @@ impl Terminal {
                     left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
-            .map_err(ServeError::Thread)?;
+            .map_err(|cause| ServeError(format!("cannot start a thread: {cause}")))?;
         link.lead_to(&name)?;
         Ok((Self { near, output, waiting, dropped: 0, reported: Instant::now() }, name))
     }

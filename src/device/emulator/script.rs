@@ -48,49 +48,11 @@ pub struct ScriptError {
     /// Its text.
     pub step: String,
     /// Problem.
-    pub problem: StepProblem,
+    pub problem: String,
 }
 
-/// A fault in a step, and what to write instead.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StepProblem {
-    /// A grasp without an object.
-    #[error("write close empty, or grasp and an object's name")]
-    NoObject,
-    /// An unknown word.
-    #[error("\"{word}\" is not known; write {instead}")]
-    Unknown {
-        /// The word.
-        word: String,
-        /// What may stand there.
-        instead: &'static str,
-    },
-    /// A word too many.
-    #[error("\"{word}\" is one word too many")]
-    TooMany {
-        /// The word.
-        word: String,
-    },
-    /// A number out of range, or no number.
-    #[error("{name}={text} is not a number from {least} to {most} {unit}")]
-    Number {
-        /// The key.
-        name: String,
-        /// What stands there.
-        text: String,
-        /// Least value.
-        least: f64,
-        /// Largest value.
-        most: f64,
-        /// Its unit.
-        unit: &'static str,
-    },
-}
-
-impl StepProblem {
-    fn unknown(word: &str, instead: &'static str) -> Self {
-        Self::Unknown { word: word.to_owned(), instead }
-    }
+fn unknown(word: &str, instead: &str) -> String {
+    format!("\"{word}\" is not known; write {instead}")
 }
 
 /// Parses a script.
@@ -104,34 +66,34 @@ pub fn parse_script(text: &str) -> Result<Vec<Step>, ScriptError> {
 }
 
 /// Parses one step.
-fn parse_step(text: &str) -> Result<Step, StepProblem> {
+fn parse_step(text: &str) -> Result<Step, String> {
     let words: Vec<&str> = text.split_whitespace().collect();
     match words.as_slice() {
         ["close", "empty", rest @ ..] => grasp("empty", rest),
         ["grasp", object, rest @ ..] => grasp(object, rest),
-        ["close" | "grasp", ..] => Err(StepProblem::NoObject),
+        ["close" | "grasp", ..] => Err("write close empty, or grasp and an object's name".to_owned()),
         words => hold(words),
     }
 }
 
-fn grasp(object: &str, words: &[&str]) -> Result<Step, StepProblem> {
+fn grasp(object: &str, words: &[&str]) -> Result<Step, String> {
     let bar = match words {
         [] => None,
         [word] => match word.split_once('=') {
             Some(("bar", value)) => Some(within("bar", value, "", 0.05..=1.5)?),
-            _ => return Err(StepProblem::unknown(word, "bar=0.8")),
+            _ => return Err(unknown(word, "bar=0.8")),
         },
-        [_, other, ..] => return Err(StepProblem::TooMany { word: (*other).to_owned() }),
+        [_, other, ..] => return Err(format!("\"{other}\" is one word too many")),
     };
     Ok(Step::Grasp { object: object.to_owned(), bar })
 }
 
-fn hold(words: &[&str]) -> Result<Step, StepProblem> {
+fn hold(words: &[&str]) -> Result<Step, String> {
     let (mut bend, mut load, mut seconds) = ([0.0; 2], [0.0; 2], HOLD_S);
     for word in words {
-        let (name, value) = word.split_once('=').ok_or_else(|| {
-            StepProblem::unknown(word, "angle=30, load=0.1kg, hold=2, rest=2, close empty or grasp lemon")
-        })?;
+        let (name, value) = word
+            .split_once('=')
+            .ok_or_else(|| unknown(word, "angle=30, load=0.1kg, hold=2, rest=2, close empty or grasp lemon"))?;
         match name {
             "hold" | "rest" => seconds = within(name, value, "s", 0.0..=3600.0)?,
             "angle" | "angleL" | "angleR" => {
@@ -145,7 +107,7 @@ fn hold(words: &[&str]) -> Result<Step, StepProblem> {
                 set(&mut load, name, force);
             }
             _ => {
-                return Err(StepProblem::unknown(name, "angle, angleL, angleR, load, loadL, loadR, hold or rest"));
+                return Err(unknown(name, "angle, angleL, angleR, load, loadL, loadR, hold or rest"));
             }
         }
     }
@@ -161,15 +123,10 @@ fn set(sides: &mut [f64; 2], name: &str, value: f64) {
     }
 }
 
-fn within(
-    name: &str,
-    text: &str,
-    unit: &'static str,
-    range: std::ops::RangeInclusive<f64>,
-) -> Result<f64, StepProblem> {
+fn within(name: &str, text: &str, unit: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
     let number = text.strip_suffix(unit).unwrap_or(text).parse().ok().filter(|value| range.contains(value));
     let (least, most) = range.into_inner();
-    number.ok_or_else(|| StepProblem::Number { name: name.to_owned(), text: text.to_owned(), least, most, unit })
+    number.ok_or_else(|| format!("{name}={text} is not a number from {least} to {most} {unit}"))
 }
 
 #[cfg(test)]

@@ -424,7 +424,7 @@ impl SensorView {
 
     fn check_parts(&self) -> Result<(), LayoutError> {
         let none = self.is_physical() && self.signals != SignalDefinition::Parts;
-        if none { Err(LayoutError::NoSuchPart) } else { Ok(()) }
+        if none { Err(LayoutError::no_such_part()) } else { Ok(()) }
     }
 
     /// Computes the signals of a simulated trial from its start to the end that the view has.
@@ -487,7 +487,7 @@ mod tests {
             assert!(own.learnt().is_ok());
         }
         let impossible = SensorView { signals: SignalDefinition::Contact, ..parts };
-        assert_eq!(impossible.learnt(), Err(LayoutError::NoSuchPart));
+        assert_eq!(impossible.learnt(), Err(LayoutError::no_such_part()));
         Ok(())
     }
 }

@@ -179,7 +179,7 @@ impl Adaptation {
             let strip = strips[side.index()].calibration();
             let pad = || match strip {
                 Some(strip) => adapted(hand.pad(side, &name(sensor), strip, weight)),
-                None => AdaptedSensor::Failed(CalibrationFault::NoStrip { strip: SensorKind::Flex.on(side).label() }),
+                None => AdaptedSensor::Failed(CalibrationFault::no_strip(SensorKind::Flex.on(side).label())),
             };
             kept(sensor).filter(|_| weight.is_none()).map_or_else(pad, AdaptedSensor::Kept)
         });

@@ -244,7 +244,7 @@ impl OpenTrial {
             let off = identification.begin_grasp(names).err().map(|cause| cause.to_string());
             // Sensors of a real gripper have no part for it.
             let no_part = identification.model().card.only_simulated() && options.sensors.is_physical();
-            self.recognition_off = off.or_else(|| no_part.then(|| LayoutError::NoSuchPart.to_string()));
+            self.recognition_off = off.or_else(|| no_part.then(|| LayoutError::no_such_part().to_string()));
         }
         let identification = identification.filter(|_| self.recognition_off.is_none());
         self.answers = answers(identification, &rows);

@@ -116,7 +116,7 @@ impl Blueprint {
     pub(super) fn build(mut self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
         if self.triangles > MOST_TRIANGLES {
             let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
-            return Err(ObjectError::Malformed { name: self.name, cause });
+            return Err(ObjectError::malformed(&self.name, &cause));
         }
         let mut solids = match options.collision {
             CollisionShape::File if !self.collision.is_empty() => std::mem::take(&mut self.collision),
@@ -127,7 +127,10 @@ impl Blueprint {
             }
         };
         if solids.is_empty() {
-            return Err(ObjectError::NoShape { name: self.name });
+            return Err(ObjectError(format!(
+                "\"{}\" has no shape: no link has a visual or collision that can be used",
+                self.name
+            )));
         }
         self.check_numbers(&solids)?;
         let scale = self.scale(options, &solids);
@@ -143,9 +146,8 @@ impl Blueprint {
             [SolidPart::Primitive(shape, place)] => DistanceField::primitive(*shape, place),
             _ => {
                 let grid = bake(&solids, options.cell.unwrap_or_else(|| choose_cell(&bounds)));
-                DistanceField::Grid(Arc::new(
-                    grid.map_err(|cause| ObjectError::Bake { name: self.name.clone(), cause })?,
-                ))
+                let grid = grid.map_err(|cause| ObjectError(format!("\"{}\": {cause}", self.name)))?;
+                DistanceField::Grid(Arc::new(grid))
             }
         };
         Ok(ObjectModel {
@@ -183,8 +185,7 @@ impl Blueprint {
         if sound && self.visual.iter().all(|part| finite(&part.mesh)) {
             Ok(())
         } else {
-            let cause = "a mesh holds numbers that are not finite".to_owned();
-            Err(ObjectError::Malformed { name: self.name.clone(), cause })
+            Err(ObjectError::malformed(&self.name, "a mesh holds numbers that are not finite"))
         }
     }
 
@@ -214,7 +215,11 @@ impl Blueprint {
     fn check_size(&mut self, bounds: &Bounds) -> Result<(), ObjectError> {
         let size = bounds.size();
         if size.max_element() > LARGEST_POSSIBLE || size.max_element() < 1e-5 || !size.is_finite() {
-            return Err(ObjectError::Size { name: self.name.clone(), metres: size.max_element() });
+            return Err(ObjectError(format!(
+                "\"{}\" is {:.3e} m across; set object.scale so that it fits a hand",
+                self.name,
+                size.max_element()
+            )));
         }
         if size.max_element() > LARGEST_GRASPABLE {
             let cm = size.max_element() * 100.0;
@@ -226,7 +231,7 @@ impl Blueprint {
     fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<(), ObjectError> {
         for solid in solids {
             if let SolidPart::Mesh(mesh) = solid {
-                let repaired = repair(mesh).map_err(|cause| ObjectError::Unsound { name: self.name.clone(), cause })?;
+                let repaired = repair(mesh).map_err(|cause| ObjectError::unsound(&self.name, &cause))?;
                 *mesh = repaired.mesh;
                 self.warnings
                     .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{}\": {note}", self.name)));
@@ -373,5 +378,5 @@ fn resting_of(solids: &[SolidPart]) -> Resting {
 
 fn hull_of(solids: &[SolidPart], name: &str) -> Result<TriMesh, ObjectError> {
     let points: Vec<glam::DVec3> = solids.iter().flat_map(|solid| mesh_of(solid).points).collect();
-    palpate_geometry::convex_hull(&points).map_err(|cause| ObjectError::Unsound { name: name.to_owned(), cause })
+    palpate_geometry::convex_hull(&points).map_err(|cause| ObjectError::unsound(name, &cause))
 }

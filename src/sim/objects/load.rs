@@ -94,23 +94,20 @@ fn blueprint(source: &str, content: &Content) -> Result<Blueprint, ObjectError> 
 fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
     if path.exists() || !extension.is_empty() {
         let kind = if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") };
-        return ObjectError::Unsupported { name: source.to_owned(), kind };
+        return ObjectError(format!("\"{source}\" is a {kind} file; Palpate reads objects from .urdf, .obj and .stl"));
     }
     let names = || catalogue().iter().map(|b| b.name.as_str());
     let nearest = names()
         .map(|name| (strsim::jaro_winkler(&source.to_ascii_lowercase(), name), name))
         .filter(|(likeness, _)| *likeness > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0));
-    ObjectError::Unknown {
-        name: source.to_owned(),
-        hint: match nearest {
-            Some((_, name)) => format!("did you mean \"{name}\"?"),
-            None => format!(
-                "there are {}, {EMPTY}, or any .urdf, .obj or .stl file",
-                names().collect::<Vec<_>>().join(", ")
-            ),
-        },
-    }
+    let hint = match nearest {
+        Some((_, name)) => format!("did you mean \"{name}\"?"),
+        None => {
+            format!("there are {}, {EMPTY}, or any .urdf, .obj or .stl file", names().collect::<Vec<_>>().join(", "))
+        }
+    };
+    ObjectError(format!("there is no object \"{source}\": {hint}"))
 }
 
 /// Names that say nothing of what is in a file.
@@ -189,16 +186,16 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
         match places.iter().find(|place| place.is_file()) {
             Some(place) => read_mesh(&place.to_string_lossy(), &read),
             None if reference.to_ascii_lowercase().ends_with(".dae") => read_mesh(reference, &read),
-            None => Err(MeshFileError::Unreadable {
-                name: reference.to_owned(),
-                cause: match places.first() {
+            None => {
+                let cause = match places.first() {
                     Some(first) if places.len() == 1 => format!("there is no file {}", first.display()),
                     Some(first) => {
                         format!("it is neither at {} nor at {} other places", first.display(), places.len() - 1)
                     }
                     None => "the reference is empty".to_owned(),
-                },
-            }),
+                };
+                Err(MeshFileError::unreadable(reference, cause))
+            }
         }
     };
     let mut blueprint = urdf::parse(&stem(path), &bytes, &mesh)?;
@@ -208,14 +205,14 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
 
 fn read_mesh_file(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
     let read = |path: &str| content.of(read_referenced(Path::new(path)));
-    let parts = read_mesh(&path.to_string_lossy(), &read).map_err(|cause| ObjectError::Mesh { cause })?;
+    let parts = read_mesh(&path.to_string_lossy(), &read)?;
     let mut blueprint = Blueprint::new(&class_in(path, None));
     blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);
     Ok(blueprint)
 }
 
 fn unreadable(path: &Path, cause: &std::io::Error) -> ObjectError {
-    ObjectError::Unreadable { path: path.to_owned(), cause: cause.to_string() }
+    ObjectError(format!("cannot read \"{}\": {cause}", path.display()))
 }
 
 #[cfg(test)]

@@ -16,86 +16,27 @@ pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, Size
 pub use options::{CollisionShape, LoadOptions};
 pub use random_shape::RandomShape;
 
-use palpate_geometry::{BakeError, MeshError, MeshFileError};
-use std::path::PathBuf;
+use palpate_geometry::{MeshError, MeshFileError};
 
-/// Error of loading an object.
+/// Reason why an object cannot be loaded, as a sentence.
 #[derive(Debug, thiserror::Error)]
-pub enum ObjectError {
-    /// Neither a built-in name nor a file.
-    #[error("there is no object \"{name}\": {hint}")]
-    Unknown {
-        /// Name given.
-        name: String,
-        /// The nearest name, or all of them.
-        hint: String,
-    },
-    /// A file of a type we do not read.
-    #[error("\"{name}\" is a {kind} file; Palpate reads objects from .urdf, .obj and .stl")]
-    Unsupported {
-        /// The file.
-        name: String,
-        /// Its extension.
-        kind: String,
-    },
-    /// The file could not be opened.
-    #[error("cannot read \"{path}\": {cause}", path = path.display())]
-    Unreadable {
-        /// The path.
-        path: PathBuf,
-        /// Message of the operating system.
-        cause: String,
-    },
-    /// The file is not what it claims to be.
-    #[error("\"{name}\" is malformed: {cause}")]
-    Malformed {
-        /// The object.
-        name: String,
-        /// Cause.
-        cause: String,
-    },
-    /// A shape of impossible size.
-    #[error("link \"{link}\": {cause}")]
-    BadShape {
-        /// The link.
-        link: String,
-        /// Cause.
-        cause: String,
-    },
-    /// A mesh file that cannot be used.
-    #[error("{cause}")]
-    Mesh {
-        /// Cause.
-        cause: MeshFileError,
-    },
-    /// Nothing to touch.
-    #[error("\"{name}\" has no shape: no link has a visual or collision that can be used")]
-    NoShape {
-        /// The object.
-        name: String,
-    },
+#[error("{0}")]
+pub struct ObjectError(String);
+
+impl ObjectError {
+    /// A file that is not what it claims to be.
+    fn malformed(name: &str, cause: &str) -> Self {
+        Self(format!("\"{name}\" is malformed: {cause}"))
+    }
+
     /// A mesh that is no solid.
-    #[error("\"{name}\" cannot be grasped: {cause}")]
-    Unsound {
-        /// The object.
-        name: String,
-        /// Fault of the mesh.
-        cause: MeshError,
-    },
-    /// An absurd size.
-    #[error("\"{name}\" is {metres:.3e} m across; set object.scale so that it fits a hand")]
-    Size {
-        /// The object.
-        name: String,
-        /// Its largest extent (m).
-        metres: f64,
-    },
-    /// Distances could not be baked.
-    #[error("\"{name}\": {cause}")]
-    Bake {
-        /// The object.
-        name: String,
-        /// Cause.
-        cause: BakeError,
-    },
+    fn unsound(name: &str, cause: &MeshError) -> Self {
+        Self(format!("\"{name}\" cannot be grasped: {cause}"))
+    }
+}
+
+impl From<MeshFileError> for ObjectError {
+    fn from(cause: MeshFileError) -> Self {
+        Self(cause.to_string())
+    }
 }

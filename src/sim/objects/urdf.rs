@@ -32,7 +32,7 @@ struct Joint<'a> {
 
 /// Parses the bytes of a URDF.
 pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Result<Blueprint, ObjectError> {
-    let malformed = |cause: String| ObjectError::Malformed { name: name.to_owned(), cause };
+    let malformed = |cause: String| ObjectError::malformed(name, &cause);
     let robot = robot_of(bytes).map_err(malformed)?;
     let mut blueprint = Blueprint::new(name);
     blueprint.robot = robot.attribute("name").map(str::to_owned);
@@ -228,7 +228,7 @@ fn shape_tags<'a>(
 }
 
 fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<ShapeSource, ObjectError> {
-    let bad = |cause: String| ObjectError::BadShape { link: link.to_owned(), cause };
+    let bad = |cause: String| ObjectError(format!("link \"{link}\": {cause}"));
     let positive = |value: f64, what: &str| {
         let possible = value.is_finite() && value > 0.0;
         if possible { Ok(value) } else { Err(bad(format!("{what} = {value} is not a positive length"))) }
@@ -256,7 +256,7 @@ fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<Sh
                 return Err(bad(format!("the mesh scale {factors} is not usable")));
             }
             let file = shape.attribute("filename").ok_or_else(|| bad("its mesh names no file".to_owned()))?;
-            let mut parts = read_mesh(file).map_err(|cause| ObjectError::Mesh { cause })?;
+            let mut parts = read_mesh(file)?;
             for part in &mut parts {
                 part.mesh.scale(factors);
             }
@@ -285,9 +285,7 @@ mod tests {
     use super::*;
 
     fn blueprint(text: &str) -> Result<Blueprint, ObjectError> {
-        parse("thing", text.as_bytes(), &|name| {
-            Err(MeshFileError::Unreadable { name: name.to_owned(), cause: "no meshes here".to_owned() })
-        })
+        parse("thing", text.as_bytes(), &|name| Err(MeshFileError::unreadable(name, "no meshes here")))
     }
 
     #[test]

@@ -44,7 +44,8 @@ impl Ranges {
     }
 
     fn refuse(&mut self, key: &str, value: &dyn std::fmt::Display, wanted: String) {
-        self.fault.get_or_insert(SceneError::OutOfRange { key: key.to_owned(), value: value.to_string(), wanted });
+        let sentence = || SceneError::Refused(format!("{key} = {value} is not possible; it must be {wanted}"));
+        self.fault.get_or_insert_with(sentence);
     }
 }
 
@@ -67,13 +68,16 @@ impl Scene {
 
     #[cfg(not(feature = "rapier"))]
     fn check_engine(&self) -> Result<(), SceneError> {
+        let without = |setting: &str| {
+            Err(SceneError::Refused(format!(
+                "{setting} needs rapier, which this build leaves out; build with the feature `rapier`"
+            )))
+        };
         if self.solver.engine == super::EngineKind::Rapier {
-            return Err(SceneError::NeedsRapier { setting: "solver.engine = \"rapier\"" });
+            return without("solver.engine = \"rapier\"");
         }
         if self.uses_resting_faces() {
-            return Err(SceneError::NeedsRapier {
-                setting: "pose.faces = \"natural\" (and \"any\" for a free object)",
-            });
+            return without("pose.faces = \"natural\" (and \"any\" for a free object)");
         }
         Ok(())
     }

@@ -4,54 +4,17 @@
 use super::Scene;
 use crate::gripper::FittedRanges;
 use crate::objects::anchored;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// The file could not be read.
-    #[error("cannot read the scene \"{path}\": {cause}")]
-    Unreadable {
-        /// The path.
-        path: PathBuf,
-        /// Message of the operating system.
-        cause: String,
-    },
-    /// A name that no scene has.
-    #[error("no scene is called \"{name}\"; choose {known}, or name a file (.toml)")]
-    UnknownName {
-        /// The name.
-        name: String,
-        /// Names of the scenes.
-        known: String,
-    },
     /// Not TOML, or a value of the wrong kind.
     #[error("the scene is not understood: {0}")]
     Syntax(String),
-    /// A key that no scene has.
-    #[error("the scene has no key \"{key}\"{}", .nearest.as_ref().map_or(String::new(), |n| format!("; did you mean \"{n}\"?")))]
-    UnknownKey {
-        /// The key, with its tables.
-        key: String,
-        /// The known key that looks most like it.
-        nearest: Option<String>,
-    },
-    /// A scene that needs an optional part of this program.
-    #[error("{setting} needs rapier, which this build leaves out; build with the feature `rapier`")]
-    NeedsRapier {
-        /// The setting, as a scene file writes it.
-        setting: &'static str,
-    },
-    /// Number outside its range.
-    #[error("{key} = {value} is not possible; it must be {wanted}")]
-    OutOfRange {
-        /// The key, with its tables.
-        key: String,
-        /// The value found.
-        value: String,
-        /// Accepted range.
-        wanted: String,
-    },
+    /// Anything else, as a sentence.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// A key of the scene file that holds a value.
@@ -90,6 +53,14 @@ impl SceneKey {
 /// Scene files larger than this are refused before parsing (bytes).
 const LARGEST_FILE: u64 = 1 << 20;
 
+impl SceneError {
+    /// A key that no scene has, and the known one that looks most like it.
+    fn unknown_key(key: &str, nearest: Option<String>) -> Self {
+        let nearest = nearest.map_or_else(String::new, |nearest| format!("; did you mean \"{nearest}\"?"));
+        Self::Refused(format!("the scene has no key \"{key}\"{nearest}"))
+    }
+}
+
 impl Scene {
     /// Reads, checks keys, fills in defaults and checks ranges.
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
@@ -116,7 +87,8 @@ impl Scene {
 
     /// Reads a scene file. A relative path of an object file counts from the scene file's folder.
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
-        let unreadable = |cause: String| SceneError::Unreadable { path: path.to_owned(), cause };
+        let unreadable =
+            |cause: String| SceneError::Refused(format!("cannot read the scene \"{}\": {cause}", path.display()));
         let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
         if size > LARGEST_FILE {
             return Err(unreadable(format!("{size} bytes is too large for a scene")));
@@ -172,7 +144,7 @@ fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<
     let unknown = |prefix: &str, last: &str| {
         let beside = beside(prefix);
         let nearest = nearest_key(last, beside.unwrap_or(&known), if beside.is_some() { prefix } else { "" });
-        SceneError::UnknownKey { key: key.to_owned(), nearest }
+        SceneError::unknown_key(key, nearest)
     };
     let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
     let mut table = document;
@@ -217,10 +189,7 @@ fn known_keys() -> toml::Table {
 fn check_keys(written: &toml::Table, known: &toml::Table, prefix: &str) -> Result<(), SceneError> {
     for (key, value) in written {
         let Some(template) = known.get(key) else {
-            return Err(SceneError::UnknownKey {
-                key: format!("{prefix}{key}"),
-                nearest: nearest_key(key, known, prefix),
-            });
+            return Err(SceneError::unknown_key(&format!("{prefix}{key}"), nearest_key(key, known, prefix)));
         };
         let inner = format!("{prefix}{key}.");
         match (value, template) {
@@ -352,6 +321,6 @@ mod tests {
         assert!(matches!(Scene::from_toml("[solver\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[solver]\naccuracy = \"best\"\n"), Err(SceneError::Syntax(_))));
         assert!(matches!(Scene::from_toml("[object]\nmass = \"heavy\"\n"), Err(SceneError::Syntax(_))));
-        assert!(matches!(Scene::from_toml("[world]\ngravity = nan\n"), Err(SceneError::OutOfRange { .. })));
+        assert!(matches!(Scene::from_toml("[world]\ngravity = nan\n"), Err(SceneError::Refused(_))));
     }
 }

@@ -63,7 +63,7 @@ impl FlexCurve {
         check(points, SensorKind::Flex, input, FRAC_PI_2)?;
         let distinct = merged(points, APART);
         if distinct.len() < 2 {
-            return Err(CalibrationFault::TooFew(format!(
+            return Err(CalibrationFault(format!(
                 "{} of at least 2 different angles: take one with the finger straight and one bent by 90 degrees, better \
                  also 30 and 60",
                 distinct.len()
@@ -72,7 +72,7 @@ impl FlexCurve {
         let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
         if most - least < if assumed { LEAST_ASSUMED_SPAN } else { LEAST_SPAN } {
             let [from, to] = [least, most].map(|angle| SensorKind::Flex.with_unit(angle));
-            return Err(CalibrationFault::TooFew(format!(
+            return Err(CalibrationFault(format!(
                 "the flex strip has points from {from} to {to} only: angles at least 45 degrees apart are needed, best 0 \
                  and 90"
             )));
@@ -81,8 +81,7 @@ impl FlexCurve {
         let weighted = |p: &Point| WeightedPoint { x: p.stimulus, y: input.ohm(p.counts), weight: 1.0 };
         let line = StraightLine::through(&points.iter().map(weighted).collect::<Vec<_>>());
         // The points differ in angle, or else they would have been refused as too close: its numbers left the range.
-        let line =
-            line.ok_or(CalibrationFault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
+        let line = line.ok_or_else(|| CalibrationFault::divider(input))?;
         let residuals = points.iter().map(|p| (input.ohm(p.counts) - line.at(p.stimulus)) / line.slope).collect();
         let curve = Self { flat_ohm: line.intercept, ohm_per_rad: line.slope, residuals, line };
         curve.is_such_a_part(input)?;
@@ -121,7 +120,7 @@ impl FlexCurve {
             let resistor = input.divider.fixed_ohm;
             let [low, high] = FLAT_OHM.map(|flat| three_digits(1e-3 * resistor * flat / self.flat_ohm));
             let said = three_digits(1e-3 * resistor);
-            return Err(CalibrationFault::ImplausiblePart(format!(
+            return Err(CalibrationFault(format!(
                 "the flat strip comes out at {} kOhm, but such parts have 17.5 to 32.5: the resistor beside it is not the \
                  {said} kOhm entered but {low} to {high}, or it is another part",
                 three_digits(self.flat_ohm * 1e-3)
@@ -134,7 +133,7 @@ impl FlexCurve {
             } else {
                 "the angles are smaller than what was bent, or the part is damaged"
             };
-            return Err(CalibrationFault::ImplausiblePart(format!(
+            return Err(CalibrationFault(format!(
                 "bent by 90 degrees the strip comes out at {} times its flat resistance, but such parts rise to 1.5 to 3.5 \
                  times: {hint}",
                 three_digits(ratio)
@@ -153,9 +152,7 @@ impl FlexCurve {
         let (at, off) =
             (SensorKind::Flex.with_unit(point.stimulus), format!("{:.1} degrees", residual.to_degrees().abs()));
         if residual.abs() > TOO_FAR {
-            return Err(CalibrationFault::BadPoint(format!(
-                "{at} is {off} off the curve through the others: take it again"
-            )));
+            return Err(CalibrationFault(format!("{at} is {off} off the curve through the others: take it again")));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!("{at} is {off} off the line; take it again if the strip may have slipped"));
@@ -171,7 +168,7 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), CalibrationFault> {
         if after <= before {
             let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
             let [from, to] = [0, 1].map(|i| SensorKind::Flex.with_unit(pair[i].stimulus));
-            return Err(CalibrationFault::BadPoint(format!(
+            return Err(CalibrationFault(format!(
                 "between {from} and {to} the resistance falls from {} to {}, but it must rise: the strip bends towards its \
                  wrong side, its input is wired the other way round, or two angles were mixed up",
                 kilo(before),

@@ -81,8 +81,7 @@ impl PadCurve {
         };
         let line = StraightLine::through(&loaded.iter().map(weighted).collect::<Vec<_>>());
         // Five different weights are five different logarithms: its numbers left the range.
-        let line =
-            line.ok_or(CalibrationFault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt })?;
+        let line = line.ok_or_else(|| CalibrationFault::divider(input))?;
         let silent = points.iter().filter(|p| !conducts(p)).map(|p| p.stimulus).fold(0.0, f64::max);
         let lightest = distinct[0].stimulus;
         let threshold = PadPart::LEAST_FORCE.max(silent.min(lightest)).min(lightest);
@@ -127,14 +126,14 @@ impl PadCurve {
         if !within(OHM_AT_1_N, ohm) {
             let [low, high] = OHM_AT_1_N.map(|wanted| three_digits(1e-3 * input.divider.fixed_ohm * wanted / ohm));
             let said = three_digits(1e-3 * input.divider.fixed_ohm);
-            return Err(CalibrationFault::ImplausiblePart(format!(
+            return Err(CalibrationFault(format!(
                 "under 1 N the pad comes out at {} kOhm, but such parts have about 6 (1.5 to 25): the resistor beside it is \
                  not the {said} kOhm entered but {low} to {high}, or weights were given in another unit than kg",
                 three_digits(ohm * 1e-3)
             )));
         }
         if !within(EXPONENTS, self.exponent) {
-            return Err(CalibrationFault::ImplausiblePart(format!(
+            return Err(CalibrationFault(format!(
                 "the pad's conductance grows with the power {} of the force, but such parts have 0.6 to 1.2: weights that \
                  rest partly beside the pad do this. Put a small stiff disc between, and the weight on its middle",
                 three_digits(self.exponent)
@@ -161,9 +160,7 @@ impl PadCurve {
         let percent = format!("{:.0} %", 100.0 * residual.abs());
         if residual.abs() > TOO_FAR {
             let at = at(point);
-            return Err(CalibrationFault::BadPoint(format!(
-                "{at} is {percent} off the curve through the others: take it again"
-            )));
+            return Err(CalibrationFault(format!("{at} is {percent} off the curve through the others: take it again")));
         }
         if residual.abs() > WORTH_A_WORD {
             words.push(format!(
@@ -186,7 +183,7 @@ fn idle_counts(points: &[Point]) -> f64 {
 
 fn enough(distinct: &[Point]) -> Result<(), CalibrationFault> {
     if distinct.len() < LEAST_WEIGHTS {
-        return Err(CalibrationFault::TooFew(format!(
+        return Err(CalibrationFault(format!(
             "{} of at least {LEAST_WEIGHTS} different weights that make the pad conduct: take five or more between 0.03 and \
              0.5 kg, such as 0.03, 0.06, 0.1, 0.2, 0.35 and 0.5; such a pad does not respond below 0.015 kg",
             distinct.len()
@@ -195,7 +192,7 @@ fn enough(distinct: &[Point]) -> Result<(), CalibrationFault> {
     let (least, most) = (distinct[0].stimulus, distinct[distinct.len() - 1].stimulus);
     if most < LEAST_SPAN * least {
         let [from, to] = [least, most].map(|force| SensorKind::Pad.with_unit(force));
-        return Err(CalibrationFault::TooFew(format!(
+        return Err(CalibrationFault(format!(
             "the pad has points from {from} to {to} only: the heaviest weight must be at least four times the lightest, best \
              0.05 to 0.5 kg"
         )));
@@ -210,7 +207,7 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), CalibrationFault> {
         if after <= before {
             let micro = |siemens: f64| format!("{} µS", three_digits(siemens * 1e6));
             let [from, to] = [0, 1].map(|i| SensorKind::Pad.with_unit(pair[i].stimulus));
-            return Err(CalibrationFault::BadPoint(format!(
+            return Err(CalibrationFault(format!(
                 "between {from} and {to} the conductance falls from {} to {}, but it must rise: two weights were mixed up, \
                  one stood partly beside the pad, or the input is wired the other way round",
                 micro(before),
@@ -255,7 +252,7 @@ impl BendingZero {
         let knots: Vec<(f64, f64)> = bins.filter(|bin| bin.len() >= LEAST_READINGS).map(middle).collect();
         let span = knots.last().map_or(0.0, |last| last.0) - knots.first().map_or(0.0, |first| first.0);
         if span < LEAST_CURVATURE - BIN {
-            return Err(CalibrationFault::BendingTooShort { have: sorted.len(), span });
+            return Err(CalibrationFault::bending_too_short(sorted.len(), span));
         }
         Ok(Self { knots })
     }

@@ -102,7 +102,7 @@ impl Point {
 /// Checks of every point, for both kinds of sensor.
 pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64) -> Result<(), CalibrationFault> {
     if !input.is_possible() {
-        return Err(CalibrationFault::Divider { ohm: input.divider.fixed_ohm, volt: input.reference_volt });
+        return Err(CalibrationFault::divider(input));
     }
     let full_scale = input.full_scale;
     for Point { stimulus, counts, .. } in points {
@@ -110,10 +110,10 @@ pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64
         // Rounding of values set in degrees or kilograms.
         if !(*stimulus >= -1e-9 && *stimulus <= most * (1.0 + 1e-9)) {
             let (kind, most) = (kind.label(), kind.with_unit(most));
-            return Err(CalibrationFault::BadPoint(format!("{at} is outside the range of a {kind}: take 0 to {most}")));
+            return Err(CalibrationFault(format!("{at} is outside the range of a {kind}: take 0 to {most}")));
         }
         if !(*counts >= 0.0 && *counts <= f64::from(full_scale)) {
-            return Err(CalibrationFault::BadPoint(format!(
+            return Err(CalibrationFault(format!(
                 "{counts} is not a reading of a converter that counts to {full_scale} (at {at})"
             )));
         }
@@ -133,7 +133,7 @@ pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64
                 three_digits(input.divider.fixed_ohm * 1e-3)
             ),
         };
-        return Err(CalibrationFault::BadPoint(fault));
+        return Err(CalibrationFault(fault));
     }
     Ok(())
 }

@@ -59,7 +59,10 @@ impl Calibration {
     /// Fits the curve; refuses what such a part cannot be.
     pub fn fit(record: Record) -> Result<Self, CalibrationFault> {
         if record.part.trim().is_empty() || record.part.chars().count() > LONGEST_NAME {
-            return Err(CalibrationFault::NoName);
+            return Err(CalibrationFault(
+                "the part needs a name, such as the number written on it: calibrations belong to parts, and parts get swapped"
+                    .to_owned(),
+            ));
         }
         let (curve, warnings) = match record.kind {
             SensorKind::Flex => {
@@ -72,8 +75,8 @@ impl Calibration {
             }
         };
         match &record.bending {
-            Some(_) if record.kind == SensorKind::Flex => Err(CalibrationFault::NoBending),
-            Some(bending) if !bending.is_possible() => Err(CalibrationFault::BendingTooShort { have: 0, span: 0.0 }),
+            Some(_) if record.kind == SensorKind::Flex => Err(CalibrationFault::no_bending()),
+            Some(bending) if !bending.is_possible() => Err(CalibrationFault::bending_too_short(0, 0.0)),
             _ => Ok(Self { record, curve, warnings }),
         }
     }
@@ -84,8 +87,8 @@ impl Calibration {
         if self.record.kind == wanted {
             return Ok(());
         }
-        let (made, part) = (self.record.kind.label(), self.record.part.clone());
-        Err(CalibrationFault::WrongKind { part, made, place: sensor.label(), wanted: wanted.label() })
+        let (made, part, place) = (self.record.kind.label(), &self.record.part, sensor.label());
+        Err(CalibrationFault(format!("\"{part}\" is calibrated as a {made}, but the {place} is a {}", wanted.label())))
     }
 
     /// Angle (rad) or force (N) of a reading, without any zero. None where the reading
