@@ -13,7 +13,7 @@ impl Ranges {
     fn number(&mut self, key: &str, value: f64, range: RangeInclusive<f64>) {
         // `contains` is false for NaN.
         if !range.contains(&value) {
-            self.refuse(key, &value, format!("between {} and {}", range.start(), range.end()));
+            self.refuse(key, &value, &format!("between {} and {}", range.start(), range.end()));
         }
     }
 
@@ -27,7 +27,7 @@ impl Ranges {
     fn between(&mut self, key: &str, [low, high]: [f64; 2], range: RangeInclusive<f64>) {
         self.numbers(key, &[low, high], &range);
         if low > high {
-            self.refuse(key, &format!("[{low}, {high}]"), "the smaller number first".to_owned());
+            self.refuse(key, &format!("[{low}, {high}]"), "the smaller number first");
         }
     }
 
@@ -39,11 +39,11 @@ impl Ranges {
 
     fn count(&mut self, key: &str, value: u32, range: RangeInclusive<u32>) {
         if !range.contains(&value) {
-            self.refuse(key, &value, format!("between {} and {}", range.start(), range.end()));
+            self.refuse(key, &value, &format!("between {} and {}", range.start(), range.end()));
         }
     }
 
-    fn refuse(&mut self, key: &str, value: &dyn std::fmt::Display, wanted: String) {
+    fn refuse(&mut self, key: &str, value: &dyn std::fmt::Display, wanted: &str) {
         let sentence = || SceneError::Refused(format!("{key} = {value} is not possible; it must be {wanted}"));
         self.fault.get_or_insert_with(sentence);
     }
@@ -85,7 +85,7 @@ impl Scene {
     fn check_object_and_support(&self, ranges: &mut Ranges) {
         let object = &self.object;
         if object.source.trim().is_empty() {
-            ranges.refuse("object.source", &"\"\"", "a name or a path".to_owned());
+            ranges.refuse("object.source", &"\"\"", "a name or a path");
         }
         ranges.numbers("object.rotation_deg", &object.rotation_deg, &(-360.0..=360.0));
         ranges.numbers("object.shift", &object.shift, &(-0.5..=0.5));
@@ -113,7 +113,7 @@ impl Scene {
         ranges.number("shaking.frequency", shaking.frequency, 0.01..=100.0);
         ranges.numbers("shaking.direction", &shaking.direction, &(-1e3..=1e3));
         if shaking.direction == [0.0; 3] {
-            ranges.refuse("shaking.direction", &"[0, 0, 0]", "a direction".to_owned());
+            ranges.refuse("shaking.direction", &"[0, 0, 0]", "a direction");
         }
         ranges.number("shaking.lift", shaking.lift, 0.0..=0.5);
         ranges.auto("shaking.start", shaking.start, 0.0..=1e5);
@@ -155,11 +155,7 @@ impl Scene {
             (torsion, sideways.torsional_stiffness, sideways.bending_stiffness),
         ] {
             if !given(own) && given(other) {
-                ranges.refuse(
-                    key,
-                    &"\"auto\"",
-                    "a number where the other stiffness out of the plane is one".to_owned(),
-                );
+                ranges.refuse(key, &"\"auto\"", "a number where the other stiffness out of the plane is one");
             }
         }
         let pad = &self.gripper.pad;
@@ -196,7 +192,7 @@ impl Scene {
             ranges.number("gripper.actuation.curve.torque", point.torque, -1e4..=1e4);
         }
         if let Some(pair) = actuation.curve.windows(2).find(|pair| pair[1].bar <= pair[0].bar) {
-            ranges.refuse("gripper.actuation.curve.bar", &pair[1].bar, "rising from point to point".to_owned());
+            ranges.refuse("gripper.actuation.curve.bar", &pair[1].bar, "rising from point to point");
         }
         let programme = &self.programme;
         ranges.number("programme.peak_bar", programme.peak_bar, 0.0..=actuation.max_bar);
@@ -212,7 +208,7 @@ impl Scene {
         ranges.number("timing.duration_s", timing.duration_s, shortest..=3600.0);
         if timing.common_hz() > u64::from(FASTEST_COMMON_HZ) {
             let rates = format!("{} and timing.actuation_hz = {}", timing.sample_hz, timing.actuation_hz);
-            ranges.refuse("timing.sample_hz", &rates, format!("rates that meet below {FASTEST_COMMON_HZ} Hz"));
+            ranges.refuse("timing.sample_hz", &rates, &format!("rates that meet below {FASTEST_COMMON_HZ} Hz"));
         }
         let solver = &self.solver;
         if let Some(tolerance) = solver.accuracy.tolerance() {
@@ -223,7 +219,7 @@ impl Scene {
         ranges.count("solver.relag_passes", solver.relag_passes, 0..=100);
         ranges.auto("solver.distance_cell", solver.distance_cell, 1e-6..=0.1);
         if ranges.fault.is_none() && timing.clock(solver.accuracy).total_ticks() > MOST_TICKS {
-            ranges.refuse("timing.duration_s", &timing.duration_s, format!("a trial of at most {MOST_TICKS} steps"));
+            ranges.refuse("timing.duration_s", &timing.duration_s, &format!("a trial of at most {MOST_TICKS} steps"));
         }
     }
 }

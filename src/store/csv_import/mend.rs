@@ -77,13 +77,13 @@ fn fill_gaps(trials: &mut [RawTrial], channels: &[String], warnings: &mut Vec<St
         // Counted before gaps are filled: a trial of one sample has no neighbours to fill from.
         if trial.t_s.len() < 2 {
             let problem = "has only 1 sample; a trial needs at least two at different times".to_owned();
-            return Err(fault(trial, problem));
+            return Err(fault(trial, &problem));
         }
         for (c, channel) in channels.iter().enumerate() {
             let Some(filled) = resample::fill_gaps(&trial.t_s, &mut trial.values, c) else {
                 let channel = brief(channel);
                 let problem = format!("has no reading of the channel \"{channel}\"; remove the trial or the column");
-                return Err(fault(trial, problem));
+                return Err(fault(trial, &problem));
             };
             if filled > 0 {
                 let count = counted(filled, "missing reading was", "missing readings were");
@@ -135,19 +135,19 @@ fn even_samples(trial: &RawTrial, rate_hz: f64) -> Result<usize, Fault> {
     if samples < 2.0 {
         let span_s = to_s - from_s;
         let problem = format!("lasts {span_s} s, less than one step at the common rate of {rate_hz} Hz; remove it");
-        Err(fault(trial, problem))
+        Err(fault(trial, &problem))
     } else if samples > MOST_SAMPLES as f64 {
         let problem = format!(
             "runs from {from_s} s to {to_s} s, which is more than {MOST_SAMPLES} samples at {rate_hz} Hz; look for a wrong \
              time in it"
         );
-        Err(fault(trial, problem))
+        Err(fault(trial, &problem))
     } else {
         Ok(samples as usize)
     }
 }
 
-fn fault(trial: &RawTrial, problem: String) -> Fault {
+fn fault(trial: &RawTrial, problem: &str) -> Fault {
     (Some(trial.line), format!("trial \"{}\" {problem}", brief(&trial.name)))
 }
 
