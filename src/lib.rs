@@ -3,15 +3,15 @@
 //! # Packages, lowest first
 //!
 //! A package uses only those that its row names; the compiler and a test check it. Each package lists its own modules
-//! the same way. `most lines` is its budget of production lines: neither blank, nor comments, nor of tests or
-//! examples. A test counts them. A budget is lowered when code goes; it is raised only by a commit that gives the reason.
+//! the same way. `most lines` is the largest number of production lines allowed; blank lines, comments, tests and
+//! examples do not count. A test checks it. Lower the number when code goes; a commit that raises it gives the reason.
 //!
 //! | package | folder | holds | uses | most lines |
 //! |---|---|---|---|---|
 //! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | | 2400 |
 //! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` | 9250 |
-//! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | frames or counts in, channels out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
-//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, PMFs out: networks, baselines, training, metrics, model files | | 8350 |
+//! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | simulated frames or raw converter counts in, sensor channels (curvature, pressure, force) out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
+//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files | | 8350 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5350 |
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5100 |
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25800 |
@@ -78,7 +78,7 @@
 //! | step | what happens |
 //! |---|---|
 //! | [`palpate_lab::grasping::collect()`], [`palpate_lab::datasets`] | grasps: simulated for the study, or chosen from a store |
-//! | [`palpate_lab::study::paper::StudyPlan`] | the cells to measure: sensors, layouts, methods, parts |
+//! | [`palpate_lab::study::paper::StudyPlan`] | what a study runs on: size, preset, sensors, trials, seed; a study lists its cells from it (one combination of factors, tested on one part of the grasps) |
 //! | [`palpate_learn::METHODS`], [`palpate_learn::evaluation`] | a recogniser fitted on some grasps and judged on others |
 //! | [`palpate_lab::study::Experiment`] | what all studies have: a grid of cells, how one is measured, the report on all |
 //! | [`palpate_lab::study::paper::Finding`] | a claim: a sentence of the paper, a verdict, the intervals that decide |
@@ -114,20 +114,20 @@
 //! | a sensor layout | a line in `src/tactile/layout.rs` |
 //! | a sensor model | a file in `src/tactile/model/` |
 //! | a recogniser | a file in `src/learn/` and a line in [`palpate_learn::METHODS`] |
-//! | a line format of boards | `src/device/protocol/fields.rs` |
-//! | a check of the doctor | a function, and a line in `src/device/doctor/checks.rs` |
+//! | a format of the text lines that boards send | `src/device/protocol/fields.rs` |
+//! | a check of `palpate doctor` (diagnostics of board and connection) | a function, and a line in `src/device/doctor/checks.rs` |
 //! | a gripper | a file in `src/lab/gripper/` that implements [`palpate_lab::gripper::Gripper`] |
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
 //! | a filter or column of the trial library | `src/store/library/`, its option in `src/cli/trials/selection.rs` |
 //! | an edit of many trials | `src/store/labels/edit.rs` and `src/store/label_repository.rs` |
-//! | a format of exported trials | `src/store/trial_export.rs` |
+//! | the CSV export of trials | `src/store/trial_export.rs` |
 //! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
-//! | a file format for trials | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
-//! | work beside the window | a function in `src/lab/workers/` that returns a `Job`, and the feature that owns it |
+//! | another file format for exported trials (MCAP, NPZ, ..) | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
+//! | a background task of the window | a function in `src/lab/workers/` that returns a `Job`, and the feature that owns it |
 //! | a study | an `Experiment` in a file of `src/lab/study/`, and its arguments in `src/cli/study/` |
 //! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
 //! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
-//! | a look of surfaces | `src/geometry/finish.rs`, and how it answers to light in `src/render/passes/solid.rs` |
+//! | a surface finish (metal, rubber, ..) | a variant in `src/geometry/finish.rs`, and its shading in `src/render/passes/solid.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!
 //! # What is deliberately absent

@@ -40,7 +40,7 @@ pub enum BakeError {
     /// Nothing to bake.
     #[error("the object has no solid part to compute distances from")]
     NothingSolid,
-    /// The lattice would not fit into reasonable memory.
+    /// The grid would need too much memory.
     #[error("a distance grid of {nodes} nodes is too fine; raise solver.distance_cell (the limit is 8 million nodes)")]
     TooFine {
         /// Nodes needed.
@@ -51,25 +51,26 @@ pub enum BakeError {
 /// Nodes beyond this are refused: 32 MB and some ten seconds.
 const MOST_NODES: usize = 8_000_000;
 
-/// Distance from the solid (m) up to which the lattice holds exact values: the ends of contact springs are this thick at
-/// most, so that what they touch is never the lattice's own border.
+/// Distance from the solid (m) up to which the grid holds exact values: the ends of contact springs are at most this
+/// thick, so contact detection never reads values at the border of the grid.
 const REACH: f64 = 4e-3;
 
-/// Cells beyond that reach, for interpolation.
+/// Cells beyond [`REACH`], for interpolation.
 const MARGIN: f64 = 2.0;
 
-/// Farther away than that, a lattice this much coarser gives a lower bound. Most nodes of a 60 mm body are that far,
-/// which saves most of the time.
+/// At nodes farther from a mesh than [`REACH`] plus [`MARGIN`] cells, the value is only a lower bound, computed from a
+/// grid that is this many times coarser. Most nodes around a 60 mm object are that far away, so this saves most of the
+/// time.
 const STRIDE: usize = 4;
 
-/// A lattice spacing (m) that keeps 0.75 mm where it can, six cells across the thinnest extent, and no more than
+/// A grid spacing (m): 0.75 mm, less if there would be under six cells across the thinnest extent, but never more than
 /// 160 cells along the longest.
 pub fn choose_cell(bounds: &Bounds) -> f64 {
     let size = bounds.size();
     (0.75e-3f64).min(size.min_element() / 6.0).max(size.max_element() / 160.0)
 }
 
-/// Samples the union of some solids with lattice spacing `cell` (m).
+/// Samples the union of some solids with grid spacing `cell` (m).
 pub fn bake(parts: &[SolidPart], cell: f64) -> Result<DistanceGrid, BakeError> {
     let solid = parts.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
     let size = solid.size();
@@ -125,7 +126,7 @@ fn mesh_distances(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<f32> {
             .project_local_point_with_max_dist(query, false, limit as f32)
             .map_or(limit, |hit| f64::from((hit.point - query).length()))
     };
-    let coarse = CoarseLattice::new(grid, |p| unsigned(p, f64::from(f32::MAX)));
+    let coarse = CoarseGrid::new(grid, |p| unsigned(p, f64::from(f32::MAX)));
     let inside = inside_by_winding(grid, mesh);
     let band = REACH + MARGIN * grid.cell;
     let [_, ny, nz] = grid.size;
@@ -146,13 +147,13 @@ fn mesh_distances(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<f32> {
 }
 
 /// Unsigned distances on every [`STRIDE`]-th node.
-struct CoarseLattice {
+struct CoarseGrid {
     cell: f64,
     size: [usize; 3],
     values: Vec<f64>,
 }
 
-impl CoarseLattice {
+impl CoarseGrid {
     fn new(grid: &DistanceGrid, distance: impl Fn(DVec3) -> f64 + Sync) -> Self {
         let size = grid.size.map(|n| n.div_ceil(STRIDE) + 1);
         let [nx, ny, nz] = size;
@@ -180,7 +181,7 @@ fn inside_by_winding(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<bool> {
     (0..grid.values.len()).map(|n| votes.iter().filter(|vote| vote[n]).count() >= 2).collect()
 }
 
-/// Lines are shifted off the lattice by these shares of a cell, so that they do not run along edges of meshes
+/// Lines are shifted off the nodes by these shares of a cell, so that they do not run along edges of meshes
 /// modelled on round numbers.
 const LINE_SHIFT: [f64; 2] = [0.001_373, 0.000_719];
 

@@ -59,7 +59,7 @@ impl DistanceField {
     }
 }
 
-/// Signed distances on a regular lattice, read by trilinear interpolation.
+/// Signed distances on a regular grid, read by trilinear interpolation.
 ///
 /// The error of a smooth surface of radius R is about cell² / (8 R): 4 µm for 0.75 mm cells on a 20 mm ball.
 /// Edges are rounded at about half a cell.
@@ -73,7 +73,7 @@ pub struct DistanceGrid {
     pub size: [usize; 3],
     /// Distances (m), z fastest.
     pub values: Vec<f32>,
-    /// Bounding box of the solid itself, inside the lattice.
+    /// Bounding box of the solid itself, inside the grid.
     pub solid: Bounds,
 }
 
@@ -83,13 +83,13 @@ impl DistanceGrid {
         self.origin + DVec3::from_array(index.map(|i| i as f64)) * self.cell
     }
 
-    /// Signed distance; outside the lattice a lower bound.
+    /// Signed distance; outside the grid a lower bound.
     #[inline]
     pub fn distance(&self, p: DVec3) -> f64 {
         self.interpolated(p).unwrap_or_else(|| self.distance_outside(p))
     }
 
-    /// Distance by trilinear interpolation, inside the lattice (m).
+    /// Distance by trilinear interpolation, inside the grid (m).
     #[inline]
     fn interpolated(&self, p: DVec3) -> Option<f64> {
         let (c, t) = self.corner_values(p)?;

@@ -127,7 +127,7 @@ fn folds_keep_grasps_that_follow_each_other_together() {
         members.into_iter().enumerate().for_each(|(n, k)| expected[k] = (n + class) % 4);
     }
     assert_eq!(data.folds(4, 2), expected);
-    // Three placings of each object but the first, which was placed once.
+    // Three successions of each object but the first, which has one.
     let by_class = data.by_class();
     for (class, members) in by_class.iter().enumerate() {
         for (n, pair) in members.windows(2).enumerate() {
@@ -140,7 +140,7 @@ fn folds_keep_grasps_that_follow_each_other_together() {
     assert_eq!(parts(&by_class[0]), 4);
     for members in &by_class[1..] {
         assert_eq!(parts(members), 3);
-        assert!(members.chunks(4).all(|placing| parts(placing) == 1), "{folds:?}");
+        assert!(members.chunks(4).all(|succession| parts(succession) == 1), "{folds:?}");
     }
 }
 

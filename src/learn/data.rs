@@ -345,37 +345,36 @@ impl Dataset {
         by_class
     }
 
-    /// Grasps of one class as successions: each follows the one before it while the object stays as released. A grasp that
-    /// follows none begins its own.
-    pub(crate) fn chains(&self, members: &[usize]) -> Vec<Vec<usize>> {
+    /// Successions of one class: series of grasps between which the object stays as released.
+    pub(crate) fn successions(&self, members: &[usize]) -> Vec<Vec<usize>> {
         let mut ends: BTreeMap<i64, usize> = BTreeMap::new();
-        let mut chains: Vec<Vec<usize>> = Vec::new();
+        let mut successions: Vec<Vec<usize>> = Vec::new();
         for &k in members {
             let example = &self.examples[k];
-            let chain = example.after.and_then(|before| ends.remove(&before)).unwrap_or_else(|| {
-                chains.push(Vec::new());
-                chains.len() - 1
+            let place = example.after.and_then(|before| ends.remove(&before)).unwrap_or_else(|| {
+                successions.push(Vec::new());
+                successions.len() - 1
             });
-            chains[chain].push(k);
-            ends.insert(example.id, chain);
+            successions[place].push(k);
+            ends.insert(example.id, place);
         }
-        chains
+        successions
     }
 
-    /// Assigns each grasp a random part, 0 to `parts - 1`, stratified by class. Grasps that follow each other share a part,
-    /// unless they are all that their class has: it would be missing where that part is left out.
+    /// Assigns each grasp a random part, 0 to `parts - 1`, stratified by class. A succession stays in one part, unless
+    /// it is the only one of its class: then the class would be missing when that part is left out.
     pub(crate) fn folds(&self, parts: usize, seed: u64) -> Vec<usize> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut fold = vec![0; self.examples.len()];
         // Classes start at different parts, so that parts have equal size.
         for (class, members) in self.by_class().into_iter().enumerate() {
-            let mut chains = self.chains(&members);
-            if chains.len() == 1 {
-                chains = members.into_iter().map(|k| vec![k]).collect();
+            let mut successions = self.successions(&members);
+            if successions.len() == 1 {
+                successions = members.into_iter().map(|k| vec![k]).collect();
             }
-            chains.shuffle(&mut random);
-            for (n, chain) in chains.into_iter().enumerate() {
-                chain.into_iter().for_each(|k| fold[k] = (n + class) % parts.max(1));
+            successions.shuffle(&mut random);
+            for (n, succession) in successions.into_iter().enumerate() {
+                succession.into_iter().for_each(|k| fold[k] = (n + class) % parts.max(1));
             }
         }
         fold

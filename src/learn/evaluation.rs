@@ -126,9 +126,9 @@ fn successions(data: &Dataset, seed: u64) -> Vec<Vec<usize>> {
     let by_class = data.by_class();
     let mut successions = vec![Vec::new(); data.examples.len()];
     for members in by_class.iter().filter(|members| members.iter().any(|k| data.examples[*k].after.is_some())) {
-        for chain in data.chains(members) {
-            for (n, k) in chain.iter().enumerate() {
-                successions[*k] = chain[n..].iter().copied().take(MOST_GRASPS).collect();
+        for succession in data.successions(members) {
+            for (n, k) in succession.iter().enumerate() {
+                successions[*k] = succession[n..].iter().copied().take(MOST_GRASPS).collect();
             }
         }
     }

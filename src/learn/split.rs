@@ -1,9 +1,10 @@
 //! Splits of a data set into training and test trials.
 //!
-//! A [`SplitPlan`] is stratified: it divides each class by itself. Trials with equal [`Example::content`] are one grasp,
-//! of which only the first trial takes part, so that no recogniser is tested on a grasp that it has learned. Random plans
-//! keep grasps that follow each other on one object ([`Example::after`]) on one side: their poses resemble each other. A
-//! grasp that is left out of the data breaks such a succession, whose ends may then land on different sides.
+//! A [`SplitPlan`] is stratified: it divides each class by itself. Trials with equal [`Example::content`] are copies of
+//! one grasp; only the first copy is used, so no recogniser is tested on a grasp that it was trained on. A succession
+//! is a series of grasps between which the object stays as released ([`Example::after`]). Its poses are similar, so
+//! random plans put the whole succession either into training or into test. If a grasp in the middle is missing from
+//! the data, the succession splits in two, and the two pieces may end up on different sides.
 //!
 //! ```
 //! use palpate_learn::{Class, Dataset, Example, Labels, SplitPlan};
@@ -29,8 +30,8 @@ use std::str::FromStr;
 /// Trials to learn from and to test with, as indices into a data set.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Split {
-    /// Training trials. Random plans list them in the order drawn, with grasps that follow each other in a row; the others
-    /// list the oldest first.
+    /// Training trials. Random plans list them in random order but keep each succession together; other plans list them
+    /// oldest first.
     pub train: Vec<usize>,
     /// Training trials of stage two, as in the paper's 40/40/20; empty otherwise.
     pub second: Vec<usize>,
@@ -72,7 +73,7 @@ pub enum SplitPlan {
     LeavePoseOut,
 }
 
-/// Refuses a test with grasps of the training.
+/// Refuses to test on grasps of the training.
 pub fn check_apart<'a>(
     train: impl IntoIterator<Item = &'a Example>,
     test: impl IntoIterator<Item = &'a Example>,
@@ -119,13 +120,13 @@ impl SplitPlan {
     /// Cross-validation with five folds.
     pub const CROSS_VALIDATION: Self = Self::Folds { folds: 5 };
 
-    /// Makes the splits. Plans that draw at random are repeated with new draws; the others give the same splits whatever
-    /// the seed, once.
+    /// Makes the splits. Random plans (`Shares`, `Folds`) are drawn `repeats` times from `seed`; the other plans ignore
+    /// both and return their splits once.
     pub fn splits(&self, data: &Dataset, seed: u64, repeats: usize) -> Result<Vec<Split>, SplitError> {
         let grasps = different_grasps(data, self.needed())?;
-        let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| data.chains(members)).collect();
+        let successions: Vec<Vec<Vec<usize>>> = grasps.iter().map(|members| data.successions(members)).collect();
         if let Self::Shares(_) | Self::Folds { .. } = self {
-            check_placings(data, &successions, self.needed())?;
+            check_successions(data, &successions, self.needed())?;
         }
         let mut draws = (0..repeats.max(1) as u64).map(|repeat| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -145,7 +146,7 @@ impl SplitPlan {
         }
     }
 
-    /// Smallest number of different grasps of each class; of placings too, where the plan is random.
+    /// Smallest number of different grasps that each class needs; for random plans, also of successions.
     fn needed(&self) -> usize {
         match self {
             Self::Shares(shares) => shares.iter().filter(|share| **share > 0.0).count(),
@@ -154,7 +155,7 @@ impl SplitPlan {
         }
     }
 
-    /// Description for tables: `5 folds`.
+    /// Description for tables, such as `cross-validation with 5 folds`.
     pub fn described(&self) -> String {
         match self {
             Self::Shares(shares) => {
@@ -257,22 +258,23 @@ fn checked(shares: [f64; 3]) -> Result<(), SplitError> {
     Err(SplitError(cause.to_owned()))
 }
 
-/// Refuses classes with too few successions: random plans hand them out whole.
-fn check_placings(data: &Dataset, successions: &[Vec<Vec<usize>>], needed: usize) -> Result<(), SplitError> {
+/// Refuses classes with too few successions: random plans do not divide them.
+fn check_successions(data: &Dataset, successions: &[Vec<Vec<usize>>], needed: usize) -> Result<(), SplitError> {
     let mut classes = successions.iter().zip(&data.labels.classes);
-    match classes.find(|(chains, _)| (1..needed).contains(&chains.len())) {
-        Some((chains, class)) => Err(SplitError(format!(
-            "object \"{}\" was placed {} time(s) for {} grasps, {needed} are needed: grasps that follow each other on one \
-             object cannot be both learned and tested. Place it anew between grasps, or leave it out with --objects",
+    match classes.find(|(own, _)| (1..needed).contains(&own.len())) {
+        Some((own, class)) => Err(SplitError(format!(
+            "object \"{}\" was put down anew only {} time(s) for its {} grasps, but this split needs {needed}: all grasps \
+             until it is put down again must go to the same side (training or test). Put it down anew between grasps, or \
+             leave it out with --objects",
             class.name,
-            chains.len(),
-            chains.iter().map(Vec::len).sum::<usize>()
+            own.len(),
+            own.iter().map(Vec::len).sum::<usize>()
         ))),
         None => Ok(()),
     }
 }
 
-/// Each class as successions of grasps of one object, in a random order.
+/// The successions of each class, in random order.
 type Drawn = [Vec<Vec<usize>>];
 
 fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
@@ -287,13 +289,13 @@ fn by_shares(drawn: &Drawn, shares: [f64; 3]) -> Result<Split, SplitError> {
         let second = rounded(shares[0] + shares[1]).clamp(first + least[1], count - least[2]);
         let ends = [first, second, count];
         let (mut part, mut of_part, mut taken) = (0, 0, 0);
-        for (n, chain) in class.iter().enumerate() {
+        for (n, succession) in class.iter().enumerate() {
             let needed_later = |part: usize| least[part + 1..].iter().sum::<usize>();
             while part < 2 && of_part >= least[part] && (taken >= ends[part] || class.len() - n <= needed_later(part)) {
                 (part, of_part) = (part + 1, 0);
             }
-            [&mut split.train, &mut split.second, &mut split.test][part].extend_from_slice(chain);
-            (of_part, taken) = (of_part + 1, taken + chain.len());
+            [&mut split.train, &mut split.second, &mut split.test][part].extend_from_slice(succession);
+            (of_part, taken) = (of_part + 1, taken + succession.len());
         }
     }
     split.test.sort_unstable();
@@ -307,10 +309,10 @@ fn by_folds(drawn: &Drawn, folds: usize) -> Result<Vec<Split>, SplitError> {
     // More folds than successions would be empty.
     let folds = folds.min(drawn.iter().map(Vec::len).sum());
     let mut splits = vec![Split::default(); folds];
-    // Each class goes on where the one before ended, so that folds have equal size.
-    for (n, chain) in drawn.iter().flatten().enumerate() {
+    // Each class continues where the previous class ended, so that folds have equal size.
+    for (n, succession) in drawn.iter().flatten().enumerate() {
         for (fold, split) in splits.iter_mut().enumerate() {
-            if n % folds == fold { &mut split.test } else { &mut split.train }.extend_from_slice(chain);
+            if n % folds == fold { &mut split.test } else { &mut split.train }.extend_from_slice(succession);
         }
     }
     splits.iter_mut().for_each(|split| split.test.sort_unstable());

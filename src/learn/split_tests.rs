@@ -163,8 +163,10 @@ fn every_part_gets_a_succession_however_long_the_others_are() {
 fn an_object_that_was_placed_once_is_refused_by_random_plans() {
     for (lengths, plan, needed) in [(&[10][..], "80/20", 2), (&[10], "folds:5", 2), (&[9, 1], "40/40/20", 3)] {
         let refused = plan.parse::<SplitPlan>().unwrap().splits(&successions(lengths), 1, 1).unwrap_err();
-        let placings = lengths.len();
-        let expected = format!("object \"ball\" was placed {placings} time(s) for 10 grasps, {needed} are needed: ");
+        let successions = lengths.len();
+        let expected = format!(
+            "object \"ball\" was put down anew only {successions} time(s) for its 10 grasps, but this split needs {needed}: "
+        );
         assert!(refused.to_string().starts_with(&expected), "{plan}: {refused}");
     }
     for plan in ["first:6", "leave-a-pose-out"] {

@@ -1,5 +1,6 @@
-//! Ambient occlusion: the distances of the picture at half its size, and from them how much of its surroundings each place
-//! sees. A picture has four samples per pixel, whose depth cannot be read everywhere, so distances are drawn on their own.
+//! Ambient occlusion: distances from the eye at half the size of the picture and, computed from them, the openness: the
+//! share of its surroundings that each place sees. A picture has four samples per pixel, whose depth cannot be read
+//! everywhere, so distances are drawn on their own.
 
 use super::frame::FrameBindings;
 use super::screen::screen_pipeline;

@@ -2,7 +2,7 @@
 
 use crate::Picture;
 
-/// PictureDifference of two pictures of one size.
+/// Difference of two pictures of one size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PictureDifference {
     /// Pixels with a channel that differs by more than the tolerance.

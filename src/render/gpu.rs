@@ -7,7 +7,8 @@ use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Limits, Queue};
 /// Choice of graphics drivers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DriverChoice {
-    /// Whatever there is: Vulkan before OpenGL in a session with a display, hardware before software. `WGPU_BACKEND` overrides it.
+    /// Any driver: Vulkan before OpenGL in a session with a display, hardware before software. `WGPU_BACKEND` overrides
+    /// it.
     #[default]
     Any,
     /// OpenGL only: the same software rasteriser on every machine, for pictures that tests compare.
@@ -74,8 +75,9 @@ pub fn offscreen_backends() -> Vec<Backends> {
     backends_for(Backends::from_env(), std::env::var_os("XDG_RUNTIME_DIR").as_deref())
 }
 
-/// Each is looked for only where those before it have no driver, as looking makes libraries talk on the terminal. Mesa's Vulkan
-/// layer that chooses the device asks the Wayland display, which complains where there is no folder for it; OpenGL needs none.
+/// An interface is tried only if those before it have no driver, because trying makes libraries print messages. Mesa's
+/// Vulkan layer that chooses the device asks the Wayland display, which prints an error if its folder is missing;
+/// OpenGL needs no display.
 fn backends_for(named: Option<Backends>, wayland_folder: Option<&OsStr>) -> Vec<Backends> {
     match named {
         Some(named) => vec![named],

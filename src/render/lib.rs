@@ -5,7 +5,7 @@
 //!
 //! # Modules, lowest layer first
 //!
-//! A module imports only from lower layers. All are private; their items stand at the root of the crate.
+//! A module imports only from lower layers. All are private; their items are at the root of the crate.
 //!
 //! | layer | module | holds |
 //! |---|---|---|

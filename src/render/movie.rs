@@ -1,5 +1,5 @@
 //! Movies of pictures: animated PNG and GIF, written picture by picture, so that memory does not grow with their length.
-//! Of each picture only the rectangle is written that differs from the one before.
+//! Only the rectangle that differs from the previous picture is written.
 
 use crate::Picture;
 use std::io::Write;
@@ -57,7 +57,7 @@ struct Region {
 }
 
 impl Region {
-    /// The smallest one around all pixels that differ; one pixel where none does. All of the picture if there was none before.
+    /// The smallest rectangle around all pixels that differ, or one pixel if none does. The whole first picture.
     fn changed(before: &[u8], now: &[u8], [width, height]: [u32; 2]) -> Self {
         if before.len() != now.len() {
             return Self { x: 0, y: 0, width, height };

@@ -1,5 +1,5 @@
-//! Draws a list: the shadow map and the openness first, then every pass in order, then the resolve. An inset is drawn before,
-//! and copied in.
+//! Draws a [`DrawList`]: the shadow map and the ambient occlusion, then all passes in order, resolved from four samples
+//! per pixel to one. An inset (a picture within the picture) is drawn beforehand into its own texture and copied in.
 
 use super::ambient::{Ambient, AmbientTargets};
 use super::frame::FrameBindings;
@@ -10,22 +10,22 @@ use glam::Vec2;
 use palpate_geometry::drawing::{Detail, DrawList};
 use wgpu::{BindGroup, CommandEncoder, Device, Queue, Texture, TextureView};
 
-/// Long-lived pipelines and textures; what changes from picture to picture is uploaded by the passes.
+/// Long-lived pipelines and textures. The passes upload what changes from picture to picture.
 pub struct Renderer {
     frame: FrameBindings,
-    /// For pictures of full detail, and for fast ones.
+    /// Shadow maps for full and for fast detail.
     shadows: [ShadowMap; 2],
     ambient: Ambient,
     passes: Vec<Box<dyn Pass>>,
     /// The picture, and its inset.
-    sized: [Option<Sized>; 2],
+    sized: [Option<SizeTargets>; 2],
 }
 
-/// What pictures of one size are drawn with.
-struct Sized {
+/// Textures and bindings for one picture size.
+struct SizeTargets {
     targets: Targets,
     ambient: AmbientTargets,
-    /// The frame for passes that are lit, with either shadow map.
+    /// Bindings of the lit passes, one for each shadow map.
     lit: [BindGroup; 2],
 }
 
@@ -41,12 +41,12 @@ impl std::fmt::Debug for Renderer {
 const PICTURE: usize = 0;
 const INSET: usize = 1;
 
-/// Whole pixels of a place in a picture.
+/// A place in a picture, from points to whole pixels.
 fn whole(place: Vec2, pixels_per_point: f32) -> [u32; 2] {
     (place * pixels_per_point).round().max(Vec2::ONE).as_uvec2().to_array()
 }
 
-/// Pictures are at least this large (pixels); a panel dragged shut would need less.
+/// Smallest width and height of a picture (pixels): a panel may be dragged shut.
 const SMALLEST: u32 = 1;
 
 impl Renderer {
@@ -74,7 +74,7 @@ impl Renderer {
         let size = size.map(|s| s.clamp(SMALLEST, most));
         let prepare = Prepare { device, queue, list, pixels_per_point };
         if let Some(inset) = &list.inset {
-            // Submitted by itself: the passes hold one list at a time.
+            // The inset gets its own submission, because the passes can hold only one draw list at a time.
             let mut first = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let inner = whole(inset.size, pixels_per_point).map(|s| s.min(most));
             self.draw(&mut first, &Prepare { list: &inset.list, ..prepare }, inner, INSET);
@@ -93,14 +93,15 @@ impl Renderer {
             pass.prepare(prepare);
         }
         let which = usize::from(list.detail == Detail::Fast);
-        // The shadows of an inset are those of its picture.
+        // Picture and inset use the same shadow map. It is drawn with the inset's list, which comes first, so a list
+        // that has an inset skips it.
         if list.inset.is_none() {
             self.draw_shadow(encoder, &self.shadows[which]);
         }
         if self.sized[target].as_ref().map(|sized| sized.targets.size) != Some(size) {
             let ambient = self.ambient.targets(device, size);
             let lit = [0, 1].map(|k| self.frame.lit(device, &self.shadows[k], &ambient.openness));
-            self.sized[target] = Some(Sized { targets: Targets::new(device, size), ambient, lit });
+            self.sized[target] = Some(SizeTargets { targets: Targets::new(device, size), ambient, lit });
         }
         if let Some(sized) = &self.sized[target] {
             self.ambient.draw(encoder, &self.frame, &sized.ambient, |pass| {

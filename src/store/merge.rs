@@ -16,11 +16,12 @@ use std::path::Path;
 pub struct Merged {
     /// Trials copied.
     pub added: u64,
-    /// Trials that were in this store already.
+    /// Trials that this store already had.
     pub known: u64,
-    /// Those of them that have a label, note, tag or corrected phase in the other store alone, which stays there.
+    /// Of these, the trials with a label, note, tag or corrected phase that only the other store has; a merge does not
+    /// copy it.
     pub annotated: u64,
-    /// Trials of the other store that are damaged, which were left out.
+    /// Damaged trials of the other store, which were left out.
     pub damaged: Vec<TrialId>,
 }
 
@@ -32,8 +33,8 @@ const CHOOSE_INCOMING: &str = "
             ours.identity = theirs.identity AND ours.state = 'complete' AND ours.deleted IS NULL));
 ";
 
-/// Grasps that this store has already belong to the other's collections too: the same trial, else the oldest that holds
-/// the grasp.
+/// If this store already has a grasp, its trial is added to the collections that the grasp has in the other store. That
+/// trial is the one with the same uid, or else the oldest complete trial of the same grasp.
 const ADD_MEMBERSHIPS: &str = "
     INSERT OR IGNORE INTO main.memberships (trial, collection)
     SELECT holder.id, known.collection FROM (
@@ -56,7 +57,7 @@ const KEEP_KNOWN: &str = "
             AND (theirs.uid = main.trials.uid OR theirs.identity = main.trials.identity));
 ";
 
-/// Calibrations come along, so that signals can be derived here too. Mountings and the plan stay with each store.
+/// Calibrations are copied too, so that signals can be derived here. Mountings and the plan are not copied.
 const COPY_CALIBRATIONS: &str = "
     INSERT INTO main.calibrations (uid, part, version, created, withdrawn, record)
     SELECT uid, part, version + coalesce((SELECT max(version) FROM main.calibrations AS ours
@@ -71,7 +72,7 @@ const COPY_JOURNAL: &str = "
     WHERE theirs.uid NOT IN (SELECT uid FROM main.journal) ORDER BY theirs.number;
 ";
 
-/// Takes damaged trials out of those that are copied: those with these numbers, and those whose chunks are damaged.
+/// Takes damaged trials out of those to copy: the trials with these numbers, and trials with damaged chunks.
 fn leave_out_damaged(transaction: &Transaction<'_>, rows: &[TrialId]) -> rusqlite::Result<Vec<TrialId>> {
     let of_chunks = [FRAMES, READINGS, BYTES].map(|kind| {
         let (table, intact) = (kind.table, kind.intact("theirs"));
@@ -90,7 +91,7 @@ fn leave_out_damaged(transaction: &Transaction<'_>, rows: &[TrialId]) -> rusqlit
     transaction.prepare("SELECT id FROM temp.damaged ORDER BY id")?.query_map([], |row| row.get(0))?.collect()
 }
 
-/// Copies the chosen trials with everything that belongs to them; returns how many, and how many others are annotated.
+/// Copies the chosen trials with everything that belongs to them.
 fn copy(transaction: &Transaction<'_>, damaged: &[TrialId]) -> rusqlite::Result<Merged> {
     transaction.execute_batch(CHOOSE_INCOMING)?;
     let damaged = leave_out_damaged(transaction, damaged)?;
@@ -121,8 +122,8 @@ fn copy(transaction: &Transaction<'_>, damaged: &[TrialId]) -> rusqlite::Result<
     Ok(Merged { added, known, annotated, damaged })
 }
 
-/// Trials known here, about which the other store's journal says more, or that have a note or tag there and another
-/// uid here.
+/// Counts trials that this store already has and for which the other store has journal entries missing here, or a note
+/// or tag while this store has the grasp under another uid.
 const COUNT_ANNOTATED: &str = "
     SELECT count(*) FROM other.trials AS theirs
     WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)
@@ -139,17 +140,17 @@ fn columns_of(transaction: &Transaction<'_>, table: &str, key: &str) -> rusqlite
 }
 
 impl Store {
-    /// Copies the trials of another store that this one does not have, but for those of its demo log. Trials keep their identity, so that merging
-    /// twice adds nothing the second time; they get new numbers.
+    /// Copies the trials that this store lacks from another store, except those in the other store's demo log. Trials
+    /// keep their uid, so merging a second time adds nothing, but they get new numbers in this store.
     pub fn merge_from(&mut self, other: &Path) -> Result<Merged, StoreError> {
         if !other.is_file() {
             return Err(StoreError::open(other, "no such file"));
         }
-        // Opening it says why it cannot be read.
+        // Open it first as a store: this gives a clear error if it cannot be read.
         let theirs = Self::open(other)?;
         let damaged: Vec<TrialId> = theirs.list(true)?.iter().filter(|row| row.damaged).map(|row| row.id).collect();
         let fault = |e: rusqlite::Error| self.fault(&e);
-        // As it is spelt, even where that is no UTF-8.
+        // Pass the path byte for byte, even if it is not valid UTF-8.
         let name = ToSqlOutput::Borrowed(ValueRef::Text(theirs.file().as_os_str().as_encoded_bytes()));
         self.connection.execute("ATTACH DATABASE ?1 AS other", [name]).map_err(fault)?;
         let merged = self.write().and_then(|transaction| {

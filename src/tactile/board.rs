@@ -100,8 +100,8 @@ impl Board {
 /// Readings after which a board's channels are known.
 pub const KNOWN_AFTER: u32 = 5;
 
-/// Time of readings (s) after which it is known what a board is: it has answered who it is, or its counts have shown
-/// how far its converter goes.
+/// Time of readings (s) after which a board is identified: it has sent its handshake, or its counts have shown the
+/// range of its converter.
 pub const KNOWN_AFTER_S: f64 = 1.2;
 
 /// One line of a board.
@@ -120,7 +120,7 @@ pub struct Reading {
     pub line_bar: Option<f64>,
 }
 
-/// A stretch of time without readings. It stays a gap: nothing is put in its place.
+/// A stretch of time without readings. Gaps are not filled.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// Time of the last reading before it (s).

@@ -36,7 +36,7 @@ pub struct Cadence {
 }
 
 impl Cadence {
-    /// The same, with its counters counted from `before` on.
+    /// These statistics, with counters counted from `before` on.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             samples: self.samples.saturating_sub(before.samples),

@@ -19,7 +19,7 @@ pub enum SignalDefinition {
     Parts,
     /// Quantities of the simulation: the circle through all joints, and force over participation area.
     Contact,
-    /// The same, but force over the convex hull of the contacts, as in the paper; undefined for points and rows.
+    /// As `Contact`, but force over the convex hull of the contacts, as in the paper; undefined for points and rows.
     Hull,
 }
 
@@ -253,7 +253,7 @@ impl SensorLayout {
         }
     }
 
-    /// The same for channels that are learnt: refuses a pad's force beside its pressure.
+    /// A layout by its name, for recognisers: refuses a pad's force beside its pressure.
     pub fn learnt(name: &str, signals: SignalDefinition) -> Result<Self, LayoutError> {
         let layout = Self::named(name)?;
         match signals {

@@ -13,25 +13,25 @@ const CRYSTAL_PPM: f64 = 100.0;
 /// Clock error from which on a counter does not count microseconds (ppm).
 const NO_CLOCK_PPM: f64 = 10_000.0;
 
-/// The same as a share of the time in which the readings arrived, while the error is not known.
+/// Such a clock error as a share of the time in which the readings arrived, while the error is not known.
 const NO_CLOCK_SHARE: f64 = 0.5;
 
 /// Relative difference from the stated rate that passes.
 const RATE_SHARE: f64 = 0.02;
 
-/// Readings are needed for so long to measure their rate (s).
+/// Least time of readings to measure their rate (s).
 const RATE_S: f64 = 1.0;
 
 /// Share of readings that may be lost.
 const LOST_SHARE: f64 = 1e-3;
 
-/// Delay of readings from which on a note is given (ms): a tenth of what a driven grasp bears.
+/// Delay of readings from which on a note is given (ms): a tenth of the longest that a driven grasp accepts.
 const LATE_MS: f64 = 100.0;
 
 /// Least share of printable bytes in text; at half the rate about half of the bytes are printable.
 const TEXT: f64 = 0.9;
 
-/// Share of lines that may be unreadable, and how many may be in any case.
+/// Share of lines that may be unreadable, and a number that always may.
 const BAD_SHARE: f64 = 0.02;
 const BAD_LINES: u64 = 2;
 
@@ -50,12 +50,12 @@ fn is_file(link: &LinkStatus) -> bool {
     link.baud.is_none()
 }
 
-/// True for a file that has no times of arrival: they are made of the board's own, or of nothing.
+/// True for a file without times of arrival: they are derived from the board's times, or assumed.
 fn is_untimed(link: &LinkStatus) -> bool {
     is_file(link) && link.cadence.delay_p95_ms < 1e-3
 }
 
-/// True where the board counts: its time, or its readings.
+/// True if the board sends its time or the number of each reading.
 fn counts(link: &LinkStatus) -> bool {
     link.detected.as_ref().is_some_and(|detected| detected.time != TimeSource::Arrival)
 }

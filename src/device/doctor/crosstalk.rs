@@ -1,5 +1,5 @@
 //! Guided crosstalk test: each sensor is moved in turn, alone, while the untouched sensors of the other finger are watched.
-//! Those of the same finger cannot be used: bending a finger presses on its pad.
+//! The sensors of the same finger cannot be watched: bending a finger presses on its pad.
 //!
 //! ```text
 //!   leave both fingers alone   -> where every sensor rests
@@ -7,8 +7,8 @@
 //!   ...                           for every sensor of the board
 //! ```
 //!
-//! Crosstalk of a converter's multiplexer follows the other sensor at once and in proportion. A sensor that moves out of step
-//! was touched.
+//! With crosstalk of a converter's multiplexer, the reading of one sensor follows the other at once and in proportion.
+//! A sensor whose reading changes at other times was touched.
 
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use serde::Serialize;
@@ -22,10 +22,11 @@ const LEAST_COUNTS: f64 = 8.0;
 const IN_STEP: f64 = 0.8;
 /// Least change of the moved sensor (counts of 4095): a press of 0.1 N, a bend of ten degrees.
 const MOVES: f64 = 150.0;
-/// It is back when it is this near to its rest (counts of 4095), or by this share of how far it was away: strips creep.
+/// A sensor is back when it is this near to its rest (counts of 4095), or within this share of its change: strips
+/// creep.
 const BACK: f64 = 50.0;
 const BACK_SHARE: f64 = 0.25;
-/// It must be back for this long (s).
+/// A sensor must be back for this long (s).
 const BACK_S: f64 = 0.4;
 /// At rest no sensor changes by more than this (counts of 4095) for [`REST_S`] (s).
 const STILL: f64 = 30.0;
@@ -38,17 +39,17 @@ const LEAST_READINGS: usize = 10;
 /// Influence of one sensor on another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bleed {
-    /// The one that was moved.
+    /// The sensor that was moved.
     pub from: Sensor,
-    /// The one that was watched.
+    /// The sensor that was watched.
     pub into: Sensor,
-    /// Change of the second over that of the first.
+    /// Change of the watched sensor over that of the moved one.
     pub share: f64,
-    /// Largest change of the second by it (counts).
+    /// Largest change of the watched sensor by the moved one (counts).
     pub counts: f64,
-    /// The second moved.
+    /// The watched sensor moved.
     pub moved: bool,
-    /// It is crosstalk: the second is in step with the first, by more than noise.
+    /// It is crosstalk: the watched sensor is in step with the moved one, by more than noise.
     pub bleeds: bool,
 }
 
@@ -67,14 +68,14 @@ pub struct CrosstalkTest {
     at: usize,
     /// Times (s) and counts of the last second, while everything rests.
     window: VecDeque<(f64, [Option<f64>; 4])>,
-    /// Since when a rest is waited for (s), and which sensor keeps it from coming.
+    /// Time since which a rest is awaited (s), and the sensor that does not rest.
     resting: Option<f64>,
     restless: Option<Sensor>,
-    /// Those that were waited for in vain.
+    /// Sensors that did not come to rest in time.
     flickers: [bool; 4],
     moving: Option<Moving>,
     found: Vec<Bleed>,
-    /// Those that could not be watched, and while which was moved.
+    /// Sensors that could not be watched, each with the one that was moved meanwhile.
     unwatched: Vec<[Sensor; 2]>,
     left_out: Vec<Sensor>,
 }
@@ -89,7 +90,7 @@ struct Moving {
     others: [f64; 4],
     /// Largest change so far, with its sign (counts).
     most: f64,
-    /// Since when it is back (s).
+    /// Time since which it is back (s).
     back: Option<f64>,
 }
 
@@ -119,7 +120,7 @@ impl CrosstalkTest {
         })
     }
 
-    /// Takes in news of the board.
+    /// Updates the description of the board.
     pub fn see(&mut self, board: &Board) {
         self.scale = f64::from(board.full_scale) / 4095.0;
     }

@@ -11,16 +11,16 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Times of the query `?`: the board may restart when the port is opened.
 const ASKED_AT: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(4500)];
 
-/// How much later than this computer's clock says the readings of a time may arrive (s): a board boots, a computer is busy.
+/// Largest delay of readings that is waited for (s): a board boots, a computer is busy.
 const LATE_S: f64 = 5.0;
 
-/// True where `seconds` of readings have come, or come no more, after `waited_s` (s) of this computer's clock.
+/// True if `seconds` of readings have come, or no more are expected, after `waited_s` (s) of this computer's clock.
 pub fn is_enough(traces: &ChannelTraces, waited_s: f64, seconds: f64) -> bool {
     let come = traces.channels.is_empty() || traces.seconds() >= seconds;
     waited_s >= seconds && (come || waited_s >= seconds + LATE_S)
 }
 
-/// The newest line that could not be read; where there was none, the newest.
+/// The newest unreadable line or, without one, the newest line.
 pub fn example_of(console: &[ConsoleLine]) -> Option<ConsoleLine> {
     let bad = console.iter().rev().find(|line| matches!(line.kind, LineKind::Bad(_)));
     bad.or(console.last()).cloned()

@@ -1,8 +1,8 @@
-//! Diagnosis of the connection to the gripper's board: one look at the port, then a list of checks, each from observations
-//! to a finding with its evidence, cause and fix. The terminal and the window show the same list.
+//! Diagnosis of the connection to the gripper's board: the port is observed once, then a list of checks turns the
+//! observations into findings with evidence, cause and fix. The terminal and the window show the same list.
 //!
-//! To add a check, write it in `connection` or `sensors` and add one line to [`CHECKS`]. A check that did not see what it
-//! needs has not passed: it was not checked.
+//! To add a check, write it in `connection` or `sensors` and add one line to [`CHECKS`]. A check that did not
+//! get the data it needs has not passed: its outcome is "not checked".
 
 mod checks;
 mod connection;
@@ -29,11 +29,11 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckStatus {
-    /// It says nothing of this board or file.
+    /// The check does not apply to this board or file.
     Skipped,
     /// Nothing is wrong.
     Passed,
-    /// What it needs was not seen: no readings, too few, or nothing moved.
+    /// The check did not get the data it needs: no readings, too few, or nothing moved.
     NotChecked,
     /// Worth knowing.
     Note,

@@ -10,16 +10,16 @@ use palpate_tactile::board::{Board, Sensor};
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
 const IDLE_COUNTS: f64 = 20.0;
 
-/// Counts of 4095 below which no strip is, however it is bent.
+/// Counts of 4095 below which a strip never reads, however it is bent.
 const LEAST_OF_A_STRIP: f64 = 400.0;
 
 /// Largest count of ten bits.
 const TEN_BITS: f64 = 1023.0;
 
-/// How long counts are watched before their largest says that the converter has ten bits (s).
+/// Time of readings after which their largest count shows that the converter has ten bits (s).
 const BITS_S: f64 = 5.0;
 
-/// A saturated channel is one for half a second (s).
+/// A channel counts as saturated after half a second (s).
 const ENDS_S: f64 = 1.0;
 
 /// No board has a higher supply (V).

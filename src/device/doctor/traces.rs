@@ -1,5 +1,5 @@
-//! Range of each channel, whether it stands still while others move, and how much it follows the channel that is converted
-//! before it.
+//! Range of each channel, whether it is constant while others move, and how much it follows the channel that is
+//! converted before it.
 
 use palpate_tactile::board::Reading;
 
@@ -98,9 +98,9 @@ impl ChannelTrace {
         self.range() > MOVES
     }
 
-    /// Share of the channel before that it follows, if it does: at its least it reads that share, and at times, when the
-    /// other moves and nothing else happens, it moves by about that share. A pad that is pressed all the time reads one too,
-    /// but does not move with it; one that is pressed by a closing finger moves far more.
+    /// Share of the channel before that this channel follows, if it does: its least reading is that share, and it often
+    /// moves by about that share when the other moves. A pad that is pressed all the time also reads a share, but does
+    /// not move with the other; a pad that is pressed by a closing finger moves far more.
     pub fn takes(&self) -> Option<f64> {
         let share = self.least_share;
         let like = |slope: &&f64| (**slope - share).abs() < 0.5 * share;
@@ -116,16 +116,16 @@ const FEWEST: usize = 4;
 /// All channels, in the order in which the board reads them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChannelTraces {
-    /// One for each.
+    /// One trace per channel.
     pub channels: Vec<ChannelTrace>,
     /// Times of the first and the newest reading, and of their arrival (s).
     span: Option<[[f64; 2]; 2]>,
 }
 
-/// A channel that has stayed at this count for so long (s) counts as stuck, where others moved meanwhile: noise moves every
+/// A channel whose count was constant for this long (s) is stuck, if others moved meanwhile: noise moves every
 /// converter by a count.
 const STUCK_S: f64 = 1.0;
-/// It must be this share of the time, too: a strip at rest beside one that moves may be quiet.
+/// The count must also be constant for this share of the time: a strip at rest beside one that moves may be quiet.
 const STUCK_SHARE: f64 = 2.0 / 3.0;
 
 impl ChannelTraces {
@@ -141,17 +141,17 @@ impl ChannelTraces {
         }
     }
 
-    /// The first reading's time to the newest's (s).
+    /// Time from the first reading to the newest (s).
     pub fn seconds(&self) -> f64 {
         self.span.map_or(0.0, |[first, newest]| newest[0] - first[0])
     }
 
-    /// The same by their arrival (s).
+    /// Time from the arrival of the first reading to that of the newest (s).
     pub fn arrived_within_s(&self) -> f64 {
         self.span.map_or(0.0, |[first, newest]| newest[1] - first[1])
     }
 
-    /// Count at which a channel has stood still, and for how long (s), while others moved.
+    /// Count at which a channel was constant while others moved, and for how long (s).
     pub fn stuck(&self, channel: usize) -> Option<[f64; 2]> {
         let [count, since] = self.channels.get(channel)?.still?;
         let lasted = self.span?[1][0] - since;

@@ -22,7 +22,7 @@ const SETTLE_S: f64 = 0.5;
 /// Actuation rate of fingers that a host drives (1/s): a host may set a pressure at any moment.
 const DRIVEN_HZ: u32 = 300;
 
-/// Time of venting after which the next pressure begins another grasp (s).
+/// After venting for this time (s), the next pressure begins another grasp.
 const LET_GO_S: f64 = 0.5;
 
 /// Time to bend a strip or place a weight (s).
@@ -41,8 +41,9 @@ struct Graspable {
 pub struct HandPlan {
     /// The gripper, its programme, and how objects lie.
     pub scene: Scene,
-    /// What is in the hand, grasp by grasp and then again; `empty` in front of others stands for the first grasp of a host
-    /// only. None: the built-in objects by itself, and nothing once a host drives, because nobody puts anything there.
+    /// What is in the hand, grasp by grasp and then again. If the list starts with `empty`, the hand is empty for the
+    /// first grasp of a host only. Without a list, the hand grasps the built-in objects by itself, and is empty once a
+    /// host drives.
     pub objects: Vec<String>,
     /// Random seed of the poses.
     pub seed: u64,

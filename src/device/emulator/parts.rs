@@ -27,7 +27,7 @@ pub struct PadSetup {
     pub divider_ohm: f64,
 }
 
-/// Hidden values of the emulated gripper's electronics. Those of its fingers stand in the scene.
+/// Hidden values of the emulated gripper's electronics. The values of its fingers are in the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HiddenParts {

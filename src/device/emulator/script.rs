@@ -1,6 +1,6 @@
 //! Bench scripts: what the emulated experimenter does, step by step, as in a calibration.
 //!
-//! Steps stand on lines or between semicolons; `#` begins a remark. Words of a step are separated by spaces:
+//! Steps are separated by line ends or semicolons; `#` begins a remark. Words of a step are separated by spaces:
 //!
 //! ```text
 //! angle=30 hold=2          both strips lie on a jig bent by 30 degrees, for 2 s

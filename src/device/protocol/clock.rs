@@ -61,7 +61,7 @@ pub(super) struct StreamClock {
     late: Option<(f64, f64)>,
     /// The connection was lost since the last reading.
     broken: bool,
-    /// The counters of the line before contradicted each other.
+    /// The counters of the previous line contradicted each other.
     doubted: bool,
 }
 

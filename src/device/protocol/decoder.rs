@@ -1,5 +1,5 @@
-//! Decoder: bytes to readings. The line format is detected; unreadable lines are counted and become gaps, and nothing is put
-//! in their place.
+//! Decoder: bytes to readings. The line format is detected; unreadable lines are counted and become gaps, which are not
+//! filled.
 
 use super::cadence::Meter;
 use super::checksum;

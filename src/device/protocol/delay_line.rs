@@ -12,7 +12,7 @@
 
 use std::collections::VecDeque;
 
-/// Of each stretch of this length only the point of least delay is kept (s).
+/// Length of a stretch, of which only the point of least delay is kept (s).
 const STRETCH_S: f64 = 0.25;
 /// How many stretches are remembered: a minute, in which a quartz's drift is steady and 200 ppm come to 12 ms.
 const STRETCHES: usize = 256;
@@ -37,9 +37,9 @@ pub(super) struct DelayLine {
 impl DelayLine {
     /// How far a gain may be from the nominal one: ceramic resonators are off by half a percent.
     const GAIN_SLACK: f64 = 0.01;
-    /// A gain is fitted once the points span this long (s); shorter ones say more of their jitter.
+    /// A gain is fitted once the points span this time (s); over shorter times jitter dominates.
     const GAIN_SPAN_S: f64 = 5.0;
-    /// The same where there is no nominal gain to go by.
+    /// Span of the points after which a gain is fitted if there is no nominal gain (s).
     const FREE_SPAN_S: f64 = 1.0;
 
     pub(super) fn new(nominal: Option<f64>) -> Self {

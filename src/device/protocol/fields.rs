@@ -7,8 +7,8 @@
 //! JSON      {"flexL":512,"flexR":498}       one flat object to a line
 //! ```
 //!
-//! `nan`, `err` or nothing in a number's place costs that channel alone; any other word refuses the line. What passes here
-//! is believed by [`super::shape`] only when the board repeats it.
+//! If a number is replaced by `nan`, `err` or nothing, only that channel has no value; with any other word the line is
+//! refused. [`super::shape`] accepts the fields found here only when the board repeats them.
 
 use palpate_tactile::board::{Format, Sensor};
 
@@ -26,7 +26,7 @@ const NOTHING: [&str; 19] = [
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field {
     pub(super) name: String,
-    /// None where the board had none to print.
+    /// None if the board had no number.
     pub(super) value: Option<f64>,
 }
 

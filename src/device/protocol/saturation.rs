@@ -1,12 +1,12 @@
 //! Saturated channels: at an end of the converter's range, or without numbers; and whether counts fit that range.
 
-/// State of a channel that says nothing of its sensor.
+/// State of a channel whose counts do not depend on its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Saturation {
-    /// No counts: the pin is at ground.
+    /// Zero counts: the pin is at ground.
     Low,
-    /// All of them: the pin is at the reference voltage, or above.
+    /// Full scale: the pin is at the reference voltage, or above.
     High,
     /// `nan`, a word or nothing where a number should be.
     NoNumber,
@@ -24,9 +24,9 @@ const NEAR: f32 = 1.0 / 512.0;
 pub(super) const FULL_12_BIT: u32 = 4095;
 /// Default full scale of `analogRead`.
 pub(super) const FULL_10_BIT: u32 = 1023;
-/// How long counts are watched before their largest says something of the converter (s): a close and a release.
+/// Time of readings after which their largest count shows the range of the converter (s): a close and a release.
 const WATCHED_S: f64 = 5.0;
-/// With less than this nothing is connected, and nothing can be said.
+/// Below this count nothing is connected, and the range is unknown.
 const ANYTHING: f32 = 128.0;
 /// Readings in a row beyond the full scale that show a wider converter: one alone may be a damaged number.
 const BELIEVED: u32 = 3;
@@ -35,13 +35,13 @@ const BELIEVED: u32 = 3;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AdcRange {
-    /// They do, or too few have come.
+    /// The counts fit, or too few have come.
     #[default]
     Fits,
     /// A flex strip never exceeds 10 bits; with 12 it is above a quarter of the range. A sketch may forget
     /// `analogReadResolution`.
     LooksTenBit,
-    /// They exceed it.
+    /// The counts exceed the range.
     Exceeded,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct SaturationWatch {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
-    /// The end at which it stands, and since when (s).
+    /// The end of the range that it is at, and since when (s).
     at: Option<(Saturation, f64)>,
 }
 

@@ -1,6 +1,6 @@
-//! The fields of a board's lines. A board repeats itself, and noise does not: a line is accepted when it has the fields of
-//! the lines before. Other fields are accepted when two lines in a row have them; a part of the known fields looks like a
-//! line that was cut, and is accepted only when twenty lines in a row have it.
+//! The fields of a board's lines. A board repeats its fields, and noise does not: a line is accepted when it has the
+//! fields of the previous lines. Other fields are accepted when two lines in a row have them; a part of the known
+//! fields looks like a line that was cut, and is accepted only when twenty lines in a row have it.
 
 use super::checksum::KEY;
 use super::fields::{Field, Fields, MAX_FIELDS, NAMELESS};
@@ -19,9 +19,9 @@ pub(super) struct Candidate {
 pub(super) enum Role {
     /// Counts, at this place.
     Channel(usize),
-    /// The board's time, in microseconds or milliseconds.
+    /// The board's time, in microseconds.
     Micros,
-    /// The same in milliseconds.
+    /// The board's time, in milliseconds.
     Millis,
     /// The sequence number.
     Sequence,
@@ -29,7 +29,7 @@ pub(super) enum Role {
     LineBar,
     /// The checksum, already verified.
     Checksum,
-    /// None: it has no name, or there are too many channels.
+    /// Ignored: the field has no name, or there are too many channels.
     Ignored,
 }
 
@@ -56,7 +56,7 @@ impl Role {
 
 /// Lines that confirm another set of fields.
 const CONFIRM: u32 = 2;
-/// The same where it is a part of the known one.
+/// Lines that confirm a set of fields that is a part of the known one.
 const CONFIRM_PART: u32 = 20;
 
 /// Accepted fields, and the candidates for others.
@@ -72,11 +72,11 @@ pub(super) struct Shapes {
 /// Verdict on a line.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Judged {
-    /// It has the known fields.
+    /// The line has the known fields.
     Known(Candidate),
-    /// Its fields are now accepted; the line before, which had them too, waited.
+    /// The fields of the line are now accepted; the previous line, which also had them, waited.
     Changed(Box<[Candidate; 2]>),
-    /// It waits for another like it, in place of `given_up` lines that waited before.
+    /// The line waits for another like it, in place of `given_up` lines that waited before.
     Waits { given_up: u64 },
 }
 

@@ -1,12 +1,13 @@
-//! Link to a board: its events in order and without loss, through disconnections.
+//! Link to a board: delivers its events in order and reconnects after a disconnection.
 //!
 //! ```text
 //!   "serial-read"                 "serial-decode"              listener
 //!   reads, stamps  --bytes-->     Decoder      --events-->     take(): readings, gaps, bytes
-//!   opens again after a loss                                   status(), console(), send()
+//!   reconnects                                                 status(), console(), send()
 //! ```
 //!
-//! Both queues are bounded; what does not fit is counted and becomes a gap.
+//! Both queues are bounded. From a port, data that do not fit are dropped, counted and reported as a gap; a file of
+//! captured bytes waits, so nothing is lost.
 
 use super::baud::Baud;
 use super::port_error::PortError;
@@ -29,10 +30,10 @@ use std::time::Duration;
 /// Status of a link, for display.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkStatus {
-    /// Its state.
+    /// State of the connection.
     #[serde(flatten)]
     pub state: LinkState,
-    /// Its port.
+    /// Port, or file of captured bytes.
     pub port: PortInfo,
     /// Baud rate; none for captured bytes.
     pub baud: Option<u32>,
@@ -73,7 +74,7 @@ impl LinkStatus {
         remarks
     }
 
-    /// Faults of the wiring, as far as counts show them.
+    /// Faults of the wiring that show in the counts.
     pub fn wiring_remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         let full = self.board.full_scale;
@@ -105,7 +106,7 @@ impl LinkStatus {
                 (Some(Saturation::NoNumber), _) => sensor.map(|_| {
                     format!("{name} has no numbers: an open circuit as the sketch sees it; look at its lines in the console")
                 }),
-                // A pad that nothing touches reads nothing.
+                // A pad without load reads zero.
                 (Some(Saturation::Low), false) | (None, _) => None,
             });
         }
@@ -126,7 +127,7 @@ pub enum SendError {
     /// There is no board at the moment.
     #[error("the board is not connected: nothing was sent")]
     NotConnected,
-    /// The port did not take it.
+    /// Writing to the port failed.
     #[error("cannot send to the board: {0}")]
     Port(String),
 }

@@ -38,7 +38,7 @@ pub struct BoardKind {
     pub native: bool,
 }
 
-/// Known devices by vendor and product; product 0 stands for any other of the vendor. Sources: Arduino's
+/// Known devices by vendor and product; product 0 means any other of the vendor. Sources: Arduino's
 /// `boards.txt`, usb.ids.
 const KNOWN: &[(u16, u16, &str, BoardKind)] = &[
     (0x2341, 0x003d, "Arduino Due, programming port", BoardKind { rank: 3, native: false }),

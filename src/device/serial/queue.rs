@@ -48,7 +48,7 @@ pub(super) struct ByteQueue {
 struct Bytes {
     pieces: VecDeque<Captured>,
     size: usize,
-    /// Bytes that found no room since the last that did.
+    /// Bytes dropped since the last that were queued.
     dropped: u64,
     dropped_in_all: u64,
     closed: bool,
@@ -82,7 +82,7 @@ impl ByteQueue {
         self.changed.notify_all();
     }
 
-    /// Everything that waits, once there is something; none when there will be nothing more.
+    /// Takes everything that waits, once there is something; none at the end.
     pub(super) fn take(&self) -> Option<VecDeque<Captured>> {
         let mut state = lock(&self.state);
         while state.pieces.is_empty() && !state.closed {
@@ -124,10 +124,10 @@ pub(super) struct EventQueue {
 #[derive(Debug, Default)]
 struct Events {
     events: VecDeque<LinkEvent>,
-    /// Readings that were let go since the last that were taken, and the time of the first of them (s).
+    /// Readings dropped since the last call of `take`, and the time of the first of them (s).
     dropped: Option<(u64, f64)>,
     dropped_in_all: u64,
-    /// Time of the last reading that was taken (s).
+    /// Time of the last reading that `take` returned (s).
     taken_s: Option<f64>,
     closed: bool,
 }
@@ -168,7 +168,7 @@ impl EventQueue {
         self.changed.notify_all();
     }
 
-    /// Everything that waits; if nothing does, waits for it up to a time.
+    /// Takes everything that waits; if nothing does, waits up to a time.
     pub(super) fn take(&self, patience: Duration) -> Vec<LinkEvent> {
         let mut state = lock(&self.state);
         if state.events.is_empty() && !state.closed {
@@ -192,7 +192,7 @@ impl EventQueue {
         events
     }
 
-    /// There will be nothing more.
+    /// Ends the queue.
     pub(super) fn close(&self) {
         lock(&self.state).closed = true;
         self.changed.notify_all();

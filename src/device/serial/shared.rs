@@ -48,14 +48,14 @@ pub enum LinkState {
         /// What to try.
         hint: String,
     },
-    /// The port is gone; it is looked for.
+    /// The port is gone; the link looks for it.
     Lost {
         /// Why.
         cause: String,
     },
-    /// It is over.
+    /// The link has ended.
     Ended {
-        /// Why, where it was not asked for.
+        /// Why, if it was not stopped on request.
         cause: Option<String>,
         /// Captured bytes that are damaged or end within a record: what followed is missing.
         cut_short: bool,
@@ -92,7 +92,7 @@ pub(super) struct Shared {
     pub(super) decoder: Mutex<Decoder>,
     pub(super) state: Mutex<LinkState>,
     pub(super) port: Mutex<PortInfo>,
-    /// The way back to the board, while there is one.
+    /// Writer to the board, while it is connected.
     pub(super) writer: Mutex<Option<Box<dyn serialport::SerialPort>>>,
     pub(super) baud: AtomicU32,
     pub(super) reconnects: AtomicU32,

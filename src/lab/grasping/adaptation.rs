@@ -1,5 +1,5 @@
-//! Adapting to a real gripper without labels: calibrations of its parts from one close of its empty hand. Afterwards its
-//! readings are those that a recogniser for any gripper has learned.
+//! Adapting to a real gripper without labels: calibrations of its parts from one close of its empty hand. Recognisers
+//! for any gripper were trained on readings that are calibrated in this way.
 
 use super::run::grasp;
 use palpate_sim::gripper::{Phase, Side};
@@ -12,7 +12,7 @@ use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyHand, Kno
 use palpate_tactile::trial::{BoardLog, TrialId};
 use palpate_tactile::{Sensors, SignalDefinition};
 
-/// Largest share by which a strip that was calibrated by hand may read otherwise than the modelled finger bends.
+/// Largest relative difference between a strip that was calibrated by hand and the bend of the modelled finger.
 const AGREES: f64 = 0.1;
 /// Least difference of the line pressure from that of the programme that is taken into account (bar).
 const OTHER_BAR: f64 = 0.02;
@@ -29,7 +29,7 @@ const DISTURBED: usize = 4;
 /// How a sensor was adapted.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AdaptedSensor {
-    /// Its part was calibrated by hand before, and stays so.
+    /// Not adapted: its part keeps the calibration made by hand.
     Kept(Calibration),
     /// Calibrated from the empty close.
     Adapted(Calibration),
@@ -94,20 +94,20 @@ pub enum AdaptError {
         finger: &'static str,
         /// What it did.
         how: &'static str,
-        /// The trial was deleted, since it is none of an empty hand.
+        /// The trial was deleted, because the hand was not empty.
         deleted: bool,
     },
 }
 
-/// Name of a part that nobody has named.
+/// Name of a part without a given name.
 fn unnamed(sensor: Sensor) -> String {
     format!("unnamed {}", sensor.label())
 }
 
 impl Adaptation {
-    /// Adapts to a gripper by a stored trial of its empty hand. `scene` holds the modelled gripper and the programme of the
-    /// closing, `weights` what the pads read under known weights. Parts that were calibrated by hand stay so, unless
-    /// `replace`.
+    /// Adapts to a gripper by a stored trial of its empty hand. `scene` holds the modelled gripper and the programme of
+    /// the closing, `weights` what the pads read under known weights. Parts that were calibrated by hand keep their
+    /// calibration, unless `replace`.
     pub fn from_trial(
         store: &Store,
         id: TrialId,
@@ -133,12 +133,12 @@ impl Adaptation {
         Ok(Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights))
     }
 
-    /// The same by readings that are not stored, of parts without names.
+    /// Adapts by readings that are not stored, of parts without names.
     pub fn of_log(log: &BoardLog, scene: &Scene) -> Self {
         Self::new(log, scene, &[const { None }; 4], &[], [None; 2])
     }
 
-    /// The same by a close that was recorded for it, as one of the empty hand. If something was in it, it is deleted.
+    /// Adapts by a trial that was recorded for this purpose. Deletes the trial if something was in the hand.
     pub fn from_close(
         store: &mut Store,
         id: TrialId,
@@ -240,10 +240,10 @@ fn most(course: &[(f64, f64)]) -> f64 {
     course.iter().map(|(_, kappa)| *kappa).fold(0.0, f64::max)
 }
 
-/// The finger that something stopped during a close that was driven, and how that shows. Against an object a finger bends as in
-/// the empty hand until it touches, and then hardly, so that it is early with what it reaches in the end; where the object
-/// slips out, it is late. Strips alone tell this: pads also fire where fingers only bend, or press on each other. A hand
-/// that is closed by hand follows no programme, and is not judged.
+/// The finger that an object stopped during a driven close, and the evidence. Against an object a finger bends as in
+/// the empty hand until it touches, and then hardly: it reaches its final bend early, or late if the object slips out.
+/// Only the strips are used: pads also respond when fingers only bend or press on each other. A close by hand follows
+/// no programme and is not checked.
 fn held(log: &BoardLog, scene: &Scene) -> Option<(Side, &'static str)> {
     log.course.phases.first()?.line_bar?;
     let scene = as_driven(log, scene);
@@ -267,7 +267,7 @@ fn held(log: &BoardLog, scene: &Scene) -> Option<(Side, &'static str)> {
     Side::BOTH.into_iter().find_map(judged)
 }
 
-/// Value of a course at a time (s).
+/// Value of a curve over time at a time (s).
 fn at(course: &[(f64, f64)], t_s: f64) -> f64 {
     let after = course.partition_point(|(own_s, _)| *own_s < t_s);
     match (after.checked_sub(1).and_then(|before| course.get(before)), course.get(after)) {

@@ -1,15 +1,15 @@
 //! Grasps computed again at finer accuracy: where forces change in the hold, or until three levels agree.
 //!
-//! No flag sees that a free object slipped the other way: the path decides, not the state at the end. Another run at a
-//! tenth of the tolerance sees most of it, and where the two disagree still finer ones decide:
+//! No flag detects that a free object slipped in the wrong direction, because this depends on the path, not on the
+//! state at the end. A run at a tenth of the tolerance detects most such cases. If the two disagree, finer runs decide:
 //!
 //! ```text
 //! asked for --> a tenth --> a hundredth --> ..  until three in a row end alike; the finest of them is reported
 //! ```
 //!
 //! Two in a row are not enough: one in a hundred extreme scenes ends in the same wrong place at two coarse levels. Levels
-//! end one below the accuracy `reference`, or where three have been computed. How often the reported result is wrong, and
-//! what it costs, is measured by `palpate study stability`.
+//! end one below the accuracy `reference`, but up to three are always computed. `palpate study stability` measures how
+//! often the reported result is wrong, and what it costs.
 
 use super::run::{grasp, prepare};
 use glam::DVec3;
@@ -24,7 +24,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recompute {
-    /// Where forces change repeatedly in its hold, or it does not come to rest.
+    /// If forces change repeatedly in its hold, or it does not come to rest.
     #[default]
     Unsettled,
     /// Until three levels of accuracy in a row agree.
@@ -36,8 +36,8 @@ pub enum Recompute {
 pub enum EndState {
     /// The object has left the hand.
     Lost,
-    /// Means over the hold, later than half a second into it, where what was pushed has settled; without a hold those
-    /// of the last sample.
+    /// Means over the hold from half a second on, when the object has settled; without a hold, values of the last
+    /// sample.
     Held {
         /// Joint angles (rad).
         q: Vec<f64>,
@@ -93,7 +93,7 @@ pub fn has_lost_object(start: &Frame, now: &Frame) -> bool {
     moved.is_some_and(|moved| moved.length() > GONE || moved.z < -FALLEN)
 }
 
-/// Levels in a row that agree on a grasp that is computed until they do.
+/// Number of levels in a row that must agree.
 const AGREEING: usize = 3;
 
 /// Result of runs at finer and finer accuracy.
@@ -136,8 +136,8 @@ fn next_level(solver: &Solver) -> Option<Solver> {
     solver.finer().filter(|finer| finer.accuracy.step_tolerance() >= least)
 }
 
-/// Runs a simulated grasp to its end, and again at finer accuracies where that is called for. The trial has the scene
-/// that it was computed from in the end; its quality says what was asked for, and why that was not enough.
+/// Runs a simulated grasp to its end, and again at finer accuracies if needed. The trial has the scene that it was
+/// finally computed from; its quality gives the accuracy asked for, and why that was not enough.
 pub fn grasp_soundly(scene: &Scene, object: Option<&ObjectModel>, seed: u64, recompute: Recompute) -> SimulatedTrial {
     match recompute {
         Recompute::Unsettled => {

@@ -5,9 +5,9 @@
 //!   \___________\_______________\________________\______________________/ abort: the cause is kept
 //! ```
 //!
-//! It knows no gripper: it takes the time on the gripper's clock and returns the line pressure that is due. An untimed grasp
-//! ([`Control::Free`]) has no programme; its phases, where known, are those that [`GraspController::observe_phase`]
-//! hands in.
+//! The controller does not depend on the kind of gripper: the caller passes the time on the gripper's clock and gets
+//! back the line pressure to set now. An untimed grasp ([`Control::Free`]) has no pressure programme; the caller
+//! reports its phases, if known, through [`GraspController::observe_phase`].
 
 use super::pressure_watch::PressureWatch;
 use crate::gripper::GripperEvent;
@@ -22,7 +22,7 @@ use palpate_tactile::trial::{Control, PhaseMark};
 pub const LEAD_S: f64 = 1.5;
 /// Recording of a real hand after the programme (s).
 const SETTLE_S: f64 = 0.4;
-/// A programme that is later than this continues from where it was: the pressure never leaps (s).
+/// A programme that is later than this continues from where it was, so the pressure does not jump (s).
 const LATE_S: f64 = 0.25;
 
 /// Course of a grasp.
@@ -102,7 +102,7 @@ pub struct PressureCommand {
 pub struct GraspController {
     plan: GraspPlan,
     began_s: f64,
-    /// When actuation tick 0 is (s); later where the programme was held up.
+    /// Time of actuation tick 0 (s); a delay of the programme is added.
     programme_s: f64,
     /// The newest actuation tick.
     tick: Option<u32>,
@@ -110,7 +110,7 @@ pub struct GraspController {
     phase: Option<Phase>,
     closing_s: Option<f64>,
     abort: Option<String>,
-    /// Over a board that drives real fingers.
+    /// Checks of the board that drives real fingers; none for simulated and hand-driven grasps.
     watch: Option<PressureWatch>,
 }
 
@@ -137,13 +137,14 @@ impl GraspController {
         &self.plan
     }
 
-    /// When the closing begins or began (s); none where that is unknown.
+    /// Time at which the closing begins or began (s); none if unknown.
     pub fn closing_s(&self) -> Option<f64> {
         self.closing_s
     }
 
-    /// The line pressure that is due at `now_s`, where it differs from before. A few ticks that were slept through are
-    /// skipped; after more than 0.25 s the programme is that much later.
+    /// The line pressure to set at `now_s`, if it differs from the previous one. If the caller is up to 0.25 s late,
+    /// the missed actuation ticks are skipped; if it is later, the programme is delayed by that time, so the pressure
+    /// does not jump.
     pub fn command(&mut self, now_s: f64) -> Option<PressureCommand> {
         if self.plan.control == Control::Free || self.abort.is_some() || now_s < self.programme_s {
             return None;
@@ -167,12 +168,13 @@ impl GraspController {
         Some(PressureCommand { bar, phase, at_s: now_s })
     }
 
-    /// From now on the board that drives the fingers is watched; it was told to vent at `now_s`.
+    /// Starts the checks of the board that drives the fingers; it was told to vent at `now_s`.
     pub fn watch_board(&mut self, now_s: f64) {
         self.watch = Some(PressureWatch::new(now_s));
     }
 
-    /// Aborts where something of a watched board is overdue at `now_s`, up to which all its events were observed.
+    /// Aborts if a reply or reading of a watched board is overdue at `now_s`. All its events up to then must have been
+    /// observed.
     pub fn check_board(&mut self, now_s: f64) {
         if let Some(Err(fault)) = self.watch.as_ref().map(|watch| watch.check(now_s)) {
             self.abort(fault.to_string());
@@ -185,8 +187,8 @@ impl GraspController {
         PhaseMark { from_s: command.at_s, phase: command.phase, line_bar: driven.then_some(command.bar) }
     }
 
-    /// Takes in a phase that began; the phase, where it is a new one. Fingers that pause while they close have not begun
-    /// to close again.
+    /// Records that a phase began; returns it if it is new. A further `Close` after an earlier phase is not new:
+    /// fingers may pause while they close.
     pub fn observe_phase(&mut self, mark: &PhaseMark) -> Option<Phase> {
         let phase = mark.phase;
         let again = phase == Phase::Close && self.phase.is_some();
@@ -198,9 +200,9 @@ impl GraspController {
         new.then_some(phase)
     }
 
-    /// Handles an event of the gripper: a board that refuses, vents on its own, disconnects or fails its watch aborts a
-    /// driven grasp, which must not continue later with a leap of pressure. The cause, where the event interrupts a grasp
-    /// that goes on.
+    /// Handles an event of the gripper. A driven grasp is aborted if the board refuses a command, vents on its own,
+    /// disconnects or fails a check of `PressureWatch`; it must not resume later with a jump of pressure. Returns the
+    /// cause if the board vented or disconnected in a grasp that is not driven and therefore continues.
     pub fn observe(&mut self, event: &GripperEvent) -> Option<String> {
         let cause = match event {
             GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Refused { reason }))) => {
@@ -237,17 +239,17 @@ impl GraspController {
         self.abort.as_deref()
     }
 
-    /// Commanded line pressure (bar), where this program commands it.
+    /// Commanded line pressure (bar); none if this program does not command it.
     pub fn line_bar(&self) -> Option<f64> {
         self.command.filter(|_| self.plan.control == Control::Driven).map(|(bar, _)| bar)
     }
 
-    /// When the programme ends (s).
+    /// Time at which the programme ends (s).
     fn programme_end_s(&self) -> Option<f64> {
         (self.plan.control != Control::Free).then(|| self.programme_s + self.plan.programme_s())
     }
 
-    /// When the grasp ends (s), where that is known.
+    /// Time at which the grasp ends (s), if known.
     pub fn end_s(&self) -> Option<f64> {
         match self.programme_end_s() {
             Some(end_s) => Some(end_s + self.plan.settle_s),
@@ -260,7 +262,7 @@ impl GraspController {
         self.abort.is_some() || self.end_s().is_some_and(|end_s| now_s > end_s)
     }
 
-    /// The stage at `now_s`, and when it ends (s) where that is known.
+    /// The stage at `now_s`, and the time at which it ends (s) if known.
     pub fn stage(&self, now_s: f64) -> (GraspStage, Option<f64>) {
         let Some(end_s) = self.programme_end_s() else {
             return (self.phase.map_or(GraspStage::Free, GraspStage::Phase), self.end_s());

@@ -1,17 +1,17 @@
 //! How far a simulated grasp may be from the exact solution of its own equations: a band about every channel, estimated
 //! from a refined run that computes the same grasp more finely.
 //!
-//! Where errors shrink by a factor r from a simulation to its refined run, the simulation's error is the difference
-//! times 1 / (1 - r): r = 1/4 for SDIRK2 at a tenth of the tolerance, 1/2 for rapier at half the step. Fixed steps of
-//! Euler have a refined run that is close to the truth, so that the difference from it is the error; see
-//! [`Solver::refined`](palpate_sim::scene::Solver::refined). The difference passes through zero where the error need
-//! not, so that a band takes the largest estimate within a tenth of a second on either side, and a factor for what the
-//! theory leaves out. How often it covers the truth is measured by a test.
+//! If errors shrink by a factor r from a simulation to its refined run, the simulation's error is the difference times
+//! 1 / (1 - r): r = 1/4 for SDIRK2 at a tenth of the tolerance, 1/2 for rapier at half the step. With fixed steps of
+//! Euler the refined run is close to the truth, so the difference from it is the error; see
+//! [`Solver::refined`](palpate_sim::scene::Solver::refined). The difference may pass through zero where the error does
+//! not, so a band takes the largest estimate within a tenth of a second on either side, times a factor for effects that
+//! the theory neglects. A test measures how often the band covers the truth.
 //!
-//! Where a free object may as well slip one way as the other, simulation and refined run may end in different grasps;
-//! the band then is as wide as these are apart, and does not shrink with the step.
+//! If a free object can slip either way, simulation and refined run may end in different grasps; the band is then as
+//! wide as the difference between them, and does not shrink with the step.
 //!
-//! The band knows only the error of integration. How far the equations are from a real gripper is another question.
+//! The band contains only the error of integration, not the difference between the equations and a real gripper.
 
 use super::run::prepare_refined;
 use palpate_sim::objects::ObjectModel;
@@ -212,7 +212,7 @@ mod tests {
         }
     }
 
-    /// How a band stands to the truth, a grasp at a tolerance of 1e-6: samples that it covers, all of them, and the
+    /// A band compared with the truth, a grasp at a tolerance of 1e-6: samples that it covers, all samples, and the
     /// sums of the squares of half-widths and errors, as shares of the largest reading of their channel.
     fn covered(scene: &Scene, object: &ObjectModel, truth: &SimulatedTrial) -> [f64; 4] {
         let sensors = sensors(scene);

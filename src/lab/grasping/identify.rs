@@ -63,7 +63,7 @@ impl RecognisedGrasp {
         Self { model, grasp, hold_s, belief }
     }
 
-    /// Belief before this grasp; before the first that of [`palpate_learn::ModelCard::prior`].
+    /// Belief before this grasp; before the first one, [`palpate_learn::ModelCard::prior`].
     pub fn before(&self) -> Option<Pmf> {
         self.belief.steps().iter().rev().nth(1).cloned().or_else(|| self.model.card.prior())
     }
@@ -125,7 +125,7 @@ pub struct IdentificationView {
     pub beliefs: Vec<Pmf>,
     /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
-    /// The threshold has been raised since beyond what the grasps reach: one more may decide anew.
+    /// The threshold has since been raised above the probability reached: one more grasp may decide anew.
     pub asks_for_more: bool,
     /// True where the model learned from perfect sensors, which no real gripper has.
     pub from_perfect_sensors: bool,
@@ -211,7 +211,7 @@ impl Identification {
         (!judged.is_empty()).then(|| EarlierGrasps { model: self.model.card.described(), judged })
     }
 
-    /// Sets the stop rule. A decision stands; between two grasps it may turn out that no other is needed.
+    /// Sets the stop rule. A decision is kept; between two grasps the new rule may end the round.
     pub fn set_rule(&mut self, rule: StopRule) {
         self.rule = rule;
         if self.closed && self.decision.is_none() {
@@ -224,14 +224,14 @@ impl Identification {
         self.decided_at = self.rule.threshold;
     }
 
-    /// True where the threshold has been raised since the decision, beyond what the grasps reach.
+    /// True if the threshold was raised after the decision, above the probability reached.
     pub fn asks_for_more(&self) -> bool {
         let reaches = |belief: &Pmf| belief.top().1 >= self.rule.threshold;
         let raised = self.decision.is_some() && self.rule.threshold > self.decided_at;
         raised && self.belief.now().is_some_and(|belief| !reaches(belief))
     }
 
-    /// Takes the decision back: another grasp of the same object follows, beyond the limit where that was reached.
+    /// Takes the decision back: another grasp of the same object follows, even if the limit of grasps was reached.
     pub fn go_on(&mut self) {
         if self.decision.take().is_some() {
             self.rule.most_grasps = self.rule.most_grasps.max(self.belief.grasps() + 1);

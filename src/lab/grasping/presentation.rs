@@ -1,8 +1,8 @@
 //! A presentation: object after object in random poses. After an object that was decided by one grasp the poses get harder,
 //! until one has needed more, so that the first minute shows how grasps add up.
 //!
-//! Harder are the poses, drawn from a wider range by the next seed; model and threshold stay as they are. Of the model's
-//! answers only the number of grasps counts.
+//! Harder poses are drawn from a wider range by the next seed; model and threshold do not change. Only the number of
+//! grasps that an object needed decides this, not whether the answer was right.
 
 use super::shuffled_objects::ShuffledObjects;
 use palpate_sim::scene::{PosePreset, PoseSpread};
@@ -30,7 +30,7 @@ impl Default for Presentation {
 }
 
 impl Presentation {
-    /// Begins with whatever is in the hand.
+    /// Begins with the object in the hand.
     pub fn new(seed: u64) -> Self {
         Self { objects: ShuffledObjects::new(seed), hard: false, several: false }
     }

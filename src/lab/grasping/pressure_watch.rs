@@ -1,9 +1,10 @@
-//! Watch over a board that sets the pressure of real fingers. What it must do, or the grasp ends and the fingers are vented:
+//! Checks of a board that sets the pressure of real fingers. The grasp ends and the fingers are vented unless the board
+//! does the following:
 //!
 //! - acknowledge every pressure with its value, within 0.3 s. A reply also answers the commands before its own;
 //! - send a readable line of values every 0.5 s;
-//! - not restart, because its pressure then begins at 0 and would leap;
-//! - where it reports a measured pressure, stay within 0.1 bar of what was commanded during the last second.
+//! - not restart, because its pressure would then be 0 and jump;
+//! - keep any measured pressure that it reports within 0.1 bar of the range commanded during the last second.
 //!
 //! Times are those of the gripper's clock.
 
@@ -15,8 +16,9 @@ use std::collections::VecDeque;
 const ANSWER_S: f64 = 0.3;
 /// Longest time between two readings (s): the firmware sends 50 a second.
 const READING_S: f64 = 0.5;
-/// Time within which the measured pressure follows a command (s): a proportional valve settles in some tenths of a second
-/// and the fingers' volume slows it. At a second, one with a time constant of 0.4 s still passes a leap by 1 bar.
+/// Time within which the measured pressure follows a command (s): a proportional valve settles in some tenths of a
+/// second and the fingers' volume slows it. With one second, a valve with a time constant of 0.4 s still passes after a
+/// jump by 1 bar.
 const SETTLED_S: f64 = 1.0;
 /// Deviation of a measured pressure that is no fault (bar): two steps of the control box, or 2 % of a valve for 5 bar.
 const OFF_BAR: f64 = 0.1;
@@ -78,7 +80,7 @@ struct Commanded {
     at_s: f64,
 }
 
-/// Watch over one grasp.
+/// Checks during one grasp.
 #[derive(Clone, Debug)]
 pub(super) struct PressureWatch {
     began_s: f64,
@@ -94,7 +96,7 @@ pub(super) struct PressureWatch {
 }
 
 impl PressureWatch {
-    /// Begins with fingers that are told to vent at this time (s).
+    /// Begins when the fingers are told to vent, at this time (s).
     pub(super) fn new(now_s: f64) -> Self {
         let vent = VecDeque::from([Commanded { bar: 0.0, at_s: now_s }]);
         let (unanswered, recent) = (vent.clone(), vent);
@@ -108,7 +110,7 @@ impl PressureWatch {
         self.recent.push_back(commanded);
     }
 
-    /// What is overdue at a time (s) up to which every event was observed.
+    /// Fails if a reply or reading is overdue at a time (s) up to which every event was observed.
     pub(super) fn check(&self, now_s: f64) -> Result<(), PressureFault> {
         let for_s = now_s - self.heard_s;
         match self.unanswered.front() {
@@ -121,7 +123,7 @@ impl PressureWatch {
         }
     }
 
-    /// Takes in an event of the board.
+    /// Checks an event of the board.
     pub(super) fn observe(&mut self, event: &LinkEvent) -> Result<(), PressureFault> {
         match event {
             LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar })) => self.answer(*line_bar),

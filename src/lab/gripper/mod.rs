@@ -53,7 +53,7 @@ pub trait Gripper {
     /// Its clock (s): simulated time, or the clock of the board's readings.
     fn now_s(&self) -> f64;
 
-    /// The next event. A board is waited for up to `patience`; then this is a [`GripperEvent::Tick`].
+    /// The next event. Waits up to `patience` for a board, then returns [`GripperEvent::Tick`].
     fn next_event(&mut self, patience: Duration) -> Result<GripperEvent, GripperError>;
 
     /// Sets the line pressure (bar) from now on.
@@ -62,7 +62,7 @@ pub trait Gripper {
     /// Lets the air out at once.
     fn vent(&mut self) -> Result<(), GripperError>;
 
-    /// Why it ended before its end: captured bytes that are damaged.
+    /// Why it ended early: damaged captured bytes.
     fn cut_short(&self) -> Option<String> {
         None
     }

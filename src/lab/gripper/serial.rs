@@ -7,10 +7,10 @@ use palpate_sim::gripper::Phase;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// The board vents after a second without a line; this leaves it time (s).
+/// Interval of keep-alive lines (s): the board vents after a second without a line.
 const KEEP_ALIVE_S: f64 = 0.4;
 
-/// A board behind a stream. Dropping it vents, where it was under pressure from here.
+/// A board behind a stream. Dropping it vents the fingers if this program had set a pressure.
 pub struct SerialGripper {
     stream: Box<dyn BoardStream>,
     waiting: VecDeque<LinkEvent>,

@@ -61,7 +61,7 @@ pub struct NotOpened {
     pub text: String,
     /// A command that fixes it, where there is one.
     pub command: Option<String>,
-    /// Another program has it open and may close it.
+    /// Another program has the port open and may close it.
     pub may_pass: bool,
 }
 

@@ -1,5 +1,6 @@
-//! Trials whose label is not what the model saw: either the label is wrong, or the model has something to learn. The
-//! surest guesses come first, because wrong labels hide there (Northcutt, Jiang and Chuang, Confident learning, 2021).
+//! Trials whose label differs from the model's prediction: either the label is wrong, or the model has something to
+//! learn. The surest predictions come first, because wrong labels hide there (Northcutt, Jiang and Chuang, Confident
+//! learning, 2021).
 
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::TrialId;

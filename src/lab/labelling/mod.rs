@@ -1,5 +1,6 @@
-//! Labelling trials of the real gripper: what to take next, when a grasp begins and ends, what is wrong with a trial, and
-//! where the model sees something else than its label says. Nothing here touches a disk; the store keeps what comes out.
+//! Labelling trials of the real gripper: which object to take next, when a grasp begins and ends, faults of a trial,
+//! and trials whose label differs from the model's prediction. Nothing here touches a disk; the store keeps the
+//! results.
 //!
 //! | file | holds |
 //! |---|---|

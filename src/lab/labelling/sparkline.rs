@@ -57,8 +57,8 @@ fn means(samples: impl DoubleEndedIterator<Item = (f64, Option<f32>)> + Clone) -
     sums.into_iter().map(|(sum, n)| (n > 0).then(|| (sum / f64::from(n)) as f32)).collect()
 }
 
-/// Sparkline of a stored trial: forces on the pads (N) of a simulated one, counts of a recorded one, of an imported one its
-/// channels of the left and right pad, else its first two.
+/// Sparkline of a stored trial: of a simulated trial the forces on the pads (N), of a recorded trial the counts, of an
+/// imported trial the channels of the left and right pad, or its first two channels.
 pub fn stored_sparkline(store: &Store, id: TrialId) -> Result<Sparkline, StoreError> {
     if let Some(info) = store.board_info(id)?.filter(|info| !info.sparkline.iter().all(Vec::is_empty)) {
         return Ok(info.sparkline);

@@ -1,5 +1,5 @@
-//! A grasp of the real gripper that is being recorded: its controller and its recording side by side. The command line
-//! and the window begin, drive and end it through this.
+//! A grasp of the real gripper that is being recorded: its controller and its recording. The command line and the
+//! window begin, drive and end it through this.
 
 use super::board_writer::BoardTrialPlan;
 use super::recent::RecentEvents;
@@ -14,7 +14,7 @@ use palpate_tactile::trial::{Control, PhaseMark};
 
 /// Readings from before the start that belong to the trial (s).
 pub(super) const BEFORE_S: f64 = 0.3;
-/// A board that is silent at the end is not waited for longer than this (s): a busy computer hears it that late.
+/// Longest wait for readings of the last moments (s): on a busy computer they arrive up to this late.
 const LATE_S: f64 = 5.0;
 
 /// Request of a trial.
@@ -26,7 +26,7 @@ pub struct TrialRequest {
     pub control: Control,
     /// Length (s), where it differs from that of the programme.
     pub length_s: Option<f64>,
-    /// Whether it adds to the belief of earlier grasps of this object; else it stands alone.
+    /// Whether its answer is combined with those of earlier grasps of this object.
     pub adds: bool,
 }
 
@@ -44,8 +44,7 @@ pub struct BoardTrialRecording {
 }
 
 impl BoardTrialRecording {
-    /// Begins to record. Earlier events from `from_s` on belong to it; without it those of the last
-    /// moments do.
+    /// Begins to record. The trial includes earlier events from `from_s` on or, without it, those of the last moments.
     pub fn begin(
         recorder: &Recorder,
         gripper: &mut SerialGripper,
@@ -83,8 +82,8 @@ impl BoardTrialRecording {
         recording
     }
 
-    /// Vents fingers that will be driven: they rest before they close, and a board that does not answer is found out before
-    /// there is pressure.
+    /// Vents fingers that will be driven, so that they rest before they close and a board that does not answer is
+    /// noticed before there is pressure.
     fn vent_first(&mut self, gripper: &mut SerialGripper) {
         match gripper.vent() {
             Ok(()) => self.controller.watch_board(gripper.now_s()),
@@ -112,8 +111,8 @@ impl BoardTrialRecording {
         recorder.board(event);
     }
 
-    /// Sets the line pressure that is due, after all events up to the last look at the board; the phase that begins, if any.
-    /// A line that cannot be sent, or an answer that is overdue, aborts the grasp.
+    /// Sets the line pressure, after all events so far were handled. Returns the phase that begins, if any. Aborts the
+    /// grasp if a line cannot be sent or a reply is overdue.
     pub fn drive(&mut self, recorder: &Recorder, gripper: &mut SerialGripper) -> Option<Phase> {
         self.controller.check_board(gripper.looked_s());
         let command = self.controller.command(gripper.now_s())?;
@@ -126,7 +125,7 @@ impl BoardTrialRecording {
         self.mark(recorder, mark)
     }
 
-    /// Records a phase that began; the phase, where it is a new one.
+    /// Records that a phase began; returns it if it is new.
     pub fn mark(&mut self, recorder: &Recorder, mark: PhaseMark) -> Option<Phase> {
         recorder.mark(mark);
         self.controller.observe_phase(&mark)

@@ -12,7 +12,7 @@ use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};
 
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
-/// A board that was silent for longer than this before the end left a gap there (s).
+/// A silence of the board before the end that is longer than this is a gap (s).
 const SILENCE_S: f64 = 1.0;
 /// Length that is reserved for a trial of unknown length (s).
 const UNKNOWN_LENGTH_S: f64 = 600.0;
@@ -50,7 +50,7 @@ pub(super) struct BoardWriter {
     about: BoardInfo,
     chunk: BoardChunk,
     samples: u64,
-    /// Of them, so many are written.
+    /// Number of these that are written.
     written: u64,
     lost: u64,
     gaps: u64,
@@ -97,7 +97,7 @@ impl BoardWriter {
         self.id
     }
 
-    /// Takes in an event of the link.
+    /// Handles an event of the link.
     pub(super) fn take(&mut self, event: LinkEvent) {
         match event {
             LinkEvent::Captured(piece) => {
@@ -134,7 +134,7 @@ impl BoardWriter {
         self.about.course.phases.push(mark);
     }
 
-    /// Writes what waits.
+    /// Writes the waiting data.
     pub(super) fn flush(&mut self, store: &mut Store) -> Result<(), StoreError> {
         store.append_board(self.id, &self.about, &self.chunk)?;
         self.chunk = BoardChunk::default();
@@ -147,7 +147,7 @@ impl BoardWriter {
         format!("{} of {} samples are kept as trial {} (cut short)", self.written, self.samples, self.id)
     }
 
-    /// Writes the rest and closes the trial. Its flags are found in what the store then holds.
+    /// Writes the rest and closes the trial. Its flags are derived from the stored data.
     pub(super) fn finish(
         &mut self,
         store: &mut Store,
@@ -185,7 +185,7 @@ impl BoardWriter {
         self.chunk.gaps.push(gap);
     }
 
-    /// Flags and sparkline of the stored trial. Without calibrations raw counts are judged.
+    /// Flags and sparkline of the stored trial. Without calibrations the flags are derived from raw counts.
     fn judge(&mut self, store: &Store) -> Result<(), StoreError> {
         let Some(trial) = store.board_log(self.id)? else { return Ok(()) };
         let serving = store.calibrations().serving(Some(self.id), &[]).unwrap_or_else(|error| {

@@ -65,7 +65,7 @@ impl RecentEvents {
     }
 }
 
-/// When an event happened, on the clock of the readings (s); none for what has no time.
+/// Time of an event on the clock of the readings (s); none for events without a time.
 fn time_of(event: &LinkEvent) -> Option<f64> {
     match event {
         LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),

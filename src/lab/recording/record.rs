@@ -13,11 +13,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-/// How long the board is waited for at a time.
+/// Longest single wait for events of the board.
 const PATIENCE: Duration = Duration::from_millis(20);
 /// Time for the first reading.
 const FIRST_READING: Duration = Duration::from_secs(20);
-/// The same where its bytes cannot be decoded, all speeds tried.
+/// Time for the first reading if bytes come but cannot be decoded: all baud rates are tried.
 const UNREADABLE: Duration = Duration::from_secs(10);
 /// Readings before the trial begins (s): until then it is unknown how late the first ones arrived.
 const SETTLE_S: f64 = 0.5;
@@ -76,7 +76,7 @@ pub struct Recording {
     pub trial: RecordedTrial,
     /// The link at its end.
     pub status: LinkStatus,
-    /// Why it ended early: a driven grasp was aborted, or readings came no longer.
+    /// Why it ended early: a driven grasp was aborted, or no more readings came.
     pub aborted: Option<String>,
 }
 

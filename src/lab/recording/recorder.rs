@@ -1,6 +1,6 @@
-//! The recorder: the thread "recorder" writes trials into the store, simulated and real ones alike. Neither a slow disk
-//! nor another program's lock holds up a grasp or the lines that keep a board from venting. Waiting data are written once a
-//! second, so that a kill loses at most the last second.
+//! The recorder: the thread "recorder" writes simulated and real trials into the store. So neither a slow disk nor
+//! another program's lock delays a grasp or the lines that keep a board from venting. Waiting data are written once a
+//! second: if the program is killed, at most the last second is lost.
 
 use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
 use palpate_device::serial::{LinkEvent, LinkStatus};
@@ -22,15 +22,15 @@ const MOST_ATTEMPTS: u32 = 6;
 /// Reports of the recorder.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecorderNotice {
-    /// A trial of the real gripper has its number.
+    /// A trial of the real gripper has begun and has this number.
     Begun(TrialId),
     /// A simulated trial is complete in the store.
     Stored(TrialId),
-    /// A simulated grasp was not stored again: this trial holds it.
+    /// The store already has this simulated grasp, as this trial; nothing was stored.
     Known(TrialId),
-    /// The same; the trial moved from the demo log to the store.
+    /// The store had this grasp only in the demo log; that trial was moved to the store.
     Kept(TrialId),
-    /// A simulated grasp for the demo log: the trial that holds it, and where that is.
+    /// A simulated grasp was sent to the demo log: the trial that now holds it, and where that trial is.
     Logged(TrialId, TrialPlace),
     /// A trial of the real gripper is complete in the store.
     Recorded(Box<RecordedTrial>),
@@ -38,7 +38,7 @@ pub enum RecorderNotice {
     Discarded(TrialId),
     /// Something about the trial was not stored; the trial itself is safe.
     Warning(String),
-    /// A trial could not be stored, or not to its end; the sentence says why.
+    /// A trial could not be stored completely; the sentence says why.
     Failed(String),
 }
 
@@ -139,7 +139,7 @@ impl Recorder {
         self.send(Message::Interrupted(cause.to_owned()));
     }
 
-    /// Ends a trial of the real gripper; flags are found in what was stored.
+    /// Ends a trial of the real gripper; its flags are derived from the stored data.
     pub fn finish_board(&self, end: BoardTrialEnd) {
         self.send(Message::FinishBoard(Box::new(end)));
     }
@@ -169,7 +169,7 @@ struct Writer {
 /// The trial that is being recorded.
 enum OpenTrial {
     None,
-    /// Nothing of it is in the store yet: scenes that are skipped within a second leave no trace.
+    /// Not in the store yet: a scene that is skipped within a second leaves nothing there.
     Announced(Box<SimulatedTrial>, Vec<Frame>),
     Simulated(TrialId, Vec<Frame>),
     Board(Box<BoardWriter>, Instant),
@@ -185,7 +185,8 @@ impl Writer {
             };
             if let Err(error) = outcome {
                 let text = match (std::mem::replace(&mut self.trial, OpenTrial::None), &error) {
-                    // Of a store that is gone nothing is kept.
+                    // With the store file itself (`FileLost`) everything is lost, so the text does not say what was
+                    // kept.
                     (OpenTrial::Board(board, _), error) if !matches!(error, StoreError::FileLost { .. }) => {
                         format!("{error}. {}", board.kept())
                     }
@@ -224,7 +225,7 @@ impl Writer {
                 }
             }
             Message::Replace(trial) => {
-                // The one before may have been kept since.
+                // The user may meanwhile have moved the last trial from the demo log to the store (Keep).
                 if let Some(old) = self.last {
                     self.place = self.with_store(|store| store.place(old))?;
                 }
@@ -303,7 +304,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Writes the frames that wait, beginning the trial where it has not begun; its number, where there is one.
+    /// Writes the waiting frames, and begins the trial if it has not begun. Returns the number of the trial, if there
+    /// is one.
     fn write_frames(&mut self) -> Result<Option<TrialId>, StoreError> {
         let (id, waiting) = match std::mem::replace(&mut self.trial, OpenTrial::None) {
             OpenTrial::Announced(trial, waiting) => {
@@ -321,7 +323,7 @@ impl Writer {
         Ok(Some(id))
     }
 
-    /// Works on the store, opening it first where needed. A store that another program writes to is tried for a minute.
+    /// Runs `work` on the store and opens it first if needed. Tries for a minute while another program writes to it.
     fn with_store<T>(&mut self, mut work: impl FnMut(&mut Store) -> Result<T, StoreError>) -> Result<T, StoreError> {
         let store = match &mut self.store {
             Some(store) => store,

@@ -71,7 +71,7 @@ impl Replay {
         Self::of_loaded(store, id, store.load(id)?, model)
     }
 
-    /// The same of a trial that has been loaded from this store under this number.
+    /// Replays a trial that was loaded from this store under this number.
     pub fn of_loaded(
         store: &Store,
         id: TrialId,

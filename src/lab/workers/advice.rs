@@ -1,12 +1,11 @@
-//! Advice beside the window: how a person should move the object before the next grasp.
+//! Advice in the background: how a person should move the object before the next grasp.
 
 use super::job::{Job, Newer};
 use super::messages::Wake;
 use crate::grasping::{Advisor, ObjectMove, RecognisedGrasp};
 use std::sync::Arc;
 
-/// The job: finished grasps in; out comes the move before the next one, where anything is known about objects in such
-/// channels.
+/// The job: a finished grasp in, the move before the next grasp out; none if no known grasps have the model's channels.
 pub fn advice_job(wake: Wake) -> Job<Arc<RecognisedGrasp>, ObjectMove> {
     let mut advisor = Advisor::default();
     Job::new("advise", Newer::Replaces, wake, move |grasp: &Arc<RecognisedGrasp>, _run| {

@@ -1,4 +1,4 @@
-//! Check of finished grasps beside the simulation: comparison with a run at a tenth of the tolerance, and computing
+//! Check of finished grasps while the simulation runs: comparison with a run at a tenth of the tolerance, and computing
 //! again until three levels agree.
 
 use super::job::{Job, Newer};
@@ -33,7 +33,7 @@ pub(super) enum CheckRequest {
 
 /// Result of a check.
 pub(super) enum CheckResult {
-    /// A finer run ends alike, or does not.
+    /// Whether a finer run ends in the same state.
     Compared { grasp: u64, agrees: bool },
     /// The grasp computed again.
     ComputedAgain { grasp: u64, trial: Box<SimulatedTrial> },

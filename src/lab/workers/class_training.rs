@@ -1,5 +1,5 @@
-//! Training of one more class, beside the window: a model learns a new object from its file or from recorded grasps, and is
-//! saved.
+//! Training of one more class, in the background: a model learns a new object from its file or from recorded grasps,
+//! and is saved.
 
 use super::job::{Job, Newer};
 use super::messages::Wake;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// The grasp that is going on.
 pub(super) struct Current {
     pub(super) run: GraspRun,
-    /// Runs along for the error band, where one is wanted.
+    /// Refined run for the error band, if one is wanted.
     pub(super) refined_run: Option<RefinedRun>,
     pub(super) plan: Arc<Plan>,
     pub(super) scene: Arc<Scene>,
@@ -21,7 +21,7 @@ pub(super) struct Current {
     pub(super) frame: Arc<Frame>,
     /// Grasps of the same object before it.
     pub(super) earlier: Option<EarlierGrasps>,
-    /// Warnings at its beginning; those that come later are warned at its end.
+    /// Warnings at its beginning; later ones are reported at its end.
     pub(super) warned: usize,
     /// The user has pulled at the object.
     pub(super) pulled: bool,

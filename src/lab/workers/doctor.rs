@@ -1,4 +1,4 @@
-//! The doctor beside the window: an examination of the gripper's port.
+//! The doctor in the background: an examination of the gripper's port.
 
 use super::job::{Job, Newer};
 use super::messages::Wake;

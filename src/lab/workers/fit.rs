@@ -1,4 +1,4 @@
-//! Fit of the simulated finger to recorded trials, beside the window.
+//! Fit of the simulated finger to recorded trials, in the background.
 
 use super::job::{Job, JobError, Newer};
 use super::messages::Wake;

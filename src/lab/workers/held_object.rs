@@ -10,12 +10,12 @@ use std::time::SystemTime;
 pub(super) struct LoadedObject {
     pub(super) source: String,
     pub(super) options: LoadOptions,
-    /// When its file was written, and how long it is: a file that was exported anew is loaded anew.
+    /// Time and length of its file: a file that was exported again is loaded again.
     pub(super) stamp: Option<(SystemTime, u64)>,
     pub(super) model: Option<Arc<ObjectModel>>,
 }
 
-/// When a file was written, and how long it is; nothing for a built-in object.
+/// Modification time and length of a file; none for a built-in object.
 pub(super) fn stamp_of(source: &str) -> Option<(SystemTime, u64)> {
     let metadata = std::fs::metadata(source).ok()?;
     Some((metadata.modified().ok()?, metadata.len()))

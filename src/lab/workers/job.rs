@@ -1,5 +1,5 @@
-//! Job: work beside the window. A command goes in; progress comes out, then an outcome or a failure. The thread runs while
-//! there is something to do.
+//! Job: a background task of the window. A command goes in; progress comes out, then an outcome or a failure. The
+//! thread runs while there is something to do.
 
 use super::messages::Wake;
 use std::collections::VecDeque;
@@ -15,18 +15,18 @@ const BETWEEN: Duration = Duration::from_millis(30);
 /// Failure after a panic.
 const PANIC: &str = "stopped because of a fault in the program; report what you did";
 
-/// What a command does to those before it.
+/// Effect of a command on earlier commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Newer {
-    /// It stops and replaces them. Only the newest outcome is kept.
+    /// The command stops and replaces them. Only the newest outcome is kept.
     Replaces,
-    /// It waits for them. All outcomes are kept until they are taken.
+    /// The command waits for them. All outcomes are kept until they are taken.
     Waits,
 }
 
 /// Error of the work.
 pub type JobError = Box<dyn Error + Send + Sync>;
-/// The same, to be kept and shown.
+/// Error of the work that can be kept and shown.
 pub type JobFailure = Arc<dyn Error + Send + Sync>;
 
 /// Progress of a command.
@@ -61,7 +61,7 @@ pub struct EndedJob<C, O> {
     pub outcome: Result<Arc<O>, JobFailure>,
 }
 
-/// What a command's work sees of its job.
+/// Access of the work to its job.
 pub struct JobRun<'a> {
     stop: &'a AtomicBool,
     report: &'a (dyn Fn(JobProgress) + Sync),
@@ -69,7 +69,7 @@ pub struct JobRun<'a> {
 
 type Work<C, O> = dyn FnMut(&C, &JobRun<'_>) -> Result<Option<O>, JobError> + Send;
 
-/// Work beside the window: commands `C` in, outcomes `O` out. Dropping it stops the work and ends the thread.
+/// A background task: commands `C` in, outcomes `O` out. Dropping it stops the work and ends the thread.
 pub struct Job<C, O> {
     shared: Arc<Shared<C, O>>,
     thread: Mutex<Option<JoinHandle<()>>>,
@@ -158,7 +158,7 @@ impl<C, O> Job<C, O> {
         }
     }
 
-    /// The running command; where a newer one replaces it, that one.
+    /// The running command, or the newer one that replaces it.
     pub fn running(&self) -> Option<RunningJob<C>> {
         let state = locked(&self.shared.state);
         let newest = state.waiting.back().filter(|_| self.shared.newer == Newer::Replaces);
@@ -192,7 +192,7 @@ impl<C, O> Job<C, O> {
 }
 
 impl<C: Send + Sync, O: Send + Sync> Shared<C, O> {
-    /// Works on a command and on those that wait by then.
+    /// Works on a command, then on those that wait.
     fn work_on(&self, mut now: RunningJob<C>) {
         let mut work = locked(&self.work);
         loop {
@@ -248,7 +248,7 @@ impl<C, O> Drop for Job<C, O> {
     }
 }
 
-/// Under these locks values are replaced; after a panic of the work they are whole.
+/// Values under these locks are only replaced as a whole, so they are valid even after a panic of the work.
 fn locked<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -264,7 +264,7 @@ impl JobRun<'_> {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// The outcome of a command that counts for nothing once it is stopped.
+    /// The outcome, or `None` if the command was stopped.
     pub fn unless_stopped<O>(&self, outcome: O) -> Option<O> {
         (!self.stopped()).then_some(outcome)
     }
@@ -280,7 +280,7 @@ impl JobRun<'_> {
     }
 }
 
-/// Threads for work beside the window and a simulation (1).
+/// Number of threads for background tasks, beside the window and a simulation.
 pub(super) fn spare_threads() -> usize {
     std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1))
 }

@@ -68,7 +68,7 @@ impl LabelView {
     }
 }
 
-/// Time between two glances at changes by other programs.
+/// Time between two checks for changes by other programs.
 pub(super) const GLANCE: Duration = Duration::from_millis(250);
 /// Number of journal entries shown.
 const ENTRIES: usize = 60;

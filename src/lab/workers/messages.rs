@@ -37,17 +37,17 @@ pub enum Command {
     SetGrasps(u32),
     /// Probability from which a class counts as certain; clamped to [`super::THRESHOLDS`].
     SetThreshold(f64),
-    /// Continue a round that was decided, where the threshold has been raised beyond what its grasps reach.
+    /// Continue a decided round, if the threshold was since raised above the probability reached.
     GraspOnceMore,
-    /// Sensors that are read from now on; restarts the grasp. Ideal ones only: a model of real sensors reads finished
-    /// trials.
+    /// Sensors to read from now on; restarts the grasp. Only ideal sensors: models of real sensors are applied to
+    /// finished trials.
     SetSensors(SensorView),
-    /// Recogniser from now on; restarts the grasp.
+    /// Recogniser to use from now on; restarts the grasp.
     SetModels(Models),
-    /// Whether the first grasp of each object has a random pose too, instead of that of the scene; from the next scene on,
-    /// whose poses are those of the first seeds.
+    /// Whether the first grasp of each object too has a random pose instead of the pose of the scene; from the next
+    /// scene on, whose poses begin with the first seeds again.
     SetFirstDrawn(bool),
-    /// Where trials are recorded from now on; nowhere without a place.
+    /// Place to record trials in from now on; without one, trials are not recorded.
     SetRecording(Option<TrialPlace>),
     /// Whether a refined run accompanies each grasp for the numerical error band; restarts the grasp.
     SetErrorBand(bool),
@@ -73,11 +73,11 @@ pub enum Notice {
     SceneRefused(Box<Refusal>),
     /// A trial is in the store.
     Stored(TrialId),
-    /// A grasp was not stored again: this trial holds it.
+    /// The store already has this grasp, as this trial; nothing was stored.
     Known(TrialId),
-    /// The same; the trial moved from the demo log to the store.
+    /// The store had this grasp only in the demo log; that trial was moved to the store.
     Kept(TrialId),
-    /// A grasp for the demo log: the trial that holds it, and where that is.
+    /// A grasp was sent to the demo log: the trial that now holds it, and where that trial is.
     Logged(TrialId, TrialPlace),
 }
 
@@ -137,12 +137,12 @@ pub struct MeasuredAccuracy {
     pub cost: AccuracyCost,
 }
 
-/// The whole of one grasp as another engine computes it.
+/// A whole grasp, computed by another engine.
 #[derive(Debug)]
 pub struct GhostGrasp {
     /// The grasp it belongs to, as in [`TraceRow::grasp`].
     pub grasp: u64,
-    /// What computed it.
+    /// Engine that computed it.
     pub engine: EngineKind,
     /// Its samples, the state before the first step included.
     pub frames: Vec<Frame>,
@@ -200,11 +200,11 @@ pub struct Status {
     pub error_band: bool,
     /// What is being done to check the last finished grasp.
     pub checking: Option<Checking>,
-    /// Move of the gripper by which this grasp was chosen, where one was.
+    /// Move of the gripper that was chosen for this grasp, if any.
     pub guided: Option<GripperMove>,
 }
 
-/// Work that tells how far a finished grasp can be trusted.
+/// Check of how far a finished grasp can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Checking {
     /// A finer run is computed to compare with.

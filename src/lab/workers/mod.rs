@@ -1,5 +1,5 @@
-//! Named threads around grippers and stores: commands in, snapshots and notices out. They know no window; its owner passes
-//! a `wake` function.
+//! Named threads around grippers and stores: commands in, snapshots and notices out. They do not depend on the window,
+//! which passes a `wake` function.
 //!
 //! ```text
 //!  UI                         "sim"                          "recorder"
@@ -12,10 +12,10 @@
 //!
 //! A [`Worker`] owns something for as long as the window is open: the simulated gripper, the link to the real gripper's
 //! board ("gripper", shared by live view, trials, recognition and calibrations), the labels ("label"), or all trials
-//! ("library"). Both of the last show changes by other programs. Commands go in; the newest view, trace rows and notices
-//! come out; a panic becomes a notice.
+//! ("library"). Labels and library show changes by other programs. Commands go in; the newest view, trace rows and
+//! notices come out; a panic becomes a notice.
 //!
-//! A [`Job`] is work beside the window with a beginning and an end: a command in, progress, then an outcome or a failure
+//! A [`Job`] is a background task with a beginning and an end: a command in, progress, then an outcome or a failure
 //! out. Its thread runs while there is something to do. A newer command replaces the older ones, or waits for them.
 //!
 //! | job | command | outcome | newer |
@@ -32,8 +32,8 @@
 //! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
 //!
 //!
-//! Pictures may skip, samples may not: a newer snapshot replaces an older one, trace rows and recorded frames keep
-//! their order and none is lost.
+//! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows and recorded frames
+//! keep their order and none is lost.
 
 mod accuracy_job;
 mod advice;

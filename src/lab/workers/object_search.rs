@@ -11,7 +11,7 @@ pub const NUMBERED_OBJECTS: usize = 9;
 pub(super) struct ObjectSearch {
     /// Names. A text that is no object's name is the last of those with a number key, as a new name.
     pub(super) names: Vec<String>,
-    /// Place of the one that the text means; none where it may mean several.
+    /// Place of the object that the text means; none if it fits several.
     pub(super) sure: Option<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! Stored trials, opened beside the window.
+//! Stored trials, opened in the background.
 
 use super::job::{Job, Newer};
 use super::messages::Wake;

@@ -1,11 +1,11 @@
-//! Simulated time beside the time on the wall.
+//! Simulated time compared with real time.
 
 use std::time::{Duration, Instant};
 
 /// Time over which the actual speed is measured.
 const SPEED_WINDOW: Duration = Duration::from_millis(500);
 
-/// Keeps simulated time level with the wall's, at some speed.
+/// Keeps simulated time in step with real time, at some speed.
 pub(super) struct Pace {
     wall: Instant,
     simulated: f64,

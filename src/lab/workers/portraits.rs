@@ -1,4 +1,4 @@
-//! Small pictures of objects from files, for lists, drawn beside the window.
+//! Small pictures of objects from files, for lists, drawn in the background.
 
 use super::job::{Job, Newer};
 use super::messages::Wake;

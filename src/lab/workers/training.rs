@@ -1,4 +1,4 @@
-//! Training on labelled trials of the real gripper, beside the window: listing what there is, training a recogniser and
+//! Training on labelled trials of the real gripper, in the background: listing what there is, training a recogniser and
 //! saving it to a file, loading such a file.
 
 use super::job::{Job, JobError, JobRun, Newer};

@@ -1,4 +1,4 @@
-//! Explanation beside the window: why the model gave its answer to a grasp, and the stored trials nearest to it.
+//! Explanation in the background: why the model gave its answer to a grasp, and the stored trials nearest to it.
 
 use super::job::{EndedJob, Job, Newer};
 use super::messages::Wake;

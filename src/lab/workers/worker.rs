@@ -39,7 +39,7 @@ struct Shared {
 /// What is sent to the thread.
 enum Mail<C> {
     Command(C),
-    /// Look at what others have done.
+    /// Look for results of jobs.
     Look,
     End,
 }
@@ -56,7 +56,7 @@ pub(super) struct Inbox<C> {
 }
 
 impl<C: Send + 'static> Inbox<C> {
-    /// The next command; none where there is something else to look at, or where so much time has passed.
+    /// The next command; none if there is a result to look for, or after this time.
     pub(super) fn next(&self, patience: Option<Duration>) -> Result<Option<C>, WorkerEnds> {
         match self.mail.recv_timeout(patience.unwrap_or(Duration::MAX)) {
             Ok(Mail::Command(command)) => {
@@ -68,7 +68,7 @@ impl<C: Send + 'static> Inbox<C> {
         }
     }
 
-    /// Has the thread look at what a job has done.
+    /// Asks the thread to look for the result of a job.
     pub(super) fn waker(&self) -> Wake {
         let sender = self.sender.clone();
         Arc::new(move || {
@@ -93,7 +93,7 @@ impl Notifier {
     }
 }
 
-/// What the thread shows to the window.
+/// Output of the thread to the window.
 pub(super) struct Publisher<V> {
     view: Arc<Latest<V>>,
     rows: SyncSender<TraceRow>,
@@ -107,7 +107,7 @@ impl<V> Publisher<V> {
         self.publish_with(view, []);
     }
 
-    /// The same, with notices about these results.
+    /// Replaces the view, with notices about these results.
     pub(super) fn publish_with(&self, view: V, notices: impl IntoIterator<Item = Notice>) {
         self.view.publish(Arc::new(view));
         for notice in notices {
@@ -118,7 +118,7 @@ impl<V> Publisher<V> {
         self.wake();
     }
 
-    /// Sends a row, or notes that one was lost where the window takes none.
+    /// Sends a row; if the queue is full, records that a row was lost.
     pub(super) fn row(&self, row: TraceRow) {
         if let Err(TrySendError::Full(_)) = self.rows.try_send(row) {
             self.shared.rows_lost.store(true, Ordering::Relaxed);
@@ -133,7 +133,7 @@ impl<V> Publisher<V> {
         (self.notifier.wake)();
     }
 
-    /// What could be started; otherwise a notice says what is missing.
+    /// Returns what could be started; otherwise a notice says what is missing.
     pub(super) fn or_notice<T>(&self, missing: &str, started: std::io::Result<T>) -> Option<T> {
         started.map_err(|cause| self.notify(Notice::Failed(format!("{missing}: {cause}")))).ok()
     }
@@ -150,7 +150,7 @@ impl<V> Publisher<V> {
 }
 
 impl<C: Send + 'static, V: Send + Sync + 'static> Worker<C, V> {
-    /// Starts the thread. A panic becomes a notice that calls it by its title.
+    /// Starts the thread. A panic becomes a notice that calls the thread `title`.
     pub(super) fn spawn(
         name: &str,
         title: &'static str,
@@ -216,7 +216,7 @@ impl<C, V> Worker<C, V> {
         self.notices.try_iter()
     }
 
-    /// Sends commands that are not the window's; an error where the thread has ended.
+    /// Sends commands of others than the window; an error if the thread has ended.
     pub(super) fn sender(&self) -> impl Fn(C) -> Result<(), WorkerEnds> + Send + Sync + use<C, V>
     where
         C: Send,

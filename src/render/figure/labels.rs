@@ -20,8 +20,8 @@ pub(super) const NEAR: f64 = 9.0;
 const DIRECTIONS: [[f64; 2]; 8] =
     [[1.0, 0.0], [0.7, -0.7], [0.7, 0.7], [-1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-0.7, -0.7], [-0.7, 0.7]];
 
-/// Place of each label, in order; `None` where it would cover another label or leave the room. Obstacles may be covered
-/// where nothing else is free, which the nearest place with the least of it then is.
+/// Place of each label, in order; `None` if it would cover another label or leave the room. If no place is free of
+/// obstacles, the place that covers the least of them is taken, and nearer ones are preferred.
 pub(super) fn place(wanted: &[Wanted], obstacles: &[Box2], room: Box2) -> Vec<Option<Box2>> {
     let mut placed: Vec<Option<Box2>> = Vec::new();
     for label in wanted {

@@ -270,7 +270,7 @@ fn dashes<B: DrawingBackend>(
 
 /// Lengths of a dash and of a gap, and the width, of a reference line.
 const REFERENCE_DASHES: ([f64; 2], f64) = ([5.0, 4.0], 0.9);
-/// The same of a dashed curve.
+/// Lengths of a dash and of a gap, and the width, of a dashed curve.
 const CURVE_DASHES: ([f64; 2], f64) = ([7.0, 4.0], 1.25);
 
 fn line_width(line: LineStyle) -> Option<f64> {

@@ -1,4 +1,4 @@
-//! Building pipelines with what all passes have in common.
+//! Building pipelines with the settings that all passes share.
 
 use super::PassSetup;
 use crate::ambient::DISTANCE;
@@ -87,7 +87,7 @@ pub(super) fn picture_pipeline(setup: &PassSetup<'_>, shape: &PictureShape<'_>) 
     })
 }
 
-/// Pipeline of what does not end in the picture itself.
+/// Pipeline that draws into another texture than the picture.
 pub(super) struct UnlitShape<'a> {
     pub(super) label: &'a str,
     pub(super) shader: &'a ShaderModule,

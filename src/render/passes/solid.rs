@@ -25,7 +25,7 @@ struct FinishUniform {
     highlight: [f32; 4],
 }
 
-/// How each finish answers to light; tuned by eye on the built-in objects.
+/// Shading of each finish; tuned by eye on the built-in objects.
 fn finish(finish: Finish) -> FinishUniform {
     let (grain, relief, [gloss, power]) = match finish {
         Finish::Plastic => ([0.0; 4], [0.0, 0.0, 0.0, 0.0], [0.34, 90.0]),

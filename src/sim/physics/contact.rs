@@ -9,11 +9,12 @@
 //!   with the pad law f and Hunt-Crossley dissipation d. It falls as v_n rises, so its potential is convex.
 //! - friction          e = xi + (h + tau) v_t;  impulse -h k_t e while |h k_t e| <= mu gamma_lag, else
 //!   -mu gamma_lag e/|e|: a shear spring with a damper of time tau beside it (Kelvin-Voigt), and a slip limit (a Huber
-//!   function of e). The limit uses a normal impulse from the step before
-//!   or from the last pass ("lag"), since a limit that followed v would not be the gradient of anything.
+//!   function of e). The limit uses the normal impulse of the previous step or of the previous pass of the solver (it
+//!   lags), not that of the current v: with a limit that depends on v, the friction impulse would not be the gradient
+//!   of any potential.
 //!
-//! A shear spring holds: a grasped object creeps 2e-7 mm/s, where velocity-regularised friction lets it slide at
-//! 0.015 to 0.066 mm/s. The shear modulus of rubber is E / 3, hence k_t = k / 3.
+//! A shear spring keeps the object in place: a grasped object creeps 2e-7 mm/s, where velocity-regularised friction
+//! lets it slide at 0.015 to 0.066 mm/s. The shear modulus of rubber is E / 3, hence k_t = k / 3.
 
 use crate::gripper::PadLaw;
 use glam::{DMat3, DVec3};
@@ -32,7 +33,7 @@ pub(super) enum Against {
 /// Body that the contact acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Acting {
-    /// Segment `link` = finger (N + 1) + segment.
+    /// A finger segment, with index finger * (N + 1) + segment for N joints per finger.
     Segment(u32),
     /// The grasped object.
     Object,
@@ -41,7 +42,7 @@ pub(super) enum Acting {
 /// A contact and its state within the solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
-    /// Index under which shear and lag are kept between steps.
+    /// Index under which the shear and the normal impulse are remembered for the next step.
     pub(super) site: u32,
     /// Body A.
     pub(super) acting: Acting,
@@ -172,12 +173,12 @@ impl Contact {
         if impulse > self.limit { e * (self.limit / impulse) } else { e }
     }
 
-    /// By how much the lagged slip limit missed the true one where it mattered (N s), and the true one.
+    /// Error of the lagged slip limit as far as it changed the friction (N s), and the true limit.
     pub(super) fn lag_mismatch(&self, step: ContactStep) -> (f64, f64) {
         let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
         let truth = self.mu * gamma;
         if self.limit <= 0.0 {
-            // Without friction force, however much there should be.
+            // No friction was applied, so the whole true limit counts as missed.
             return (truth, truth);
         }
         let used = self.force(step).1.length() * step.h;

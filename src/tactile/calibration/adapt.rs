@@ -1,9 +1,9 @@
 //! Calibration of a gripper of which no angle or weight is known, from one close of its empty hand.
 //!
-//! What is assumed stands for what is not known: the fingers bend like the modelled one, and the pads are nominal parts. A
-//! strip is flat at rest, and at the end of the closing it bends as the modelled finger does; so its reading is that of the
-//! modelled finger, whatever share of the bend reaches it. Of a pad, what it shows in the empty hand is what bending does
-//! to it.
+//! Two assumptions replace measurements: the fingers bend like the modelled finger, and the pads are nominal parts. A
+//! strip's reading at rest is calibrated as zero bend, and its reading at the end of the closing as the bend of the
+//! modelled finger, so it does not matter how much of the finger's bend reaches the strip. Whatever a pad reads while
+//! the empty hand closes is taken as the effect of bending.
 
 use super::CalibrationFault;
 use super::input::Input;
@@ -20,7 +20,7 @@ use palpate_sim::gripper::Side;
 const LOADS_KG: [f64; 6] = [0.03, 0.06, 0.1, 0.2, 0.35, 0.5];
 /// Fewest readings of a sensor at rest, and of one that is bent.
 const LEAST_READINGS: usize = 3;
-/// Share of the way to the farthest reading that counts as bent.
+/// A strip counts as bent from this share of its largest change on.
 const BENT: f64 = 0.95;
 /// Least change of a strip's reading, as a share of that at rest.
 const LEAST_CHANGE: f64 = 0.05;
@@ -30,31 +30,31 @@ const LEAST_CHANGE: f64 = 0.05;
 pub struct EmptyHand<'a> {
     /// The board.
     pub board: &'a Board,
-    /// Its readings, from rest on.
+    /// Readings of the board, from rest on.
     pub readings: &'a [Reading],
     /// Start of the closing on the clock of the readings (s), where known.
     pub closing_s: Option<f64>,
-    /// Curvature at the end of the closing, as the modelled finger has it (1/m).
+    /// Curvature of the modelled finger at the end of the closing (1/m).
     pub modelled: f64,
 }
 
-/// A weight on a pad, and what it reads.
+/// A weight on a pad, and the reading of the pad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownWeight {
-    /// Its force (N).
+    /// Force of the weight (N).
     pub force: f64,
     /// Mean of the readings (counts).
     pub counts: f64,
 }
 
 impl EmptyHand<'_> {
-    /// Calibration of a strip, of the part with this name.
+    /// Calibration of the strip with this part name.
     pub fn strip(&self, side: Side, part: &str) -> Result<Calibration, CalibrationFault> {
         let sensor = SensorKind::Flex.on(side);
         let rest = self.rest(sensor)?;
         let mut moved: Vec<f64> = self.counts(sensor, self.readings).map(|counts| counts - rest).collect();
         moved.sort_by(f64::total_cmp);
-        // One reading in fifty may be a fault of the line.
+        // The 98th percentile instead of the maximum: up to 2 % of the readings may be transmission errors.
         let farthest =
             *moved.get(moved.len() * 49 / 50).ok_or_else(|| CalibrationFault::no_readings(sensor.label()))?;
         let bent: Vec<f64> =
@@ -73,8 +73,9 @@ impl EmptyHand<'_> {
         self.fit(sensor, part, vec![point(0.0, rest), point(angle, bent_counts)], None)
     }
 
-    /// Course of a strip's bend: time since the closing began (s), and bend as a share of the largest. Resistance is linear
-    /// in the bend, so that no calibration is needed. Empty where the strip does not move, or nobody knows when it began.
+    /// Bend of a strip over time: time since the closing began (s), and bend divided by the largest bend. No
+    /// calibration is needed, because the resistance is linear in the bend. Empty if the strip does not move or the
+    /// start of the closing is unknown.
     pub fn course(&self, side: Side) -> Vec<(f64, f64)> {
         let sensor = SensorKind::Flex.on(side);
         let (Some(closing_s), Ok(rest), Some(column)) =
@@ -90,7 +91,7 @@ impl EmptyHand<'_> {
         let bends: Vec<(f64, f64)> = self.readings.iter().filter_map(bend).filter(|(t_s, _)| *t_s >= 0.0).collect();
         let mut sizes: Vec<f64> = bends.iter().map(|(_, bend)| *bend).collect();
         sizes.sort_by(f64::total_cmp);
-        // One reading in fifty may be a fault of the line.
+        // The 98th percentile, as in `strip`.
         let most = sizes.get(sizes.len() * 49 / 50).copied().unwrap_or_default();
         if most < LEAST_CHANGE * input.ohm(rest) {
             return Vec::new();
@@ -98,8 +99,9 @@ impl EmptyHand<'_> {
         bends.into_iter().map(|(t_s, bend)| (t_s, bend / most)).collect()
     }
 
-    /// Calibration of a pad: a nominal part, or the one that reads so under a known weight. `strip` is the calibration of
-    /// the strip on its finger, which tells the bending.
+    /// Calibration of a pad. Its gain is that of a nominal part or, with `known`, the one that gives the reading
+    /// measured under that weight. `strip` is the calibration of the flex strip on the same finger, from which the
+    /// bending is computed.
     pub fn pad(
         &self,
         side: Side,

@@ -1,5 +1,5 @@
-//! The last step of a pad's calibration: the empty hand closes once, and what the pad shows meanwhile is what bending
-//! does to it, over the curvature that its finger's strip reads.
+//! The last step of a pad's calibration: the empty hand closes once, and the pad's readings meanwhile give the effect
+//! of bending, over the curvature that the strip of the same finger reads.
 
 use super::CalibrationFault;
 use super::pad_curve::BendingZero;
@@ -27,8 +27,8 @@ impl EmptyClose {
     /// Default duration (s): enough to turn a regulator up and down again.
     pub const SECONDS: f64 = 15.0;
 
-    /// Watches a pad that was calibrated just now, for some seconds. `serving` are the calibrations of the other parts;
-    /// the strip of the same finger must be among them.
+    /// Records a pad that was just calibrated, for some seconds. `serving` are the calibrations of the other parts; the
+    /// strip of the same finger must be among them.
     pub fn begin(
         board: &Board,
         pad: (Sensor, Calibration),

@@ -35,7 +35,8 @@ const APART: f64 = 5.0 / 90.0 * FRAC_PI_2;
 /// setting them makes two at 90.
 const LEAST_SPAN: f64 = 0.5 * FRAC_PI_2;
 
-/// The same where the angles are those of the modelled finger, whose readings are not extrapolated (rad): 15 degrees.
+/// Such a least difference if the angles are those of the modelled finger, which are not extrapolated (rad): 15
+/// degrees.
 const LEAST_ASSUMED_SPAN: f64 = LEAST_SPAN / 3.0;
 
 /// A point this far off is mentioned (rad): 3 degrees, three times what a calibration should reach.

@@ -1,17 +1,17 @@
-//! From a board's counts to angle, curvature, force and pressure: [`super::electronics`] run backwards, with what was
-//! measured of the parts.
+//! From a board's counts to angle, curvature, force and pressure: the inverse of [`super::electronics`], with the
+//! measured constants of the parts.
 //!
 //! ```text
 //! counts --divider--> resistance R --- strip: R = R0 + s theta ---> angle theta --- / 55.37 mm --> curvature
 //!                     conductance G -- pad:   G = a F^b ---------> force F ------- / 169.7 mm² -> pressure
 //! ```
 //!
-//! A [`Record`] is what was measured of a part at known angles or weights; a [`Calibration`] is the curve fitted to it.
-//! Only records are stored, so that a better fit serves old ones too, as a better calibration serves old trials:
-//! [`Readout`] derives [`super::Signals`] from stored readings with whatever calibrations it is given.
+//! A [`Record`] holds the readings of a part at known angles or weights; a [`Calibration`] is the curve fitted to it.
+//! Only records are stored, so a better fit also applies to old records, and a better calibration to old trials:
+//! [`Readout`] derives [`super::Signals`] from stored readings with the calibrations that it is given.
 //!
-//! Calibrations belong to parts, which have names, and not to places: parts get swapped. What is known of parts of
-//! these kinds from data sheets is used to refuse calibrations that cannot be; see [`CalibrationFault`].
+//! Calibrations belong to parts, which have names, and not to places: parts get swapped. Calibrations that the data
+//! sheets of such parts rule out are refused; see [`CalibrationFault`].
 
 mod adapt;
 mod empty_close;

@@ -3,9 +3,9 @@
 //!   G = a F^b,
 //!
 //! a straight line in logarithms (data sheet of the FSR07CE; its threshold is below 15 g). The line is fitted with
-//! weights: a relative error of a pad is its repeatability, 2 %, and what the noise of the counts makes of it, which is
-//! much where a pad hardly conducts. Two things show without a force: what the pad conducts at rest, which is
-//! subtracted, and what bending does to it, the [`BendingZero`].
+//! weights: the relative error of a pad is its repeatability, 2 %, plus the effect of the noise of the counts, which is
+//! large if the pad hardly conducts. Two effects are independent of force: the conductance at rest, which is
+//! subtracted, and the effect of bending, the [`BendingZero`].
 
 use super::CalibrationFault;
 use super::input::Input;
@@ -30,10 +30,10 @@ const LEAST_SPAN: f64 = 4.0;
 /// Largest force for which the law holds (N): 5 kg (data sheet).
 const MOST: f64 = 5.0 * STANDARD_GRAVITY;
 
-/// Exponents that are believed: 0.6 to 1 in tables of such pads, and what weights set by hand add.
+/// Plausible exponents: 0.6 to 1 in tables of such pads, with a margin for weights set by hand.
 const EXPONENTS: [f64; 2] = [0.6, 1.2];
 
-/// Resistance under 1 N that is believed (ohm): four times less and more than the 6 kOhm of an Interlink 402 (the table
+/// Plausible resistance under 1 N (ohm): four times less and more than the 6 kOhm of an Interlink 402 (the table
 /// of Adafruit; there is none for the FSR07).
 const OHM_AT_1_N: [f64; 2] = [1.5e3, 25e3];
 
@@ -281,7 +281,7 @@ impl BendingZero {
         self.knots.last().map_or(0.0, |last| last.0)
     }
 
-    /// True where its numbers are possible: what comes from a file may be anything.
+    /// True if its numbers are possible: it may come from a file.
     pub(super) fn is_possible(&self) -> bool {
         let finite = self.knots.iter().all(|(kappa, siemens)| kappa.is_finite() && siemens.is_finite());
         finite && self.knots.is_sorted_by(|a, b| a.0 < b.0)

@@ -1,5 +1,5 @@
-//! Calibrating step by step: what to set next, whether the reading has settled, what came out. Terminal and window
-//! drive the same procedure; it knows neither of them, nor the port that its readings come from.
+//! Calibrating step by step: what to set next, whether the reading has settled, and the result. Terminal and window use
+//! the same procedure; it does not depend on them, nor on the port that its readings come from.
 //!
 //! ```text
 //!   next() -> "bend to 30 degrees"
@@ -29,7 +29,7 @@ const CREEP_COUNTS: f64 = 1.0;
 /// Reason why no point can be taken yet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsettled {
-    /// Nothing, or not enough, has been read since the last point.
+    /// Too few readings since the last point, or none.
     #[error("reading: {have_s:.1} of {need_s:.1} s")]
     TooShort {
         /// Present length (s).
@@ -40,7 +40,7 @@ pub enum Unsettled {
     /// No numbers on the channel.
     #[error("the board sends no value on this channel: check the wiring and the name of the channel")]
     Silent,
-    /// Still on its way.
+    /// The reading still changes.
     #[error("still moving ({by:+.1} counts): hold it still and wait")]
     Moving {
         /// The later half less the earlier (counts).
@@ -236,7 +236,7 @@ impl Procedure {
         Ok(Point { stimulus: f64::NAN, counts, spread, readings: self.window.len() as u32 })
     }
 
-    /// True when the reading is another than at the last point: what a hands-free procedure waits for.
+    /// True when the reading differs from that of the last point: a hands-free procedure waits for this.
     pub fn has_changed(&self) -> bool {
         let (Some(last), Ok(now)) = (self.record.points.last(), self.settled()) else {
             return self.record.points.is_empty();
@@ -244,8 +244,8 @@ impl Procedure {
         (now.counts - last.counts).abs() > 10.0 + 5.0 * now.spread
     }
 
-    /// Takes the settled reading as that of an angle (rad) or force (N); readings for the next point begin anew. What
-    /// was next in the plan is done with it. A reading that has not settled is refused, and nothing changes.
+    /// Takes the settled reading as that of an angle (rad) or force (N), which completes the next value of the plan;
+    /// readings for the following point begin anew. A reading that has not settled is refused, and nothing changes.
     pub fn take(&mut self, stimulus: f64) -> Result<Point, Unsettled> {
         let point = Point { stimulus, ..self.settled()? };
         self.record.points.push(point);
@@ -256,7 +256,7 @@ impl Procedure {
         Ok(point)
     }
 
-    /// Leaves out what was next in the plan.
+    /// Skips the next value of the plan.
     pub fn skip(&mut self) {
         self.left.pop_front();
     }

@@ -68,10 +68,10 @@ pub struct Readout {
     warnings: Vec<String>,
 }
 
-/// A channel that more than this share of the readings lack is left out, rather than the readings.
+/// If more than this share of the readings lack a channel, the channel is left out instead of the readings.
 const MOST_MISSING: f64 = 0.2;
 
-/// Length of the window before the closing that is taken where the line pressure is not known (s).
+/// Length of the window before the closing if the line pressure is unknown (s).
 const REST_WINDOW_S: f64 = 0.3;
 
 /// Margin beyond the calibrated angles of a strip before a warning (rad): 3 degrees.
@@ -325,7 +325,7 @@ impl Readout {
         self.zero.offsets[sensor].unwrap_or(0.0)
     }
 
-    /// Force (N) at a conductance, less what the pad shows at rest and what bending does to it.
+    /// Force (N) at a conductance, less the reading at rest and the effect of bending.
     fn force(&self, sensor: usize, siemens: f64, curvature: Option<f64>) -> Option<f64> {
         let wired = self.wired[sensor].as_ref()?;
         let Curve::Pad(curve) = &wired.calibration.curve else { return None };

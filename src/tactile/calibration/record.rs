@@ -16,7 +16,7 @@ const LONGEST_NAME: usize = 80;
 pub struct Record {
     /// Name of the part, such as the number written on it.
     pub part: String,
-    /// SensorKind of the sensor.
+    /// Kind of the sensor.
     pub kind: SensorKind,
     /// The input and converter it was measured with.
     pub input: Input,
@@ -28,7 +28,7 @@ pub struct Record {
     /// True where the angles or forces were not set but assumed; see [`super::EmptyHand`].
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub assumed: bool,
-    /// Whatever should be known besides.
+    /// Note by the user or the program.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
 }

@@ -1,4 +1,4 @@
-//! A straight line through points of known relative weight, with honest intervals.
+//! A straight line through points of known relative weight, with confidence intervals.
 //!
 //! Minimises sum w (y - a - b x)². The noise of a point of weight 1 is estimated from the residuals with n - 2 degrees
 //! of freedom, and intervals are Student's (Draper and Smith, Applied Regression Analysis, chapter 1). Two points leave
@@ -16,7 +16,7 @@ pub(super) struct WeightedPoint {
     pub(super) weight: f64,
 }
 
-/// A line y = a + b x, and what the points leave open about it.
+/// A line y = a + b x, and its uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StraightLine {
     /// a, the value at x = 0.

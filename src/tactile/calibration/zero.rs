@@ -1,9 +1,9 @@
 //! Zeros of the sensors: tare, dynamic re-zero, and drift.
 //!
-//! Strips creep and pads are pinched, so that the reading of a finger at rest drifts. A [`Zero`] holds the reading of
-//! each sensor without contact and pressure: taken on request it is a tare; taken from the window before each trial's
-//! closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless it is so
-//! large that it must have another cause.
+//! Strips creep and pads are squeezed by their finger, so the reading of a finger at rest drifts. A [`Zero`] holds the
+//! reading of each sensor without contact and pressure: taken on request it is a tare; taken from the window before
+//! each trial's closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless
+//! it is so large that it must have another cause.
 
 use crate::board::Sensor;
 use crate::electronics::PadPart;
@@ -44,7 +44,7 @@ pub enum Unrest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriftLevel {
-    /// Within what a calibration promises.
+    /// Within the accuracy of a calibration.
     Steady,
     /// More than that; it is corrected.
     Moved,

@@ -8,7 +8,7 @@
 //! | converter | count c of 2^bits stands for the share c / 2^bits of the supply | the same |
 //!
 //! Used by the sensor model of simulated trials ([`super::model`]) and by the emulator's sensors. Random and tuned
-//! values stand there; this module holds only the laws.
+//! values are there; this module holds only the laws.
 
 mod converter;
 mod divider;

@@ -1,10 +1,10 @@
 //! The force-sensing pad, whose one reading is force, or pressure over its area: Ohmite FSR07CE (paper, section IV-B).
 //!
-//! Its law stands in [`crate::electronics`]; here it saturates at last, and the divider is amplified so that the
-//! converter reaches full scale where the pad saturates. Loads are counted here as shares u of the load that saturates the
-//! nominal pad: G = G_full u^b.
+//! [`crate::electronics`] has its law; here the pad also saturates, and the divider is amplified so that the converter
+//! reaches full scale when the pad saturates. Loads are given as shares u of the load that saturates the nominal pad:
+//! G = G_full u^b.
 //!
-//! Recordings of the real gripper know three levels: idle, touched, and saturated soon after the touch. No circuit or
+//! Recordings of the real gripper have three levels: idle, touched, and saturated soon after the touch. No circuit or
 //! curve of it is published, so the load that saturates is assumed, and a setting: [`PhysicalLike::full_force`].
 //! The calibration knows the nominal a and b: two points of a straight line in logarithms.
 
@@ -34,8 +34,8 @@ const CLOSED_EMPTY: f64 = 11.8;
 /// Deviation of the conductance from grasp to grasp (data sheet, single part repeatability).
 const SLIP: f64 = 0.02;
 
-/// The divider's resistor over the pad's at the load that saturates, G_full R_m. That load is assumed to make of the
-/// pad what 1 N makes of a common one.
+/// The divider's resistor over the pad's at the load that saturates, G_full R_m. The pad is assumed to have the
+/// conductance there that a common pad has at 1 N.
 const FULL_RATIO: f64 = PadPart::DIVIDER_OHM * PadPart::NOMINAL_SIEMENS;
 
 /// Voltage over R_m at the load that saturates, as a share of the supply.
@@ -100,8 +100,8 @@ impl ReadPad {
         self.pad.part.full * conductance.powf(1.0 / PadPart::NOMINAL_EXPONENT)
     }
 
-    /// What bending alone shows at a curvature, as a user knows it from an empty close (N). Where nothing shows yet it
-    /// rises straight to where it first does, as in [`crate::calibration::BendingZero`].
+    /// Force that bending alone causes at a curvature, as a user knows it from an empty close (N). Below the threshold
+    /// it rises linearly to the first value that shows, as in [`crate::calibration::BendingZero`].
     fn of_bending(&self, kappa: f64) -> f64 {
         let shown = |kappa: f64| {
             let mut still = ForcePad::new(self.pad.part, SAMPLE_HZ);

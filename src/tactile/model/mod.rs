@@ -17,9 +17,9 @@
 //! | noise, counts | divider, converter | divider, amplifier, converter |
 //!
 //! Readings have the units of the clean signals, by a nominal two-point calibration, as a user of the real gripper
-//! would have one: the difference between nominal and actual part stays in the readings. A real pad also fires when it
-//! is bent (Interlink's guide, "false triggering"). The model of the real gripper leaves it out, so that a channel reads
-//! the same in every layout that has it; that of any gripper draws it.
+//! would make it: the difference between nominal and actual part stays in the readings. A real pad also fires when it
+//! is bent (Interlink's guide, "false triggering"). The model of the real gripper leaves it out, so that a channel
+//! reads the same in every layout that has it; that of any gripper draws it.
 //!
 //! Constants without a source are marked as assumed. They were chosen from data sheets and from the published facts
 //! about the real recordings, before any recogniser was trained on the result.
@@ -46,16 +46,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorModel {
-    /// Perfect ones, as in the paper's simulation.
+    /// Perfect sensors, as in the paper's simulation.
     #[default]
     Virtual,
     /// Perfect parts that slip a little, drift a little and are read with noise.
     Noisy,
-    /// Such as the real gripper has: [`PhysicalLike`] with everything on.
+    /// Sensors as on the real gripper: [`PhysicalLike`] with everything on.
     PhysicalLike,
-    /// The same after one close of the empty hand, by which [`crate::calibration::EmptyHand`] calibrates them.
+    /// Sensors as on the real gripper after one close of the empty hand, by which [`crate::calibration::EmptyHand`]
+    /// calibrates them.
     Adapted,
-    /// Such as any real gripper may have: parts and their mounting are drawn anew for each grasp, and one empty close is
+    /// Sensors as on any real gripper: parts and their mounting are drawn anew for each grasp, and one empty close is
     /// known. For training recognisers for grippers without labelled grasps.
     Drawn,
 }

@@ -1,4 +1,4 @@
-//! Sensors such as a real gripper has, each of their faults a switch.
+//! Sensors as on a real gripper; each of their faults can be switched off.
 
 use super::streams::Stream;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 /// 2 % of the nominal calibration, which the published readings of the real gripper suggest.
 pub const GRIPPER: u64 = 127;
 
-/// Faults of the sensors and the gripper whose parts they are made of. Other constants stand with the parts.
+/// Faults of the sensors, each a switch, and the gripper from which their tolerances are drawn. Other constants are
+/// with the parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhysicalLike {

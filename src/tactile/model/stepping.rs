@@ -4,8 +4,8 @@
 //!
 //! This is a *quasi-static re-timing* of a grasp that was simulated with a pressure rising ten times a second. The
 //! signals are held at the instants of a grid; from one to the next they go by a first-order transient, and every
-//! reading falls into the settled part of its step. In between nothing is simulated again: how a finger swings, slips
-//! or snaps when a whole step of pressure arrives at once is not in it. The grid covers the whole trial, so that the
+//! reading falls into the settled part of its step. Nothing is simulated again: the model does not contain how a finger
+//! swings, slips or snaps when a whole step of pressure arrives at once. The grid covers the whole trial, so that the
 //! release moves in steps as well.
 
 use super::sampling::Trace;

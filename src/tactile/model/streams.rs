@@ -1,5 +1,5 @@
-//! Random numbers, a stream for every sensor and effect: switching an effect off, or leaving a channel out, leaves
-//! what the others draw as it was.
+//! Random numbers, a stream for every sensor and effect: switching an effect off, or leaving a channel out, does not
+//! change the numbers of the others.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

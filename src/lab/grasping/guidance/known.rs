@@ -72,7 +72,7 @@ impl KnownTouches {
         })
     }
 
-    /// A model's answers to them; none where it reads other channels.
+    /// A model's answers to these grasps; none if it reads other channels.
     pub fn library(&self, model: &Model) -> Option<TouchLibrary> {
         let place = |channel: &String| self.card.channels.iter().position(|own| own == channel);
         let places: Vec<usize> = model.card.channels.iter().map(place).collect::<Option<_>>()?;
@@ -137,12 +137,12 @@ impl KnownTouches {
 }
 
 impl Card {
-    /// Times of the kept readings (s): the middles of what each is the mean of.
+    /// Times of the kept readings (s): the middle of each averaged interval.
     fn times(&self) -> Vec<f32> {
         (0..KEPT).map(|k| self.duration_s * (k as f32 + 0.5) / KEPT as f32).collect()
     }
 
-    /// Means over equal times; where there is no reading, the one before.
+    /// Means over equal times; if one has no reading, the mean before it.
     fn means(&self, grasp: &Sequence) -> Sequence {
         let width = self.channels.len();
         let mut values = vec![0.0; KEPT * width];

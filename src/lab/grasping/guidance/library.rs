@@ -3,7 +3,7 @@
 use super::stance::{GripperMove, Stance};
 use palpate_learn::{Pmf, Sequence, mirror};
 
-/// Nearest poses whose answers are predicted: single ones are of little weight, as answers vary between like poses.
+/// Number of nearest poses used for a prediction: several, because answers vary between similar poses.
 const NEAREST: usize = 6;
 
 /// Times of a grasp at which readings are compared, from this share of it to its end.
@@ -23,7 +23,7 @@ pub(super) struct KnownTouch {
 /// Grasps of known objects in known poses, for one recogniser that did not learn from them.
 #[derive(Clone, Debug)]
 pub struct TouchLibrary {
-    /// Those of each class, each also with both fingers exchanged.
+    /// Grasps of each class, each also with both fingers exchanged.
     pub(super) touches: Vec<Vec<KnownTouch>>,
     scale: Scale,
 }
@@ -111,7 +111,7 @@ impl TouchLibrary {
         self.scale.felt(grasp)
     }
 
-    /// Touches of a class in the nearest stances, nearest first, by their index.
+    /// Indices of the grasps of a class in the nearest stances, nearest first.
     pub(super) fn nearest(&self, class: usize, stance: &Stance) -> Vec<usize> {
         let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(NEAREST + 1);
         for (touch, own) in self.touches[class].iter().enumerate() {

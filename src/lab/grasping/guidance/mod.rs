@@ -1,4 +1,5 @@
-//! Which grasp next: the move of the gripper after which least is expected to be unknown about the object in the hand.
+//! Choice of the next grasp: the move of the gripper after which the uncertainty about the object in the hand is
+//! expected to be least.
 //!
 //! A library holds grasps of known objects in known poses, and the recogniser's answer to each. Every one of them is a
 //! hypothesis: the object is this one, and it was gripped like this. The readings of the grasps so far weigh the

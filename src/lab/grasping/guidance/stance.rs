@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec2, EulerRot};
 use palpate_sim::scene::Scene;
 
-/// Differences of pose that a grasp feels, for distances between poses: a turn, a shift in the plane, a lift.
+/// Units for distances between poses: differences of turn, shift in the plane and lift that change the readings.
 const TURN_DEG: f64 = 12.0;
 const SHIFT: f64 = 0.012;
 const LIFT: f64 = 0.003;
@@ -75,7 +75,7 @@ impl Stance {
         Self { turned, offset: DVec2::new(across, along), height }
     }
 
-    /// Squared distance, in differences that a grasp feels.
+    /// Squared distance, in these units.
     pub(super) fn distance2(&self, other: &Self) -> f64 {
         let turn_deg = 2.0 * self.turned.dot(other.turned).abs().min(1.0).acos().to_degrees();
         let squared = |difference: f64, felt: f64| (difference / felt) * (difference / felt);

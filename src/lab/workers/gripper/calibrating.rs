@@ -35,7 +35,7 @@ pub struct CalibrationPlan {
     pub sensor: Sensor,
     /// Name of the part.
     pub part: String,
-    /// The port, or a file of captured bytes, where none is open yet; the only likely port where nothing is named.
+    /// Port or file of captured bytes to open if none is open yet; without a name, the only likely port.
     pub port: Option<PathBuf>,
 }
 
@@ -65,10 +65,10 @@ pub struct RunningCalibration {
     pub not_taken: Option<String>,
 }
 
-/// What a calibration does by itself, and what it begins with.
+/// Setup of a calibration, and the steps that it takes without commands.
 #[derive(Clone, Debug, Default)]
 pub struct CalibrationSetup {
-    /// Resistor beside the sensor (ohm), where it is not as the board reports.
+    /// Resistor beside the sensor (ohm), if it differs from the one that the board reports.
     pub resistor_ohm: Option<f64>,
     /// Angles (rad) or forces (N) to set; empty for the usual ones.
     pub stimuli: Vec<f64>,
@@ -123,7 +123,7 @@ impl CalibrationSession {
         self.setup.close_s.is_some() && self.closing.is_none() && self.has_all_points() && !self.has_bending()
     }
 
-    /// True where nothing of the setup is missing.
+    /// True if the setup is complete.
     pub fn is_complete(&self) -> bool {
         self.has_all_points() && self.closing.is_none() && (self.setup.close_s.is_none() || self.has_bending())
     }

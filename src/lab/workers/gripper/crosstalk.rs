@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// Command to the crosstalk test.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CrosstalkCommand {
-    /// Begin, on the port that is open, else on this one, else on the only likely one.
+    /// Begin: on the open port, or else on this one, or else on the only likely one.
     Begin(Option<PathBuf>),
     /// Skip the present sensor.
     Skip,

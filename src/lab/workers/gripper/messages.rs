@@ -77,7 +77,7 @@ pub enum GripperCommand {
 pub struct LatestReading {
     /// Counts by channel of the board.
     pub counts: Vec<Option<f32>>,
-    /// Angle, curvature, force and pressure by the calibrations; nothing where there are none.
+    /// Angle, curvature, force and pressure by the calibrations; empty without calibrations.
     pub estimate: SensorEstimate,
     /// Sensors outside their calibrated range, in the order of `Sensor::ALL`.
     pub beyond: [bool; 4],

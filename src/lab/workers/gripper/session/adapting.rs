@@ -17,7 +17,7 @@ impl GripperSession {
         self.adapting = self.begun > begun;
     }
 
-    /// Makes calibrations of the recorded close, if that is what it was for.
+    /// Calibrates the sensors by the recorded close, if it was recorded for this purpose.
     pub(super) fn adapt_to(&mut self, id: TrialId, discarded: bool) {
         if !std::mem::take(&mut self.adapting) || discarded {
             return;
@@ -39,7 +39,7 @@ impl GripperSession {
     }
 }
 
-/// What was found and assumed, in a sentence.
+/// Results and assumptions, in a sentence.
 fn notice_of(adaptation: &Adaptation) -> Notice {
     let sensors = || Sensor::ALL.into_iter().zip(&adaptation.sensors);
     let failed = sensors().find_map(|(sensor, adapted)| match adapted {

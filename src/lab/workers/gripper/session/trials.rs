@@ -37,7 +37,7 @@ impl GripperSession {
         }
     }
 
-    /// Detects trials from now on, or no longer; an automatic trial that is running ends then.
+    /// Turns the detection of trials on or off; turning it off ends a running automatic trial.
     pub(super) fn set_watching(&mut self, request: Option<TrialRequest>) {
         self.watching = request;
         if self.watching.is_none() && self.recording.as_ref().is_some_and(BoardTrialRecording::is_automatic) {
@@ -63,7 +63,7 @@ impl GripperSession {
         self.end(false, None);
     }
 
-    /// Sets the pressure that is due, and ends a trial whose programme is over.
+    /// Sets the line pressure, and ends a trial whose programme is over.
     pub(super) fn drive(&mut self) {
         let (Some(connection), Some(recording), Some(recorder)) =
             (&mut self.connection, &mut self.recording, &self.recorder)
@@ -176,7 +176,7 @@ impl GripperSession {
         }
     }
 
-    /// The trial cannot be recorded any further. Driven fingers are not left under pressure.
+    /// Ends a trial that cannot be recorded any further, and vents driven fingers.
     fn stop_recording(&mut self, cause: &str) {
         self.adapting = false;
         if self.ending.pop_front().is_some() {
