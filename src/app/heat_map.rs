@@ -152,7 +152,6 @@ pub(super) struct OverTime<'a> {
     pub(super) shown: &'a ShownMaps,
     /// Time shown (s).
     pub(super) time: [f64; 2],
-    /// Cursor (s).
     pub(super) cursor_s: Option<f64>,
     /// Phases of the grasp.
     pub(super) phases: &'a [PhaseSpan],

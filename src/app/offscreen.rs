@@ -25,9 +25,7 @@ pub struct OffscreenWindow {
     pub scene: Scene,
     /// Store of trials.
     pub store: PathBuf,
-    /// Mode.
     pub mode: Mode,
-    /// Theme.
     pub theme: Theme,
     /// Width and height (pixels, which are points).
     pub size: [u32; 2],
@@ -40,16 +38,12 @@ pub struct OffscreenWindow {
 /// Reason why there is no picture of the window.
 #[derive(Debug, thiserror::Error)]
 pub enum OffscreenError {
-    /// No graphics driver.
     #[error("no graphics driver can draw the window ({0}); install one, such as mesa-vulkan-drivers")]
     Driver(String),
-    /// A thread of the window cannot be started.
     #[error(transparent)]
     Thread(#[from] ThreadError),
-    /// The texture cannot be read.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// The window did not come to show what was asked for.
     #[error("the window did not show {wanted} within {seconds} s{}", said.as_ref().map(|s| format!("; it said: {s}")).unwrap_or_default())]
     Late {
         /// What was waited for.

@@ -41,7 +41,6 @@ pub(super) struct DisplayedData<'a> {
 /// A trial beside the one that is shown.
 #[derive(Clone, Debug)]
 pub struct Pinned {
-    /// The trial.
     pub trial: Arc<OpenTrial>,
     /// Number of its colour.
     pub colour: usize,
@@ -63,7 +62,6 @@ pub struct ComparedTrace {
 /// The open trial, the time shown, and trials compared with it.
 #[derive(Clone, Copy)]
 pub struct Inspected<'a> {
-    /// The trial.
     pub trial: &'a Arc<OpenTrial>,
     /// Time that is shown (s).
     pub cursor_s: f64,

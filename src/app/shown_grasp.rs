@@ -36,7 +36,6 @@ pub(super) struct ShownGrasp<'a> {
     /// First and last time (s).
     pub(super) span_s: [f64; 2],
     window_s: Option<[f64; 2]>,
-    /// Phases.
     pub(super) phases: Vec<PhaseSpan>,
 }
 

@@ -27,19 +27,14 @@ pub enum Display {
 /// Reason why the window does not open.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// There is no display.
     #[error("no display to open a window on (neither Wayland nor X11); {hint}", hint = WITHOUT_DISPLAY)]
     NoDisplay,
-    /// The display is named but does not answer.
     #[error("the display \"{0}\" does not answer; {hint}", hint = WITHOUT_DISPLAY)]
     DeadDisplay(String),
-    /// Libraries are missing.
     #[error("the window needs {hint}", hint = install_hint(.0))]
     Missing(Vec<Needed>),
-    /// No driver can draw into the window.
     #[error("no graphics driver can draw into the window ({0}); it needs {hint}", hint = install_hint(&[DRIVER]))]
     NoDriver(String),
-    /// Anything else.
     #[error("cannot open the window: {0}")]
     Other(String),
 }

@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{FingerFit, Known, RecordedGrasps, fit_finger};
+use palpate_lab::study::{Certainty, FingerFit, RecordedGrasps, fit_finger};
 use palpate_store::CalibrationId;
 
 /// Arguments of `palpate fit`.
@@ -79,9 +79,9 @@ impl Report for FitReport {
         let estimates = self.fit.estimates.iter().map(|estimate| {
             let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(three_digits);
             let known = match estimate.known {
-                Known::Well => "well known",
-                Known::Roughly => "roughly known",
-                Known::Hardly => "hardly known",
+                Certainty::Well => "well known",
+                Certainty::Roughly => "roughly known",
+                Certainty::Hardly => "hardly known",
             };
             [estimate.name.clone(), value, format!("{low} to {high}"), estimate.unit.to_owned(), known.to_owned()]
         });

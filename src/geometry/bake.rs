@@ -37,10 +37,8 @@ impl SolidPart {
 /// Error of baking a distance grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BakeError {
-    /// Nothing to bake.
     #[error("the object has no solid part to compute distances from")]
     NothingSolid,
-    /// The grid would need too much memory.
     #[error("a distance grid of {nodes} nodes is too fine; raise solver.distance_cell (the limit is 8 million nodes)")]
     TooFine {
         /// Nodes needed.

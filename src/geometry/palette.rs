@@ -135,7 +135,6 @@ pub struct ThemeColours {
     pub raised: Rgb,
     /// Thin lines between things.
     pub border: Rgb,
-    /// Text.
     pub text: Rgb,
     /// Text that matters less.
     pub quiet_text: Rgb,
@@ -151,7 +150,6 @@ pub struct ThemeColours {
     pub sky: Rgb,
     /// The 3-D view's backdrop, below.
     pub horizon: Rgb,
-    /// The ground.
     pub ground: Rgb,
     /// Lines of the ground's grid.
     pub grid: Rgb,

@@ -9,25 +9,16 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Primitive {
     /// A ball.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
+    Sphere { radius: f64 },
     /// A box.
     Cuboid {
         /// Half the edge lengths.
         half: DVec3,
     },
     /// A cylinder along z with flat ends.
-    Cylinder {
-        /// Radius.
-        radius: f64,
-        /// Half the length.
-        half_length: f64,
-    },
+    Cylinder { radius: f64, half_length: f64 },
     /// A cylinder along z with round ends; `half_length` counts the straight part only.
     Capsule {
-        /// Radius.
         radius: f64,
         /// Half the length of the straight part.
         half_length: f64,

@@ -14,25 +14,20 @@ use std::collections::{BTreeMap, HashMap};
 /// Reason why a mesh is no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// No triangles at all, or none left after removing degenerate ones.
     #[error("the mesh is empty: it has no triangles with area")]
     Empty,
-    /// A coordinate is NaN or infinite.
     #[error("corner {index} of the mesh is not a finite number")]
     NotFinite {
         /// Index of the corner.
         index: usize,
     },
-    /// A triangle names a corner that does not exist.
     #[error("triangle {index} of the mesh refers to a corner that does not exist")]
     BadIndex {
         /// Index of the triangle.
         index: usize,
     },
-    /// All corners lie in a plane or on a line, or the volume is zero.
     #[error("the mesh is flat: it encloses no volume (a sheet cannot be grasped; give it thickness)")]
     NoVolume,
-    /// Holes too wide to close without guessing the shape.
     #[error(
         "the mesh is open: {holes} hole(s), the widest {widest_mm:.1} mm across, which is too wide to close safely; \
          close it in a modelling tool, or set object.collision = \"hull\""
@@ -43,7 +38,6 @@ pub enum MeshError {
         /// Width of the widest (mm).
         widest_mm: f64,
     },
-    /// The surface crosses itself, so that inside and outside are not defined.
     #[error(
         "the mesh has no consistent inside (one-sided or tangled surface); repair it in a modelling tool, \
          or set object.collision = \"hull\""

@@ -59,7 +59,6 @@ pub const OTHER: &str = "other";
 /// Object class, with its size and shape class for stage one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Class {
-    /// Name.
     pub name: String,
     /// Size class, an index into [`Labels::sizes`]; `None` if unknown.
     pub size: Option<usize>,

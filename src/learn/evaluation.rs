@@ -115,7 +115,6 @@ pub fn answer(recogniser: &dyn Recogniser, data: &Dataset) -> Answers {
 pub struct Round {
     /// True class.
     pub truth: usize,
-    /// Belief.
     pub belief: Belief,
 }
 

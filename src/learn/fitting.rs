@@ -52,10 +52,8 @@ impl Fitting<'_> {
 /// Reason why a recogniser could not be fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LearnError {
-    /// Stopped by the caller.
     #[error("training stopped; no model was saved")]
     Stopped,
-    /// Unsuitable data or settings, or a failure, as a sentence.
     #[error("{0}")]
     Refused(String),
 }

@@ -79,7 +79,6 @@ impl ModelCard {
 pub struct Model {
     /// Description.
     pub card: ModelCard,
-    /// Recogniser.
     pub recogniser: Arc<dyn Recogniser>,
     /// Class signatures; `None` in files of older versions.
     pub signatures: Option<Arc<Signatures>>,

@@ -18,14 +18,12 @@ pub enum DriverChoice {
 /// Error of opening a graphics device.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
-    /// No driver at all.
     #[error(
         "no graphics driver was found, not even a software one. On Debian and Ubuntu: sudo apt install \
          mesa-vulkan-drivers (or libegl1 libgl1-mesa-dri); on Fedora: sudo dnf install mesa-vulkan-drivers; on Arch: sudo \
          pacman -S vulkan-icd-loader vulkan-swrast"
     )]
     NoDriver,
-    /// A driver that gives no device.
     #[error("the graphics driver {driver} cannot be used: {cause}; update the driver")]
     NoDevice {
         /// Its name.

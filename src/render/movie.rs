@@ -16,13 +16,11 @@ pub enum MovieFormat {
 /// Error of writing a movie.
 #[derive(Debug, thiserror::Error)]
 pub enum MovieError {
-    /// The encoder or its output failed.
     #[error("the movie cannot be written: {cause}")]
     Encode {
         /// Message of the encoder.
         cause: String,
     },
-    /// A picture of another size than the first one.
     #[error("a picture of the movie is {found:?} pixels instead of {wanted:?}")]
     Size {
         /// Its width and height (pixels).
@@ -30,7 +28,6 @@ pub enum MovieError {
         /// Those of the movie.
         wanted: [u32; 2],
     },
-    /// A size that the format cannot hold.
     #[error("a GIF is at most 65535 pixels wide and high, not {0:?}")]
     TooLarge([u32; 2]),
 }

@@ -17,24 +17,18 @@ pub struct Picture {
 /// Error of making a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// The device failed while drawing.
     #[error("the picture could not be read back from the graphics driver: {cause}")]
     Device {
         /// Message of the driver.
         cause: String,
     },
-    /// The picture could not be packed.
     #[error("the picture cannot be written as PNG: {cause}")]
     Encode {
         /// Message of the encoder.
         cause: String,
     },
-    /// The bytes are no picture.
     #[error("these bytes are not a PNG picture: {cause}")]
-    Decode {
-        /// Cause.
-        cause: String,
-    },
+    Decode { cause: String },
 }
 
 impl Picture {

@@ -123,7 +123,6 @@ pub struct Quality {
 pub struct Recomputed {
     /// Accuracy that was asked for.
     pub asked: Accuracy,
-    /// Cause.
     pub cause: RecomputeCause,
 }
 
@@ -277,7 +276,6 @@ pub struct PlannedEffect {
     pub number: f64,
     /// `auto` means on where the number is above this.
     pub threshold: f64,
-    /// Reason.
     pub reason: String,
 }
 

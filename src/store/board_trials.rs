@@ -19,7 +19,6 @@ use serde::{Deserialize, Serialize};
 pub struct BoardInfo {
     /// Name of the port.
     pub port: String,
-    /// Board and course.
     #[serde(flatten)]
     pub course: BoardCourse,
     /// Time from the beginning to the last reading (s); zero in trials of early versions.
@@ -33,11 +32,8 @@ pub struct BoardInfo {
 /// Data of a second or less.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardChunk {
-    /// Readings.
     pub readings: Vec<Reading>,
-    /// Gaps.
     pub gaps: Vec<Gap>,
-    /// Bytes.
     pub bytes: Vec<Captured>,
 }
 

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 pub enum FileKind {
     /// Animated PNG.
     Apng,
-    /// Lines of a board.
     BoardLines,
     /// Captured bytes of a board.
     Capture,
@@ -19,19 +18,15 @@ pub enum FileKind {
     Csv,
     /// Animated GIF.
     Gif,
-    /// JSON.
     Json,
-    /// MCAP.
     Mcap,
     /// Recognition model of this program.
     Model,
     /// Arrays of numpy.
     Npz,
-    /// Parquet.
     Parquet,
     /// PNG picture.
     Png,
-    /// Scene.
     Scene,
     /// SVG figure.
     Svg,

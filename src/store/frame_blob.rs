@@ -34,16 +34,13 @@ const FINGERS_SWAY: u8 = 2;
 /// Error of decoding frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlobError {
-    /// Another format or version.
     #[error("its frames have an unknown format")]
     Magic,
-    /// Too few bytes.
     #[error("its frames end in the middle of frame {frame}")]
     CutShort {
         /// Number of the frame.
         frame: u32,
     },
-    /// Too many bytes, or an invalid value.
     #[error("frame {frame} holds an invalid value")]
     BadValue {
         /// Number of the frame.

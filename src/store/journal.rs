@@ -31,14 +31,12 @@ pub enum Change {
     Kept,
     /// That was undone.
     ReturnedToLog,
-    /// The note.
     Note {
         /// Before.
         from: String,
         /// After.
         to: String,
     },
-    /// The tags.
     Tags {
         /// Before.
         from: Vec<String>,
@@ -66,7 +64,6 @@ pub enum Change {
     },
     /// The label was reviewed and kept.
     Reviewed,
-    /// The plan.
     Plan {
         /// Before.
         from: LabelPlan,
@@ -137,7 +134,6 @@ pub struct JournalEntry {
     pub trial_uid: Option<String>,
     /// Number of the trial in this store; none once it is purged.
     pub trial: Option<TrialId>,
-    /// The change.
     #[serde(flatten)]
     pub change: Change,
     /// Number of the entry that this one undoes.

@@ -29,7 +29,6 @@ use std::path::{Path, PathBuf};
 /// Result of an export.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Exported {
-    /// Path of the folder.
     pub folder: PathBuf,
     /// Trials written.
     pub trials: usize,

@@ -126,7 +126,7 @@ fn copy(transaction: &Transaction<'_>, damaged: &[TrialId]) -> rusqlite::Result<
 /// or tag while this store has the grasp under another uid.
 const COUNT_ANNOTATED: &str = "
     SELECT count(*) FROM other.trials AS theirs
-    WHERE theirs.deleted IS NULL AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)
+    WHERE theirs.deleted IS NULL AND theirs.demo = 0 AND theirs.uid NOT IN (SELECT uid FROM temp.incoming)
     AND theirs.id NOT IN (SELECT id FROM temp.damaged) AND (
         EXISTS (SELECT 1 FROM other.journal AS told
             WHERE told.trial = theirs.uid AND told.uid NOT IN (SELECT uid FROM main.journal))

@@ -17,10 +17,8 @@ const FULL: u64 = 64 << 10;
 /// Error of a store: a variant where somebody acts on it.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// Another program keeps the store locked.
     #[error("the store is busy: another program has been writing to it for {} s; try again", BUSY_TIMEOUT.as_secs())]
     Busy,
-    /// The file was deleted, replaced or cut short while it was open.
     #[error(
         "the store \"{path}\" was {event} while it was open: new trials are not in it. Put it back or choose another with \
          --store, then start Palpate again",
@@ -32,7 +30,6 @@ pub enum StoreError {
         /// Its fate.
         event: &'static str,
     },
-    /// A trial is damaged; others are not affected.
     #[error(
         "{what}. Take the store from a backup, or delete this trial: palpate trials delete {id}. Other trials are not \
          affected"
@@ -43,10 +40,8 @@ pub enum StoreError {
         /// Damage, with the number of the trial.
         what: String,
     },
-    /// A trial whose label cannot be changed, because it is not of the real gripper.
     #[error("{0}")]
     NotOfBoard(String),
-    /// Anything else, as a sentence.
     #[error("{0}")]
     Refused(String),
 }
@@ -100,13 +95,10 @@ impl StoreError {
 /// Error of an export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// Error of the store.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The layout does not fit the gripper of a trial.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// Anything else, as a sentence.
     #[error("{0}")]
     Refused(String),
 }

@@ -65,9 +65,7 @@ pub struct TrialRow {
     pub sound: bool,
     /// Number of warnings.
     pub warnings: usize,
-    /// Note.
     pub note: String,
-    /// Tags.
     pub tags: Vec<String>,
     /// The label is marked as unsure.
     pub unsure: bool,

@@ -12,7 +12,6 @@ pub struct Cadence {
     pub lost: u64,
     /// Lines that could not be read.
     pub bad_lines: u64,
-    /// Gaps.
     pub gaps: u64,
     /// Restarts of the board while it was connected, as its clock and its numbers show them.
     pub restarts: u64,

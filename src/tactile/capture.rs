@@ -25,14 +25,12 @@ pub enum Captured {
     Bytes {
         /// Time (s since the stream began).
         arrived_s: f64,
-        /// The bytes.
         bytes: Vec<u8>,
     },
     /// The stream was interrupted.
     Interrupted {
         /// Time (s since the stream began).
         at_s: f64,
-        /// Cause.
         cause: String,
     },
 }

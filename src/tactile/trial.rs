@@ -18,7 +18,6 @@ pub type TrialId = i64;
 pub struct PhaseMark {
     /// Begin, on the clock of the readings (s).
     pub from_s: f64,
-    /// Phase.
     pub phase: Phase,
     /// Commanded line pressure (bar), where this program commands it.
     pub line_bar: Option<f64>,
@@ -170,7 +169,6 @@ impl TrialHeader {
 /// Data of a simulated trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedData {
-    /// Pose of the gripper in the world.
     pub world_from_gripper: Pose,
     /// Effects simulated; empty for trials of early versions.
     pub plan: Plan,
@@ -184,7 +182,6 @@ pub struct SimulatedData {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct BoardCourse {
-    /// Board.
     pub board: Board,
     /// Detected format of its lines.
     pub detected: Option<Detected>,
@@ -201,7 +198,6 @@ pub struct BoardCourse {
 /// Data of a trial of a real gripper, as its board sent them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoardLog {
-    /// Board and course.
     pub course: BoardCourse,
     /// Readings, in order.
     pub readings: Vec<Reading>,
@@ -225,7 +221,6 @@ pub enum TrialData {
 pub struct Trial<D = TrialData> {
     /// Facts that trials of all sources have.
     pub header: TrialHeader,
-    /// Data.
     pub data: D,
 }
 

@@ -18,15 +18,8 @@ pub(crate) struct FuzzStream {
 /// Rule that the decoder broke.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BrokenRule {
-    /// An event is wrong.
     #[error("{rule}: {event:?}")]
-    Event {
-        /// The rule.
-        rule: &'static str,
-        /// The event.
-        event: DecodedEvent,
-    },
-    /// The cadence counts other readings than were decoded.
+    Event { rule: &'static str, event: DecodedEvent },
     #[error("cadence counts {counted} readings, {decoded} were decoded")]
     Count {
         /// Readings by the cadence.

@@ -252,6 +252,31 @@ fn imports_are_found_through_re_exports() {
 }
 
 #[test]
+fn public_items_are_documented() {
+    let item = ["struct", "enum", "trait", "fn", "const", "static", "type", "union"];
+    let is_item = |line: &str| {
+        let rest = line.trim_start().strip_prefix("pub ");
+        let mut words =
+            rest.unwrap_or_default().split_whitespace().skip_while(|word| ["async", "unsafe"].contains(word));
+        words.next().is_some_and(|word| item.contains(&word))
+    };
+    let mut found = 0;
+    for (package, sources) in workspace() {
+        for (file, text) in sources.files.iter().filter(|(file, _)| !file.contains("test")) {
+            let lines: Vec<&str> = text.lines().take_while(|line| !line.starts_with("#[cfg(test)]")).collect();
+            for at in (0..lines.len()).filter(|at| is_item(lines[*at])) {
+                let mut above = lines[..at].iter().rev().map(|line| line.trim());
+                // Attributes stand between an item and its documentation, some over several lines.
+                let near = above.find(|line| line.starts_with("///") || line.is_empty() || line.ends_with(['}', ';']));
+                assert!(near.is_some_and(|line| line.starts_with("///")), "{package} {file}: {}", lines[at]);
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 1000, "only {found} items");
+}
+
+#[test]
 fn the_window_knows_neither_command_line_nor_physics() {
     let sources = sources("palpate");
     for (file, code) in sources.files.iter().filter(|(file, _)| file.starts_with("app/")) {

@@ -12,7 +12,7 @@ use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenP
 use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::gripper::Listen;
-use palpate_lab::study::{FingerFit, Known, Observation, Trust, fit_finger};
+use palpate_lab::study::{Certainty, FingerFit, Observation, Trust, fit_finger};
 use palpate_sim::gripper::Phase;
 use palpate_sim::gripper::{GripperModel, Side, TorquePoint};
 use palpate_sim::objects::{EMPTY, ObjectModel};
@@ -225,7 +225,7 @@ fn fitted(parts: &HiddenParts, seed: u64) -> FingerFit {
 fn the_hidden_finger_is_fitted_within_3_per_cent() {
     let fit = fitted(&parts(5, false), 5);
     println!("{:+.4} {:?} {} steps {:?}", off(&fit), fit.estimates, fit.steps, fit.remainders);
-    assert!(off(&fit).abs() < 0.03 && fit.estimates[0].known == Known::Well, "{}", off(&fit));
+    assert!(off(&fit).abs() < 0.03 && fit.estimates[0].known == Certainty::Well, "{}", off(&fit));
     assert_ne!(fit.gripper, GripperModel::default());
     // The grippers that a model learns, drawn about the fitted one, have the hidden one among them.
     let (ranges, [_, hidden]) = (fit.gripper.fitted.unwrap(), scenes());

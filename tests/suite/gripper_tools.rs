@@ -16,7 +16,7 @@ use palpate_device::protocol::{AdcRange, Saturation};
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, UsbIdentity};
 use palpate_geometry::palette::Theme;
 use palpate_lab::gripper::{Listen, NotOpened};
-use palpate_lab::study::{Course, Estimate, FingerFit, FingerFitError, Known, Remainder};
+use palpate_lab::study::{Certainty, Estimate, FingerFit, FingerFitError, FingerMotion, Remainder};
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, Examine, FitTrials, FittedFinger, GripperCommand};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
@@ -204,7 +204,8 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         pictures.push(bench.picture());
         bench.harness.get_by_label("Skip").click();
         bench.harness.step();
-        bench.until_shown(true, "sensor 4 of 4");
+        // What it says above the button changes once the fingers have rested.
+        bench.until_shown(true, "Press the right pad firmly");
         bench.harness.get_by_label("Stop").click();
         bench.harness.step();
         bench.until_shown(true, "The right flex strip follows the left flex strip by 10.0 %: +60 counts");
@@ -391,11 +392,11 @@ fn made_up_fit(trials: &[TrialId]) -> FittedFinger {
         Estimate { name: name.to_owned(), unit, value, low, high, known }
     };
     let estimates = vec![
-        estimate("gripper.finger.bending_stiffness", "N m²", 3.36e-3, 0.021, Known::Well),
-        estimate("gripper.finger.damping_time", "s", 0.03, 0.18, Known::Roughly),
-        estimate("gripper.actuation.filling_time", "s", 0.06, 0.7, Known::Hardly),
-        estimate("torque at 0.40 bar", "N m", 0.018, 0.03, Known::Well),
-        estimate("torque at 0.80 bar / bending stiffness", "1/m", 12.5, 0.004, Known::Well),
+        estimate("gripper.finger.bending_stiffness", "N m²", 3.36e-3, 0.021, Certainty::Well),
+        estimate("gripper.finger.damping_time", "s", 0.03, 0.18, Certainty::Roughly),
+        estimate("gripper.actuation.filling_time", "s", 0.06, 0.7, Certainty::Hardly),
+        estimate("torque at 0.40 bar", "N m", 0.018, 0.03, Certainty::Well),
+        estimate("torque at 0.80 bar / bending stiffness", "1/m", 12.5, 0.004, Certainty::Well),
     ];
     let remainders = trials.iter().map(|id| Remainder {
         name: format!("trial {id}"),
@@ -408,7 +409,7 @@ fn made_up_fit(trials: &[TrialId]) -> FittedFinger {
         let fitted =
             t_s.iter().map(|t| (8.0 + side.index() as f64) * (1.0 - (1.2 * t).cos()) / 2.0).collect::<Vec<_>>();
         let recorded = t_s.iter().zip(&fitted).map(|(t, own)| own + 0.3 * (9.0 * t).sin()).collect();
-        Course { name: format!("trial {id}"), side, t_s, recorded, fitted }
+        FingerMotion { name: format!("trial {id}"), side, t_s, recorded, fitted }
     };
     let mut scene = Scene::default();
     scene.gripper.finger.bending_stiffness = 3.36e-3;

@@ -4,7 +4,7 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::Shard;
 use palpate_lab::study::accuracy::stored_accuracy;
 use palpate_lab::study::paper::{
-    Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport,
+    Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyData, StudyError, StudyPlan, StudyProgress, StudyReport,
     StudyRow, StudySize, StudyStep, is_current, paper_study, stored_report, study_fingerprint,
 };
 use palpate_lab::study::{Measuring, StoredStudy, StudyOutcome, generated_sections, merged_units, program};
@@ -65,7 +65,7 @@ fn sample(
     let store = Store::open(&folder.join("store.sqlite")).expect("opens");
     let work = Measuring { threads, cancelled: &cancelled, progress: &progress };
     let results = stop_after.map(|_| folder.join(format!("{}.jsonl", study.card().key)));
-    let outcome = study.run(&StudyBench::new(store, &plan, work), results.as_deref(), Shard::WHOLE)?;
+    let outcome = study.run(&StudyData::new(store, &plan, work), results.as_deref(), Shard::WHOLE)?;
     Ok(outcome.whole())
 }
 
@@ -85,14 +85,14 @@ fn eight_parts_of_a_study_merge_into_the_file_of_one_machine() -> TestResult {
     let plan = StudyPlan::of_size(StudySize::Sample { objects: 3, trials: 6 });
     let cancelled = AtomicBool::new(false);
     // Each machine has a store of its own.
-    let machine = |name: &str, progress: &(dyn Fn(StudyProgress) + Sync), run: &dyn Fn(&StudyBench<'_>, &Path)| {
+    let machine = |name: &str, progress: &(dyn Fn(StudyProgress) + Sync), run: &dyn Fn(&StudyData<'_>, &Path)| {
         let store = Store::open(&folder.path().join(format!("{name}.sqlite"))).expect("opens");
         let work = Measuring { threads: 1, cancelled: &cancelled, progress };
         let file = folder.path().join(format!("{name}.jsonl"));
-        run(&StudyBench::new(store, &plan, work), &file);
+        run(&StudyData::new(store, &plan, work), &file);
         file
     };
-    let whole = |bench: &StudyBench<'_>, file: &Path| {
+    let whole = |bench: &StudyData<'_>, file: &Path| {
         let stored = study.run(bench, Some(file), Shard::WHOLE).expect("runs").whole().expect("finished");
         std::fs::write(file.with_extension("json"), serde_json::to_string(&stored.result).expect("writes"))
             .expect("writes");
@@ -101,7 +101,7 @@ fn eight_parts_of_a_study_merge_into_the_file_of_one_machine() -> TestResult {
     let parts: Vec<PathBuf> = (1..=8)
         .map(|number| {
             let shard: Shard = format!("{number}/8").parse().expect("a part");
-            let part = |bench: &StudyBench<'_>, file: &Path| {
+            let part = |bench: &StudyData<'_>, file: &Path| {
                 let outcome = study.run(bench, Some(file), shard).expect("runs");
                 assert!(matches!(outcome, StudyOutcome::Part(0 | 1)), "{outcome:?}");
             };

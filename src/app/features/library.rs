@@ -26,7 +26,6 @@ pub struct LibrarySelection {
     pub query: TrialQuery,
     /// The search field should get the cursor.
     pub focus_search: bool,
-    /// Selected trials.
     pub selected: BTreeSet<TrialId>,
     /// Trial selected last.
     pub cursor: Option<TrialId>,

@@ -39,7 +39,6 @@ pub struct GripperTools {
     pub data: Job<(), TrainingData>,
     /// Training on labelled trials.
     pub training: Job<TrainRequest, FinishedTraining>,
-    /// Loading of models.
     pub load: Job<PathBuf, TrainedModel>,
     /// Teaching of new objects.
     pub teaching: Job<TeachRequest, TrainedModel>,

@@ -10,7 +10,7 @@ use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{Course, Estimate, FingerFit, Known, Remainder};
+use palpate_lab::study::{Certainty, Estimate, FingerFit, FingerMotion, Remainder};
 use palpate_lab::workers::FittedFinger;
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
@@ -123,7 +123,7 @@ const BAR_ENDS: [f64; 2] = [0.02, 0.5];
 fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
     let share = |estimate: &Estimate| [estimate.low, estimate.high].map(|end| end / estimate.value.max(1e-12) - 1.0);
     // Unidentified parameters reach beyond.
-    let identified = estimates.iter().filter(|estimate| estimate.known != Known::Hardly);
+    let identified = estimates.iter().filter(|estimate| estimate.known != Certainty::Hardly);
     let widest = identified.flat_map(share).map(f64::abs).fold(0.0, f64::max);
     let end = widest.clamp(BAR_ENDS[0], BAR_ENDS[1]);
     ui.add_space(4.0);
@@ -132,9 +132,9 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
     ui.spacing_mut().interact_size.y = 16.0;
     for estimate in estimates {
         let known = match estimate.known {
-            Known::Well => theme.colours().accent,
-            Known::Roughly => theme.colours().warning,
-            Known::Hardly => theme.colours().error,
+            Certainty::Well => theme.colours().accent,
+            Certainty::Roughly => theme.colours().warning,
+            Certainty::Hardly => theme.colours().error,
         };
         ui.horizontal(|ui| {
             ui.label(name_of(estimate));
@@ -147,9 +147,9 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
         ui.horizontal(|ui| {
             bar_ui(ui, share(estimate).map(|share| (share / end) as f32), colour(known), estimate);
             let words = match estimate.known {
-                Known::Well => "well identified",
-                Known::Roughly => "roughly identified",
-                Known::Hardly => "hardly identified",
+                Certainty::Well => "well identified",
+                Certainty::Roughly => "roughly identified",
+                Certainty::Hardly => "hardly identified",
             };
             let [low, high] = [estimate.low, estimate.high].map(three_digits);
             ui.label(RichText::new(format!("{low} to {high}, {words}")).small().weak());
@@ -186,8 +186,8 @@ fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
     remark_ui(ui, "Thick: recorded. Thin: fitted. Dashed: right finger.");
     for (number, left) in fit.remainders.iter().enumerate() {
         wrapped(ui, RichText::new(remainder_text(left)));
-        let own = |course: &&Course| course.name == left.name;
-        let courses: Vec<&Course> = fit.courses.iter().filter(own).collect();
+        let own = |course: &&FingerMotion| course.name == left.name;
+        let courses: Vec<&FingerMotion> = fit.courses.iter().filter(own).collect();
         let recorded = veil(Trace::Curvature.colour(theme), 0.5);
         let thin = colour(theme.colours().text);
         plot(theme, &format!("fitted curvature {number}"), 110.0).show(ui, |plot| {
@@ -211,7 +211,7 @@ fn remainder_text(left: &Remainder) -> String {
     format!("{}: curvature within {} 1/m{force} (RMS)", left.name, three_digits(left.curvature_per_m))
 }
 
-fn line<'a>(course: &Course, values: &[f64], name: &str) -> Line<'a> {
+fn line<'a>(course: &FingerMotion, values: &[f64], name: &str) -> Line<'a> {
     let points: PlotPoints<'_> = course.t_s.iter().zip(values).map(|(t, value)| [*t, *value]).collect();
     let style = match course.side {
         Side::Left => LineStyle::Solid,

@@ -35,7 +35,6 @@ pub(super) struct PlotCurve {
     pub(super) trace: Trace,
     /// Dashed for the right finger.
     pub(super) dashed: bool,
-    /// Its values.
     pub(super) values: TraceValue,
     /// Half the width of its error band, in the same unit; `None` without one.
     pub(super) half_width: TraceValue,
@@ -49,7 +48,6 @@ pub(super) struct TimePlot<'a> {
     pub(super) id: &'a str,
     /// Unit of the values, shown at the axis.
     pub(super) unit: &'a str,
-    /// Curves.
     pub(super) curves: Vec<PlotCurve>,
     /// Least range of values, so that noise does not fill a plot.
     pub(super) least: [f64; 2],

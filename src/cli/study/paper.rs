@@ -7,7 +7,7 @@ use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use palpate_lab::datasets::DatasetQuery;
 use palpate_lab::study::Measuring;
 use palpate_lab::study::paper::{
-    PAPER_STUDIES, STUDY_PRESET, StudyBench, StudyCard, StudyPlan, StudyProgress, StudySize, StudyStep, paper_study,
+    PAPER_STUDIES, STUDY_PRESET, StudyCard, StudyData, StudyPlan, StudyProgress, StudySize, StudyStep, paper_study,
 };
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
@@ -126,7 +126,7 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
         bar.show(done, of);
     };
     let work = Measuring { threads: output.threads(), cancelled: &stop, progress: &progress };
-    let bench = StudyBench::new(open_store(store)?, &plan, work);
+    let bench = StudyData::new(open_store(store)?, &plan, work);
     let mut reports = BTreeMap::new();
     for study in studies {
         let StudyCard { key, title, .. } = study.card();

@@ -8,7 +8,6 @@ use super::{CheckFinding, CheckStatus, Observations, SKETCH};
 /// One check.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
-    /// Its name.
     pub name: &'static str,
     /// What holds when it passes.
     pub about: &'static str,

@@ -28,9 +28,7 @@ pub const WIRING_RULES: [&str; 2] = [
 /// Voltage divider of one pin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wire {
-    /// The pin.
     pub pin: &'static str,
-    /// Its sensor.
     pub sensor: Sensor,
     /// Part between the pin and 3.3 V.
     pub above: String,

@@ -96,7 +96,6 @@ impl FaultKind {
 /// A fault and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmulatedFault {
-    /// Its kind.
     pub kind: FaultKind,
     /// Its parameter; see [`fault_help`].
     pub value: f64,
@@ -136,7 +135,6 @@ pub fn fault_help() -> String {
 pub struct FaultError {
     /// The fault.
     pub text: String,
-    /// Problem.
     pub problem: String,
 }
 

@@ -3,7 +3,7 @@
 
 use super::faults::{EmulatedFault, FaultKind};
 use super::firmware::{BoardSetup, FirmwareBoard};
-use super::hand::{Began, Hand, HandPlan};
+use super::hand::{Hand, HandEvent, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
 use super::script::Step;
 use super::uart::misread;
@@ -35,7 +35,6 @@ pub struct EmulatorSetup {
     pub most_steps: u8,
     /// Start of the board's clock (µs).
     pub clock_start_us: u32,
-    /// Faults.
     pub faults: Vec<EmulatedFault>,
     /// Random seed of noise and faults.
     pub seed: u64,
@@ -49,7 +48,6 @@ pub enum EmulatorEventKind {
     Grasp {
         /// Number of the grasp, from 1.
         number: u32,
-        /// The object.
         object: String,
     },
     /// A bend and a load are held on the bench.
@@ -96,7 +94,6 @@ pub enum EmulatorEventKind {
 pub struct EmulatorEvent {
     /// Time since the first host (s).
     pub t_s: f64,
-    /// The event.
     #[serde(flatten)]
     pub what: EmulatorEventKind,
 }
@@ -325,10 +322,10 @@ impl EmulatedGripper {
     fn tell_hand(&mut self) {
         for began in self.hand.take_began() {
             self.tell(match began {
-                Began::Grasp { number, object } => EmulatorEventKind::Grasp { number, object },
-                Began::Hold { bend_deg, load_n, seconds } => EmulatorEventKind::Hold { bend_deg, load_n, seconds },
-                Began::Done => EmulatorEventKind::ScriptDone,
-                Began::Failed(reason) => EmulatorEventKind::Failed { reason },
+                HandEvent::Grasp { number, object } => EmulatorEventKind::Grasp { number, object },
+                HandEvent::Hold { bend_deg, load_n, seconds } => EmulatorEventKind::Hold { bend_deg, load_n, seconds },
+                HandEvent::Done => EmulatorEventKind::ScriptDone,
+                HandEvent::Failed(reason) => EmulatorEventKind::Failed { reason },
             });
         }
     }

@@ -55,7 +55,7 @@ pub struct HandPlan {
 
 /// Activity of the fingers.
 #[derive(Debug)]
-enum Doing {
+enum HandActivity {
     Rest,
     Held { from: Stimulus, to: Stimulus, since_s: f64, until_s: f64 },
     Grasp(Box<LiveGrasp>),
@@ -63,7 +63,7 @@ enum Doing {
 
 /// Start of an activity.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Began {
+pub(super) enum HandEvent {
     /// The fingers close on something.
     Grasp { number: u32, object: String },
     /// A bend and a load are held.
@@ -81,7 +81,7 @@ pub(super) struct Hand {
     things: Vec<Graspable>,
     script: VecDeque<Step>,
     scripted: bool,
-    doing: Doing,
+    doing: HandActivity,
     grasps: u32,
     /// Grasps since the hand was last emptied.
     turn: usize,
@@ -89,7 +89,7 @@ pub(super) struct Hand {
     /// A host drives.
     driven: bool,
     vented_since_s: Option<f64>,
-    began: Vec<Began>,
+    began: Vec<HandEvent>,
     last: Stimulus,
 }
 
@@ -111,7 +111,7 @@ impl Hand {
             scripted: !plan.script.is_empty(),
             plan,
             things: Vec::new(),
-            doing: Doing::Rest,
+            doing: HandActivity::Rest,
             grasps: 0,
             turn: 0,
             next_s: 0.0,
@@ -149,16 +149,16 @@ impl Hand {
     }
 
     /// Takes the starts since the last call.
-    pub(super) fn take_began(&mut self) -> Vec<Began> {
+    pub(super) fn take_began(&mut self) -> Vec<HandEvent> {
         std::mem::take(&mut self.began)
     }
 
     /// Line pressure of the hand's own programme (bar), if it has one.
     pub(super) fn own_bar(&self) -> Option<f64> {
         match &self.doing {
-            Doing::Grasp(grasp) if grasp.programme.is_some() => Some(grasp.line_bar),
-            Doing::Rest | Doing::Held { .. } if !self.driven => Some(0.0),
-            Doing::Rest | Doing::Held { .. } | Doing::Grasp(_) => None,
+            HandActivity::Grasp(grasp) if grasp.programme.is_some() => Some(grasp.line_bar),
+            HandActivity::Rest | HandActivity::Held { .. } if !self.driven => Some(0.0),
+            HandActivity::Rest | HandActivity::Held { .. } | HandActivity::Grasp(_) => None,
         }
     }
 
@@ -168,7 +168,7 @@ impl Hand {
             // Until now the old pressure was on.
             self.at(t, was_bar);
         } else {
-            (self.driven, self.doing, self.turn) = (true, Doing::Rest, 0);
+            (self.driven, self.doing, self.turn) = (true, HandActivity::Rest, 0);
             self.script.clear();
         }
     }
@@ -181,11 +181,13 @@ impl Hand {
             self.go_on(t);
         }
         self.last = match &mut self.doing {
-            Doing::Rest => Stimulus::default(),
-            Doing::Held { from, to, since_s, .. } => from.towards(*to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0)),
-            Doing::Grasp(grasp) => {
+            HandActivity::Rest => Stimulus::default(),
+            HandActivity::Held { from, to, since_s, .. } => {
+                from.towards(*to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0))
+            }
+            HandActivity::Grasp(grasp) => {
                 let stimulus = grasp.at(t, host_bar);
-                self.began.extend(grasp.failed.take().map(Began::Failed));
+                self.began.extend(grasp.failed.take().map(HandEvent::Failed));
                 stimulus
             }
         };
@@ -198,7 +200,7 @@ impl Hand {
             return;
         }
         let let_go = self.vented_since_s.take().is_some_and(|since| t - since >= LET_GO_S);
-        if let_go || matches!(self.doing, Doing::Rest) {
+        if let_go || matches!(self.doing, HandActivity::Rest) {
             self.grasp_next(t, None);
         }
     }
@@ -206,9 +208,9 @@ impl Hand {
     /// Continues the script, or its own grasps.
     fn go_on(&mut self, t: f64) {
         let busy = match &self.doing {
-            Doing::Rest => false,
-            Doing::Held { until_s, .. } => t < *until_s,
-            Doing::Grasp(grasp) => t < grasp.ends_s,
+            HandActivity::Rest => false,
+            HandActivity::Held { until_s, .. } => t < *until_s,
+            HandActivity::Grasp(grasp) => t < grasp.ends_s,
         };
         if busy {
             return;
@@ -216,9 +218,9 @@ impl Hand {
         if let Some(step) = self.script.pop_front() {
             self.take_step(&step, t);
         } else if self.scripted {
-            if !matches!(self.doing, Doing::Rest) {
-                self.began.push(Began::Done);
-                self.doing = Doing::Rest;
+            if !matches!(self.doing, HandActivity::Rest) {
+                self.began.push(HandEvent::Done);
+                self.doing = HandActivity::Rest;
             }
         } else if let Some(every) = self.plan.grasp_every_s.filter(|_| t >= self.next_s) {
             self.next_s = t + every;
@@ -231,9 +233,9 @@ impl Hand {
         match step {
             Step::Hold { bend, load, seconds } => {
                 let to = Stimulus { kappa: bend.map(|angle| angle / StripPart::ACTIVE_LENGTH), force: *load };
-                self.doing = Doing::Held { from: self.last, to, since_s: t, until_s: t + seconds };
+                self.doing = HandActivity::Held { from: self.last, to, since_s: t, until_s: t + seconds };
                 let bend_deg = bend.map(f64::to_degrees);
-                self.began.push(Began::Hold { bend_deg, load_n: *load, seconds: *seconds });
+                self.began.push(HandEvent::Hold { bend_deg, load_n: *load, seconds: *seconds });
             }
             Step::Grasp { object, bar } => {
                 let mut programme = self.plan.scene.programme.clone();
@@ -269,8 +271,8 @@ impl Hand {
         self.grasps += 1;
         let Graspable { name, model, poses } = &self.things[thing];
         let (scene, _) = poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps)));
-        self.began.push(Began::Grasp { number: self.grasps, object: name.clone() });
-        self.doing = Doing::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
+        self.began.push(HandEvent::Grasp { number: self.grasps, object: name.clone() });
+        self.doing = HandActivity::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
     }
 }
 
@@ -377,7 +379,7 @@ mod tests {
         assert_eq!(loaded, Stimulus { kappa: [0.0; 2], force: [1.0; 2] });
         assert_eq!(run(&mut hand, 1.9, 3.0, 0.0), Stimulus::default());
         let began = hand.take_began();
-        assert!(matches!(began[..], [Began::Hold { .. }, Began::Hold { .. }, Began::Done]), "{began:?}");
+        assert!(matches!(began[..], [HandEvent::Hold { .. }, HandEvent::Hold { .. }, HandEvent::Done]), "{began:?}");
     }
 
     #[test]

@@ -47,7 +47,6 @@ pub struct ScriptError {
     pub number: usize,
     /// Its text.
     pub step: String,
-    /// Problem.
     pub problem: String,
 }
 

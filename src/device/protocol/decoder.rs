@@ -11,7 +11,7 @@ use super::line_log::{ConsoleLine, LineKind, LineLog};
 use super::lines::{Line, LineSplitter};
 use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
-use super::shape::{Candidate, Judged, Role, Shapes};
+use super::shape::{Candidate, LineVerdict, Role, Shapes};
 use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
 
@@ -186,12 +186,12 @@ impl Reader {
         };
         self.line_log.add(line, arrived_s, LineKind::Values);
         match self.shapes.judge(Candidate { format, fields, arrived_s }) {
-            Judged::Known(line) => {
+            LineVerdict::Known(line) => {
                 self.give_up(arrived_s);
                 self.reading(&line, events);
             }
-            Judged::Changed(lines) => lines.iter().for_each(|line| self.reading(line, events)),
-            Judged::Waits { given_up } => {
+            LineVerdict::Changed(lines) => lines.iter().for_each(|line| self.reading(line, events)),
+            LineVerdict::Waits { given_up } => {
                 for _ in 0..given_up {
                     self.unreadable += 1;
                     self.meter.bad_line(arrived_s);

@@ -19,7 +19,6 @@ const CHECKED_FROM: u32 = 2;
 /// Parsed handshake.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Handshake {
-    /// The board.
     pub(super) board: Board,
     /// Lines of numbers end in a checksum.
     pub(super) checked: bool,

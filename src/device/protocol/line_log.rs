@@ -26,7 +26,6 @@ pub struct ConsoleLine {
     pub arrived_ms: u64,
     /// Its text; other bytes are escaped.
     pub text: String,
-    /// Its kind.
     pub kind: LineKind,
 }
 

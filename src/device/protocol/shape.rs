@@ -71,7 +71,7 @@ pub(super) struct Shapes {
 
 /// Verdict on a line.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Judged {
+pub(super) enum LineVerdict {
     /// The line has the known fields.
     Known(Candidate),
     /// The fields of the line are now accepted; the previous line, which also had them, waited.
@@ -82,10 +82,10 @@ pub(super) enum Judged {
 
 impl Shapes {
     /// Judges a line.
-    pub(super) fn judge(&mut self, line: Candidate) -> Judged {
+    pub(super) fn judge(&mut self, line: Candidate) -> LineVerdict {
         if self.is_known(&line) {
             // The caller, who has seen this line arrive, gives up the line that waits.
-            return Judged::Known(line);
+            return LineVerdict::Known(line);
         }
         let part = self.format == Some(line.format) && self.is_part(&line);
         let needed = if part { CONFIRM_PART } else { CONFIRM };
@@ -95,14 +95,14 @@ impl Shapes {
                     self.names = line.fields.iter().map(|field| field.name.clone()).collect();
                     self.format = Some(line.format);
                     self.roles.clear();
-                    return Judged::Changed(Box::new([before, line]));
+                    return LineVerdict::Changed(Box::new([before, line]));
                 }
                 self.waiting = Some((line, count + 1));
-                Judged::Waits { given_up: 1 }
+                LineVerdict::Waits { given_up: 1 }
             }
             before => {
                 self.waiting = Some((line, 1));
-                Judged::Waits { given_up: u64::from(before.is_some()) }
+                LineVerdict::Waits { given_up: u64::from(before.is_some()) }
             }
         }
     }

@@ -79,10 +79,8 @@ impl From<Baud> for u32 {
 /// A rate that no port is opened at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BaudError {
-    /// 1200 baud is the signal that erases a Due.
     #[error("1200 baud erases the sketch of a Due and is never used; try 115200")]
     Erases,
-    /// Not one of [`Baud::ALL`].
     #[error("{0} is not a supported baud rate; choose one of {list}", list = Baud::ALL.map(|baud| baud.rate().to_string()).join(", "))]
     Unsupported(u32),
 }

@@ -124,10 +124,8 @@ impl LinkStatus {
 /// Why a line could not be sent to the board.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
-    /// There is no board at the moment.
     #[error("the board is not connected: nothing was sent")]
     NotConnected,
-    /// Writing to the port failed.
     #[error("cannot send to the board: {0}")]
     Port(String),
 }

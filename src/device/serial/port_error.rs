@@ -35,7 +35,6 @@ pub struct PortError {
     pub trouble: PortTrouble,
     /// What failed.
     pub what: String,
-    /// Cause.
     pub cause: String,
     /// Fix, in a sentence.
     pub fix: String,

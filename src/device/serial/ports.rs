@@ -24,7 +24,6 @@ pub struct PortInfo {
     pub title: String,
     /// Its USB device, if it is one.
     pub usb: Option<UsbIdentity>,
-    /// Kind of board.
     #[serde(skip)]
     pub kind: BoardKind,
 }

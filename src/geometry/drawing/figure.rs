@@ -24,7 +24,6 @@ pub struct Figure {
 /// Axes with series of points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
-    /// Title.
     pub title: String,
     /// Horizontal axis.
     pub x: PlotAxis,
@@ -73,7 +72,6 @@ pub struct DataSeries {
     pub line: LineStyle,
     /// Sign at each point.
     pub marker: Marker,
-    /// The points.
     pub points: Vec<DataPoint>,
 }
 
@@ -91,12 +89,9 @@ pub struct DataPoint {
 /// Line of a series.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineStyle {
-    /// None.
     #[default]
     None,
-    /// Thin.
     Thin,
-    /// Bold.
     Bold,
     /// Thin and dashed.
     Dashed,
@@ -105,7 +100,6 @@ pub enum LineStyle {
 /// Sign at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Marker {
-    /// None.
     #[default]
     None,
     /// Filled circle.

@@ -8,7 +8,6 @@ use crate::units::three_digits;
 /// Grid of values as colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// Title.
     pub title: String,
     /// Quantity of the values.
     pub quantity: String,

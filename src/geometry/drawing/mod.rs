@@ -35,7 +35,6 @@ pub struct DrawList {
     pub solids: Vec<Solid>,
     /// Things shown for comparison: translucent, without shadow.
     pub ghosts: Vec<Solid>,
-    /// Soft fingers.
     pub fingers: Vec<SoftFinger>,
     /// Forces.
     pub arrows: Vec<Arrow>,
@@ -73,7 +72,6 @@ pub enum Detail {
 pub struct Ground {
     /// Its height (m).
     pub height: f32,
-    /// Its colour.
     pub colour: Rgb,
     /// Colour of the grid: a line every 10 mm, a stronger one every 50 mm.
     pub grid: Rgb,
@@ -125,7 +123,6 @@ pub struct FingerSensors {
 pub struct SensorStrip {
     /// Where it begins and ends, along the neutral axis from the palm (m).
     pub stretch: [f32; 2],
-    /// Its colour.
     pub colour: Rgb,
 }
 
@@ -184,6 +181,5 @@ pub struct Arrow {
     pub to: Vec3,
     /// Radius of the shaft (m).
     pub radius: f32,
-    /// Its colour.
     pub colour: Rgb,
 }

@@ -32,7 +32,6 @@ pub enum Shape2 {
         to: Vec2,
         /// Width in points.
         width: f32,
-        /// Colour.
         colour: Rgb,
         /// 0 invisible to 1 opaque.
         opacity: f32,
@@ -54,7 +53,6 @@ pub enum Shape2 {
         centre: Vec2,
         /// Radius in points.
         radius: f32,
-        /// Colour.
         colour: Rgb,
     },
     /// A line of text, centred vertically on its position.
@@ -65,9 +63,7 @@ pub enum Shape2 {
         align: Align,
         /// Height of the font in points.
         size: f32,
-        /// Colour.
         colour: Rgb,
-        /// The text.
         text: String,
     },
 }

@@ -72,7 +72,7 @@ pub struct Comparison<'a> {
 }
 
 /// A method's tests, in one split or several.
-struct Tested {
+struct TestRun {
     model: String,
     title: String,
     /// Test grasps of all splits, one after the other.
@@ -88,7 +88,7 @@ struct Tested {
     splits: usize,
 }
 
-impl Tested {
+impl TestRun {
     /// Adds the tests of another split.
     fn with(mut self, other: Self) -> Self {
         let splits = (self.splits + other.splits) as f64;
@@ -129,8 +129,8 @@ pub struct MethodResult {
 
 impl MethodResult {
     /// The result where all splits have ended and none has failed.
-    fn of(method: &'static str, splits: &[Option<Result<Tested, ComparisonError>>]) -> Option<Self> {
-        let tested: Vec<&Tested> = splits.iter().map(|split| split.as_ref()?.as_ref().ok()).collect::<Option<_>>()?;
+    fn of(method: &'static str, splits: &[Option<Result<TestRun, ComparisonError>>]) -> Option<Self> {
+        let tested: Vec<&TestRun> = splits.iter().map(|split| split.as_ref()?.as_ref().ok()).collect::<Option<_>>()?;
         let pairs = tested.iter().flat_map(|own| own.answers.truth.iter().copied().zip(decisions(&own.answers)));
         let confusion = Confusion::from_pairs(tested.first()?.data.labels.classes.len(), pairs)?;
         let train_cpu_s = tested.iter().map(|own| own.train_cpu_s).sum::<f64>() / tested.len() as f64;
@@ -141,18 +141,14 @@ impl MethodResult {
 /// Error of a comparison.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ComparisonError {
-    /// A method could not be fitted.
     #[error("{method}: {cause}")]
     Fit {
         /// Key of the method.
         method: &'static str,
-        /// Cause.
         cause: LearnError,
     },
-    /// The same grasp for training and for testing.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// No test grasps.
     #[error("no test grasps left: collect more trials, or train on fewer with --train-trials")]
     NoTest,
 }
@@ -172,7 +168,7 @@ pub fn compare(
     }
     let fits = methods.len() * splits.len();
     let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<Option<Result<Tested, ComparisonError>>>> = Mutex::new((0..fits).map(|_| None).collect());
+    let done: Mutex<Vec<Option<Result<TestRun, ComparisonError>>>> = Mutex::new((0..fits).map(|_| None).collect());
     std::thread::scope(|scope| {
         for _ in 0..threads.clamp(1, fits.max(1)) {
             scope.spawn(|| {
@@ -192,10 +188,10 @@ pub fn compare(
     let mut done = done.into_inner().unwrap_or_default().into_iter().flatten();
     let (mut kept, mut left_out, mut refused) = (Vec::new(), Vec::new(), None);
     for method in methods {
-        let of_splits: Result<Vec<Tested>, _> =
+        let of_splits: Result<Vec<TestRun>, _> =
             done.by_ref().take(splits.len()).collect::<Vec<_>>().into_iter().collect();
         match of_splits {
-            Ok(tested) => kept.extend(tested.into_iter().reduce(Tested::with)),
+            Ok(tested) => kept.extend(tested.into_iter().reduce(TestRun::with)),
             Err(ComparisonError::Fit { cause, .. }) if cause != LearnError::Stopped => {
                 left_out.push((method.key, cause.clone()));
                 refused.get_or_insert(ComparisonError::Fit { method: method.key, cause });
@@ -231,7 +227,7 @@ impl Comparison<'_> {
         }
     }
 
-    fn of_method(&self, method: &'static Method) -> Result<Tested, ComparisonError> {
+    fn of_method(&self, method: &'static Method) -> Result<TestRun, ComparisonError> {
         let fitting = self.fitting();
         let model =
             method.train(self.train, &fitting).map_err(|cause| ComparisonError::Fit { method: method.key, cause })?;
@@ -245,12 +241,12 @@ impl Comparison<'_> {
         self.row(&self.of_model(name, title, model))
     }
 
-    fn of_model(&self, name: &str, title: &str, model: &Model) -> Tested {
+    fn of_model(&self, name: &str, title: &str, model: &Model) -> TestRun {
         let recogniser = model.recogniser.as_ref();
         let answers = answer(recogniser, self.test);
         let seed = self.seed ^ 0x6ea5;
         let followed = rounds(recogniser, self.test, &answers, seed);
-        Tested {
+        TestRun {
             model: name.to_owned(),
             title: title.to_owned(),
             data: self.test.clone(),
@@ -266,8 +262,8 @@ impl Comparison<'_> {
         }
     }
 
-    fn row(&self, tested: &Tested) -> Result<ComparisonRow, ComparisonError> {
-        let Tested { data, answers, followed, independent, .. } = tested;
+    fn row(&self, tested: &TestRun) -> Result<ComparisonRow, ComparisonError> {
+        let TestRun { data, answers, followed, independent, .. } = tested;
         let bootstrap = Bootstrap { seed: self.seed ^ 0x6ea5, ..Bootstrap::default() };
         let evaluation = evaluate_stopped(data, answers, followed, &tested.stops, self.stop, &bootstrap);
         let classes = data.labels.classes.len();
@@ -286,14 +282,14 @@ impl Comparison<'_> {
         })
     }
 
-    fn compared(&self, tested: &[Tested]) -> Result<Vec<ComparisonRow>, ComparisonError> {
+    fn compared(&self, tested: &[TestRun]) -> Result<Vec<ComparisonRow>, ComparisonError> {
         let mut rows = tested.iter().map(|tested| self.row(tested)).collect::<Result<Vec<_>, _>>()?;
         let Some((first, others)) = tested.split_first() else { return Ok(rows) };
         // A trial that several splits test counts once.
         let mut met = BTreeSet::new();
         let examples = first.data.examples.iter().enumerate();
         let once: Vec<usize> = examples.filter(|(_, e)| met.insert((e.id, e.class))).map(|(k, _)| k).collect();
-        let decided = |tested: &Tested| -> Vec<Option<usize>> {
+        let decided = |tested: &TestRun| -> Vec<Option<usize>> {
             once.iter().map(|k| Some(tested.answers.verdicts[*k].pmf.top().0)).collect()
         };
         let truth: Vec<usize> = once.iter().map(|k| first.answers.truth[*k]).collect();

@@ -92,7 +92,6 @@ pub struct JudgedModel {
 /// Error of a training.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainingError {
-    /// Fewer than two objects with enough trials.
     #[error(
         "training needs two objects with {LEAST_TRIALS} labelled trials each (now {found}): record and label more trials of \
          the real gripper"
@@ -101,7 +100,6 @@ pub enum TrainingError {
         /// Number of objects with enough trials.
         found: usize,
     },
-    /// Too few readable trials.
     #[error(
         "training needs two objects with {LEAST_TRIALS} usable trials each (now {found}): {usable} of {all} labelled trials \
          are usable. `palpate calibrate list` shows which parts are calibrated"
@@ -114,25 +112,18 @@ pub enum TrainingError {
         /// Number of objects with enough trials.
         found: usize,
     },
-    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The trials do not form a data set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// No trials can be held out.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// The fit failed.
     #[error(transparent)]
     Fit(#[from] LearnError),
-    /// The evaluation failed.
     #[error(transparent)]
     Judge(#[from] ComparisonError),
-    /// No such method.
     #[error("unknown method \"{0}\"")]
     UnknownMethod(String),
-    /// The model could not be saved.
     #[error(transparent)]
     Save(#[from] ModelError),
 }

@@ -26,8 +26,8 @@ pub use effect_audit::{
 };
 pub use effects::{EffectChange, ExplainedEffect, Explanation, explain_effects};
 pub use finger_fit::{
-    Course, Estimate, FingerFit, FingerFitError, FitWatch, Known, MOST_STEPS, Observation, RecordedGraspError,
-    RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+    Certainty, Estimate, FingerFit, FingerFitError, FingerMotion, FitWatch, MOST_STEPS, Observation,
+    RecordedGraspError, RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
 };
 pub use frame::{
     Experiment, GeneratedSection, Measuring, ResultFile, ResultFileError, StoredStudy, StudyCell, StudyCommand,

@@ -16,13 +16,11 @@ pub struct StepSizes {
     pub steps: usize,
     /// Sequences in a batch.
     pub batch: usize,
-    /// Channels.
     pub channels: usize,
     /// LSTM units.
     pub units: usize,
     /// Width of the first fully connected layer.
     pub hidden: usize,
-    /// Classes.
     pub classes: usize,
 }
 
@@ -38,7 +36,6 @@ impl StepSizes {
 pub struct NetworkCost {
     /// Timed operation.
     pub what: &'static str,
-    /// Sizes.
     pub sizes: StepSizes,
     /// CPU time, the median over the runs (ms).
     pub cpu_ms_median: f64,

@@ -28,9 +28,7 @@ pub struct BenchScene {
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostRow {
-    /// Scene.
     pub scene: &'static str,
-    /// Accuracy.
     pub accuracy: String,
     /// Step length (s); under a tolerance the mean.
     pub step_s: f64,

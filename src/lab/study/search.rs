@@ -24,10 +24,8 @@ const FOLDS: usize = 2;
 /// Error of a search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SearchError {
-    /// A fit failed.
     #[error(transparent)]
     Fit(#[from] LearnError),
-    /// The grasps cannot be divided into folds.
     #[error(transparent)]
     Split(#[from] SplitError),
 }

@@ -5,7 +5,7 @@ use super::job::{Job, JobError, JobFailure, JobRun, Newer, spare_threads};
 use super::messages::Wake;
 use crate::grasping::Shard;
 use crate::study::paper::{
-    LinkedFigure, PAPER_STUDIES, PaperStudy, StudyBench, StudyError, StudyPlan, StudyProgress, StudyReport, StudySize,
+    LinkedFigure, PAPER_STUDIES, PaperStudy, StudyData, StudyError, StudyPlan, StudyProgress, StudyReport, StudySize,
     StudyStep, is_current, paper_study, stored_report,
 };
 use crate::study::{Measuring, ResultFileError, StoredStudy, program};
@@ -105,7 +105,7 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
         run.count(done, of, words);
     };
     let work = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
-    let bench = StudyBench::new(Store::open(store)?, &plan, work);
+    let bench = StudyData::new(Store::open(store)?, &plan, work);
     let outcome = study.run(&bench, Some(&folder.units(key)), Shard::WHOLE)?;
     let Some(stored) = outcome.whole() else { return Ok(false) };
     folder.write(key, &stored, &stored.result.tables, study.figures(&stored.result), draw.as_ref())?;

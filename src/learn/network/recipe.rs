@@ -31,7 +31,6 @@ pub struct Recipe {
     /// stage one decides after the whole grasp, PMFs are those of the softmax, and of earlier grasps only the PMF is read.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub strict: bool,
-    /// Training.
     pub training: Training,
 }
 

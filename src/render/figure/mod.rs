@@ -18,7 +18,6 @@ use plotters::prelude::{BitMapBackend, SVGBackend};
 /// Error of drawing a figure.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
-    /// A drawing backend failed.
     #[error("the figure cannot be drawn: {cause}")]
     Backend {
         /// Message of the backend.

@@ -64,9 +64,7 @@ pub struct JointAxes {
     pub place: DVec3,
     /// Bending in the plane: its first and its second half.
     pub bending: [DVec3; 2],
-    /// Sideways.
     pub sideways: DVec3,
-    /// Twist.
     pub twist: DVec3,
 }
 

@@ -15,7 +15,6 @@ pub struct SimulationError {
     pub tick: u64,
     /// Its time (s).
     pub seconds: f64,
-    /// Cause.
     pub cause: NotFinite,
 }
 

@@ -58,7 +58,7 @@ pub(super) struct Integrator {
 
 /// A step that was taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taken {
+pub(super) struct AcceptedStep {
     pub(super) report: StepReport,
     /// Estimated error; see [`Integrator`].
     pub(super) error: f64,
@@ -88,14 +88,14 @@ impl Integrator {
         within: &mut Surroundings<'_>,
         state: &mut State,
         h: f64,
-    ) -> Result<Taken, NotFinite> {
+    ) -> Result<AcceptedStep, NotFinite> {
         self.start.copy_from(state);
         match self.method {
             IntegrationMethod::Euler => {
                 let report = within.step(state, h)?;
                 // The step less the trapezoidal rule: h (v1 - v0) / 2.
                 let weights = [-0.5 * h, 0.0, 0.5 * h];
-                Ok(Taken { report, error: self.error(state, within.model, weights) })
+                Ok(AcceptedStep { report, error: self.error(state, within.model, weights) })
             }
             IntegrationMethod::Sdirk2 => {
                 let first = within.step(state, GAMMA * h)?;
@@ -106,7 +106,7 @@ impl Integrator {
                 let b1 = 1.0 / (6.0 * GAMMA * (1.0 - GAMMA));
                 let b2 = 0.5 - b1 * GAMMA;
                 let weights = [1.0 - b1 - b2, b1 - (1.0 - GAMMA), b2 - GAMMA].map(|b| b * h);
-                Ok(Taken { report: first.followed_by(&second), error: self.error(state, within.model, weights) })
+                Ok(AcceptedStep { report: first.followed_by(&second), error: self.error(state, within.model, weights) })
             }
         }
     }

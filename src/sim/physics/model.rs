@@ -40,7 +40,6 @@ pub struct PhysicsModel {
     pub(super) chamber: Option<Chamber>,
     /// Joints that creep.
     pub(super) relaxation: Option<Relaxation>,
-    /// Motion of the hand.
     pub(super) hand_motion: Option<HandMotion>,
     /// Soft shell of the object.
     pub(super) shell: Option<Shell>,

@@ -10,7 +10,6 @@ use rand_chacha::ChaCha8Rng;
 /// The start of a scene, in world coordinates. The world's origin is the middle of the table, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// Pose of the gripper in the world.
     pub world_from_gripper: Pose,
     /// Pose of the object's own frame (not its centre of mass) in the world; absent for an empty hand.
     pub world_from_object: Option<Pose>,

@@ -32,11 +32,9 @@ impl Spatial {
 /// A symmetric 6 x 6 block over (linear, angular), as contacts at different arms add up to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block {
-    /// Linear by linear.
     pub(super) linear: DMat3,
     /// Angular rows, linear columns.
     pub(super) mixed: DMat3,
-    /// Angular by angular.
     pub(super) angular: DMat3,
 }
 

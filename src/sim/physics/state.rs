@@ -1,6 +1,6 @@
 //! State of a simulation. All of it can be saved and restored; scratch memory is elsewhere.
 
-use super::effects::went_on;
+use super::effects::continued;
 use super::model::PhysicsModel;
 use super::placement::Placement;
 use crate::gripper::Sway;
@@ -164,7 +164,7 @@ impl State {
         for (now, before) in self.hand.iter_mut().zip(start.hand) {
             *now += (*now - before) * share;
         }
-        self.chamber_bar = went_on(start.chamber_bar, self.chamber_bar, self.filled_from_bar, share);
+        self.chamber_bar = continued(start.chamber_bar, self.chamber_bar, self.filled_from_bar, share);
         self.body.position += (self.body.position - start.body.position) * share;
         let turn = rotation_vector(self.body.rotation * start.body.rotation.inverse());
         self.body.rotation = (DQuat::from_scaled_axis(turn * share) * self.body.rotation).normalize();

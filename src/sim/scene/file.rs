@@ -9,10 +9,8 @@ use std::path::Path;
 /// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// Not TOML, or a value of the wrong kind.
     #[error("the scene is not understood: {0}")]
     Syntax(String),
-    /// Anything else, as a sentence.
     #[error("{0}")]
     Refused(String),
 }

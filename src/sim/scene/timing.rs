@@ -26,7 +26,6 @@ impl Default for Timing {
 /// A tick rate on which samples and actuation both fall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
-    /// Ticks per second.
     pub ticks_per_second: u32,
     /// Ticks from one sample to the next.
     pub ticks_per_sample: u32,

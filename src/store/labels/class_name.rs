@@ -16,7 +16,6 @@ pub struct LabelError(pub(super) String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{}\" and \"{}\" hold different objects, and the class of both is \"{class}\"; {advice}", sources[0], sources[1])]
 pub struct ClassClash {
-    /// The class.
     pub class: String,
     /// Where the two objects are from.
     pub sources: [String; 2],

@@ -61,7 +61,6 @@ pub struct LabelledTrial {
     pub object: Option<String>,
     /// Recorded to its end.
     pub complete: bool,
-    /// Note.
     pub note: String,
     /// Tags, in the order given.
     pub tags: Vec<String>,

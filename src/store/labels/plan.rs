@@ -108,7 +108,6 @@ impl LabelPlan {
 /// Progress of one object.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ObjectProgress {
-    /// Name.
     pub name: String,
     /// Trials wanted.
     pub wanted: u32,

@@ -28,7 +28,6 @@ use std::sync::Arc;
 /// A trial in the library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LibraryTrial {
-    /// The trial.
     pub row: TrialRow,
     /// Title of its object, or `unlabelled`.
     pub title: Arc<str>,

@@ -23,13 +23,10 @@ pub enum TrialColumn {
     Source,
     /// Preset of poses.
     Preset,
-    /// Sensors.
     Sensors,
     /// Quality, the best first.
     Quality,
-    /// Tags.
     Tags,
-    /// Note.
     Note,
     /// Number of samples.
     Samples,

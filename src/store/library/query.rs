@@ -92,7 +92,6 @@ pub struct TrialQuery {
     pub tag: Option<String>,
     /// Has this flag.
     pub flag: Option<Flag>,
-    /// Quality.
     pub quality: Option<TrialQuality>,
     /// Preset of poses.
     pub preset: Option<String>,
@@ -106,7 +105,6 @@ pub struct TrialQuery {
     pub until: Option<Day>,
     /// As to deletion.
     pub shown: Shown,
-    /// Order.
     pub order: TrialOrder,
 }
 

@@ -28,7 +28,6 @@ const LEAST_CHANGE: f64 = 0.05;
 /// One close of an empty hand.
 #[derive(Clone, Copy, Debug)]
 pub struct EmptyHand<'a> {
-    /// The board.
     pub board: &'a Board,
     /// Readings of the board, from rest on.
     pub readings: &'a [Reading],

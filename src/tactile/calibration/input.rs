@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 /// An input of the board: a divider and the converter behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Input {
-    /// The divider.
     pub divider: Divider,
     /// The largest count of the converter, C.
     pub full_scale: u32,

@@ -29,7 +29,6 @@ const CREEP_COUNTS: f64 = 1.0;
 /// Reason why no point can be taken yet.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsettled {
-    /// Too few readings since the last point, or none.
     #[error("reading: {have_s:.1} of {need_s:.1} s")]
     TooShort {
         /// Present length (s).
@@ -37,16 +36,13 @@ pub enum Unsettled {
         /// Needed length (s).
         need_s: f64,
     },
-    /// No numbers on the channel.
     #[error("the board sends no value on this channel: check the wiring and the name of the channel")]
     Silent,
-    /// The reading still changes.
     #[error("still moving ({by:+.1} counts): hold it still and wait")]
     Moving {
         /// The later half less the earlier (counts).
         by: f64,
     },
-    /// At the end of the converter's range.
     #[error("{counts:.0} counts is an end of the range: the circuit is open or shorted, or the pad is saturated")]
     RangeEnd {
         /// Reading (counts).

@@ -16,7 +16,6 @@ const LONGEST_NAME: usize = 80;
 pub struct Record {
     /// Name of the part, such as the number written on it.
     pub part: String,
-    /// Kind of the sensor.
     pub kind: SensorKind,
     /// The input and converter it was measured with.
     pub input: Input,

@@ -20,19 +20,16 @@ pub struct Zero {
 /// Reason why readings give no tare.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unrest {
-    /// Too few readings.
     #[error("only {have} readings arrived: check that the board is sending")]
     TooFew {
         /// Number of readings.
         have: usize,
     },
-    /// Pressure is on.
     #[error("the line pressure is {bar:.2} bar: vent, let the fingers come to rest, and try again")]
     Pressed {
         /// The line pressure (bar).
         bar: f64,
     },
-    /// A sensor moves.
     #[error("the {place} is moving: let the fingers come to rest, and try again", place = .sensor.label())]
     Moving {
         /// Sensor that moves.
@@ -55,7 +52,6 @@ pub enum DriftLevel {
 /// The zero of one sensor against its calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Drift {
-    /// The sensor.
     pub sensor: Sensor,
     /// Shift of the zero: an angle (rad), or the apparent force on a pad (N).
     pub moved: f64,

@@ -19,7 +19,6 @@ pub(super) enum Shows {
     Thumbnail,
     /// Small plot.
     Sparkline,
-    /// Text.
     Text(TrialColumn),
 }
 

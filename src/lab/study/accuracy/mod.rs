@@ -28,7 +28,7 @@ use palpate_geometry::DistanceField;
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
-use recognition::{LevelAnswers, RecognitionBench, scores};
+use recognition::{LevelAnswers, RecognitionData, scores};
 use report::SceneKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -52,7 +52,6 @@ enum UnitResult {
 pub enum AccuracyCell {
     /// All settings of one object in one pose.
     Pose {
-        /// The object.
         object: String,
         /// True where it is fixed.
         fixed: bool,
@@ -82,7 +81,7 @@ pub struct AccuracyExperiment {
     plan: AccuracyPlan,
     objects: BTreeMap<String, (ObjectModel, PoseSampler)>,
     /// Test grasps, once the first models are trained.
-    bench: Mutex<Option<Arc<RecognitionBench>>>,
+    bench: Mutex<Option<Arc<RecognitionData>>>,
 }
 
 impl AccuracyExperiment {
@@ -95,12 +94,12 @@ impl AccuracyExperiment {
         Ok(Self { plan, objects, bench: Mutex::new(None) })
     }
 
-    fn bench(&self, stop: &AtomicBool) -> Result<Arc<RecognitionBench>, StudyError> {
+    fn bench(&self, stop: &AtomicBool) -> Result<Arc<RecognitionData>, StudyError> {
         let mut bench = self.bench.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(bench) = &*bench {
             return Ok(Arc::clone(bench));
         }
-        let made = Arc::new(RecognitionBench::new(self.plan.recognition.clone(), stop)?);
+        let made = Arc::new(RecognitionData::new(self.plan.recognition.clone(), stop)?);
         *bench = Some(Arc::clone(&made));
         Ok(made)
     }

@@ -38,7 +38,7 @@ pub(super) struct LevelAnswers {
 }
 
 /// Objects with their poses, and the test grasps.
-pub(super) struct RecognitionBench {
+pub(super) struct RecognitionData {
     plan: RecognitionPlan,
     objects: Vec<(ObjectModel, PoseSampler)>,
     labels: Labels,
@@ -49,7 +49,7 @@ pub(super) struct RecognitionBench {
 const TRAIN_SEEDS: u64 = 1;
 const TEST_SEEDS: u64 = 1_000_001;
 
-impl RecognitionBench {
+impl RecognitionData {
     /// Loads the objects and computes the test grasps.
     pub(super) fn new(plan: RecognitionPlan, stop: &AtomicBool) -> Result<Self, StudyError> {
         let base = Scene {

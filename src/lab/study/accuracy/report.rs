@@ -22,7 +22,6 @@ pub struct AccuracyStudy {
 /// Cost and error of one setting.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AccuracyRow {
-    /// The setting.
     #[serde(flatten)]
     pub setting: AccuracySetting,
     /// Results by kind of scene.
@@ -94,7 +93,6 @@ pub(super) struct SceneKind {
 pub struct GroupCost {
     /// Kind of scene.
     pub group: SceneGroup,
-    /// Grasps.
     pub grasps: usize,
     /// Grasps that report a fault, or end with the object elsewhere.
     pub failed: usize,
@@ -112,7 +110,6 @@ pub struct GroupCost {
 pub struct Spread {
     /// Lower quartile.
     pub low: f64,
-    /// Median.
     pub median: f64,
     /// Upper quartile.
     pub high: f64,
@@ -156,7 +153,6 @@ pub struct RecognitionRow {
     pub grasps: usize,
     /// Training grasps that were left out because they report a fault.
     pub left_out: usize,
-    /// Scores by method.
     pub scores: Vec<MethodScore>,
 }
 

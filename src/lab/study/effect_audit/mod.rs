@@ -22,7 +22,7 @@ use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::scene::{Effect, Scene, Setting};
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, SignalDefinition};
-use scenes::{Drawn, ObjectShelf};
+use scenes::{Drawn, ObjectCache};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -30,7 +30,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct EffectAudit {
     scenes: u32,
     seed: u64,
-    shelf: ObjectShelf,
+    shelf: ObjectCache,
 }
 
 /// Difference of two trials: root mean squares over all samples of both fingers.
@@ -91,7 +91,6 @@ pub struct AuditedScene {
 /// An effect in a random scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AuditedEffect {
-    /// Its name.
     pub name: String,
     /// Decision of `auto`.
     pub on: bool,
@@ -119,7 +118,7 @@ impl EffectAudit {
 
     /// An audit of so many random scenes of a seed.
     pub fn new(scenes: u32, seed: u64) -> Result<Self, ObjectError> {
-        Ok(Self { scenes, seed, shelf: ObjectShelf::load()? })
+        Ok(Self { scenes, seed, shelf: ObjectCache::load()? })
     }
 }
 

@@ -23,7 +23,6 @@ pub struct AuditReport {
 /// Audit of one effect's rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AuditRow {
-    /// Name.
     pub name: String,
     /// Threshold of its rule.
     pub threshold: f64,

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Objects with the settings that a scene loads them with by default.
-pub(super) struct ObjectShelf(Vec<(String, Option<ObjectModel>)>);
+pub(super) struct ObjectCache(Vec<(String, Option<ObjectModel>)>);
 
 /// A random scene.
 pub(super) struct Drawn {
@@ -29,7 +29,7 @@ const SOFT_SHARE: f64 = 0.5;
 const SLOW_SHARE: f64 = 0.5;
 const SIDEWAYS_SHARE: f64 = 0.25;
 
-impl ObjectShelf {
+impl ObjectCache {
     pub(super) fn load() -> Result<Self, ObjectError> {
         let options = Scene::default().load_options();
         let names = catalogue().iter().map(|built_in| built_in.name.clone());
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn scenes_are_valid_differ_and_repeat_by_their_settings() -> Result<(), Box<dyn std::error::Error>> {
-        let shelf = ObjectShelf::load()?;
+        let shelf = ObjectCache::load()?;
         let mut seen = Vec::new();
         for index in 0..40 {
             let drawn = shelf.draw(1, index);

@@ -6,7 +6,7 @@ use palpate_sim::gripper::Side;
 
 /// Curvature of one finger over a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course {
+pub struct FingerMotion {
     /// The recording.
     pub name: String,
     /// Finger.
@@ -20,14 +20,14 @@ pub struct Course {
 }
 
 /// Courses from residuals in the order of the fitted model's places.
-pub(super) fn courses(observations: &[Observation], fitted: &FittedModel<'_>, residuals: &[f64]) -> Vec<Course> {
-    let mut courses: Vec<Course> = Vec::new();
+pub(super) fn courses(observations: &[Observation], fitted: &FittedModel<'_>, residuals: &[f64]) -> Vec<FingerMotion> {
+    let mut courses: Vec<FingerMotion> = Vec::new();
     let mut last = None;
     for ((number, track, k), residual) in fitted.places().zip(residuals).filter(|((_, track, _), _)| !track.is_force) {
         let Observation { name, signals, .. } = &observations[number];
         if last.replace((number, track.side)) != Some((number, track.side)) {
             let (name, side) = (name.clone(), track.side);
-            courses.push(Course { name, side, t_s: Vec::new(), recorded: Vec::new(), fitted: Vec::new() });
+            courses.push(FingerMotion { name, side, t_s: Vec::new(), recorded: Vec::new(), fitted: Vec::new() });
         }
         let recorded = f64::from(signals.row(k)[track.column]);
         if let Some(course) = courses.last_mut() {

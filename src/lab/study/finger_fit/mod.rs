@@ -20,7 +20,7 @@ mod recorded;
 mod tests;
 mod watched;
 
-pub use course::Course;
+pub use course::FingerMotion;
 pub use least_squares::MOST_STEPS;
 pub use observation::Observation;
 pub use recorded::{RecordedGraspError, RecordedGrasps};
@@ -56,7 +56,7 @@ impl Default for Trust {
 /// Identifiability of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Known {
+pub enum Certainty {
     /// Within a tenth of itself.
     Well,
     /// Within a half.
@@ -70,7 +70,6 @@ pub enum Known {
 pub struct Estimate {
     /// Name: a key of the scene, or a ratio.
     pub name: String,
-    /// Its unit.
     pub unit: &'static str,
     /// Its most likely value.
     pub value: f64,
@@ -79,7 +78,7 @@ pub struct Estimate {
     /// Upper end of the interval.
     pub high: f64,
     /// Identifiability.
-    pub known: Known,
+    pub known: Certainty,
 }
 
 /// Remaining difference between fitted model and recording.
@@ -112,22 +111,19 @@ pub struct FingerFit {
     pub remarks: Vec<String>,
     /// Curvature over time, recorded and fitted, of each finger of each recording.
     #[serde(skip)]
-    pub courses: Vec<Course>,
+    pub courses: Vec<FingerMotion>,
 }
 
 /// Error of a fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FingerFitError {
-    /// No recording.
     #[error("nothing to fit: name recorded trials, such as empty closes and presses against a fixed object")]
     Nothing,
-    /// A recording without curvature.
     #[error("{name} has no curvature of either finger: is its flex strip calibrated? See `palpate calibrate list`")]
     NoCurvature {
         /// The recording.
         name: String,
     },
-    /// A recording with hardly any motion.
     #[error("{name} hardly moves the fingers ({} 1/m at {} bar): record closes to half a bar and more", three_digits(*curvature), three_digits(*bar))]
     NoMotion {
         /// The recording.
@@ -137,7 +133,6 @@ pub enum FingerFitError {
         /// Highest pressure (bar).
         bar: f64,
     },
-    /// A recording that is too long or too short.
     #[error("{name} lasts {} s: recordings of 0.5 to 60 s can be fitted", three_digits(*duration_s))]
     Length {
         /// The recording.
@@ -145,18 +140,14 @@ pub enum FingerFitError {
         /// Its length (s).
         duration_s: f64,
     },
-    /// Cancelled.
     #[error("the fit was stopped; nothing was changed")]
     Stopped,
-    /// The fitted model cannot be simulated.
     #[error("{name} cannot be simulated with the fitted finger: {cause}")]
     Simulation {
         /// The recording.
         name: String,
-        /// Cause.
         cause: SimulationError,
     },
-    /// The data do not determine the parameters.
     #[error(
         "the parameters cannot be identified from these recordings: add an empty close to a higher pressure, or a press \
          against a fixed object"
@@ -268,7 +259,7 @@ fn estimates(minimum: &Minimum, knots: &[f64]) -> Vec<Estimate> {
             value: x.exp(),
             low: (x - half).exp(),
             high: (x + half).exp(),
-            known: Known::within(half),
+            known: Certainty::within(half),
         }
     };
     let of =
@@ -285,7 +276,7 @@ fn estimates(minimum: &Minimum, knots: &[f64]) -> Vec<Estimate> {
         low: (lag - half).max(0.0),
         high: lag + half,
         // A lag near zero is judged against a sample of the real gripper, not against itself.
-        known: Known::within(half / lag.max(0.1)),
+        known: Certainty::within(half / lag.max(0.1)),
     });
     let covariance = &minimum.covariance;
     for (k, bar) in knots.iter().enumerate() {
@@ -311,7 +302,7 @@ fn ranges(minimum: &Minimum, knots: &[f64]) -> FittedRanges {
     }
 }
 
-impl Known {
+impl Certainty {
     /// From half the width of an interval as a share.
     fn within(share: f64) -> Self {
         match share {
@@ -364,14 +355,16 @@ fn remarks(
             three_digits(grams)
         ));
     }
-    for estimate in estimates.iter().filter(|estimate| estimate.known == Known::Hardly) {
+    for estimate in estimates.iter().filter(|estimate| estimate.known == Certainty::Hardly) {
         let (name, low, high) = (&estimate.name, three_digits(estimate.low), three_digits(estimate.high));
         remarks.push(format!(
             "{name} cannot be identified from the recordings: any value from {low} to {high} {} fits",
             estimate.unit
         ));
     }
-    if estimates[STIFFNESS].known != Known::Well && estimates.last().is_some_and(|ratio| ratio.known == Known::Well) {
+    if estimates[STIFFNESS].known != Certainty::Well
+        && estimates.last().is_some_and(|ratio| ratio.known == Certainty::Well)
+    {
         remarks.push("only the ratio of torque to stiffness is identifiable: change both together".to_owned());
     }
     remarks.extend(corrected_sensors(fitted, minimum));

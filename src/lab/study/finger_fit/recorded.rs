@@ -28,17 +28,10 @@ pub struct RecordedGrasps {
 /// Error of reading a stored trial for a fit.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedGraspError {
-    /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// Its object cannot be loaded.
     #[error("the object of trial {id} cannot be loaded: {cause}")]
-    Object {
-        /// The trial.
-        id: TrialId,
-        /// Cause.
-        cause: ObjectError,
-    },
+    Object { id: TrialId, cause: ObjectError },
 }
 
 impl RecordedGrasps {

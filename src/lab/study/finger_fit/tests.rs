@@ -159,7 +159,11 @@ fn a_hidden_finger_is_recovered_from_one_clean_close() -> Result<(), FingerFitEr
         assert!((estimate.value / truth - 1.0).abs() < 0.03, "{estimate:?} instead of {truth}");
     }
     // A close alone cannot determine this well; the result shows it.
-    assert!(fit.estimates[0].known == Known::Roughly && fit.estimates[6].known == Known::Well, "{:?}", fit.estimates);
+    assert!(
+        fit.estimates[0].known == Certainty::Roughly && fit.estimates[6].known == Certainty::Well,
+        "{:?}",
+        fit.estimates
+    );
     assert!(fit.remarks.iter().any(|r| r.contains("weight of the finger, 30.0 g")), "{:?}", fit.remarks);
     assert!(fit.remarks.iter().any(|r| r.contains("change both together")), "{:?}", fit.remarks);
     Ok(())
@@ -181,7 +185,7 @@ fn a_close_and_a_press_through_real_sensors_recover_stiffness_within_3_per_cent(
         let fit = fit_finger(&[close, press], &Trust { pad_gain: [0.02; 2], ..Trust::default() })?;
         println!("seed {seed}: {:+.4}, {} steps, {fit:?}", off(&fit), fit.steps);
         assert!(off(&fit).abs() < 0.03, "seed {seed}: {}", off(&fit));
-        assert!(fit.estimates[0].known == Known::Well && fit.remarks.is_empty(), "{fit:?}");
+        assert!(fit.estimates[0].known == Certainty::Well && fit.remarks.is_empty(), "{fit:?}");
         assert!(
             fit.remainders[0].curvature_per_m < 0.1 && fit.remainders[1].force_share.is_some_and(|share| share < 0.02)
         );

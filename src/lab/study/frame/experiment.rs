@@ -123,39 +123,28 @@ pub fn run_experiment<E: Experiment>(
 /// Error of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// Grasps could not be collected.
     #[error(transparent)]
     Collect(#[from] CollectionError),
-    /// Grasps could not be read.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The file of finished units failed.
     #[error(transparent)]
     Results(#[from] ResultFileError),
-    /// A built-in object cannot be loaded.
     #[error(transparent)]
     Object(#[from] ObjectError),
-    /// A setting does not fit the scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A method could not be fitted.
     #[error("{method}: {cause}")]
     Fit {
         /// Key of the method.
         method: String,
-        /// Cause.
         cause: LearnError,
     },
-    /// The trials cannot be divided into training and test grasps.
     #[error(transparent)]
     Split(#[from] SplitError),
-    /// A preset or method that does not exist.
     #[error("there is no {0}")]
     Unknown(String),
-    /// The trials lack something that the study needs.
     #[error("the study needs {0}")]
     Missing(String),
-    /// It was stopped; the same plan continues.
     #[error("stopped")]
     Stopped,
 }

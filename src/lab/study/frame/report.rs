@@ -14,7 +14,6 @@ pub struct StudyReport {
     pub fingerprint: String,
     /// Data that it rests on, a line for each kind.
     pub data: Vec<String>,
-    /// Tables.
     pub tables: Vec<StudyTable>,
     /// The paper's claims beside our numbers.
     pub findings: Vec<Finding>,
@@ -25,11 +24,8 @@ pub struct StudyReport {
 pub struct StudyTable {
     /// Name in files.
     pub name: String,
-    /// Title.
     pub title: String,
-    /// Columns.
     pub columns: Vec<StudyColumn>,
-    /// Rows.
     pub rows: Vec<StudyRow>,
 }
 
@@ -56,7 +52,6 @@ pub struct StudyRow {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// Text.
     Text(String),
     /// Number in the unit of its column.
     Number(f64),
@@ -78,7 +73,6 @@ pub struct Finding {
     /// The numbers behind it; of many, those that are most against the claim come first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub measured: Vec<ClaimNumber>,
-    /// Agreement.
     pub verdict: Agreement,
     /// Rule of the verdict, or reason of a difference.
     pub why: String,
@@ -167,7 +161,6 @@ pub enum Agreement {
     Disagrees,
     /// Our numbers support a part of it, or do not decide.
     Partly,
-    /// Not measured.
     NotMeasured,
 }
 
@@ -208,7 +201,6 @@ impl Agreement {
 pub struct LinkedFigure {
     /// Name in files.
     pub name: String,
-    /// The figure.
     pub figure: Figure,
     /// Width and height of its files (points).
     pub size: [u32; 2],
@@ -235,7 +227,6 @@ impl LinkedFigure {
 pub struct FigureLink {
     /// Number of the plot.
     pub plot: usize,
-    /// The mark.
     pub mark: FigureMark,
     /// Number of the table.
     pub table: usize,

@@ -26,7 +26,6 @@ pub enum StudyStep {
 /// Progress of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StudyProgress {
-    /// Step.
     pub step: StudyStep,
     /// Grasps, units or effects done.
     pub done: usize,
@@ -127,17 +126,14 @@ pub fn merged_units(files: &[PathBuf]) -> Result<(String, usize), ResultFileErro
 /// Error of a result file.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultFileError {
-    /// The file cannot be read or written.
     #[error("cannot {attempt} the results in \"{path}\": {cause}", path = path.display())]
     File {
         /// What was attempted.
         attempt: &'static str,
         /// The file.
         path: PathBuf,
-        /// Cause.
         cause: io::Error,
     },
-    /// The file holds something else.
     #[error(
         "\"{path}\" holds results of {difference}, which cannot be continued: delete it or choose another --out",
         path = path.display()
@@ -148,7 +144,6 @@ pub enum ResultFileError {
         /// What differs.
         difference: String,
     },
-    /// The parts of a study were measured on differently numbered trials.
     #[error(
         "\"{path}\" numbers its trials ({trials}) otherwise than the parts before it: measure all parts on copies of one store \
          that holds the grasps, or each on an empty store",
@@ -157,15 +152,10 @@ pub enum ResultFileError {
     OtherTrials {
         /// The file.
         path: PathBuf,
-        /// The trials.
         trials: String,
     },
-    /// A result cannot be written as JSON.
     #[error("a result cannot be written as JSON: {cause}")]
-    Unwritable {
-        /// Cause.
-        cause: serde_json::Error,
-    },
+    Unwritable { cause: serde_json::Error },
 }
 
 impl<U: Serialize + DeserializeOwned> ResultFile<U> {

@@ -18,7 +18,6 @@ pub struct StoredStudy<R> {
     pub program: String,
     /// CPU time that it took (h).
     pub cpu_hours: f64,
-    /// The result.
     pub result: R,
 }
 

@@ -1,6 +1,6 @@
 //! Models fitted and judged in a study: their answers to test grasps, with intervals and paired differences.
 
-use super::bench::StudyBench;
+use super::bench::StudyData;
 use super::plan::{DataWanted, StudyPlan};
 use crate::study::frame::{Cell, PERCENT, StudyError, StudyTable};
 use palpate_learn::evaluation::{Answers, answer};
@@ -26,7 +26,6 @@ pub(super) struct ModelAnswers {
     pub(super) decided: Vec<usize>,
     /// Expected calibration error.
     pub(super) ece: f64,
-    /// Cost of the model.
     pub(super) cost: ModelCost,
 }
 
@@ -49,7 +48,6 @@ pub(super) struct ModelCost {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum TestAnswers {
-    /// It answered.
     Answers(ModelAnswers),
     /// It could not be fitted.
     NotFitted(String),
@@ -102,7 +100,7 @@ impl TestPart {
     }
 }
 
-impl StudyBench<'_> {
+impl StudyData<'_> {
     /// Training and test grasps of a method.
     pub(super) fn split(
         &self,

@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Bench of a study.
-pub struct StudyBench<'a> {
+pub struct StudyData<'a> {
     plan: &'a StudyPlan,
     work: Measuring<'a>,
     store: Mutex<Store>,
@@ -27,7 +27,7 @@ pub struct StudyBench<'a> {
 /// Data sets kept in memory: as many as are in use at a time.
 const KEPT: usize = 4;
 
-impl<'a> StudyBench<'a> {
+impl<'a> StudyData<'a> {
     /// A bench on a store.
     pub fn new(store: Store, plan: &'a StudyPlan, work: Measuring<'a>) -> Self {
         Self { plan, work, store: Mutex::new(store), read: Mutex::default(), trials: Mutex::default() }

@@ -127,7 +127,7 @@ fn zeroed(data: &Dataset) -> Dataset {
 }
 
 /// Readings of the same simulated grasps by real sensors with these faults.
-fn read_again(bench: &StudyBench<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Dataset, StudyError> {
+fn read_again(bench: &StudyData<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Dataset, StudyError> {
     let mut read = Vec::new();
     for example in &data.examples {
         let missing = || StudyError::Missing("simulated grasps".to_owned());
@@ -198,7 +198,7 @@ impl Study for Drift {
         drifted.chain(hysteresis.into_iter().flatten()).flat_map(|kind| kind.fits(parts)).collect()
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<Answers, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<Answers, StudyError> {
         let (plan, Kind { sensors, method, factor: reading }) = (bench.plan(), *kind);
         let mut answers = Answers::new();
         let data = bench.data(&usual_grasps(plan, sensors))?;

@@ -32,12 +32,12 @@ pub(super) const PRODUCT: &str = "product of experts";
 pub(super) struct GraspsResult {
     data: Vec<String>,
     classes: Vec<String>,
-    courses: Vec<Course>,
+    courses: Vec<ConfidenceByGrasp>,
 }
 
 /// Rounds of successive grasps, combined in one way.
 #[derive(Clone, Serialize, Deserialize)]
-struct Course {
+struct ConfidenceByGrasp {
     placed: String,
     combined: String,
     rounds: Vec<CourseRound>,
@@ -46,7 +46,6 @@ struct Course {
 /// A round: grasps in a row.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct CourseRound {
-    /// The first of its trials.
     first: TrialId,
     truth: usize,
     /// Decision after each grasp.
@@ -131,7 +130,7 @@ impl Study for Grasps {
         crossed(plan, &[()], &MODELS, |kind| kind.usual_parts(plan))
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<GraspsResult, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<GraspsResult, StudyError> {
         let plan = bench.plan();
         let wanted = usual_grasps(plan, kind.sensors).read_by(kind.method);
         let [train, test] = bench.split(wanted.clone(), kind.method, TestPart::usual(plan, *part))?;
@@ -156,7 +155,11 @@ impl Study for Grasps {
             for (combined, feedback) in [(PRODUCT, false), (FEEDBACK, true)] {
                 if !feedback || is_iterated {
                     let rounds = course(&model, data, &alone, rounds, feedback);
-                    courses.push(Course { placed: placed.to_owned(), combined: combined.to_owned(), rounds });
+                    courses.push(ConfidenceByGrasp {
+                        placed: placed.to_owned(),
+                        combined: combined.to_owned(),
+                        rounds,
+                    });
                 }
             }
         }
@@ -172,7 +175,7 @@ impl Study for Grasps {
         let data = unique(found.iter().flat_map(|(_, result)| result.data.clone()));
         let classes = found.last().map_or_else(Vec::new, |(_, result)| result.classes.clone());
         let courses = found.into_iter().flat_map(|(fit, result)| {
-            let kind = move |course: Course| (fit.kind.with(Way::of(&course)), course.rounds);
+            let kind = move |course: ConfidenceByGrasp| (fit.kind.with(Way::of(&course)), course.rounds);
             result.courses.into_iter().map(kind)
         });
         let merged = grouped(courses).into_iter().map(|(kind, rounds)| Merged { kind, rounds: rounds.concat() });
@@ -221,7 +224,7 @@ struct Way {
 }
 
 impl Way {
-    fn of(course: &Course) -> Self {
+    fn of(course: &ConfidenceByGrasp) -> Self {
         let placed = if course.placed == ANEW { ANEW } else { LEFT };
         Self { placed, combined: if course.combined == FEEDBACK { FEEDBACK } else { PRODUCT } }
     }

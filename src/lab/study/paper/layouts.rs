@@ -88,7 +88,7 @@ impl Study for Layouts {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
         let mut wanted = usual_grasps(bench.plan(), kind.sensors);
         (wanted.view.layout, wanted.view.signals) = (kind.factor.layout.clone(), kind.factor.definition);
         let sets = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;

@@ -1,7 +1,7 @@
 //! The paper's studies: each figure of its section V, and two of its future work, from one command each; and what
 //! recognition reaches beyond the paper.
 //!
-//! A `Study` is a grid of cells. A cell takes a data set from the [`StudyBench`]; what is found is kept, so that a
+//! A `Study` is a grid of cells. A cell takes a data set from the [`StudyData`]; what is found is kept, so that a
 //! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a [`StudyReport`]: tables, and
 //! a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
 //!
@@ -32,7 +32,7 @@ pub use super::frame::{
     StudyColumn, StudyError, StudyFolder, StudyProgress, StudyReport, StudyRow, StudyStep, StudyTable,
 };
 pub(in crate::study) use answers::Pool;
-pub use bench::StudyBench;
+pub use bench::StudyData;
 pub(in crate::study) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
 pub(in crate::study) use stored::sections;

@@ -100,7 +100,7 @@ impl Study for Modality {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
         let mut wanted = usual_grasps(bench.plan(), kind.sensors);
         wanted.view.layout = kind.factor.layout.to_owned();
         let [train, test] = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;

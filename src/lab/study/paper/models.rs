@@ -75,7 +75,7 @@ impl Study for Models {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
         let (plan, is_imbalanced) = (bench.plan(), kind.factor == Balance::Imbalanced);
         let train = if is_imbalanced { TRAIN * 55 / 50 } else { TRAIN };
         let part = TestPart { train, ..TestPart::usual(plan, *part) };

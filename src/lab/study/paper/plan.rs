@@ -56,7 +56,6 @@ pub struct DataWanted {
     pub poses: u64,
     /// How much the build of the gripper varies.
     pub build: f64,
-    /// Sensors.
     pub view: SensorView,
 }
 

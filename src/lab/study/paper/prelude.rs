@@ -3,7 +3,7 @@
 pub(super) use super::answers::{
     ModelAnswers, PARTS, Pool, SHOWN, TRAIN, TestAnswers, TestPart, confusion_table, judge, usual_grasps,
 };
-pub(super) use super::bench::StudyBench;
+pub(super) use super::bench::StudyData;
 pub(super) use super::plan::{DataWanted, StudyPlan, StudySize};
 pub(super) use super::rows::{Factor, Fit, Kind, Row, by_model, compare, crossed, described, find, gains_over, pooled};
 pub(super) use super::study::Study;

@@ -69,7 +69,7 @@ fn scene(motion: Motion) -> Scene {
 }
 
 /// Grasps of the objects, or of some of them with other masses, each mass a class of its own.
-fn grasps(bench: &StudyBench<'_>, Case(kind): &Case) -> Result<Dataset, StudyError> {
+fn grasps(bench: &StudyData<'_>, Case(kind): &Case) -> Result<Dataset, StudyError> {
     let (plan, (set, motion)) = (bench.plan(), kind.factor);
     let usual = plan.wanted(plan.grasps(GRASPS, QUICK), kind.sensors);
     if set == OBJECTS {
@@ -126,7 +126,7 @@ impl Study for Shaken {
         cases
     }
 
-    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Vec<TestAnswers>, StudyError> {
+    fn measure(case: &Case, bench: &StudyData<'_>) -> Result<Vec<TestAnswers>, StudyError> {
         let (plan, data) = (bench.plan(), grasps(bench, case)?);
         let of_part = |part| {
             let all = TestPart { train: usize::MAX, ..TestPart::usual(plan, part) };

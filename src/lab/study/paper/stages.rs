@@ -14,7 +14,7 @@ const MODELS: [&str; 2] = ["macro-layer", "extra-trees"];
 
 /// What stage two knows beside the grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Known {
+struct ShownProperties {
     name: &'static str,
     size: Source,
     shape: Source,
@@ -27,7 +27,6 @@ enum Source {
     Uniform,
     /// Probabilities of stage one.
     StageOne,
-    /// The truth.
     Truth,
 }
 
@@ -39,14 +38,14 @@ const TRUTH: &str = "true size and shape";
 /// One model of all training grasps, as a fair rival of two stages.
 const ONE_STAGE: &str = "one stage, all grasps";
 
-const KNOWN: [Known; 7] = [
-    Known { name: NOTHING, size: Source::Uniform, shape: Source::Uniform },
-    Known { name: SIZE, size: Source::StageOne, shape: Source::Uniform },
-    Known { name: SHAPE, size: Source::Uniform, shape: Source::StageOne },
-    Known { name: BOTH, size: Source::StageOne, shape: Source::StageOne },
-    Known { name: "true size", size: Source::Truth, shape: Source::Uniform },
-    Known { name: "true shape", size: Source::Uniform, shape: Source::Truth },
-    Known { name: TRUTH, size: Source::Truth, shape: Source::Truth },
+const KNOWN: [ShownProperties; 7] = [
+    ShownProperties { name: NOTHING, size: Source::Uniform, shape: Source::Uniform },
+    ShownProperties { name: SIZE, size: Source::StageOne, shape: Source::Uniform },
+    ShownProperties { name: SHAPE, size: Source::Uniform, shape: Source::StageOne },
+    ShownProperties { name: BOTH, size: Source::StageOne, shape: Source::StageOne },
+    ShownProperties { name: "true size", size: Source::Truth, shape: Source::Uniform },
+    ShownProperties { name: "true shape", size: Source::Uniform, shape: Source::Truth },
+    ShownProperties { name: TRUTH, size: Source::Truth, shape: Source::Truth },
 ];
 
 /// Properties in tables, and the paper's F1 of stage one.
@@ -81,7 +80,7 @@ fn of_property(data: &Dataset, property: usize) -> Option<Dataset> {
 type Estimates = [Pmf; 2];
 
 /// The data set with properties as further channels. Each stands on both fingers, so that grasps can still be mirrored.
-fn with_known(data: &Dataset, estimates: &[Estimates], known: Known) -> Dataset {
+fn with_known(data: &Dataset, estimates: &[Estimates], known: ShownProperties) -> Dataset {
     let labels = &data.labels;
     let mut channels = data.channels.clone();
     for name in labels.sizes.iter().chain(&labels.shapes) {
@@ -130,7 +129,7 @@ impl Study for Stages {
         crossed(plan, &[()], &MODELS, |kind| kind.usual_parts(plan))
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<StagesResult, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<StagesResult, StudyError> {
         let (plan, method) = (bench.plan(), kind.method);
         let usual = usual_grasps(plan, kind.sensors);
         let [train, test] = bench.split(usual, method, TestPart::usual(plan, *part))?;
@@ -229,7 +228,7 @@ fn findings(first: &[Row<String>], second: &[Row<String>]) -> Vec<Finding> {
             BOTH,
             &[NOTHING, SIZE, SHAPE],
         ),
-        gains("Known size and shape would improve the recognition of the object", TRUTH, &[NOTHING, BOTH]),
+        gains("ShownProperties size and shape would improve the recognition of the object", TRUTH, &[NOTHING, BOTH]),
         gains("Two stages on one half of the grasps each are better than one stage on all of them", BOTH, &[ONE_STAGE]),
     ];
     stage_one.into_iter().chain(stage_two).collect()

@@ -1,6 +1,6 @@
 //! A study of the paper: an experiment on grasps of a store.
 
-use super::bench::StudyBench;
+use super::bench::StudyData;
 use super::{StudyCard, StudyPlan};
 use crate::grasping::Shard;
 use crate::study::frame::{
@@ -26,7 +26,7 @@ pub(super) trait Study: Sync {
     fn grid(plan: &StudyPlan) -> Vec<Self::Cell>;
 
     /// Computes a cell.
-    fn measure(cell: &Self::Cell, bench: &StudyBench<'_>) -> Result<Self::Found, StudyError>;
+    fn measure(cell: &Self::Cell, bench: &StudyData<'_>) -> Result<Self::Found, StudyError>;
 
     /// Tables and findings from all cells, in the order of the grid.
     fn report(plan: &StudyPlan, found: Vec<(Self::Cell, Self::Found)>) -> StudyReport;
@@ -38,7 +38,7 @@ pub(super) trait Study: Sync {
 /// A study on a bench.
 struct OnBench<'a, S> {
     study: &'a S,
-    bench: &'a StudyBench<'a>,
+    bench: &'a StudyData<'a>,
 }
 
 impl<S: Study> Experiment for OnBench<'_, S> {
@@ -95,7 +95,7 @@ pub trait PaperStudy: Sync {
     /// Computes the cells of a part that a file of results lacks, then the result of the whole.
     fn run(
         &self,
-        bench: &StudyBench<'_>,
+        bench: &StudyData<'_>,
         file: Option<&Path>,
         shard: Shard,
     ) -> Result<StudyOutcome<StudyReport>, StudyError>;
@@ -115,7 +115,7 @@ impl<S: Study> PaperStudy for S {
 
     fn run(
         &self,
-        bench: &StudyBench<'_>,
+        bench: &StudyData<'_>,
         file: Option<&Path>,
         shard: Shard,
     ) -> Result<StudyOutcome<StudyReport>, StudyError> {

@@ -70,7 +70,7 @@ impl Study for TrainingSize {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyBench<'_>) -> Result<TestAnswers, StudyError> {
+    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
         let plan = bench.plan();
         let wanted = plan.wanted(plan.grasps(MOST + TEST, 40), kind.sensors);
         let of = plan.pick((MOST + TEST) / TEST, 2, 3);

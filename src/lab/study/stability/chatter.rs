@@ -25,11 +25,9 @@ const HELD: f64 = 1e-3;
 /// Grasps of one object in poses of one preset: a piece of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChatterUnit {
-    /// The preset.
     preset: usize,
     /// Place of the object in the catalogue.
     object: usize,
-    /// Grasps.
     grasps: usize,
 }
 
@@ -40,7 +38,6 @@ pub struct ChatterRow {
     pub preset: String,
     /// Accuracy that was asked for.
     pub accuracy: String,
-    /// Grasps.
     pub grasps: usize,
     /// Grasps computed again because forces change in their hold.
     pub recomputed: usize,

@@ -144,7 +144,6 @@ pub struct Measurement {
     pub what: String,
     /// Value.
     pub measured: f64,
-    /// Limit.
     pub limit: Limit,
 }
 
@@ -191,11 +190,8 @@ pub struct Case {
 /// One row of the table: a case at one setting.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseRow {
-    /// The case.
     pub case: String,
-    /// Claim.
     pub claim: String,
-    /// The setting.
     pub setting: String,
     /// All measurements; the one closest to its limit, or beyond it, comes first.
     pub findings: Vec<Measurement>,

@@ -39,9 +39,7 @@ pub struct StabilityReport {
 /// A hard case over all settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseSummary {
-    /// The case.
     pub case: String,
-    /// Claim.
     pub claim: String,
     /// Settings it was run at.
     pub settings: usize,

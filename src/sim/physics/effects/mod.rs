@@ -24,7 +24,7 @@ mod support;
 
 pub(super) use creep::Relaxation;
 pub(super) use finger_contact::FingerContact;
-pub(super) use pneumatic_lag::{Chamber, went_on};
+pub(super) use pneumatic_lag::{Chamber, continued};
 pub(super) use shaking::{move_world, note_passing, work_of_motion};
 use situation::Situation;
 pub(super) use soft_object::Shell;

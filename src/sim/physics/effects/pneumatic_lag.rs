@@ -50,7 +50,7 @@ impl Chamber {
 
 /// Pressure (bar) after `share` as much time again, where it has gone from `before` to `now` towards `line`: no
 /// straight line but the same exponential, so that a step made of stages is as exact as a single one.
-pub(in crate::physics) fn went_on(before: f64, now: f64, line: f64, share: f64) -> f64 {
+pub(in crate::physics) fn continued(before: f64, now: f64, line: f64, share: f64) -> f64 {
     let left = (now - line) / (before - line);
     if left > 0.0 && left < 1.0 { line + (now - line) * left.powf(share) } else { now }
 }
@@ -64,8 +64,8 @@ mod tests {
         let chamber = chamber(0.1);
         let (before, line) = (0.2, 1.0);
         let now = chamber.filled(before, line, 0.03);
-        assert!((went_on(before, now, line, 1.5) - chamber.filled(before, line, 0.075)).abs() < 1e-15);
-        assert_eq!((went_on(1.0, 1.0, 1.0, 1.5), went_on(0.0, 0.0, 0.0, 1.5)), (1.0, 0.0));
+        assert!((continued(before, now, line, 1.5) - chamber.filled(before, line, 0.075)).abs() < 1e-15);
+        assert_eq!((continued(1.0, 1.0, 1.0, 1.5), continued(0.0, 0.0, 0.0, 1.5)), (1.0, 0.0));
     }
 
     fn chamber(filling_time: f64) -> Chamber {

@@ -51,7 +51,7 @@ impl NextPose {
 
 /// End of one round.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Ended {
+struct RoundEnd {
     grasps: usize,
     /// Reached the probability.
     sure: bool,
@@ -60,14 +60,14 @@ struct Ended {
 
 /// Rounds from the same first pose of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct BothRounds {
+struct GuidedAndRandom {
     class: usize,
-    random: Ended,
-    guided: Ended,
+    random: RoundEnd,
+    guided: RoundEnd,
 }
 
-impl BothRounds {
-    fn of(&self, next: NextPose) -> &Ended {
+impl GuidedAndRandom {
+    fn of(&self, next: NextPose) -> &RoundEnd {
         match next {
             NextPose::Random => &self.random,
             NextPose::Guided => &self.guided,
@@ -79,7 +79,7 @@ impl BothRounds {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(in crate::study::paper) struct GuidedRounds {
     pub(super) data: String,
-    rounds: Vec<BothRounds>,
+    rounds: Vec<GuidedAndRandom>,
 }
 
 /// Grasps and recogniser of the rounds.
@@ -128,7 +128,7 @@ impl GuidedCase {
     }
 
     /// A model, grasps that it has not learned from with its answers, and what it learned.
-    fn model(self, bench: &StudyBench<'_>) -> Result<(Model, TouchLibrary, String), StudyError> {
+    fn model(self, bench: &StudyData<'_>) -> Result<(Model, TouchLibrary, String), StudyError> {
         let missing = |what: &str| StudyError::Missing(what.to_owned());
         if self == Self::Unlabelled {
             let failed = |cause: &dyn std::fmt::Display| StudyError::Missing(cause.to_string());
@@ -152,7 +152,7 @@ impl GuidedCase {
 }
 
 /// Runs all rounds.
-pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<GuidedRounds, StudyError> {
+pub(super) fn guided(case: GuidedCase, bench: &StudyData<'_>) -> Result<GuidedRounds, StudyError> {
     let (plan, question) = (bench.plan(), case.question());
     let missing = || StudyError::Missing("simulated grasps of the same objects".to_owned());
     let (model, library, data) = case.model(bench)?;
@@ -178,7 +178,7 @@ pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<GuidedR
             let view = &wanted.view;
             let round = Round { model: &model, library: &library, view, nominal: &scene, object: &object, class, seed };
             let run = |next: NextPose| round.run(&first, next, bench);
-            Some(BothRounds { class, random: run(NextPose::Random)?, guided: run(NextPose::Guided)? })
+            Some(GuidedAndRandom { class, random: run(NextPose::Random)?, guided: run(NextPose::Guided)? })
         };
         let ended: Option<Vec<_>> = (0..count).into_par_iter().map(round).collect();
         rounds.extend(ended.ok_or(StudyError::Stopped)?);
@@ -187,7 +187,7 @@ pub(super) fn guided(case: GuidedCase, bench: &StudyBench<'_>) -> Result<GuidedR
 }
 
 /// The guide's library: grasps that the model has not learned from, and its answers.
-fn library(model: &Model, known: &Dataset, bench: &StudyBench<'_>) -> Result<TouchLibrary, StudyError> {
+fn library(model: &Model, known: &Dataset, bench: &StudyData<'_>) -> Result<TouchLibrary, StudyError> {
     let mut touches = Vec::new();
     for example in &known.examples {
         let Some(SimulatedTrial { header, .. }) = bench.simulated(example.id)? else { continue };
@@ -210,7 +210,7 @@ struct Round<'a> {
 
 impl Round<'_> {
     /// Grasps until the recogniser is sure; none where it was cancelled.
-    fn run(&self, first: &Scene, next: NextPose, bench: &StudyBench<'_>) -> Option<Ended> {
+    fn run(&self, first: &Scene, next: NextPose, bench: &StudyData<'_>) -> Option<RoundEnd> {
         let mut belief = Belief::default();
         let mut guide = Guide::new(Arc::clone(self.library));
         let (mut scene, mut by) = (first.clone(), GripperMove::default());
@@ -238,7 +238,7 @@ impl Round<'_> {
             let (top, probability) = now.top();
             let (sure, right) = (probability >= SURE, top == self.class);
             if sure || belief.grasps() >= MOST_GRASPS {
-                return Some(Ended { grasps: belief.grasps(), sure, right });
+                return Some(RoundEnd { grasps: belief.grasps(), sure, right });
             }
             let seed = self.seed.wrapping_mul(1000).wrapping_add(belief.grasps() as u64);
             let random = sampler.draw_after(Some(self.object), seed, trial.frames().last()).0;
@@ -255,7 +255,7 @@ impl Round<'_> {
             guide.felt(&grasp, &by);
             let from = Scene { object: random.object, ..scene };
             let Some(chosen) = guide.best(&now, &from, &nominal, Some(self.object)) else {
-                return Some(Ended { grasps: MOST_GRASPS, sure, right });
+                return Some(RoundEnd { grasps: MOST_GRASPS, sure, right });
             };
             (by, scene) = chosen;
         }
@@ -263,7 +263,7 @@ impl Round<'_> {
 }
 
 /// Rounds of a case with one way to choose poses.
-type Row<'a> = (GuidedCase, &'a [BothRounds], NextPose);
+type Row<'a> = (GuidedCase, &'a [GuidedAndRandom], NextPose);
 
 /// A number of rounds, over resampled rounds of each object.
 fn resampled((_, rounds, _): &Row<'_>, number: impl Fn(&[usize]) -> f64) -> Cell {
@@ -272,12 +272,12 @@ fn resampled((_, rounds, _): &Row<'_>, number: impl Fn(&[usize]) -> f64) -> Cell
 }
 
 /// Mean number of grasps after the first.
-fn after_first(rounds: &[BothRounds], next: NextPose, chosen: &[usize]) -> f64 {
+fn after_first(rounds: &[GuidedAndRandom], next: NextPose, chosen: &[usize]) -> f64 {
     let all = chosen.iter().map(|k| rounds[*k].of(next).grasps as f64 - 1.0);
     all.sum::<f64>() / chosen.len().max(1) as f64
 }
 
-fn share(row: &Row<'_>, said: impl Fn(&Ended) -> Option<bool>) -> Cell {
+fn share(row: &Row<'_>, said: impl Fn(&RoundEnd) -> Option<bool>) -> Cell {
     resampled(row, |chosen| {
         let said: Vec<bool> = chosen.iter().filter_map(|k| said(row.1[*k].of(row.2))).collect();
         said.iter().filter(|yes| **yes).count() as f64 / said.len() as f64

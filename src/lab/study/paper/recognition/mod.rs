@@ -82,7 +82,7 @@ pub(super) struct Answered {
 }
 
 impl Answered {
-    fn new(question: &Question, method: &Method, draw: usize, bench: &StudyBench<'_>) -> Result<Self, StudyError> {
+    fn new(question: &Question, method: &Method, draw: usize, bench: &StudyData<'_>) -> Result<Self, StudyError> {
         let plan = bench.plan();
         let (of_each, _) = question.draws(plan);
         let test = tested(question, bench)?;
@@ -118,7 +118,7 @@ impl Answered {
 }
 
 /// Grasps that judge.
-fn tested(question: &Question, bench: &StudyBench<'_>) -> Result<Arc<Dataset>, StudyError> {
+fn tested(question: &Question, bench: &StudyData<'_>) -> Result<Arc<Dataset>, StudyError> {
     let plan = bench.plan();
     let wanted = question.wanted(plan, plan.grasps(TESTED, 10), JUDGED);
     match question.reads {
@@ -193,7 +193,7 @@ impl Study for Recognition {
         cases
     }
 
-    fn measure(case: &Case, bench: &StudyBench<'_>) -> Result<Found, StudyError> {
+    fn measure(case: &Case, bench: &StudyData<'_>) -> Result<Found, StudyError> {
         if bench.plan().query.is_some() {
             let needs = "grasps of several presets that it simulates; leave out the options that choose trials";
             return Err(StudyError::Missing(needs.to_owned()));

@@ -16,7 +16,7 @@ pub(super) fn new_object(
     question: &Question,
     left_out: &str,
     method: &Method,
-    bench: &StudyBench<'_>,
+    bench: &StudyData<'_>,
 ) -> Result<Scored, StudyError> {
     let plan = bench.plan();
     let test = tested(question, bench)?;

@@ -33,7 +33,7 @@ pub(in crate::study::paper) struct Scored {
 }
 
 /// How surely each test grasp is of a known object, for a model that has not learned one of them.
-pub(super) fn novelty(left_out: &str, method: &Method, bench: &StudyBench<'_>) -> Result<Scored, StudyError> {
+pub(super) fn novelty(left_out: &str, method: &Method, bench: &StudyData<'_>) -> Result<Scored, StudyError> {
     let plan = bench.plan();
     let grasps = plan.grasps(50, 20);
     let question = &QUESTIONS[0];
@@ -71,7 +71,7 @@ struct Decided {
 }
 
 /// How surely grasps of emulated grippers are of a known object, for the shipped model, and what is decided.
-pub(super) fn emulated_novelty(bench: &StudyBench<'_>) -> Result<EmulatedRounds, StudyError> {
+pub(super) fn emulated_novelty(bench: &StudyData<'_>) -> Result<EmulatedRounds, StudyError> {
     let plan = bench.plan();
     let model = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
     let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;

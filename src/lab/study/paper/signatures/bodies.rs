@@ -1,7 +1,7 @@
 //! Bodies of known shape and width, grasped centred, and the settings of the gripper that are varied with them.
 
 use super::super::prelude::*;
-use super::course::{Course, Grasped, Signature, median, rank_correlation};
+use super::course::{GraspCurves, Grasped, Signature, median, rank_correlation};
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
 use glam::DVec3;
@@ -41,14 +41,14 @@ pub(super) fn papers_view() -> SensorView {
     SensorView::default().with_signals(SignalDefinition::Contact)
 }
 
-/// Course of a grasp of a body.
-fn grasp_body(scene: &Scene, (kind, _, width_mm): (&str, &str, f64)) -> Option<Course> {
+/// GraspCurves of a grasp of a body.
+fn grasp_body(scene: &Scene, (kind, _, width_mm): (&str, &str, f64)) -> Option<GraspCurves> {
     let (object, rotation_deg) = body(kind, width_mm);
     let mut scene = scene.clone();
     scene.object.rotation_deg = rotation_deg;
     let trial = grasp(&scene, Some(&object), 0);
     let signals = papers_view().signals(&trial).ok()?;
-    Course::of(&signals.channels, &sequence_of(&signals))
+    GraspCurves::of(&signals.channels, &sequence_of(&signals))
 }
 
 /// Signatures of bodies in a scene.
@@ -140,7 +140,6 @@ impl Summary {
 pub(super) struct Varied {
     /// Name in tables.
     pub(super) name: &'static str,
-    /// Its unit.
     pub(super) unit: &'static str,
     /// Values in its unit, the default and that of the paper's scene among them.
     pub(super) values: &'static [f64],

@@ -4,7 +4,7 @@ use super::super::prelude::*;
 
 /// Bending and pressure of a grasp over time, means of both fingers.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Course {
+pub(super) struct GraspCurves {
     pub(super) t_s: Vec<f64>,
     pub(super) bend: Vec<f64>,
     pub(super) pressure: Vec<f64>,
@@ -57,7 +57,7 @@ const PASSED_S: f64 = 0.15;
 const HALF_WAY_S: f64 = 0.40;
 const LOOKED_AT_S: f64 = 0.75;
 
-impl Course {
+impl GraspCurves {
     /// The mean of the channels of curvature, and of those of pressure or else of force; none without both.
     pub(super) fn of(channels: &[String], grasp: &Sequence) -> Option<Self> {
         let with = |word: &str| -> Vec<usize> { (0..channels.len()).filter(|k| channels[*k].contains(word)).collect() };
@@ -174,11 +174,11 @@ mod tests {
     use super::*;
 
     /// Bends at one rate up to contact at 0.8 s and at another after it; pressure rises within `rise` seconds.
-    fn course(after: f64, rise: f64) -> Course {
+    fn course(after: f64, rise: f64) -> GraspCurves {
         let t_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
         let bend = t_s.iter().map(|t| 10.0 * t.min(0.8) + 10.0 * after * (t - 0.8).max(0.0)).collect();
         let pressure = t_s.iter().map(|t| 2e3 * ((t - 0.8) / rise).clamp(0.0, 1.0)).collect();
-        Course { t_s, bend, pressure }
+        GraspCurves { t_s, bend, pressure }
     }
 
     #[test]
@@ -191,7 +191,7 @@ mod tests {
         let growing = of(0.5, 1.0);
         assert!((growing.rate.expect("long enough") - 0.5).abs() < 0.02 && growing.line > Some(0.999), "{growing:?}");
         assert!(growing.share > 0.5 && growing.rise_s > 0.8, "{growing:?}");
-        let untouched = Course { pressure: vec![0.0; 300], ..course(0.1, 0.1) };
+        let untouched = GraspCurves { pressure: vec![0.0; 300], ..course(0.1, 0.1) };
         assert_eq!(untouched.signature(Grasped::default()), None);
     }
 

@@ -10,7 +10,7 @@ use super::prelude::*;
 use crate::datasets::{SensorView, sequence_of};
 use crate::grasping::grasp;
 use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, Varied, WIDTHS, papers_scene, papers_view};
-use course::{Course, Grasped, Signature, median};
+use course::{GraspCurves, Grasped, Signature, median};
 use findings::{Measured, findings, sentences};
 use palpate_learn::metrics::Bootstrap;
 use palpate_sim::objects::{ObjectModel, catalogue};
@@ -86,7 +86,7 @@ pub(super) struct Found {
     varied: Vec<(f64, Summary)>,
 }
 
-/// Course of one grasp, thinned.
+/// GraspCurves of one grasp, thinned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Curve {
     object: String,
@@ -100,7 +100,7 @@ pub(super) struct Curve {
 const POINTS: usize = 46;
 
 impl Curve {
-    fn of(object: &ObjectModel, course: &Course) -> Option<Self> {
+    fn of(object: &ObjectModel, course: &GraspCurves) -> Option<Self> {
         let class = object.class?;
         let step = (course.t_s.len() - 1) as f64 / (POINTS - 1) as f64;
         let at = |k: usize| (step * k as f64).round() as usize;
@@ -146,7 +146,7 @@ fn objects_found(plan: &StudyPlan, scene: &Scene) -> Found {
         scene.object.source.clone_from(&name);
         let Ok(Some(object)) = scene.load_object() else { continue };
         let trial = grasp(&scene, Some(&object), 0);
-        let course = papers_view().signals(&trial).ok().map(|own| Course::of(&own.channels, &sequence_of(&own)));
+        let course = papers_view().signals(&trial).ok().map(|own| GraspCurves::of(&own.channels, &sequence_of(&own)));
         let Some(course) = course.flatten() else { continue };
         found.curves.extend(Curve::of(&object, &course));
         let shape = object.class.map_or("unknown", |class| shape_of(class.shape.name())).to_owned();
@@ -160,7 +160,7 @@ fn objects_found(plan: &StudyPlan, scene: &Scene) -> Found {
 }
 
 /// Signatures of the grasps of a data set.
-fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Found, StudyError> {
+fn of_data(bench: &StudyData<'_>, wanted: &DataWanted) -> Result<Found, StudyError> {
     let data = bench.data(wanted)?;
     let models: BTreeMap<&str, ObjectModel> = catalogue()
         .iter()
@@ -174,7 +174,7 @@ fn of_data(bench: &StudyBench<'_>, wanted: &DataWanted) -> Result<Found, StudyEr
     for example in &data.examples {
         bench.check_stop()?;
         let class = &data.labels.classes[example.class];
-        let course = Course::of(&data.channels, &example.grasp);
+        let course = GraspCurves::of(&data.channels, &example.grasp);
         let course = course.ok_or_else(|| {
             StudyError::Missing(format!("curvature and pressure; the trials have {}", data.channels.join(", ")))
         })?;
@@ -233,7 +233,7 @@ impl Study for TactileSignatures {
         units
     }
 
-    fn measure(unit: &Unit, bench: &StudyBench<'_>) -> Result<Found, StudyError> {
+    fn measure(unit: &Unit, bench: &StudyData<'_>) -> Result<Found, StudyError> {
         let (plan, scene) = (bench.plan(), scene_of(unit.gripper));
         let found = match &unit.grasps {
             Grasps::Bodies => bodies_found(plan, &scene),

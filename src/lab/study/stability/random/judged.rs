@@ -53,7 +53,6 @@ pub struct LevelResult {
     pub static_residual: f64,
     /// Largest outer friction residual.
     pub friction_residual: f64,
-    /// Steps.
     pub steps: u64,
     /// Convex minimisations: the cost that does not depend on the machine.
     pub solves: u64,
@@ -98,7 +97,6 @@ fn agree(coarse: &Ran, fine: &Ran) -> bool {
 /// A scene with its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JudgedScene {
-    /// Its number.
     pub number: u64,
     /// Results at the levels that every scene is computed at, coarsest first.
     pub levels: Vec<LevelResult>,

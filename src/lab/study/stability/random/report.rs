@@ -136,7 +136,6 @@ pub struct FlagRow {
 pub struct RandomReport {
     /// Seed of the scenes.
     pub seed: u64,
-    /// Scenes.
     pub scenes: usize,
     /// Scenes without a single answer: small changes of the start change the end.
     pub no_answer: usize,
