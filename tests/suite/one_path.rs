@@ -8,7 +8,7 @@ use crate::streams::Emulated;
 use palpate_device::emulator::{EmulatorSetup, HandPlan};
 use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, SendError, SerialLink};
-use palpate_lab::grasping::{FrameReader, Identification, grasp};
+use palpate_lab::grasping::{Identification, Row, grasp};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
 use palpate_lab::recording::{Replay, TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
@@ -20,7 +20,7 @@ use palpate_store::labels::Flag;
 use palpate_store::{ImportedTrial, Store};
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{Control, TrialId};
-use palpate_tactile::{Channel, SensorLayout, Signals};
+use palpate_tactile::{Channel, SensorLayout, Sensors, Signals};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -248,10 +248,10 @@ fn a_replayed_simulation_gives_the_rows_and_the_answer_of_the_live_one() {
     let model = Arc::new(Shipped::PerfectSensors.model().unwrap());
     let mut live = Identification::new(Arc::clone(&model), StopRule::default());
     let more = live.channels_on(&scene.gripper).unwrap();
-    let reader =
-        FrameReader::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, more[0].signals, &more).unwrap();
+    let mut reader = Sensors::new(&SensorLayout::named("C1+F").unwrap(), &scene.gripper, more[0].signals).unwrap();
+    reader.add(&more);
     live.begin_grasp(reader.channels().iter().map(Channel::name).enumerate()).unwrap();
-    let rows: Vec<_> = trial.frames().iter().map(|frame| reader.row(frame)).collect();
+    let rows: Vec<_> = trial.frames().iter().map(|frame| Row::of_frame(frame, &reader)).collect();
     for row in &rows {
         live.push(row.t_s, row);
     }

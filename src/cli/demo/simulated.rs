@@ -9,7 +9,7 @@ use glam::Vec2;
 use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
-use palpate_lab::grasping::{Advisor, FrameReader, GraspSummary, Identification, Recompute, grasp_soundly};
+use palpate_lab::grasping::{Advisor, GraspSummary, Identification, Recompute, Row, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::Shipped;
 use palpate_sim::frame::Frame;
@@ -18,8 +18,8 @@ use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Between, Scene};
 use palpate_store::{Stored, file_name_of};
-use palpate_tactile::Channel;
 use palpate_tactile::trial::SimulatedTrial;
+use palpate_tactile::{Channel, Sensors};
 use rand::{RngExt, SeedableRng};
 use std::hash::{BuildHasher, RandomState};
 use std::sync::Arc;
@@ -92,9 +92,9 @@ impl Hand for SimulatedHand<'_> {
             before.and_then(|((last, _), grasp)| self.advisor.next(grasp, [last, &drawn], &self.sampler, self.object));
         let (guided, scene) = guided.map_or((None, drawn), |(by, scene)| (Some(by.to_string()), scene));
         let trial = grasp_soundly(&scene, self.object, self.seed, Recompute::Unsettled);
-        let reader = FrameReader::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
+        let reader = Sensors::of(identification.channels_on(&scene.gripper)?, &scene.gripper);
         identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate())?;
-        for row in trial.frames().iter().map(|frame| reader.row(frame)) {
+        for row in trial.frames().iter().map(|frame| Row::of_frame(frame, &reader)) {
             identification.push(row.t_s, &row);
         }
         identification.end_grasp();

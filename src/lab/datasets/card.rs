@@ -29,53 +29,23 @@ pub(super) fn card(
     let distinct: BTreeSet<Option<&String>> = collections.into_iter().collect();
 
     let mut mixed = Vec::new();
-    let mut note = |count: usize, named: bool, what: &str, which: Vec<String>, option: &str| {
-        if count > 1 && !named {
-            mixed.push(format!("{count} {what} ({}); {option}", which.join(", ")));
+    let mut note = |which: Vec<String>, named: bool, what: &str, option: &str| {
+        if which.len() > 1 && !named {
+            mixed.push(format!("{} {what} ({}); {option} selects one", which.len(), which.join(", ")));
         }
     };
-    let texts = |all: &BTreeSet<Option<&String>>| -> Vec<String> {
-        all.iter().map(|name| name.map_or_else(|| "none".to_owned(), Clone::clone)).collect()
-    };
-    note(distinct.len(), query.collection.is_some(), "collections", texts(&distinct), "--collection selects one");
-    note(
-        sources.len(),
-        query.source.is_some(),
-        "sources",
-        sources.iter().map(|name| (*name).to_owned()).collect(),
-        "--source selects one",
-    );
+    let owned = |name: &Option<&String>| name.map_or_else(|| "none".to_owned(), Clone::clone);
     let named = |preset: &Option<&str>| preset.unwrap_or("others").to_owned();
-    note(
-        presets.len(),
-        query.preset.is_some(),
-        "pose presets",
-        presets.iter().map(named).collect(),
-        "--preset selects one",
-    );
-    note(
-        fixed.len(),
-        false,
-        "kinds of support",
-        vec!["free".to_owned(), "fixed".to_owned()],
-        "--collection selects one",
-    );
     let version = |physics: &Option<u32>| physics.map_or_else(|| "unknown".to_owned(), |version| version.to_string());
-    note(
-        physics.len(),
-        query.physics.is_some(),
-        "versions of the physics",
-        physics.iter().map(version).collect(),
-        "--physics selects one",
-    );
     let ids = |ids: &&[i64]| ids.iter().map(i64::to_string).collect::<Vec<_>>().join("+");
-    note(
-        calibrations.len(),
-        !query.calibrations.is_empty(),
-        "sets of calibrations",
-        calibrations.iter().map(ids).collect(),
-        "--calibration selects one",
-    );
+    let support = |fixed: &bool| if *fixed { "fixed" } else { "free" }.to_owned();
+    note(distinct.iter().map(owned).collect(), query.collection.is_some(), "collections", "--collection");
+    note(sources.iter().map(|name| (*name).to_owned()).collect(), query.source.is_some(), "sources", "--source");
+    note(presets.iter().map(named).collect(), query.preset.is_some(), "pose presets", "--preset");
+    note(fixed.iter().map(support).collect(), false, "kinds of support", "--collection");
+    note(physics.iter().map(version).collect(), query.physics.is_some(), "versions of the physics", "--physics");
+    let calibrated = calibrations.iter().map(ids).collect();
+    note(calibrated, !query.calibrations.is_empty(), "sets of calibrations", "--calibration");
 
     let object = match (fixed.len(), fixed.contains(&true)) {
         (0, _) => "recorded",

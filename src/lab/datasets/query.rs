@@ -96,54 +96,16 @@ impl std::str::FromStr for PhysicsVersion {
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// The store failed.
-    #[error("{cause}")]
-    Store {
-        /// Error of the store.
-        cause: StoreError,
-    },
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// The sensor layout does not fit.
-    #[error("{cause}")]
-    Layout {
-        /// Error of the layout.
-        cause: LayoutError,
-    },
-    /// No trial matches.
-    #[error("no trial in the store matches{about}; `palpate collect` makes trials, `palpate trials list` lists them")]
-    Nothing {
-        /// The query.
-        about: String,
-    },
-    /// Trials match, but none is sound.
-    #[error(
-        "no matching trial{about} is usable: {reasons}; `palpate trials show` says why, --include-flagged keeps flagged \
-         trials, `palpate trials keep` takes trials out of the demo log"
-    )]
-    Unsound {
-        /// The query.
-        about: String,
-        /// Numbers of matching trials by reason.
-        reasons: String,
-    },
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// A trial asked for by its number is not sound.
     #[error("trial {id} is not sound: `palpate trials show {id}` says why")]
     TrialUnsound {
         /// The trial.
         id: TrialId,
-    },
-    /// Trials with different channels.
-    #[error(
-        "the trials do not have the same channels: trial {first} has {first_channels}, trial {other} has \
-         {other_channels}; choose one kind with --collection"
-    )]
-    Mixed {
-        /// First trial.
-        first: TrialId,
-        /// Its channels.
-        first_channels: String,
-        /// Second trial.
-        other: TrialId,
-        /// Its channels.
-        other_channels: String,
     },
     /// A trial of a real gripper, asked for channels of the simulation.
     #[error("trial {id} is of a real gripper, whose pads do not measure contact pressure: choose {choice}")]
@@ -163,26 +125,12 @@ pub enum DatasetError {
         /// Missing parts.
         why: String,
     },
-    /// Trials of the real gripper, none of which can be derived.
-    #[error(
-        "none of the {left_out} trials of the real gripper is calibrated: {why}; `palpate calibrate list` lists the \
-         calibrations"
-    )]
-    NoneCalibrated {
-        /// Matching trials.
-        left_out: usize,
-        /// Missing parts of the first trial.
-        why: String,
-    },
     /// Trials of different objects under one class.
     #[error(transparent)]
     OneClass(#[from] ClassClash),
-    /// An object of the query without trials.
-    #[error("the store has no trial of \"{object}\"; `palpate trials list` lists the trials")]
-    NoSuchObject {
-        /// The object.
-        object: String,
-    },
+    /// No trial is left, or those that are do not fit together.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// Labels of the sixteen built-in objects, and of the empty hand, which has neither size nor shape.
@@ -325,7 +273,7 @@ pub(super) fn signals_of(
     if source == TrialSource::Recorded {
         return of_board();
     }
-    let Trial { header, data } = store.load(id).map_err(|cause| DatasetError::Store { cause })?;
+    let Trial { header, data } = store.load(id)?;
     let trial = match data {
         TrialData::Simulated(data) => SimulatedTrial { header, data },
         TrialData::Imported(signals) => {
@@ -334,10 +282,18 @@ pub(super) fn signals_of(
         }
         TrialData::Recorded(_) => return of_board(),
     };
-    let mut readings = view.readings(&trial).map_err(|cause| DatasetError::Layout { cause })?.into_iter();
+    let mut readings = view.readings(&trial)?.into_iter();
     let signals = readings.next().unwrap_or_default();
     let hold_s = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
     Ok((TrialSignals { signals, further: readings.collect(), hold_s }, TrialOrigin::simulated(&trial.header)))
+}
+
+/// Trials of the real gripper, none of which can be derived, for what the first one lacks.
+pub(super) fn none_calibrated(left_out: usize, why: &str) -> DatasetError {
+    DatasetError::Refused(format!(
+        "none of the {left_out} trials of the real gripper is calibrated: {why}; `palpate calibrate list` lists the \
+         calibrations"
+    ))
 }
 
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
@@ -351,11 +307,10 @@ fn board_signals(
         let choice = "--signals parts, or --source sim for simulated trials alone";
         return Err(DatasetError::OnlySimulated { id, choice });
     }
-    let read = store.board_signals(id, calibrations).map_err(|cause| DatasetError::Store { cause })?;
-    let read = read.ok_or(DatasetError::NoneCalibrated { left_out: 1, why: "its board sent no data".to_owned() })?;
-    let layout = SensorLayout::named(&view.layout).map_err(|cause| DatasetError::Layout { cause })?;
-    let channels =
-        layout.channels(&GripperModel::default(), view.signals).map_err(|cause| DatasetError::Layout { cause })?;
+    let read = store.board_signals(id, calibrations)?;
+    let read = read.ok_or_else(|| none_calibrated(1, "its board sent no data"))?;
+    let layout = SensorLayout::named(&view.layout)?;
+    let channels = layout.channels(&GripperModel::default(), view.signals)?;
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
     let cut = match view.cut {
         Cut::HoldEnd => read.grasp(&wanted),

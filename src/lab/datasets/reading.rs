@@ -2,7 +2,9 @@
 
 use super::card::card;
 use super::origin::TrialOrigin;
-use super::query::{DatasetError, DatasetQuery, SensorView, TrialSignals, labels, sequence_of, signals_of};
+use super::query::{
+    DatasetError, DatasetQuery, SensorView, TrialSignals, labels, none_calibrated, sequence_of, signals_of,
+};
 use palpate_learn::{Dataset, Example, OTHER, Sequence};
 use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
 use palpate_store::labels::{Classes, Flag, compared};
@@ -26,11 +28,10 @@ impl DatasetQuery {
         view: &SensorView,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Dataset, DatasetError> {
-        view.learnt().map_err(|cause| DatasetError::Layout { cause })?;
-        let failed = |cause| DatasetError::Store { cause };
-        let library = Library::read(store).map_err(failed)?;
+        view.learnt()?;
+        let library = Library::read(store)?;
         let mut before = Predecessors::of(library.rows());
-        let found = library.find(store, &self.library_query()).map_err(failed)?;
+        let found = library.find(store, &self.library_query())?;
         let mut rows: Vec<&TrialRow> = found.iter().map(|trial| &trial.row).collect();
         rows.retain(|row| !row.object.is_empty() && self.fits(row));
         let matching = rows.len();
@@ -39,7 +40,9 @@ impl DatasetQuery {
         if matching > 0
             && let Some(object) = self.objects.iter().find(|object| !has_trials(object))
         {
-            return Err(DatasetError::NoSuchObject { object: object.clone() });
+            return Err(DatasetError::Refused(format!(
+                "the store has no trial of \"{object}\"; `palpate trials list` lists the trials"
+            )));
         }
         let mut left_out = LeftOut::new();
         let (mut kept, mut held) = (BTreeMap::<String, usize>::new(), BTreeSet::new());
@@ -60,10 +63,12 @@ impl DatasetQuery {
         // Of equal grasps, the one within the query comes before those that follow it.
         before.by_identity.extend(rows.iter().filter_map(|row| Some((row.identity.clone()?, row.id))));
         if rows.is_empty() {
-            let about = self.about(store);
             return Err(match matching {
-                0 => DatasetError::Nothing { about },
-                _ => DatasetError::Unsound { about, reasons: palpate_learn::counted(&left_out) },
+                0 => DatasetError::Refused(format!(
+                    "no trial in the store matches{}; `palpate collect` makes trials, `palpate trials list` lists them",
+                    self.about(store)
+                )),
+                _ => self.unusable(store, &left_out),
             });
         }
         self.read_rows(store, &rows, view, &before, left_out, progress)
@@ -71,12 +76,12 @@ impl DatasetQuery {
 
     /// Reads one trial, labelled or not, flagged or not, as a data set.
     pub fn read_trial(&self, store: &Store, id: TrialId, view: &SensorView) -> Result<Dataset, DatasetError> {
-        let listed = store.list(false).map_err(|cause| DatasetError::Store { cause })?;
+        let listed = store.list(false)?;
         let rows: Vec<&TrialRow> = listed.iter().filter(|row| row.id == id).collect();
         match rows.first() {
             // Loading returns the reason.
-            None => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
-            Some(row) if row.damaged => drop(store.load(id).map_err(|cause| DatasetError::Store { cause })?),
+            None => drop(store.load(id)?),
+            Some(row) if row.damaged => drop(store.load(id)?),
             Some(row) if !row.sound => return Err(DatasetError::TrialUnsound { id }),
             Some(_) => {}
         }
@@ -107,6 +112,15 @@ impl DatasetQuery {
         }
     }
 
+    /// Trials match, but none of them can be used.
+    fn unusable(&self, store: &Store, left_out: &LeftOut) -> DatasetError {
+        let (about, reasons) = (self.about(store), palpate_learn::counted(left_out));
+        DatasetError::Refused(format!(
+            "no matching trial{about} is usable: {reasons}; `palpate trials show` says why, --include-flagged keeps flagged \
+             trials, `palpate trials keep` takes trials out of the demo log"
+        ))
+    }
+
     fn read_rows(
         &self,
         store: &Store,
@@ -133,7 +147,7 @@ impl DatasetQuery {
                         uncalibrated += 1;
                         continue;
                     }
-                    Err(DatasetError::Store { cause }) if rows.len() > 1 && cause.is_damage() => {
+                    Err(DatasetError::Store(cause)) if rows.len() > 1 && cause.is_damage() => {
                         *left_out.entry(DAMAGED.to_owned()).or_default() += 1;
                         continue;
                     }
@@ -145,12 +159,13 @@ impl DatasetQuery {
             }
             let (first, known) = channels.get_or_insert_with(|| (row.id, signals.channels.clone()));
             if *known != signals.channels {
-                return Err(DatasetError::Mixed {
-                    first: *first,
-                    first_channels: known.join(", "),
-                    other: row.id,
-                    other_channels: signals.channels.join(", "),
-                });
+                return Err(DatasetError::Refused(format!(
+                    "the trials do not have the same channels: trial {first} has {}, trial {} has {}; choose one kind with \
+                     --collection",
+                    known.join(", "),
+                    row.id,
+                    signals.channels.join(", ")
+                )));
             }
             let grasp = sequence_of(&signals);
             // All grasps of an empty hand are alike: it touches nothing.
@@ -176,8 +191,8 @@ impl DatasetQuery {
         }
         if read.is_empty() {
             return Err(match uncalibrated {
-                0 => DatasetError::Unsound { about: self.about(store), reasons: palpate_learn::counted(&left_out) },
-                _ => DatasetError::NoneCalibrated { left_out: uncalibrated, why: missing },
+                0 => self.unusable(store, &left_out),
+                _ => none_calibrated(uncalibrated, &missing),
             });
         }
         let labels = labels(&named);

@@ -54,7 +54,8 @@ impl<'a> Contents<'a> {
         let repository = self.store.calibrations();
         let ids = repository.serving(Some(id), &[])?.ids;
         let used = ids.into_iter().map(|id| repository.get(id)).collect::<Result<Vec<_>, _>>()?;
-        serde_json::to_string_pretty(&used).map_err(|e| ExchangeError::Encode { id, cause: e.to_string() })
+        serde_json::to_string_pretty(&used)
+            .map_err(|e| ExchangeError::Refused(format!("trial {id} cannot be written: {e}")))
     }
 }
 

@@ -74,33 +74,12 @@ pub enum ExchangeError {
         /// Cause.
         cause: String,
     },
-    /// Something of a trial cannot be put into the format.
-    #[error("trial {id} cannot be written: {cause}")]
-    Encode {
-        /// The trial.
-        id: TrialId,
-        /// Cause.
-        cause: String,
-    },
-    /// More than the format or the memory takes.
-    #[error("the arrays would take {gigabytes:.1} GB, more than the limit of {most} GB; export fewer trials at once")]
-    TooLarge {
-        /// Size of the arrays (GB).
-        gigabytes: f64,
-        /// The limit (GB).
-        most: u64,
-    },
+    /// The format has no place for it.
+    #[error("{0}")]
+    Refused(String),
     /// The user ended it.
     #[error("stopped; nothing was written")]
     Stopped,
-    /// No format has this extension.
-    #[error("no format for \"{path}\": its extension has to be {known}", path = path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-        /// Extensions of all formats.
-        known: String,
-    },
 }
 
 impl ExchangeError {
@@ -144,7 +123,8 @@ pub fn write_trials(
 ) -> Result<(), ExchangeError> {
     let format = ExchangeFormat::of(path).ok_or_else(|| {
         let known: Vec<&str> = FORMATS.iter().flat_map(|format| format.kind.endings()).copied().collect();
-        ExchangeError::UnknownFormat { path: path.to_owned(), known: known.join(", ") }
+        let (path, known) = (path.display(), known.join(", "));
+        ExchangeError::Refused(format!("no format for \"{path}\": its extension has to be {known}"))
     })?;
     format.write(store, ids, options, path, allow)
 }
@@ -207,14 +187,13 @@ mod tests {
         for (trial, id) in import.trials.iter().zip([1, 2]) {
             let stored = store.load(id)?;
             let open = crate::inspection::OpenTrial::open(&store, id, &OpenOptions::default())?;
-            let wanted = crate::grasping::FrameReader::new(
+            let wanted = palpate_tactile::Sensors::new(
                 &palpate_tactile::SensorLayout::named("C1+F")?,
                 &stored.header.scene.gripper,
                 palpate_tactile::SignalDefinition::Parts,
-                &[],
             )?;
             // Where a pressure is undefined, recognisers take none: so do imported trials.
-            assert_eq!(bits(&trial.signals), bits(&wanted.sensors().signals(stored.frames())));
+            assert_eq!(bits(&trial.signals), bits(&wanted.signals(stored.frames())));
             assert_eq!(trial.signals.t_s, open.t_s);
             assert!(trial.size.is_some() && trial.shape.is_some());
         }

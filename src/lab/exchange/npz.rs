@@ -32,7 +32,10 @@ pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Res
         bytes = u64::max(bytes, each * trial.samples.len() as u64);
         let gigabytes = (bytes * request.ids.len() as u64) as f64 / 1e9;
         if bytes.saturating_mul(request.ids.len() as u64) > MOST_BYTES {
-            return Err(ExchangeError::TooLarge { gigabytes, most: MOST_BYTES >> 30 });
+            let most = MOST_BYTES >> 30;
+            return Err(ExchangeError::Refused(format!(
+                "the arrays would take {gigabytes:.1} GB, more than the limit of {most} GB; export fewer trials at once"
+            )));
         }
         trials.push(trial);
     }

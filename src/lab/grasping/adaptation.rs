@@ -66,20 +66,9 @@ pub enum AdaptError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// Not a trial of a real gripper.
-    #[error("trial {id} is not of a real gripper: adapt reads counts of its board")]
-    NotRecorded {
-        /// The trial.
-        id: TrialId,
-    },
-    /// A trial of a hand that holds something.
-    #[error("trial {id} is of \"{object}\": adapt needs a close of the empty hand, which touches nothing")]
-    NotEmpty {
-        /// The trial.
-        id: TrialId,
-        /// Its label.
-        object: String,
-    },
+    /// Not a trial of a real gripper's empty hand.
+    #[error("{0}")]
+    Refused(String),
     /// The fingers did not close as empty ones do.
     #[error(
         "something is in the hand: the {finger} finger {how}. Take it out and close again. If the hand was empty, its fingers \
@@ -118,11 +107,14 @@ impl Adaptation {
         let Some(log) = store.board_log(id)? else {
             // Loading returns the reason where there is no such trial.
             store.load(id)?;
-            return Err(AdaptError::NotRecorded { id });
+            let cause = format!("trial {id} is not of a real gripper: adapt reads counts of its board");
+            return Err(AdaptError::Refused(cause));
         };
         let object = store.list(false)?.into_iter().find(|row| row.id == id).map(|row| row.object).unwrap_or_default();
         if !object.is_empty() && object != EMPTY {
-            return Err(AdaptError::NotEmpty { id, object });
+            return Err(AdaptError::Refused(format!(
+                "trial {id} is of \"{object}\": adapt needs a close of the empty hand, which touches nothing"
+            )));
         }
         if let Some((side, how)) = held(&log, scene) {
             return Err(AdaptError::Held { id, finger: side.name(), how, deleted: false });

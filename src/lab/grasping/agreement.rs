@@ -162,13 +162,7 @@ pub fn grasp_until_agreement(
 ) -> Option<SimulatedTrial> {
     let run = |solver: &Solver| {
         let scene = Scene { solver: solver.clone(), ..scene.clone() };
-        let mut run = prepare(&scene, object, seed);
-        while run.next_frame().is_some() {
-            if cancelled() {
-                return None;
-            }
-        }
-        Some(run.finish(&scene))
+        prepare(&scene, object, seed).to_end(&scene, cancelled)
     };
     // A run that was cancelled ends the search at once: those that follow are cancelled too.
     let agree = |coarse: &Option<SimulatedTrial>, fine: &Option<SimulatedTrial>| match (coarse, fine) {

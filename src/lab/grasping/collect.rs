@@ -158,15 +158,15 @@ impl CollectionPlan {
 
     /// Loads the files of the plan, and refuses two objects in one class, before anything is stored.
     pub fn ready(&self) -> Result<ReadyCollection<'_>, CollectionError> {
-        let mut bench = Bench::new(self);
+        let mut ready = ReadyCollection::new(self);
         let mut classes = Classes::default();
         for object in 0..self.objects.len() {
             let source = &self.objects[object];
-            let content = bench.prepare(object)?;
-            let class = bench.names[object].clone();
+            let content = ready.prepare(object)?;
+            let class = ready.names[object].clone();
             classes.take(&class, content, source, "name a class of each with --class")?;
         }
-        Ok(ReadyCollection { bench })
+        Ok(ready)
     }
 
     /// Name of the collection: plans that differ in scene or seed have different names, parts of one plan the same.
@@ -211,11 +211,6 @@ fn mixed(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A plan whose objects are at hand, each in a class of its own.
-pub struct ReadyCollection<'a> {
-    bench: Bench<'a>,
-}
-
 /// Collects a plan; see [`ReadyCollection::collect`].
 pub fn collect(
     plan: &CollectionPlan,
@@ -235,12 +230,11 @@ impl ReadyCollection<'_> {
         threads: usize,
         progress: &mut dyn FnMut(CollectionProgress) -> ControlFlow<()>,
     ) -> Result<CollectionReport, CollectionError> {
-        let bench = &self.bench;
-        let known = store.collected(&bench.collection)?;
-        let all = bench.plan.tasks();
-        let is_new = |task: &Task| !known.contains(&(bench.names[task.object].clone(), task.seed));
+        let known = store.collected(&self.collection)?;
+        let all = self.plan.tasks();
+        let is_new = |task: &Task| !known.contains(&(self.names[task.object].clone(), task.seed));
         let tasks: Vec<Task> = all.iter().copied().filter(is_new).collect();
-        let mut report = CollectionReport { collection: bench.collection.clone(), ..CollectionReport::default() };
+        let mut report = CollectionReport { collection: self.collection.clone(), ..CollectionReport::default() };
         report.known = (all.len() - tasks.len()) as u32;
         let line = Line {
             tasks: &tasks,
@@ -252,7 +246,7 @@ impl ReadyCollection<'_> {
             let (sender, made) = sync_channel(2 * threads.max(1));
             for _ in 0..threads.max(1) {
                 let (line, sender) = (&line, sender.clone());
-                scope.spawn(move || line.work(bench, &sender));
+                scope.spawn(move || line.work(self, &sender));
             }
             drop(sender);
             let outcome = store_in_order(&line, &made, store, &mut report, &mut |done, object| {
@@ -282,7 +276,7 @@ struct Line<'a> {
 const MOST_AHEAD: usize = 256;
 
 impl Line<'_> {
-    fn work(&self, bench: &Bench<'_>, made: &SyncSender<(usize, Made)>) {
+    fn work(&self, ready: &ReadyCollection<'_>, made: &SyncSender<(usize, Made)>) {
         loop {
             let k = self.taken.fetch_add(1, Ordering::Relaxed);
             let Some(task) = self.tasks.get(k) else { return };
@@ -293,7 +287,7 @@ impl Line<'_> {
                 return;
             }
             // If a panic ended the thread, the other threads would wait for this task forever.
-            let make = std::panic::AssertUnwindSafe(|| bench.make(*task));
+            let make = std::panic::AssertUnwindSafe(|| ready.make(*task));
             let outcome = std::panic::catch_unwind(make).unwrap_or(Err(CollectionError::Internal { seed: task.seed }));
             if made.send((k, outcome)).is_err() {
                 return;
@@ -358,7 +352,8 @@ struct OnBench {
     sampler: PoseSampler,
 }
 
-struct Bench<'a> {
+/// A plan whose objects are at hand, each in a class of its own.
+pub struct ReadyCollection<'a> {
     plan: &'a CollectionPlan,
     collection: String,
     /// Names of the objects in the store.
@@ -366,7 +361,7 @@ struct Bench<'a> {
     objects: Vec<OnceLock<Result<OnBench, Arc<ObjectError>>>>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> ReadyCollection<'a> {
     fn new(plan: &'a CollectionPlan) -> Self {
         let objects = plan.objects.iter().map(|_| OnceLock::new()).collect();
         Self { plan, collection: plan.name(), names: plan.objects.clone(), objects }

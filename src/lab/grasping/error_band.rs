@@ -13,7 +13,8 @@
 //!
 //! The band contains only the error of integration, not the difference between the equations and a real gripper.
 
-use super::run::prepare_refined;
+use super::run::{GraspRun, prepare_refined};
+use glam::DVec3;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{EngineKind, IntegrationMethod, Scene};
 use palpate_tactile::trial::SimulatedTrial;
@@ -157,13 +158,37 @@ pub fn band_half_width(t_s: &[f64], estimates: &[f32], sample: usize) -> Option<
 
 /// Runs the refined run of a grasp that was made from this scene, and gives the band about it.
 pub fn error_band(trial: &SimulatedTrial, scene: &Scene, object: Option<&ObjectModel>, sensors: &Sensors) -> ErrorBand {
-    let mut run = prepare_refined(scene, object, trial.header.seed);
-    let mut band = ErrorBand::new(scene, sensors.channels().len());
+    let mut refined = RefinedRun::new(scene, object, trial.header.seed, sensors.channels().len());
     for frame in trial.frames() {
-        let Some(finer) = run.next_frame() else { break };
-        band.push(frame.t, &sensors.read(frame), &sensors.read(finer));
+        refined.errors(frame.t, &sensors.read(frame), sensors);
     }
-    band
+    refined.band
+}
+
+/// Refined run of a grasp, which advances sample by sample beside it.
+pub(crate) struct RefinedRun {
+    run: GraspRun,
+    band: ErrorBand,
+}
+
+impl RefinedRun {
+    /// Creates the refined run of a grasp that starts.
+    pub(crate) fn new(scene: &Scene, object: Option<&ObjectModel>, seed: u64, channels: usize) -> Self {
+        Self { run: prepare_refined(scene, object, seed), band: ErrorBand::new(scene, channels) }
+    }
+
+    /// Advances by one sample and returns the estimated errors of the sensor values at that time (s); empty at its end.
+    pub(crate) fn errors(&mut self, t: f64, values: &[Option<f64>], sensors: &Sensors) -> Box<[f32]> {
+        match self.run.next_frame() {
+            Some(finer) => self.band.push(t, values, &sensors.read(finer)).into(),
+            None => Box::default(),
+        }
+    }
+
+    /// Applies the same pull to the object as in the watched grasp (N, world axes).
+    pub(crate) fn pull(&mut self, force: DVec3) {
+        self.run.gripper_mut().run_mut().pull_object(force);
+    }
 }
 
 #[cfg(test)]

@@ -17,17 +17,11 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
     /// The model was made for imported channels, or for a layout that does not exist.
-    #[error("{cause}")]
-    Layout {
-        /// Cause.
-        cause: LayoutError,
-    },
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// The model reads other channels than the gripper has.
-    #[error("{cause}")]
-    Channels {
-        /// The differing channels.
-        cause: ModelError,
-    },
+    #[error(transparent)]
+    Channels(#[from] ModelError),
 }
 
 /// A finished grasp as a model read it, and the model's answers.
@@ -242,9 +236,8 @@ impl Identification {
     pub fn channels_on(&self, gripper: &GripperModel) -> Result<Vec<Channel>, IdentifyError> {
         let data = &self.model.card.data;
         let signals = data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default();
-        SensorLayout::named(data.layout.as_deref().unwrap_or("C1"))
-            .and_then(|layout| layout.shown(signals).channels(gripper, signals))
-            .map_err(|cause| IdentifyError::Layout { cause })
+        let layout = SensorLayout::named(data.layout.as_deref().unwrap_or("C1"))?;
+        Ok(layout.shown(signals).channels(gripper, signals)?)
     }
 
     /// Begins another grasp of the same object, on a gripper whose rows have these channels in these columns; rows follow
@@ -255,7 +248,7 @@ impl Identification {
         let wanted = &self.model.card.channels;
         self.columns = wanted.iter().filter_map(|name| named.get(name).copied()).collect();
         let found: Vec<String> = wanted.iter().filter(|name| named.contains_key(*name)).cloned().collect();
-        self.model.check_channels(&found).map_err(|cause| IdentifyError::Channels { cause })?;
+        self.model.check_channels(&found)?;
         self.readings = Sequence::default();
         self.hold_s = None;
         self.verdict = None;

@@ -63,55 +63,25 @@ pub enum LessonError {
     /// An object failed to load.
     #[error(transparent)]
     Object(#[from] ObjectError),
-    /// A source without an object, such as the empty hand.
-    #[error("\"{source_name}\" is no object; name a URDF, OBJ or STL file")]
-    NoObject {
-        /// What was named.
-        source_name: String,
-    },
-    /// The model already has such a class.
-    #[error(
-        "the model already knows \"{name}\"; to teach another object, name its class with --class, or rename the file"
-    )]
-    Known {
-        /// Name of the object.
-        name: String,
-    },
     /// Two objects would be one class.
     #[error(transparent)]
     OneClass(#[from] ClassClash),
-    /// None of the simulated grasps is sound.
-    #[error("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")]
-    Unsound {
-        /// Name of the object.
-        name: String,
-    },
-    /// Too few recorded grasps.
-    #[error("\"{name}\" has {found} usable recorded grasps; teaching needs {LEAST_RECORDED}. Record and label more")]
-    TooFew {
-        /// Label.
-        name: String,
-        /// Usable grasps.
-        found: usize,
-    },
-    /// Nothing to learn from.
-    #[error("name an object file, or a label with --recorded")]
-    Nothing,
     /// The gripper has no such sensors.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// The recorded grasps cannot be read.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The grasps have other channels than the model.
-    #[error("these grasps lack channels of the model: {needs}")]
-    Channels {
-        /// Channels of the model.
-        needs: String,
-    },
     /// The fit failed.
     #[error(transparent)]
     Learn(#[from] LearnError),
+    /// There is nothing to learn, or too little.
+    #[error("{0}")]
+    Refused(String),
+}
+
+fn refused(cause: impl Into<String>) -> LessonError {
+    LessonError::Refused(cause.into())
 }
 
 impl Lessons<'_> {
@@ -119,14 +89,16 @@ impl Lessons<'_> {
     pub fn teach(&self, model: &Model, store: Option<&Store>) -> Result<Model, LessonError> {
         model.check_learns_new_objects()?;
         let view = view_of(&model.card);
+        let nothing = || refused("name an object file, or a label with --recorded");
+        let needs = &model.card.channels;
+        let other_channels = || refused(format!("these grasps lack channels of the model: {}", needs.join(", ")));
         let mut lessons: Option<Dataset> = None;
         let mut add = |data: Dataset| -> Result<(), LessonError> {
             let joined = match lessons.take() {
                 Some(before) => before.with(&data),
                 None => Some(data),
             };
-            let needs = || model.card.channels.join(", ");
-            lessons = Some(joined.ok_or_else(|| LessonError::Channels { needs: needs() })?);
+            lessons = Some(joined.ok_or_else(&other_channels)?);
             Ok(())
         };
         let scene = scene_of(&model.card);
@@ -141,25 +113,29 @@ impl Lessons<'_> {
             let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
             scene.object = ObjectSetup { fixed, shift, ..setup.clone() };
             let object = scene.load_object()?;
-            let mut object = object.ok_or_else(|| LessonError::NoObject { source_name: setup.source.clone() })?;
+            let mut object = object
+                .ok_or_else(|| refused(format!("\"{}\" is no object; name a URDF, OBJ or STL file", setup.source)))?;
             if let Some(class) = self.classes.get(number) {
                 object.name.clone_from(class);
             }
             if known(&object.name) || object.name == OTHER {
-                return Err(LessonError::Known { name: object.name });
+                return Err(refused(format!(
+                    "the model already knows \"{}\"; to teach another object, name its class with --class, or rename the file",
+                    object.name
+                )));
             }
             classes.take(&object.name, object.content, &setup.source, SEPARATE)?;
             taught_from.insert(object.name.clone(), (object.content, setup.source.clone()));
             add(self.simulated(number, &scene, &object, &view)?)?;
         }
         for name in self.recorded {
-            let store = store.ok_or(LessonError::Nothing)?;
+            let store = store.ok_or_else(nothing)?;
             let simulated = self.objects.len() * self.grasps;
             add(recorded(name, store, &view, simulated)?)?;
         }
-        let lessons = lessons.ok_or(LessonError::Nothing)?;
-        if lessons.channels != model.card.channels {
-            return Err(LessonError::Channels { needs: model.card.channels.join(", ") });
+        let lessons = lessons.ok_or_else(nothing)?;
+        if lessons.channels != *needs {
+            return Err(other_channels());
         }
         let progress = |share: f64| (self.progress)(LessonStage::Fitting(share));
         let settings = serde_json::Map::new();
@@ -201,7 +177,8 @@ impl Lessons<'_> {
         let examples: Vec<Option<Example>> = seeds.par_iter().enumerate().map(read).collect::<Result<_, _>>()?;
         let examples: Vec<Example> = examples.into_iter().flatten().collect();
         if examples.is_empty() {
-            return Err(LessonError::Unsound { name: object.name.clone() });
+            let name = &object.name;
+            return Err(refused(format!("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")));
         }
         let class = Class { name: object.name.clone(), size: None, shape: None };
         let channels = view.learnt()?.channels(&scene.gripper, view.signals)?;
@@ -221,7 +198,9 @@ fn recorded(name: &str, store: &Store, view: &SensorView, simulated: usize) -> R
     let mut data = query.read(store, view, &mut |_, _| ())?;
     let found = data.examples.len();
     if found < LEAST_RECORDED {
-        return Err(LessonError::TooFew { name: name.to_owned(), found });
+        return Err(refused(format!(
+            "\"{name}\" has {found} usable recorded grasps; teaching needs {LEAST_RECORDED}. Record and label more"
+        )));
     }
     let times = (simulated * view.readers() as usize).div_ceil(found).max(1);
     for example in &mut data.examples {

@@ -29,13 +29,14 @@ pub use collect::{
     all_objects, collect,
 };
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
+pub(crate) use error_band::RefinedRun;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
 pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance, TouchLibrary, TouchesError};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 pub use presentation::Presentation;
-pub use row::{FrameReader, Row};
+pub use row::Row;
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;
 pub(crate) use summary::CONTACT_FORCE;

@@ -63,12 +63,12 @@ fn poses(preset: &str) -> PoseSpread {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FrameReader, Identification, grasp};
+    use super::super::{Identification, Row, grasp};
     use super::*;
     use palpate_learn::{Model, Shipped, StopRule};
     use palpate_sim::poses::PoseSampler;
     use palpate_sim::scene::Scene;
-    use palpate_tactile::Channel;
+    use palpate_tactile::{Channel, Sensors};
     use std::sync::Arc;
 
     #[test]
@@ -100,9 +100,11 @@ mod tests {
                 (pose, grasps) = (pose + 1, grasps + 1);
                 t += TIMES[0] + if grasps > 1 { TIMES[1] } else { 0.0 };
                 let (drawn, _) = sampler.draw(object.as_ref(), pose);
-                let reader = FrameReader::of(identification.channels_on(&drawn.gripper).expect("fits"), &drawn.gripper);
+                let reader = Sensors::of(identification.channels_on(&drawn.gripper).expect("fits"), &drawn.gripper);
                 identification.begin_grasp(reader.channels().iter().map(Channel::name).enumerate()).expect("fits");
-                for row in grasp(&drawn, object.as_ref(), pose).frames().iter().map(|frame| reader.row(frame)) {
+                for row in
+                    grasp(&drawn, object.as_ref(), pose).frames().iter().map(|frame| Row::of_frame(frame, &reader))
+                {
                     identification.push(row.t_s, &row);
                 }
                 identification.end_grasp();

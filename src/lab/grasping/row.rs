@@ -2,10 +2,10 @@
 //! recogniser reads is found once per grasp.
 
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{GripperModel, Phase};
+use palpate_sim::gripper::Phase;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::SensorEstimate;
-use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition};
+use palpate_tactile::{Channel, Sensors};
 
 /// One sample: a value per channel, in the channel's unit; NaN where it is undefined.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,50 +28,15 @@ impl Row {
         let values = derived.chain((0..counts).map(count)).collect();
         Self { t_s: reading.t_s, line_bar: reading.line_bar.unwrap_or(f64::NAN), phase: None, values }
     }
-}
 
-/// Reads frames of a simulated gripper as rows.
-#[derive(Clone, Debug)]
-pub struct FrameReader {
-    sensors: Sensors,
-}
-
-impl FrameReader {
-    /// Reads the channels of a layout, followed by those of `more` that it lacks.
-    pub fn new(
-        layout: &SensorLayout,
-        gripper: &GripperModel,
-        signals: SignalDefinition,
-        more: &[Channel],
-    ) -> Result<Self, LayoutError> {
-        let mut sensors = Sensors::new(layout, gripper, signals)?;
-        sensors.add(more);
-        Ok(Self { sensors })
-    }
-
-    /// Reads these channels.
-    pub fn of(channels: Vec<Channel>, gripper: &GripperModel) -> Self {
-        Self { sensors: Sensors::of(channels, gripper) }
-    }
-
-    /// The channels of its rows.
-    pub fn channels(&self) -> &[Channel] {
-        self.sensors.channels()
-    }
-
-    /// The sensors.
-    pub fn sensors(&self) -> &Sensors {
-        &self.sensors
+    /// The row of a frame, as these sensors read it.
+    pub fn of_frame(frame: &Frame, sensors: &Sensors) -> Self {
+        Self::of_values(frame, &sensors.read(frame))
     }
 
     /// The row of a frame, of which `values` were read.
-    pub fn row_of(frame: &Frame, values: &[Option<f64>]) -> Row {
+    pub fn of_values(frame: &Frame, values: &[Option<f64>]) -> Self {
         let values = values.iter().map(|value| value.map_or(f32::NAN, |value| value as f32)).collect();
-        Row { t_s: frame.t, line_bar: frame.line_bar, phase: Some(frame.phase), values }
-    }
-
-    /// The row of a frame.
-    pub fn row(&self, frame: &Frame) -> Row {
-        Self::row_of(frame, &self.sensors.read(frame))
+        Self { t_s: frame.t, line_bar: frame.line_bar, phase: Some(frame.phase), values }
     }
 }

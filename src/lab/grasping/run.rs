@@ -161,6 +161,16 @@ impl GraspRun {
         Ok(None)
     }
 
+    /// Runs to the end; `None` if it was cancelled.
+    pub(crate) fn to_end(mut self, scene: &Scene, cancelled: &dyn Fn() -> bool) -> Option<SimulatedTrial> {
+        while self.next_frame().is_some() {
+            if cancelled() {
+                return None;
+            }
+        }
+        Some(self.finish(scene))
+    }
+
     /// The trial so far, without its samples.
     pub fn begun(&self) -> SimulatedTrial {
         let simulation = self.gripper.run();

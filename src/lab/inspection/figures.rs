@@ -12,7 +12,7 @@ use palpate_geometry::drawing::{
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_tactile::SignalDefinition;
-use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::trial::TrialSource;
 
 /// What a heat map shows over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,39 +40,8 @@ pub struct FigureOptions {
 
 /// Reason why there is no figure.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FigureDataError {
-    /// No trial was chosen.
-    #[error("no trial is chosen; choose at least one")]
-    NoTrials,
-    /// A name that begins no channel.
-    #[error("trial {id} has no channel \"{name}\"; it has {known}")]
-    NoChannel {
-        /// The trial.
-        id: TrialId,
-        /// The name asked for.
-        name: String,
-        /// Names that it has.
-        known: String,
-    },
-    /// Raw counts of a trial that has none.
-    #[error("trial {id} is {source_title}: only trials of the real gripper have raw counts")]
-    NoCounts {
-        /// The trial.
-        id: TrialId,
-        /// Its source, in words.
-        source_title: &'static str,
-    },
-    /// Heat maps of a trial that has no joints or taxels.
-    #[error("trial {id} is {source_title}: only simulated trials have {what}")]
-    NoHeat {
-        /// The trial.
-        id: TrialId,
-        /// Its source, in words.
-        source_title: &'static str,
-        /// The missing part.
-        what: &'static str,
-    },
-}
+#[error("{0}")]
+pub struct FigureDataError(String);
 
 /// Trials named one by one in a caption.
 const NAMED: usize = 3;
@@ -117,7 +86,9 @@ pub fn caption(trials: &[&OpenTrial]) -> String {
 /// A figure of one trial, or of several over each other: a plot per quantity, a colour per trial (with one trial, per place
 /// on the finger), the right finger dashed.
 pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Result<Figure, FigureDataError> {
-    let Some(first) = trials.first() else { return Err(FigureDataError::NoTrials) };
+    let Some(first) = trials.first() else {
+        return Err(FigureDataError("no trial is chosen; choose at least one".to_owned()));
+    };
     let title = match trials {
         [one] => format!("{}, trial {}", one.title, one.id),
         _ => titles(trials),
@@ -127,7 +98,7 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
         None => {
             let simulated = trials.iter().find(|trial| trial.source != TrialSource::Recorded).filter(|_| options.raw);
             if let Some(trial) = simulated {
-                return Err(FigureDataError::NoCounts { id: trial.id, source_title: trial.source_title() });
+                return Err(lacking(trial, "trials of the real gripper", "raw counts"));
             }
             let origins = origins(trials, options.align);
             let terms = if options.channels.is_empty() { stems(first, options.raw) } else { options.channels.clone() };
@@ -139,17 +110,27 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
     Ok(Figure { title, plots, columns, note: caption(trials) })
 }
 
+/// Only others have what was asked for.
+fn lacking(trial: &OpenTrial, others: &str, what: &str) -> FigureDataError {
+    FigureDataError(format!("trial {} is {}: only {others} have {what}", trial.id, trial.source_title()))
+}
+
 /// Objects of several trials: `Lemon (2), Tomato (1)`.
 fn titles(trials: &[&OpenTrial]) -> String {
-    let mut counts: Vec<(&str, usize)> = Vec::new();
+    let texts: Vec<String> = by_title(trials).iter().map(|(title, own)| format!("{title} ({})", own.len())).collect();
+    texts.join(", ")
+}
+
+/// Trials of each object, in their order.
+fn by_title<'a>(trials: &[&'a OpenTrial]) -> Vec<(&'a str, Vec<&'a OpenTrial>)> {
+    let mut titles: Vec<(&str, Vec<&OpenTrial>)> = Vec::new();
     for trial in trials {
-        match counts.iter_mut().find(|(title, _)| *title == trial.title) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((&trial.title, 1)),
+        match titles.iter_mut().find(|(title, _)| *title == trial.title) {
+            Some((_, own)) => own.push(trial),
+            None => titles.push((&trial.title, vec![trial])),
         }
     }
-    let texts: Vec<String> = counts.into_iter().map(|(title, count)| format!("{title} ({count})")).collect();
-    texts.join(", ")
+    titles
 }
 
 /// Time of each trial that becomes zero (s). A single one keeps its own time, unless aligned at contact.
@@ -232,8 +213,8 @@ fn found<'a>(trial: &'a OpenTrial, term: &str, raw: bool) -> Result<(Vec<Curve<'
         names.push("line");
         let more = if names.len() > LISTED { ", .." } else { "" };
         names.truncate(LISTED);
-        let known = format!("{}{more}", names.join(", "));
-        return Err(FigureDataError::NoChannel { id: trial.id, name: term.to_owned(), known });
+        let (id, known) = (trial.id, names.join(", "));
+        return Err(FigureDataError(format!("trial {id} has no channel \"{term}\"; it has {known}{more}")));
     }
     Ok((curves, unit))
 }
@@ -288,14 +269,7 @@ fn curves(
 
 /// Mean of the trials of each object as a line, and its standard deviation as a band.
 fn means(trials: &[&OpenTrial], term: &str, options: &FigureOptions, plot: &mut Plot) -> Result<(), FigureDataError> {
-    let mut classes: Vec<(&str, Vec<&OpenTrial>)> = Vec::new();
-    for trial in trials {
-        match classes.iter_mut().find(|(title, _)| *title == trial.title) {
-            Some((_, own)) => own.push(trial),
-            None => classes.push((&trial.title, vec![trial])),
-        }
-    }
-    for (colour, (title, own)) in classes.iter().enumerate() {
+    for (colour, (title, own)) in by_title(trials).iter().enumerate() {
         let Some(mean) = MeanTrial::of(own, options.align) else { continue };
         let (curves, _) = found(own[0], term, options.raw)?;
         for curve in curves {
@@ -356,7 +330,7 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
             HeatKind::Pads => "taxels",
         };
         if !simulated {
-            return Err(FigureDataError::NoHeat { id: trial.id, source_title: trial.source_title(), what });
+            return Err(lacking(trial, "simulated trials", what));
         }
         let gripper = &trial.header.scene.gripper;
         let maps: [HeatMap; 2] = match kind {
@@ -445,7 +419,7 @@ mod tests {
         let unknown = FigureOptions { channels: vec!["warmth".to_owned()], ..options };
         let error = comparison_figure(&trials, &unknown).expect_err("no such channel").to_string();
         assert!(error.contains("\"warmth\"; it has curvature_left, "), "{error}");
-        assert_eq!(comparison_figure(&[], &FigureOptions::default()), Err(FigureDataError::NoTrials));
+        assert!(comparison_figure(&[], &FigureOptions::default()).is_err());
         Ok(())
     }
 

@@ -2,18 +2,18 @@
 
 use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, onset, phases_of_frames};
 use crate::datasets::{SensorView, noise_seed};
-use crate::grasping::{FrameReader, Identification, IdentificationView, Row, prepare};
+use crate::grasping::{Identification, IdentificationView, Row, prepare};
 use crate::picture::{Stage, evenly_bent};
-use crate::recording::{Replay, ReplayError};
+use crate::recording::{OpenTrialError, Replay};
 use palpate_geometry::Pose;
 use palpate_learn::{Model, Models, Shipped, StopRule};
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
-use palpate_store::{Store, StoreError};
+use palpate_store::Store;
 use palpate_tactile::board::{Board, Gap, Sensor};
 use palpate_tactile::trial::{CorrectedPhases, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource};
-use palpate_tactile::{Channel, LayoutError, Quantity, SignalDefinition, Signals, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, SignalDefinition, Signals, whole_fingers};
 use std::sync::Arc;
 
 /// How a trial is opened.
@@ -102,25 +102,6 @@ pub struct OpenTrial {
     pub recognition_off: Option<String>,
     /// What is missing, in sentences: an object's file that is gone, sensors without calibration.
     pub remarks: Vec<String>,
-}
-
-/// Reason why a trial cannot be opened.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenTrialError {
-    /// The store.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The sensor layout.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The replay of a board's trial.
-    #[error("trial {id} cannot be replayed: {cause}")]
-    Replay {
-        /// The trial.
-        id: TrialId,
-        /// Cause.
-        cause: String,
-    },
 }
 
 /// State of a trial at a time.
@@ -234,7 +215,8 @@ impl OpenTrial {
         let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
         let (layout, signals) = (options.sensors.shown()?, options.sensors.signals);
         let shown = layout.channels(gripper, signals)?.len();
-        let reader = FrameReader::new(&layout, gripper, signals, &more)?;
+        let mut reader = Sensors::new(&layout, gripper, signals)?;
+        reader.add(&more);
         let rows = self.rows_of(&data.frames, &reader, options);
         if let Some(identification) = &mut identification {
             if let Some(earlier) = &self.header.earlier {
@@ -270,11 +252,11 @@ impl OpenTrial {
     }
 
     /// Rows of frames: through ideal sensors one of each frame, as they were live; or by the sensors' own clock.
-    fn rows_of(&self, frames: &[Frame], reader: &FrameReader, options: &OpenOptions) -> Vec<Row> {
+    fn rows_of(&self, frames: &[Frame], reader: &Sensors, options: &OpenOptions) -> Vec<Row> {
         if options.sensors.sensors == Default::default() {
-            return frames.iter().map(|frame| reader.row(frame)).collect();
+            return frames.iter().map(|frame| Row::of_frame(frame, reader)).collect();
         }
-        let clean = reader.sensors().signals(frames);
+        let clean = reader.signals(frames);
         let read: Signals = options.sensors.sensors.apply(&clean, noise_seed(&self.header));
         let row = |(k, t_s): (usize, &f64)| {
             let frame = last_until(frames, |frame| frame.t, *t_s).map(|k| &frames[k]);
@@ -299,14 +281,10 @@ impl OpenTrial {
             TrialSource::Simulated | TrialSource::Imported => Shipped::PerfectSensors,
         };
         let model = options.models.of(kind);
-        let failed = |cause: String| OpenTrialError::Replay { id, cause };
-        let mut replay = Replay::of_loaded(store, id, trial, model.cloned()).map_err(|error| match error {
-            ReplayError::Store(error) => OpenTrialError::Store(error),
-            ReplayError::Layout(error) => OpenTrialError::Layout(error),
-        })?;
+        let mut replay = Replay::of_loaded(store, id, trial, model.cloned())?;
         let mut gaps = gaps.iter().peekable();
         let mut newest: Option<Arc<IdentificationView>> = None;
-        while let Some(row) = replay.next_row().map_err(|error| failed(error.to_string()))? {
+        while let Some(row) = replay.next_row().map_err(|cause| OpenTrialError::Replay { id, cause })? {
             while self.columns.len() < replay.channels().len() {
                 let name = &replay.channels()[self.columns.len()];
                 let channel =

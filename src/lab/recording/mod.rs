@@ -16,4 +16,4 @@ pub use recent::RecentEvents;
 pub use record::{RecordError, RecordProgress, Recording, record};
 pub use recorder::{BoardTrialEnd, Recorder, RecorderNotice};
 pub(crate) use replay::REST_S;
-pub use replay::{Replay, ReplayError};
+pub use replay::{OpenTrialError, Replay};

@@ -27,35 +27,15 @@ const PROGRESS: Duration = Duration::from_millis(250);
 /// A trial that could not be recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The gripper.
+    /// The gripper failed.
     #[error(transparent)]
     Gripper(#[from] GripperError),
-    /// The board sent nothing that can be read.
-    #[error("no reading from \"{port}\": {state}", port = port.display())]
-    NoReading {
-        /// The port.
-        port: PathBuf,
-        /// State of the link, in a sentence.
-        state: String,
-    },
-    /// A file without readings.
-    #[error(
-        "\"{file}\" has no reading ({bad_lines} unreadable line(s)): it should hold bytes as a board sent them, such as \
-         `palpate trials export --labelled` writes",
-        file = file.display()
-    )]
-    NoReadingInFile {
-        /// The file.
-        file: PathBuf,
-        /// Lines that could not be read.
-        bad_lines: u64,
-    },
     /// The recorder's thread could not be started.
     #[error("the recorder could not be started: {0}")]
     Recorder(#[from] std::io::Error),
-    /// The store; what was written before is safe.
+    /// Nothing was read, or nothing stored.
     #[error("{0}")]
-    Store(String),
+    Failed(String),
 }
 
 /// Progress of a recording.
@@ -134,7 +114,7 @@ pub fn record(
             _ => {}
         }
     }
-    Err(RecordError::Store(failed.unwrap_or_else(|| "the trial was not stored".to_owned())))
+    Err(RecordError::Failed(failed.unwrap_or_else(|| "the trial was not stored".to_owned())))
 }
 
 /// Waits until the board sends readings and their times have settled.
@@ -158,10 +138,14 @@ fn wait_for_readings(gripper: &mut SerialGripper, stop: &AtomicBool) -> Result<R
         let LinkStatus { state, port, baud, cadence, .. } = gripper.stream().status();
         finished |= matches!(state, LinkState::Unreadable { .. }) && start.elapsed() > UNREADABLE;
         if finished || start.elapsed() > FIRST_READING || stop.load(Ordering::Relaxed) {
-            return Err(match baud {
-                None => RecordError::NoReadingInFile { file: port.path, bad_lines: cadence.bad_lines },
-                Some(_) => RecordError::NoReading { port: port.path, state: state.sentence() },
-            });
+            let (path, bad_lines) = (port.path.display(), cadence.bad_lines);
+            return Err(RecordError::Failed(match baud {
+                None => format!(
+                    "\"{path}\" has no reading ({bad_lines} unreadable line(s)): it should hold bytes as a board sent them, \
+                     such as `palpate trials export --labelled` writes"
+                ),
+                Some(_) => format!("no reading from \"{path}\": {}", state.sentence()),
+            }));
         }
     }
 }

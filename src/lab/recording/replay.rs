@@ -1,7 +1,7 @@
 //! Replay of a stored trial or of captured bytes: the rows and the recognition of the live gripper, event by event.
 
 use super::recent::RecentEvents;
-use crate::grasping::{FrameReader, GraspController, GraspPlan, Identification, IdentifyError, Row};
+use crate::grasping::{GraspController, GraspPlan, Identification, IdentifyError, Row};
 use crate::gripper::{Gripper, GripperError, GripperEvent, ReplayedGripper, SerialGripper};
 use crate::labelling::{SegmentEvent, Segmenter};
 use palpate_device::protocol::DecodedEvent;
@@ -13,7 +13,7 @@ use palpate_store::{Serving, Store, StoreError};
 use palpate_tactile::board::{Board, Reading};
 use palpate_tactile::calibration::Readout;
 use palpate_tactile::trial::{Control, PhaseMark, Trial, TrialData, TrialId};
-use palpate_tactile::{Channel, LayoutError, SensorLayout, SignalDefinition, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition, whole_fingers};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,15 +23,23 @@ pub(crate) const REST_S: f64 = 0.6;
 /// Longest wait for captured bytes.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// A trial that cannot be replayed.
+/// Reason why a stored trial cannot be opened or replayed.
 #[derive(Debug, thiserror::Error)]
-pub enum ReplayError {
+pub enum OpenTrialError {
     /// The store.
     #[error(transparent)]
     Store(#[from] StoreError),
     /// The gripper of the trial does not fit the layout of its rows.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// The replay of a trial stopped.
+    #[error("trial {id} cannot be replayed: {cause}")]
+    Replay {
+        /// The trial.
+        id: TrialId,
+        /// Cause.
+        cause: GripperError,
+    },
 }
 
 /// A replay in progress.
@@ -47,7 +55,7 @@ pub struct Replay {
 
 /// Makes rows of events.
 enum RowReader {
-    Frames(Box<FrameReader>),
+    Frames(Box<Sensors>),
     Signals,
     Board(Box<BoardReader>),
 }
@@ -67,7 +75,7 @@ struct BoardReader {
 
 impl Replay {
     /// Replays a stored trial of any source; without a model nothing is recognised.
-    pub fn of_trial(store: &Store, id: TrialId, model: Option<Arc<Model>>) -> Result<Self, ReplayError> {
+    pub fn of_trial(store: &Store, id: TrialId, model: Option<Arc<Model>>) -> Result<Self, OpenTrialError> {
         Self::of_loaded(store, id, store.load(id)?, model)
     }
 
@@ -77,7 +85,7 @@ impl Replay {
         id: TrialId,
         mut trial: Trial,
         model: Option<Arc<Model>>,
-    ) -> Result<Self, ReplayError> {
+    ) -> Result<Self, OpenTrialError> {
         let plan = GraspPlan::simulated(&trial.header.scene);
         Ok(match &mut trial.data {
             TrialData::Recorded(log) => {
@@ -94,7 +102,8 @@ impl Replay {
                 let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
                 // All channels use the model's definition of the signals, so that a name means one channel.
                 let signals = more.first().map(|channel| channel.signals).unwrap_or_default();
-                let reader = FrameReader::new(&SensorLayout::named("C1+F")?, gripper, signals, &more)?;
+                let mut reader = Sensors::new(&SensorLayout::named("C1+F")?, gripper, signals)?;
+                reader.add(&more);
                 let names = reader.channels().iter().map(Channel::name).collect();
                 Self::of_rows(
                     ReplayedGripper::new(trial),
@@ -112,7 +121,7 @@ impl Replay {
         gripper: SerialGripper,
         store: Option<&Store>,
         model: Option<Arc<Model>>,
-    ) -> Result<Self, ReplayError> {
+    ) -> Result<Self, OpenTrialError> {
         let serving = store.map(|store| store.calibrations().serving(None, &[])).transpose()?.unwrap_or_default();
         Ok(Self::of_board(Box::new(gripper), serving, VecDeque::new(), model))
     }
@@ -179,7 +188,7 @@ impl Replay {
     pub fn next_row(&mut self) -> Result<Option<Row>, GripperError> {
         loop {
             let row = match (self.gripper.next_event(PATIENCE)?, &self.reader) {
-                (GripperEvent::Sampled(frame), RowReader::Frames(reader)) => reader.row(&frame),
+                (GripperEvent::Sampled(frame), RowReader::Frames(sensors)) => Row::of_frame(&frame, sensors),
                 (GripperEvent::Signals { t_s, values }, _) => {
                     Row { t_s, line_bar: f64::NAN, phase: None, values: values.into() }
                 }

@@ -1,11 +1,11 @@
 //! The grasp that is going on in the simulation's thread.
 
-use super::refined_run::RefinedRun;
-use crate::grasping::{FrameReader, GraspRun};
+use crate::grasping::{GraspRun, RefinedRun};
 use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::scene::Scene;
+use palpate_tactile::Sensors;
 use palpate_tactile::trial::EarlierGrasps;
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) struct Current {
     pub(super) plan: Arc<Plan>,
     pub(super) scene: Arc<Scene>,
     pub(super) stage: Arc<Stage>,
-    pub(super) reader: FrameReader,
+    pub(super) reader: Sensors,
     pub(super) frame: Arc<Frame>,
     /// Grasps of the same object before it.
     pub(super) earlier: Option<EarlierGrasps>,

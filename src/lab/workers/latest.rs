@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The newest value of something, shared between threads.
 #[derive(Debug)]
-pub struct Latest<T> {
+pub(super) struct Latest<T> {
     slot: Mutex<Option<Arc<T>>>,
 }
 
@@ -16,13 +16,13 @@ impl<T> Default for Latest<T> {
 
 impl<T> Latest<T> {
     /// Replaces the value.
-    pub fn publish(&self, value: Arc<T>) {
+    pub(super) fn publish(&self, value: Arc<T>) {
         // A pointer is swapped under the lock, nothing that could panic; a poisoned lock still holds a whole value.
         *self.slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(value);
     }
 
     /// The newest value, if there has been one.
-    pub fn get(&self) -> Option<Arc<T>> {
+    pub(super) fn get(&self) -> Option<Arc<T>> {
         self.slot.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

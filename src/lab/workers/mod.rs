@@ -60,7 +60,6 @@ mod open_trial;
 mod own_store;
 mod pace;
 mod portraits;
-mod refined_run;
 mod sim;
 #[cfg(test)]
 mod sim_tests;
@@ -86,7 +85,6 @@ pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
     parse_tags,
 };
-pub use latest::Latest;
 pub use library_worker::{LibraryCommand, LibraryView, LibraryWorker};
 pub use live_recognition::THRESHOLDS;
 pub use messages::{

@@ -8,6 +8,7 @@ use palpate_sim::objects::catalogue;
 use palpate_store::{Import, ImportError, ImportedTrial, read_trials};
 use palpate_tactile::Signals;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -22,63 +23,25 @@ const LONGEST_NAME: usize = 200;
 
 /// Error of an import of MCAP.
 #[derive(Debug, thiserror::Error)]
-pub enum McapImportError {
-    /// The file cannot be opened.
-    #[error("cannot open \"{name}\": {cause}")]
-    Open {
-        /// Name of the file.
-        name: String,
-        /// Message of the system.
-        cause: String,
-    },
-    /// The file is not sound MCAP.
-    #[error("cannot import \"{name}\": {cause}")]
-    Container {
-        /// Name of the file.
-        name: String,
-        /// Fault.
-        cause: String,
-    },
-    /// Nothing in it is a number over time.
-    #[error(
-        "\"{name}\" has no channel that can be imported; JointState, FluidPressure, Float32, Float64 and their arrays in CDR \
-         can be. It has: {topics}"
-    )]
-    NoChannels {
-        /// Name of the file.
-        name: String,
-        /// Topics with their types.
-        topics: String,
-    },
-    /// More than the limits allow.
-    #[error("cannot import \"{name}\": it has more than {most} {what}; split it")]
-    TooLarge {
-        /// Name of the file.
-        name: String,
-        /// The limit.
-        most: usize,
-        /// Of what.
-        what: &'static str,
-    },
-    /// A trial of this program that does not fit its description.
-    #[error("cannot import \"{name}\": trial {trial} {problem}")]
-    Trial {
-        /// Name of the file.
-        name: String,
-        /// Its number in the store that it comes from.
-        trial: String,
-        /// Problem.
-        problem: String,
-    },
-    /// The channels do not make a trial.
-    #[error(transparent)]
-    Channels(#[from] ImportError),
+#[error("{0}")]
+pub struct McapImportError(String);
+
+impl From<ImportError> for McapImportError {
+    fn from(error: ImportError) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl McapImportError {
+    fn new(name: &str, cause: impl Display) -> Self {
+        Self(format!("cannot import \"{name}\": {cause}"))
+    }
 }
 
 /// Reads the trials of an MCAP file. A file of another program is one trial with this label.
 pub fn read_mcap(path: &Path, label: &str) -> Result<Import, McapImportError> {
     let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
-    let file = File::open(path).map_err(|e| McapImportError::Open { name: name.clone(), cause: e.to_string() })?;
+    let file = File::open(path).map_err(|e| McapImportError(format!("cannot open \"{name}\": {e}")))?;
     read_bag(BufReader::new(file), &name, label)
 }
 
@@ -86,7 +49,7 @@ pub fn read_mcap(path: &Path, label: &str) -> Result<Import, McapImportError> {
 fn read_bag(source: impl Read, name: &str, label: &str) -> Result<Import, McapImportError> {
     let mut bag = Bag::new(name);
     let whole = read_records(source, |record| bag.take(record));
-    let whole = whole.map_err(|fault| fault.named(name))?;
+    let whole = whole.map_err(|fault: String| McapImportError::new(name, fault))?;
     let mut import = if bag.own.is_empty() || bag.rows.is_empty() {
         bag.foreign(label)?
     } else {
@@ -98,26 +61,14 @@ fn read_bag(source: impl Read, name: &str, label: &str) -> Result<Import, McapIm
     Ok(import)
 }
 
-/// A fault before the name of the file is known to it.
-enum Fault {
-    Container(ContainerFault),
-    TooLarge(usize, &'static str),
-}
-
-impl From<ContainerFault> for Fault {
+impl From<ContainerFault> for String {
     fn from(fault: ContainerFault) -> Self {
-        Self::Container(fault)
+        fault.to_string()
     }
 }
 
-impl Fault {
-    fn named(self, name: &str) -> McapImportError {
-        let name = name.to_owned();
-        match self {
-            Self::Container(fault) => McapImportError::Container { name, cause: fault.to_string() },
-            Self::TooLarge(most, what) => McapImportError::TooLarge { name, most, what },
-        }
-    }
+fn too_large(most: usize, what: &str) -> String {
+    format!("it has more than {most} {what}; split it")
 }
 
 /// A channel of the container.
@@ -157,7 +108,7 @@ impl<'a> Bag<'a> {
         }
     }
 
-    fn take(&mut self, record: Record<'_>) -> Result<(), Fault> {
+    fn take(&mut self, record: Record<'_>) -> Result<(), String> {
         match record {
             Record::Schema { id, name, encoding } => {
                 let name = if encoding == "ros2msg" || encoding == "ros2idl" { name } else { "" };
@@ -172,7 +123,7 @@ impl<'a> Bag<'a> {
             }
             Record::Metadata { name: TRIAL, pairs } => {
                 if self.own.len() >= MOST_TRIALS {
-                    return Err(Fault::TooLarge(MOST_TRIALS, "trials"));
+                    return Err(too_large(MOST_TRIALS, "trials"));
                 }
                 self.own.push(pairs);
             }
@@ -182,7 +133,7 @@ impl<'a> Bag<'a> {
         Ok(())
     }
 
-    fn message(&mut self, channel: u16, ns: u64, data: &[u8]) -> Result<(), Fault> {
+    fn message(&mut self, channel: u16, ns: u64, data: &[u8]) -> Result<(), String> {
         let Some(topic) = self.topics.get(&channel) else { return Ok(()) };
         let Some(kind) = topic.kind else { return Ok(()) };
         if kind == MessageKind::Text || kind == MessageKind::Transforms {
@@ -194,7 +145,7 @@ impl<'a> Bag<'a> {
         };
         self.held += values.len();
         if self.held > MOST_NUMBERS {
-            return Err(Fault::TooLarge(MOST_NUMBERS, "numbers"));
+            return Err(too_large(MOST_NUMBERS, "numbers"));
         }
         if topic.names.is_some() {
             self.rows.push((channel, ns, values.into_iter().map(|(_, value)| value).collect()));
@@ -203,7 +154,7 @@ impl<'a> Bag<'a> {
         for (end, value) in values {
             let name = format!("{}{}", topic.name, clean(&end));
             if !self.numbers.contains_key(&name) && self.numbers.len() >= MOST_CHANNELS {
-                return Err(Fault::TooLarge(MOST_CHANNELS, "channels"));
+                return Err(too_large(MOST_CHANNELS, "channels"));
             }
             self.numbers.entry(name).or_default().push((ns, value));
         }
@@ -225,11 +176,7 @@ impl<'a> Bag<'a> {
     fn trial(&self, pairs: &Pairs) -> Result<ImportedTrial, McapImportError> {
         let field = |name: &str| pairs.get(name).map(String::as_str).unwrap_or_default();
         let id: String = field("trial").chars().take(20).collect();
-        let problem = |problem: &str| McapImportError::Trial {
-            name: self.file.to_owned(),
-            trial: id.clone(),
-            problem: problem.to_owned(),
-        };
+        let problem = |problem: &str| McapImportError::new(self.file, format!("trial {id} {problem}"));
         let [begin, end] = ["begin_ns", "end_ns"].map(|name| field(name).parse::<u64>().ok());
         let (Some(begin), Some(end)) = (begin, end) else { return Err(problem("has no times")) };
         let [first, after] = [begin, end.saturating_add(1)].map(|ns| self.rows.partition_point(|row| row.1 < ns));
@@ -280,13 +227,17 @@ impl<'a> Bag<'a> {
                 topics.push("no topics".to_owned());
             }
             let topics = topics.join(", ");
-            return Err(McapImportError::NoChannels { name: self.file.to_owned(), topics });
+            return Err(McapImportError(format!(
+                "\"{}\" has no channel that can be imported; JointState, FluidPressure, Float32, Float64 and their arrays in \
+                 CDR can be. It has: {topics}",
+                self.file
+            )));
         };
         let mut times: Vec<u64> = clock.iter().map(|(ns, _)| *ns).collect();
         times.sort_unstable();
         times.dedup();
         if times.len().saturating_mul(self.numbers.len()) > MOST_NUMBERS {
-            return Err(Fault::TooLarge(MOST_NUMBERS, "numbers").named(self.file));
+            return Err(McapImportError::new(self.file, too_large(MOST_NUMBERS, "numbers")));
         }
         let origin = times.first().copied().unwrap_or(0);
         let columns: Vec<Vec<f64>> = self.numbers.values().map(|samples| at_times(samples, &times)).collect();

@@ -118,7 +118,7 @@ impl RecognitionData {
                     left_out += 1;
                     continue;
                 };
-                let signals = view.signals(&trial).map_err(|cause| DatasetError::Layout { cause })?;
+                let signals = view.signals(&trial).map_err(DatasetError::Layout)?;
                 data.channels.clone_from(&signals.channels);
                 let grasp = Arc::new(sequence_of(&signals));
                 let (id, content) = (seed as i64, grasp.content());

@@ -93,7 +93,7 @@ impl<'a> StudyData<'a> {
     /// A simulated trial of the store; none for others.
     pub fn simulated(&self, id: TrialId) -> Result<Option<SimulatedTrial>, StudyError> {
         let store = self.store.lock().unwrap_or_else(PoisonError::into_inner);
-        let Trial { header, data } = store.load(id).map_err(|cause| DatasetError::Store { cause })?;
+        let Trial { header, data } = store.load(id).map_err(DatasetError::Store)?;
         Ok(match data {
             TrialData::Simulated(data) => Some(SimulatedTrial { header, data }),
             TrialData::Recorded(_) | TrialData::Imported(_) => None,

@@ -6,15 +6,14 @@ use super::super::held_object::{LoadedObject, card_of, stamp_of};
 use super::super::live_recognition::LiveRecognition;
 use super::super::messages::Notice;
 use super::super::pace::Pace;
-use super::super::refined_run::RefinedRun;
 use super::Session;
-use crate::grasping::{FrameReader, prepare};
+use crate::grasping::{RefinedRun, prepare};
 use crate::picture::Stage;
 use palpate_learn::{Model, Shipped};
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
-use palpate_tactile::Channel;
+use palpate_tactile::{Channel, Sensors};
 use std::sync::Arc;
 
 impl Session {
@@ -89,14 +88,17 @@ impl Session {
         let signals = self.sensors.signals;
         let reader = self.sensors.shown().and_then(|layout| {
             let plotted = layout.channels(&scene.gripper, signals)?.len();
-            Ok((FrameReader::new(&layout, &scene.gripper, signals, &more)?, plotted))
+            let mut sensors = Sensors::new(&layout, &scene.gripper, signals)?;
+            sensors.add(&more);
+            Ok((sensors, plotted))
         });
         let (reader, plotted) = match reader {
             Ok(reader) => reader,
             Err(error) => return self.publisher.notify(Notice::Failed(error.to_string())),
         };
-        if let Some(accuracy_job) = self.accuracy_job.as_mut().filter(|_| !again) {
-            accuracy_job.measure(&scene, model.clone());
+        if !again && self.measured.as_ref() != Some(&scene) {
+            self.measured = Some(scene.clone());
+            self.accuracy.start((scene.clone(), model.clone()));
         }
         let mut run = prepare(&scene, model.as_deref(), seed);
         run.set_after(after);

@@ -3,7 +3,7 @@
 use super::super::check_job::{CheckRequest, CheckResult, Subject};
 use super::super::messages::{Checking, FinishedGrasp, TraceRow};
 use super::Session;
-use crate::grasping::GraspSummary;
+use crate::grasping::{GraspSummary, Row};
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;
 
@@ -31,10 +31,7 @@ impl Session {
 
     /// Takes in what the jobs have found.
     pub(super) fn take_results(&mut self) {
-        let measured = self.measured.get();
-        let is_new = measured.as_ref().map(Arc::as_ptr) != self.accuracy.as_ref().map(Arc::as_ptr);
-        if is_new | !self.ghost.take().is_empty() {
-            self.accuracy = measured;
+        if !self.accuracy.take().is_empty() | !self.ghost.take().is_empty() {
             self.publish();
         }
         let settled = self.checker.is_settled();
@@ -83,7 +80,7 @@ impl Session {
         };
         let plotted = self.channels.len();
         for frame in trial.frames() {
-            let row = current.reader.row(frame);
+            let row = Row::of_frame(frame, &current.reader);
             let values = row.values[..plotted].into();
             let (t, line_bar, errors) = (row.t_s, row.line_bar, Box::default());
             let frame = Some(Arc::new(frame.clone()));

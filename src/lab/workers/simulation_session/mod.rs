@@ -3,13 +3,12 @@
 mod beginning;
 mod checks;
 
-use super::accuracy_job::AccuracyJob;
+use super::accuracy_job::{AccuracyRequest, accuracy_job};
 use super::check_job::{CheckRequest, CheckResult, Subject, check_job};
 use super::current::Current;
 use super::ghost::{GhostRequest, ghost_job};
 use super::held_object::LoadedObject;
 use super::job::Job;
-use super::latest::Latest;
 use super::live_recognition::LiveRecognition;
 use super::messages::{
     Command, FinishedGrasp, GhostGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup, Snapshot,
@@ -18,7 +17,7 @@ use super::messages::{
 use super::pace::Pace;
 use super::worker::{Inbox, Publisher, WorkerEnds};
 use crate::datasets::SensorView;
-use crate::grasping::{Advisor, EndState, FrameReader, GraspSummary};
+use crate::grasping::{Advisor, EndState, GraspSummary, Row};
 use crate::recording::{Recorder, RecorderNotice};
 use palpate_learn::Models;
 use palpate_sim::objects::ObjectError;
@@ -39,11 +38,9 @@ const LATEST: f64 = 0.25;
 pub(super) struct Session {
     publisher: Publisher<Snapshot>,
     recorder: Option<Recorder>,
-    /// Absent where its thread could not be started.
-    accuracy_job: Option<AccuracyJob>,
-    /// Its newest result, and the one that is shown.
-    measured: Arc<Latest<MeasuredAccuracy>>,
-    accuracy: Option<Arc<MeasuredAccuracy>>,
+    accuracy: Job<AccuracyRequest, MeasuredAccuracy>,
+    /// The scene whose accuracy was last asked for.
+    measured: Option<Scene>,
     checker: Job<CheckRequest, CheckResult>,
     ghost: Job<GhostRequest, GhostGrasp>,
     /// The last finished grasp, where it can be computed again.
@@ -98,14 +95,11 @@ impl Session {
             });
         });
         let recorder = publisher.or_notice("trials cannot be stored", recorder);
-        let measured = Arc::new(Latest::default());
-        let accuracy_job = AccuracyJob::start(Arc::clone(&measured), inbox.waker()).ok();
         let grasps = setup.grasps.max(1);
         let mut session = Self {
             recorder,
-            accuracy_job,
-            measured,
-            accuracy: None,
+            accuracy: accuracy_job(inbox.waker()),
+            measured: None,
             checker: check_job(inbox.waker()),
             ghost: ghost_job(inbox.waker()),
             subject: None,
@@ -347,13 +341,13 @@ impl Session {
         {
             recorder.frame(&frame);
         }
-        let read = current.reader.sensors().read(&frame);
-        let row = FrameReader::row_of(&frame, &read);
+        let read = current.reader.read(&frame);
+        let row = Row::of_values(&frame, &read);
         if let Some(recognition) = &mut self.recognition {
             recognition.push(row.t_s, &row);
         }
         let plotted = self.channels.len();
-        let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, current.reader.sensors()));
+        let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, &current.reader));
         let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
         let frame = Arc::new(frame);
         current.frame = Arc::clone(&frame);
@@ -458,7 +452,7 @@ impl Session {
             last: self.last.clone(),
             identification: self.recognition.as_ref().and_then(LiveRecognition::view),
             recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
-            accuracy: self.accuracy.clone(),
+            accuracy: self.accuracy.outcome(),
             ghost: self.ghost.outcome(),
         });
     }
