@@ -275,7 +275,7 @@ fn simulated(scene: &Scene, at: Option<f64>) -> Result<(Stage, Vec<Frame>, Strin
     let object = scene.load_object()?;
     let mut run = prepare(scene, object.as_ref(), 0);
     let stage = Stage::new(scene, object.as_ref(), run.begun().data.world_from_gripper);
-    let mut frames = vec![run.gripper_mut().run_mut().first_look()];
+    let mut frames = vec![run.simulation_mut().first_look()];
     while frames.last().is_some_and(|last| last.t < at_s) {
         match run.next_frame() {
             Some(next) => frames.push(next.clone()),

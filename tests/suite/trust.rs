@@ -30,7 +30,7 @@ fn not_finite() -> SimulatedTrial {
     let mut run = prepare(&scene, scene.load_object().unwrap().as_ref(), 3);
     while run.next_frame().is_some() {
         if run.frames().len() == 75 {
-            run.gripper_mut().run_mut().pull_object(DVec3::new(0.0, f64::NAN, 0.0));
+            run.simulation_mut().pull_object(DVec3::new(0.0, f64::NAN, 0.0));
         }
     }
     run.finish(&scene)

@@ -187,7 +187,7 @@ impl RefinedRun {
 
     /// Applies the same pull to the object as in the watched grasp (N, world axes).
     pub(crate) fn pull(&mut self, force: DVec3) {
-        self.run.gripper_mut().run_mut().pull_object(force);
+        self.run.simulation_mut().pull_object(force);
     }
 }
 

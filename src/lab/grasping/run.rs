@@ -94,9 +94,9 @@ impl GraspRun {
         &self.header
     }
 
-    /// The gripper.
-    pub fn gripper_mut(&mut self) -> &mut SimulatedGripper {
-        &mut self.gripper
+    /// The simulation.
+    pub fn simulation_mut(&mut self) -> &mut SimRun {
+        &mut self.gripper.run
     }
 
     /// Records that the object has stayed as the grasp of this identity released it.
@@ -120,7 +120,7 @@ impl GraspRun {
             origin.pulls =
                 fingerprint(std::iter::once(before.as_slice()).chain(numbers.iter().map(<[u8; 8]>::as_slice)));
         }
-        self.gripper.run_mut().pull_object(force);
+        self.gripper.run.pull_object(force);
     }
 
     /// Samples so far.
@@ -173,9 +173,9 @@ impl GraspRun {
 
     /// The trial so far, without its samples.
     pub fn begun(&self) -> SimulatedTrial {
-        let simulation = self.gripper.run();
+        let simulation = &self.gripper.run;
         let data = SimulatedData {
-            world_from_gripper: self.gripper.world_from_gripper(),
+            world_from_gripper: self.gripper.world_from_gripper,
             plan: simulation.plan().clone(),
             quality: simulation.quality(),
             frames: Vec::new(),
@@ -198,7 +198,7 @@ impl GraspRun {
                  a larger tolerance"
             ));
         }
-        warnings.extend(self.gripper.run().notes());
+        warnings.extend(self.gripper.run.notes());
         data.frames = std::mem::take(&mut self.frames);
         let passable = scene.effects.get(Effect::FingerContact) == Setting::Off;
         if let Some(t) = fingers_cross(scene, &data.frames).filter(|_| passable) {

@@ -9,8 +9,8 @@ use std::time::Duration;
 /// A simulation as a gripper. Time passes only in [`Gripper::next_event`].
 #[derive(Clone, Debug)]
 pub struct SimulatedGripper {
-    run: SimRun,
-    world_from_gripper: Pose,
+    pub(crate) run: SimRun,
+    pub(crate) world_from_gripper: Pose,
     actuation_hz: f64,
     now_s: f64,
 }
@@ -19,21 +19,6 @@ impl SimulatedGripper {
     /// Wraps a simulation of a gripper in this pose, whose line pressure may change `actuation_hz` times a second.
     pub fn new(run: SimRun, world_from_gripper: Pose, actuation_hz: f64) -> Self {
         Self { run, world_from_gripper, actuation_hz, now_s: 0.0 }
-    }
-
-    /// The simulation.
-    pub fn run(&self) -> &SimRun {
-        &self.run
-    }
-
-    /// Pose in the world.
-    pub fn world_from_gripper(&self) -> Pose {
-        self.world_from_gripper
-    }
-
-    /// The simulation, for what only it can do: pull the object, measure the starting overlap.
-    pub fn run_mut(&mut self) -> &mut SimRun {
-        &mut self.run
     }
 }
 

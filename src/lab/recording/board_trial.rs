@@ -32,14 +32,16 @@ pub struct TrialRequest {
 
 /// A grasp that is being recorded.
 pub struct BoardTrialRecording {
-    request: TrialRequest,
-    controller: GraspController,
-    began_s: f64,
-    samples: u64,
+    pub(crate) request: TrialRequest,
+    pub(crate) controller: GraspController,
+    /// Beginning of the trial, on the gripper's clock (s).
+    pub(crate) began_s: f64,
+    /// Readings so far.
+    pub(crate) samples: u64,
     newest_s: f64,
     notes: Vec<String>,
     /// Begun and ended automatically.
-    automatic: bool,
+    pub(crate) automatic: bool,
     over: bool,
 }
 
@@ -167,36 +169,6 @@ impl BoardTrialRecording {
             self.note(format!("ended early and vented: {cause}"));
         }
         recorder.finish_board(BoardTrialEnd { status: gripper.stream().status(), notes: self.notes, guess, discarded });
-    }
-
-    /// The controller.
-    pub fn controller(&self) -> &GraspController {
-        &self.controller
-    }
-
-    /// The controller, for an abort.
-    pub fn controller_mut(&mut self) -> &mut GraspController {
-        &mut self.controller
-    }
-
-    /// The request.
-    pub fn request(&self) -> &TrialRequest {
-        &self.request
-    }
-
-    /// Time of the first reading (s).
-    pub fn began_s(&self) -> f64 {
-        self.began_s
-    }
-
-    /// Readings so far.
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
-    /// Whether it begins and ends automatically.
-    pub fn is_automatic(&self) -> bool {
-        self.automatic
     }
 
     /// Whether this program sets the pressure.

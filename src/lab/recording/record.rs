@@ -86,7 +86,7 @@ pub fn record(
             Ok(GripperEvent::Tick | GripperEvent::Sampled(_) | GripperEvent::Signals { .. }) => {
                 recording.drive(&recorder, gripper);
             }
-            Err(error) => recording.controller_mut().abort(error.to_string()),
+            Err(error) => recording.controller.abort(error.to_string()),
         }
         for notice in notices.try_iter() {
             match notice {
@@ -97,12 +97,12 @@ pub fn record(
         }
         if reported.elapsed() >= PROGRESS {
             reported = Instant::now();
-            progress(RecordProgress { id, samples: recording.samples(), status: &gripper.stream().status() });
+            progress(RecordProgress { id, samples: recording.samples, status: &gripper.stream().status() });
         }
     }
     let missing = live && !recording.is_complete() && !stop.load(Ordering::Relaxed);
     let lost = missing.then(|| format!("readings came no longer. {}", gripper.stream().status().state.sentence()));
-    let aborted = recording.controller().abort_cause().map(str::to_owned).or(lost);
+    let aborted = recording.controller.abort_cause().map(str::to_owned).or(lost);
     recording.finish(&recorder, gripper, false, None);
     let status = gripper.stream().status();
     let aborted = aborted.or_else(|| status.state.cut_short().map(str::to_owned));

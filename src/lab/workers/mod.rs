@@ -35,15 +35,12 @@
 //! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows and recorded frames
 //! keep their order and none is lost.
 
-mod accuracy_job;
 mod advice;
-mod check_job;
 mod class_training;
 mod current;
 mod doctor;
 mod effects;
 mod fit;
-mod ghost;
 mod gripper;
 mod held_object;
 mod job;

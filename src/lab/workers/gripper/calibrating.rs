@@ -1,12 +1,33 @@
 //! Calibration session: readings and applied values in, a curve out. The terminal feeds it from its own link, the gripper
 //! thread from the shared one.
 
-use super::sensor_job_error::SensorJobError;
-use palpate_store::Store;
+use crate::gripper::NotOpened;
+use palpate_device::doctor::CrosstalkError;
+use palpate_store::{Store, StoreError};
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyClose, Procedure, Record};
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Error of a job that shares the link with the live view: a calibration or crosstalk test.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum SensorJobError {
+    /// The port could not be opened.
+    #[error(transparent)]
+    Port(#[from] NotOpened),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] Arc<StoreError>),
+    /// The points do not make a calibration.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationFault),
+    /// The board has too few sensors for a crosstalk test.
+    #[error(transparent)]
+    Crosstalk(#[from] CrosstalkError),
+    /// The fingers are in use, or the board sends too little.
+    #[error("{0}")]
+    Failed(String),
+}
 
 /// Command to the calibration.
 #[derive(Clone, Debug, PartialEq)]
@@ -247,7 +268,13 @@ impl CalibrationSession {
             Some(record) => Procedure::after(board, *sensor, record.clone()),
             None => Procedure::new(board, *sensor, part, *resistor_ohm),
         };
-        let missing = || SensorJobError::NoChannel { wanted: sensor.channel(), has: board.channels.join(", ") };
+        let missing = || {
+            SensorJobError::Failed(format!(
+                "the board has no channel \"{}\"; it has {}. Name its channels in the sketch, or in a header line",
+                sensor.channel(),
+                board.channels.join(", ")
+            ))
+        };
         let procedure = procedure.ok_or_else(missing)?;
         Ok(if stimuli.is_empty() { procedure } else { procedure.with_plan(stimuli) })
     }

@@ -1,6 +1,6 @@
 //! Crosstalk test on the shared link.
 
-use super::sensor_job_error::SensorJobError;
+use super::calibrating::SensorJobError;
 use palpate_device::doctor::{Bleed, CrosstalkSession, CrosstalkTest};
 use std::path::PathBuf;
 
@@ -47,7 +47,8 @@ impl CrosstalkView {
     /// View of a test that has ended.
     pub(super) fn ended(session: &CrosstalkSession) -> Self {
         let found = session.test().map(|test| test.found().to_vec()).unwrap_or_default();
-        let ended = session.test().map(CrosstalkTest::summary).ok_or(SensorJobError::NoReadings);
+        let nothing = || SensorJobError::Failed("no readings from the board".to_owned());
+        let ended = session.test().map(CrosstalkTest::summary).ok_or_else(nothing);
         Self { running: None, found, ended: Some(ended) }
     }
 }

@@ -14,15 +14,14 @@ mod crosstalk;
 mod messages;
 mod observing;
 mod plotted;
-mod sensor_job_error;
 mod session;
 mod worker;
 
 pub use calibrating::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, RunningCalibration,
+    SensorJobError,
 };
 pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
 pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
-pub use sensor_job_error::SensorJobError;
 pub use worker::GripperWorker;

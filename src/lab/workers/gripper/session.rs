@@ -5,12 +5,11 @@ mod recognising;
 mod sensors;
 mod trials;
 
-use super::calibrating::{CalibrationSession, CalibrationView};
+use super::calibrating::{CalibrationSession, CalibrationView, SensorJobError};
 use super::crosstalk::CrosstalkView;
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
-use super::sensor_job_error::SensorJobError;
 use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
@@ -261,7 +260,7 @@ impl GripperSession {
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
         if self.calibrating.take().is_some() {
-            self.calibrated = Some(Err(SensorJobError::Disconnected(why.to_owned())));
+            self.calibrated = Some(Err(SensorJobError::Failed(format!("nothing was stored: {why}"))));
         }
         if let Some(crossing) = self.crossing.take() {
             self.crossed = CrosstalkView::ended(&crossing);
@@ -281,7 +280,7 @@ impl GripperSession {
                 Ok(_) => break,
                 Err(error) => {
                     if let Some(recording) = &mut self.recording {
-                        recording.controller_mut().abort(error.to_string());
+                        recording.controller.abort(error.to_string());
                     }
                     break;
                 }
@@ -344,7 +343,7 @@ impl GripperSession {
     fn take_reading(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
         let estimate = connection.readout.estimate(reading);
-        let commanded = self.recording.as_ref().and_then(|recording| recording.controller().line_bar());
+        let commanded = self.recording.as_ref().and_then(|recording| recording.controller.line_bar());
         // The reported pressure is more accurate than the commanded one.
         let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));

@@ -1,12 +1,12 @@
 //! Beginning of rounds and grasps: object, pose, sensors, recording, and what the recogniser thinks so far.
 
 use super::super::current::Current;
-use super::super::ghost::GhostRequest;
 use super::super::held_object::{LoadedObject, card_of, stamp_of};
 use super::super::live_recognition::LiveRecognition;
 use super::super::messages::Notice;
 use super::super::pace::Pace;
 use super::Session;
+use super::jobs::GhostRequest;
 use crate::grasping::{RefinedRun, prepare};
 use crate::picture::Stage;
 use palpate_learn::{Model, Shipped};
@@ -123,7 +123,7 @@ impl Session {
         // What the recogniser reads beyond the layout is not plotted.
         self.channels = reader.channels()[..plotted].into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), begun.data.world_from_gripper));
-        let frame = Arc::new(run.gripper_mut().run_mut().first_look());
+        let frame = Arc::new(run.simulation_mut().first_look());
         self.card = model.as_deref().map(|model| Arc::new(card_of(model, &scene)));
         let (warned, scene, plan) = (begun.header.warnings.len(), Arc::new(scene), Arc::new(begun.data.plan));
         let channels = reader.channels().len();

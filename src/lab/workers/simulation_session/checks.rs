@@ -1,8 +1,8 @@
 //! Checks of the last finished grasp: a finer run to compare with, and the grasp computed again.
 
-use super::super::check_job::{CheckRequest, CheckResult, Subject};
 use super::super::messages::{Checking, FinishedGrasp, TraceRow};
 use super::Session;
+use super::jobs::{CheckRequest, CheckResult, Subject};
 use crate::grasping::{GraspSummary, Row};
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;

@@ -2,11 +2,9 @@
 
 mod beginning;
 mod checks;
+mod jobs;
 
-use super::accuracy_job::{AccuracyRequest, accuracy_job};
-use super::check_job::{CheckRequest, CheckResult, Subject, check_job};
 use super::current::Current;
-use super::ghost::{GhostRequest, ghost_job};
 use super::held_object::LoadedObject;
 use super::job::Job;
 use super::live_recognition::LiveRecognition;
@@ -19,6 +17,7 @@ use super::worker::{Inbox, Publisher, WorkerEnds};
 use crate::datasets::SensorView;
 use crate::grasping::{Advisor, EndState, GraspSummary, Row};
 use crate::recording::{Recorder, RecorderNotice};
+use jobs::{AccuracyRequest, CheckRequest, CheckResult, GhostRequest, Subject, accuracy_job, check_job, ghost_job};
 use palpate_learn::Models;
 use palpate_sim::objects::ObjectError;
 use palpate_sim::poses::PoseSampler;

@@ -40,7 +40,7 @@ impl GripperSession {
     /// Passes a row to the model, from the closing on.
     pub(super) fn recognise(&mut self, row: &Row) {
         let (Some(recognition), Some(recording)) = (&mut self.recognition, &self.recording) else { return };
-        let since = recording.controller().closing_s().map(|closing_s| row.t_s - closing_s);
+        let since = recording.controller.closing_s().map(|closing_s| row.t_s - closing_s);
         if let Some(t) = since.filter(|t| *t >= 0.0) {
             recognition.push(t, row);
         }

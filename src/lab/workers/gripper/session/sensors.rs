@@ -4,10 +4,11 @@ use super::{Connection, GripperSession};
 use crate::gripper::Gripper;
 use crate::recording::REST_S;
 use crate::workers::Notice;
-use crate::workers::gripper::calibrating::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
+use crate::workers::gripper::calibrating::{
+    CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, SensorJobError,
+};
 use crate::workers::gripper::crosstalk::{CrosstalkCommand, CrosstalkView};
 use crate::workers::gripper::plotted::Plotted;
-use crate::workers::gripper::sensor_job_error::SensorJobError;
 use palpate_device::doctor::CrosstalkSession;
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
@@ -159,7 +160,7 @@ impl GripperSession {
     /// Takes the fingers for a calibration or test; opens a port where none is open.
     fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), SensorJobError> {
         if let Some(occupied) = self.occupied() {
-            return Err(SensorJobError::Occupied(occupied));
+            return Err(SensorJobError::Failed(occupied.to_owned()));
         }
         if self.connection.is_some() {
             return Ok(());

@@ -21,7 +21,7 @@ impl GripperSession {
         let free = self.calibrating.is_none() && self.crossing.is_none();
         let Some(request) = self.watching.clone().filter(|_| free) else { return };
         // A trial begun by command is not ended automatically.
-        if self.recording.as_ref().is_some_and(|recording| !recording.is_automatic()) {
+        if self.recording.as_ref().is_some_and(|recording| !recording.automatic) {
             return;
         }
         for event in events {
@@ -40,7 +40,7 @@ impl GripperSession {
     /// Turns the detection of trials on or off; turning it off ends a running automatic trial.
     pub(super) fn set_watching(&mut self, request: Option<TrialRequest>) {
         self.watching = request;
-        if self.watching.is_none() && self.recording.as_ref().is_some_and(BoardTrialRecording::is_automatic) {
+        if self.watching.is_none() && self.recording.as_ref().is_some_and(|recording| recording.automatic) {
             self.end(false, None);
         }
     }
@@ -83,7 +83,7 @@ impl GripperSession {
 
     /// Ends an aborted trial.
     pub(super) fn end_aborted(&mut self) {
-        let cause = self.recording.as_ref().and_then(|recording| recording.controller().abort_cause());
+        let cause = self.recording.as_ref().and_then(|recording| recording.controller.abort_cause());
         let Some(cause) = cause else { return };
         self.publisher.notify(Notice::Warning(format!("trial ended and fingers told to vent: {cause}")));
         self.end(false, None);
@@ -96,7 +96,7 @@ impl GripperSession {
                 let closing_s = self
                     .recording
                     .as_ref()
-                    .and_then(|recording| recording.controller().closing_s())
+                    .and_then(|recording| recording.controller.closing_s())
                     .unwrap_or(f64::INFINITY);
                 self.zero_from_rest(closing_s);
                 self.begin_recognition();
@@ -139,7 +139,7 @@ impl GripperSession {
             request,
             from_s,
         );
-        self.begin_stretch(recording.controller().closing_s().unwrap_or(recording.began_s()));
+        self.begin_stretch(recording.controller.closing_s().unwrap_or(recording.began_s));
         self.recording = Some(recording);
         self.recording_id = None;
         self.begun += 1;
@@ -199,7 +199,7 @@ impl GripperSession {
             recording.note(note);
         }
         let (Some(connection), Some(recorder)) = (&mut self.connection, &self.recorder) else { return };
-        let adds = recording.request().adds;
+        let adds = recording.request.adds;
         if let Some(recognition) = &mut self.recognition {
             if discarded && !adds {
                 recognition.start_over();
@@ -208,28 +208,28 @@ impl GripperSession {
             }
         }
         // A guess that adds to earlier grasps says nothing of this trial alone.
-        let alone = !discarded && !adds && recording.controller().closing_s().is_some();
+        let alone = !discarded && !adds && recording.controller.closing_s().is_some();
         let guess = self.recognition.as_ref().filter(|_| alone).and_then(LiveRecognition::guess);
         let guess = self.model.clone().zip(guess);
-        self.ending.push_back((recording.request().clone(), discarded));
+        self.ending.push_back((recording.request.clone(), discarded));
         recording.finish(recorder, &mut connection.gripper, discarded, guess);
         self.begin_stretch(0.0);
     }
 
     /// The view of a trial that is recorded.
     pub(super) fn trial_view(&self, recording: &BoardTrialRecording, now_s: f64) -> TrialView {
-        let controller = recording.controller();
-        let closing_s = controller.closing_s().unwrap_or(recording.began_s());
+        let controller = &recording.controller;
+        let closing_s = controller.closing_s().unwrap_or(recording.began_s);
         let (stage, until_s) = controller.stage(now_s);
         TrialView {
             id: self.recording_id,
-            request: recording.request().clone(),
+            request: recording.request.clone(),
             stage,
             left_s: until_s.map(|until_s| (until_s - now_s).max(0.0)),
             t_s: now_s - closing_s,
             length_s: controller.end_s().map(|end_s| end_s - closing_s),
-            samples: recording.samples(),
-            automatic: recording.is_automatic(),
+            samples: recording.samples,
+            automatic: recording.automatic,
             adapting: self.adapting,
         }
     }

@@ -1,13 +1,38 @@
-//! Check of finished grasps while the simulation runs: comparison with a run at a tenth of the tolerance, and computing
-//! again until three levels agree.
+//! Jobs of the simulation thread: the grasp by the other engine, the check of a finished grasp by finer runs, and the cost
+//! and error of a scene's accuracy.
 
-use super::job::{Job, Newer};
-use super::messages::Wake;
+use super::super::job::{Job, Newer};
+use super::super::messages::{GhostGrasp, MeasuredAccuracy, Wake};
 use crate::grasping::{EndState, grasp_until_agreement, prepare};
+use crate::study::accuracy_cost;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;
+
+/// Grasp to be computed.
+pub(super) struct GhostRequest {
+    /// Its number, as in [`super::TraceRow::grasp`].
+    pub(super) grasp: u64,
+    /// The scene, with the engine of the ghost.
+    pub(super) scene: Scene,
+    pub(super) object: Option<Arc<ObjectModel>>,
+}
+
+/// The job; without a ghost nothing else changes.
+pub(super) fn ghost_job(wake: Wake) -> Job<GhostRequest, GhostGrasp> {
+    Job::new("ghost", Newer::Replaces, wake, |GhostRequest { grasp, scene, object }, run| {
+        let mut ghost = prepare(scene, object.as_deref(), 0);
+        let mut frames = vec![ghost.simulation_mut().first_look()];
+        while !run.stopped() {
+            match ghost.next_frame() {
+                Some(frame) => frames.push(frame.clone()),
+                None => return Ok(Some(GhostGrasp { grasp: *grasp, engine: scene.solver.engine, frames })),
+            }
+        }
+        Ok(None)
+    })
+}
 
 /// A finished grasp that can be computed again.
 #[derive(Clone)]
@@ -60,4 +85,16 @@ fn compare(subject: &Subject, cancelled: &dyn Fn() -> bool) -> Option<CheckResul
     let trial = prepare(&scene, subject.object.as_deref(), subject.seed).to_end(&scene, cancelled)?;
     let alike = subject.end.as_ref().zip(EndState::of(trial.frames())).is_some_and(|(a, b)| a.is_like(&b));
     Some(CheckResult::Compared { grasp: subject.grasp, agrees: alike && trial.data.quality.is_sound() })
+}
+
+/// A scene to measure, and its object.
+pub(super) type AccuracyRequest = (Scene, Option<Arc<ObjectModel>>);
+
+/// Measures the accuracy of scenes by whole grasps of its own, so that the numbers stand there long before the watched grasp is
+/// over; another scene makes it start over.
+pub(super) fn accuracy_job(wake: Wake) -> Job<AccuracyRequest, MeasuredAccuracy> {
+    Job::new("accuracy", Newer::Replaces, wake, |(scene, object): &AccuracyRequest, run| {
+        let cost = accuracy_cost(scene, object.as_deref(), &|| run.stopped());
+        Ok(cost.and_then(|cost| run.unless_stopped(MeasuredAccuracy { scene: scene.clone(), cost })))
+    })
 }
