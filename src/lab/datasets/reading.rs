@@ -80,8 +80,7 @@ impl DatasetQuery {
         let rows: Vec<&TrialRow> = listed.iter().filter(|row| row.id == id).collect();
         match rows.first() {
             // Loading returns the reason.
-            None => drop(store.load(id)?),
-            Some(row) if row.damaged => drop(store.load(id)?),
+            None | Some(TrialRow { damaged: true, .. }) => drop(store.load(id)?),
             Some(row) if !row.sound => return Err(DatasetError::TrialUnsound { id }),
             Some(_) => {}
         }

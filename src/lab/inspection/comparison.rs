@@ -42,8 +42,6 @@ impl Alignment {
 pub struct MeanColumn {
     /// Name of the channel.
     pub name: String,
-    /// Unit.
-    pub unit: &'static str,
     /// Mean at each time; NaN where fewer than half of the trials have a value.
     pub mean: Vec<f32>,
     /// Standard deviation at each time, in the same unit; zero of a single trial.
@@ -94,7 +92,7 @@ impl MeanTrial {
         let column = |own: &Column| {
             let values = |trial: &OpenTrial, t: f64| trial.column(&own.name).and_then(|column| trial.value(column, t));
             let (mean, spread) = statistics(&values);
-            MeanColumn { name: own.name.clone(), unit: own.unit, mean: narrow(mean), spread: narrow(spread) }
+            MeanColumn { name: own.name.clone(), mean: narrow(mean), spread: narrow(spread) }
         };
         Some(Self {
             trials: trials.len(),

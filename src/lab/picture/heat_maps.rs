@@ -113,29 +113,21 @@ pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit, full_scale
         for (taxel, load) in frame.loads(side, grid.count()) {
             values[taxel] = (f64::from(load.normal) * unit.factor(grid.area())) as f32;
         }
-        HeatMap {
-            title: side.name().to_owned(),
-            quantity: format!("taxel {}", unit.quantity()),
-            unit: unit.symbol().to_owned(),
-            x: axis("across", "mm", grid.columns, [-half_width, half_width]),
-            y: rows(gripper),
-            values,
-            scale: unit.scale(grid.area(), full_scale),
-        }
+        let axes = [axis("across", "mm", grid.columns, [-half_width, half_width]), rows(gripper)];
+        let quantity = format!("taxel {}", unit.quantity());
+        map(side, [&quantity, unit.symbol()], axes, values, unit.scale(grid.area(), full_scale))
     })
 }
 
 /// Both pads of a gripper that reads one force on each (N), NaN where it is unknown, over an area (m²): a single cell.
 pub fn whole_pads(gripper: &GripperModel, force: [f64; 2], area: f64, unit: LoadUnit) -> [HeatMap; 2] {
     let half_width = 0.5 * mm(gripper.finger.width);
-    Side::BOTH.map(|side| HeatMap {
-        title: side.name().to_owned(),
-        quantity: format!("pad {}", unit.quantity()),
-        unit: unit.symbol().to_owned(),
-        x: axis("across", "mm", 1, [-half_width, half_width]),
-        y: axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)]),
-        values: vec![(force[side.index()] * unit.factor(area)) as f32],
-        scale: unit.scale(area, PAD_FULL_SCALE),
+    Side::BOTH.map(|side| {
+        let across = axis("across", "mm", 1, [-half_width, half_width]);
+        let axes = [across, axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)])];
+        let values = vec![(force[side.index()] * unit.factor(area)) as f32];
+        let quantity = format!("pad {}", unit.quantity());
+        map(side, [&quantity, unit.symbol()], axes, values, unit.scale(area, PAD_FULL_SCALE))
     })
 }
 
@@ -147,15 +139,9 @@ pub fn joints_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], 
         let values = over_time(frames, joints, |frame, row| {
             frame.joints(side).get(row).map_or(f32::NAN, |q| unit.value(*q, segment) as f32)
         });
-        HeatMap {
-            title: side.name().to_owned(),
-            quantity: unit.quantity().to_owned(),
-            unit: unit.symbol().to_owned(),
-            x: time_axis(frames),
-            y: axis("joint", "", joints, [0.5, joints as f64 + 0.5]),
-            values,
-            scale: ColourScale::Signed(unit.value(strongest, segment) as f32),
-        }
+        let axes = [time_axis(frames), axis("joint", "", joints, [0.5, joints as f64 + 0.5])];
+        let scale = ColourScale::Signed(unit.value(strongest, segment) as f32);
+        map(side, [unit.quantity(), unit.symbol()], axes, values, scale)
     })
 }
 
@@ -171,15 +157,9 @@ pub fn pad_rows_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F]
                 values[row * frames.len() + column] += (f64::from(load.normal) * unit.factor(area)) as f32;
             }
         }
-        HeatMap {
-            title: side.name().to_owned(),
-            quantity: format!("row {}", unit.quantity()),
-            unit: unit.symbol().to_owned(),
-            x: time_axis(frames),
-            y: rows(gripper),
-            values,
-            scale: unit.scale(area, PAD_FULL_SCALE),
-        }
+        let quantity = format!("row {}", unit.quantity());
+        let axes = [time_axis(frames), rows(gripper)];
+        map(side, [&quantity, unit.symbol()], axes, values, unit.scale(area, PAD_FULL_SCALE))
     })
 }
 
@@ -220,16 +200,20 @@ pub fn channels_over_time(t_s: &[f64], sides: [&[&[f32]]; 2], rows: SensorRows, 
                 }
             }
         }
-        HeatMap {
-            title: side.name().to_owned(),
-            quantity: quantity.to_owned(),
-            unit: unit.to_owned(),
-            x: time.clone(),
-            y: axis("sensor", "", sensors.len(), [0.5, sensors.len() as f64 + 0.5]),
-            values,
-            scale,
-        }
+        let axes = [time.clone(), axis("sensor", "", sensors.len(), [0.5, sensors.len() as f64 + 0.5])];
+        map(side, [quantity, unit], axes, values, scale)
     })
+}
+
+/// Map of one finger, of a quantity in its unit.
+fn map(
+    side: Side,
+    [quantity, unit]: [&str; 2],
+    [x, y]: [CellAxis; 2],
+    values: Vec<f32>,
+    scale: ColourScale,
+) -> HeatMap {
+    HeatMap { title: side.name().to_owned(), quantity: quantity.to_owned(), unit: unit.to_owned(), x, y, values, scale }
 }
 
 fn axis(name: &str, unit: &str, count: usize, range: [f64; 2]) -> CellAxis {

@@ -1,6 +1,6 @@
 //! Live recognition: reads rows of successive grasps and decides when a round of grasps is complete.
 
-use crate::grasping::{Identification, IdentificationView, IdentifyError, RecognisedGrasp, Row};
+use crate::grasping::{Identification, IdentificationView, RecognisedGrasp, Row};
 use palpate_learn::{Model, StopReason, StopRule};
 use palpate_sim::gripper::GripperModel;
 use palpate_tactile::Channel;
@@ -73,10 +73,6 @@ impl LiveRecognition {
         place: &str,
     ) -> Option<String> {
         let begun = self.identification.begin_grasp(columns);
-        self.begun(begun, place)
-    }
-
-    fn begun(&mut self, begun: Result<(), IdentifyError>, place: &str) -> Option<String> {
         self.refresh();
         let Err(cause) = begun else {
             self.off = None;

@@ -192,11 +192,9 @@ impl<W: Write> Bag<W> {
             "probabilities": named(&verdict.pmf, &classes),
         });
         if let (Some(own), Some(report)) = (&verdict.properties, report.as_object_mut()) {
-            let texts = |all: &'_ [String]| all.iter().map(String::as_str).map(str::to_owned).collect::<Vec<String>>();
-            let (sizes, shapes) = (texts(&last.labels.sizes), texts(&last.labels.shapes));
             let list = |all: &[String], pmf: &Pmf| named(pmf, &all.iter().map(String::as_str).collect::<Vec<_>>());
-            report.insert("size".to_owned(), list(&sizes, &own.size).into());
-            report.insert("shape".to_owned(), list(&shapes, &own.shape).into());
+            report.insert("size".to_owned(), list(&last.labels.sizes, &own.size).into());
+            report.insert("shape".to_owned(), list(&last.labels.shapes, &own.shape).into());
         }
         self.text("/recognition/verdict", at(open.span_s()[1]), &report.to_string())
     }
