@@ -228,7 +228,7 @@ fn findings(first: &[Row<String>], second: &[Row<String>]) -> Vec<Finding> {
             BOTH,
             &[NOTHING, SIZE, SHAPE],
         ),
-        gains("ShownProperties size and shape would improve the recognition of the object", TRUTH, &[NOTHING, BOTH]),
+        gains("Known size and shape would improve the recognition of the object", TRUTH, &[NOTHING, BOTH]),
         gains("Two stages on one half of the grasps each are better than one stage on all of them", BOTH, &[ONE_STAGE]),
     ];
     stage_one.into_iter().chain(stage_two).collect()

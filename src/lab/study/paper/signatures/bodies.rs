@@ -41,7 +41,7 @@ pub(super) fn papers_view() -> SensorView {
     SensorView::default().with_signals(SignalDefinition::Contact)
 }
 
-/// GraspCurves of a grasp of a body.
+/// Curves of a grasp of a body.
 fn grasp_body(scene: &Scene, (kind, _, width_mm): (&str, &str, f64)) -> Option<GraspCurves> {
     let (object, rotation_deg) = body(kind, width_mm);
     let mut scene = scene.clone();

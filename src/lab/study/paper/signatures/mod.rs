@@ -86,7 +86,7 @@ pub(super) struct Found {
     varied: Vec<(f64, Summary)>,
 }
 
-/// GraspCurves of one grasp, thinned.
+/// Curves of one grasp, thinned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Curve {
     object: String,
