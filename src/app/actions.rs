@@ -3,9 +3,12 @@
 use crate::app::features::App;
 use egui::{Key, KeyboardShortcut, Modifiers, Response};
 
+/// What a button does with the window.
+pub(super) type Action = Box<dyn FnOnce(&mut App)>;
+
 /// Actions pushed in one frame. They run after it, in their order.
 #[derive(Default)]
-pub struct Actions(Vec<Box<dyn FnOnce(&mut App)>>);
+pub struct Actions(Vec<Action>);
 
 impl Actions {
     /// Adds an action.
@@ -22,8 +25,8 @@ impl Actions {
 }
 
 impl IntoIterator for Actions {
-    type Item = Box<dyn FnOnce(&mut App)>;
-    type IntoIter = std::vec::IntoIter<Self::Item>;
+    type Item = Action;
+    type IntoIter = std::vec::IntoIter<Action>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.into_iter()

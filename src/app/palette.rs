@@ -102,7 +102,7 @@ pub(super) fn ui(app: &App, actions: &mut Actions) {
 fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Response {
     let colours = theme.colours();
     let Entry { group, title, key, .. } = entry;
-    let (rect, response) = selectable_row(ui, ROW, chosen, format!("{group}: {title}"));
+    let (rect, response) = selectable_row(ui, ROW, chosen, &format!("{group}: {title}"));
     let [quiet, ink] = [colours.quiet_text, colours.text].map(colour);
     let small = FontId::proportional(11.5);
     let painter = ui.painter_at(rect.shrink2(vec2(6.0, 0.0)));

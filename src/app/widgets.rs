@@ -37,9 +37,9 @@ pub(super) fn capital(text: &str) -> String {
 }
 
 /// Row that can be chosen, with its name for screen readers.
-pub(super) fn selectable_row(ui: &mut Ui, height: f32, chosen: bool, name: impl ToString) -> (Rect, Response) {
+pub(super) fn selectable_row(ui: &mut Ui, height: f32, chosen: bool, name: &str) -> (Rect, Response) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::Button, true, chosen, name.to_string()));
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, chosen, name));
     if chosen || response.hovered() || response.has_focus() {
         let (colours, share) = (theme::of(ui).colours(), if chosen { 0.30 } else { 0.10 });
         ui.painter().rect_filled(rect, 4.0, colour(colours.background.mix(colours.accent, share)));

@@ -232,7 +232,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
         let view = snapshot.as_ref().and_then(|snapshot| snapshot.identification.as_ref());
         view.is_some_and(|view| view.labels.class("carton").is_some())
     };
-    bench.tell(|app| app.open(&file.to_string_lossy().into_owned()));
+    bench.tell(|app| app.open(&file.to_string_lossy()));
     bench.until_shown(true, "Learning carton");
     bench.harness.get_by_label("Stop").click();
     bench.until_shown(false, "Learning carton");
@@ -252,7 +252,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     // It is learned once, and not again when it is opened again.
     bench.tell(|app| app.open("lemon"));
     bench.until(|s| s.truth() == "lemon");
-    bench.tell(|app| app.open(&file.to_string_lossy().into_owned()));
+    bench.tell(|app| app.open(&file.to_string_lossy()));
     bench.until(|s| s.truth() == "carton");
     bench.harness.run_steps(5);
     assert!(bench.harness.query_by_label_contains("Learning carton").is_none());

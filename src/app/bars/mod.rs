@@ -91,7 +91,7 @@ fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         });
         ui.separator();
         actions.on(&ui.button("Reset layout").on_hover_text("Restore the default layout of all modes"), |app| {
-            app.view.layouts.clear()
+            app.view.layouts.clear();
         });
         let hint = "Full screen: object after object, with large letters and a score";
         actions.on(&ui.button("Presenter mode  F11").on_hover_text(hint), |app| app.present(true));
@@ -148,7 +148,7 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     for (source, text, about, ink) in sources {
         let text = RichText::new(text).small().color(colour(ink));
         actions.on(&ui.selectable_label(app.view.source == source, text).on_hover_text(about), move |app| {
-            app.view.source = source
+            app.view.source = source;
         });
     }
     if app.view.source == ViewSource::Trial

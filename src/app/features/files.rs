@@ -10,6 +10,9 @@ use palpate_store::{FileKind, write_whole};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// What is done with a path that was chosen.
+type WithPath = Box<dyn FnOnce(&mut App, PathBuf)>;
+
 /// File to ask for, and what is done with it.
 pub(in crate::app) struct Question {
     pub(in crate::app) title: &'static str,
@@ -17,7 +20,7 @@ pub(in crate::app) struct Question {
     pub(in crate::app) extensions: &'static [&'static str],
     /// Name proposed for a file to write; none for one to read.
     pub(in crate::app) name: Option<String>,
-    then: Box<dyn FnOnce(&mut App, PathBuf)>,
+    then: WithPath,
 }
 
 impl Question {

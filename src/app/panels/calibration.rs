@@ -130,7 +130,7 @@ fn running_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) 
 fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, fits: bool, actions: &mut Actions) {
     let mut button = |ready: bool, text: &str, about: &str, command: CalibrationCommand| {
         actions.on(&ui.add_enabled(ready, Button::new(text)).on_hover_text(about), |app| {
-            _ = app.gripper.send(GripperCommand::Calibrate(command))
+            _ = app.gripper.send(GripperCommand::Calibrate(command));
         });
     };
     let (free, procedure) = (!running.closing, running.procedure.as_ref());

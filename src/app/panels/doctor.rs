@@ -58,7 +58,7 @@ fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
         }
         let about = "Move each sensor in turn; those of the other finger must not follow";
         actions.on(&ui.button("Test for crosstalk").on_hover_text(about), |app| {
-            _ = app.gripper.send(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)))
+            _ = app.gripper.send(GripperCommand::Crosstalk(CrosstalkCommand::Begin(port)));
         });
     });
     remark_ui(ui, hint);
@@ -103,7 +103,7 @@ fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCros
             ("Stop", "End the test and report so far", CrosstalkCommand::Stop),
         ] {
             actions.on(&ui.button(text).on_hover_text(about), |app| {
-                _ = app.gripper.send(GripperCommand::Crosstalk(command))
+                _ = app.gripper.send(GripperCommand::Crosstalk(command));
             });
         }
     });

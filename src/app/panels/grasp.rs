@@ -112,7 +112,7 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
     };
     let button = ui.add_enabled(free, Button::new("Compute again"));
     actions.on(&button.on_hover_text(about).on_disabled_hover_text(about), |app| {
-        app.simulation.send(Command::ComputeAgain)
+        app.simulation.send(Command::ComputeAgain);
     });
 }
 

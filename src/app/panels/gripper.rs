@@ -38,7 +38,7 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(theme::of(ui)));
         actions.on(&ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)"), |app| {
-            app.connect(None)
+            app.connect(None);
         });
         actions.on(&ui.button("List ports"), |app| _ = app.gripper.send(GripperCommand::ListPorts));
     });

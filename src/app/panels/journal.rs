@@ -8,7 +8,7 @@ use palpate_lab::workers::{LabelCommand, LabelView};
 pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
         actions.on(&ui.button("Undo").on_hover_text("Undo the last change (Ctrl+Z)"), |app| {
-            app.edit_labels(LabelCommand::Undo)
+            app.edit_labels(LabelCommand::Undo);
         });
         actions
             .on(&ui.button("Redo").on_hover_text("Redo it (Ctrl+Shift+Z)"), |app| app.edit_labels(LabelCommand::Redo));

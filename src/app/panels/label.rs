@@ -97,7 +97,7 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
     if connected {
         let button = Button::new("Record  R").fill(accented(theme::of(ui)));
         actions.on(&ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)"), |app| {
-            app.label(LabellingAction::Record)
+            app.label(LabellingAction::Record);
         });
     } else {
         warning_ui(ui, "Connect the gripper: Ctrl+G, or the panel Gripper below.");
@@ -193,11 +193,11 @@ fn question_ui(
     search_ui(ui, labelling, actions);
     ui.horizontal_wrapped(|ui| {
         actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(theme::of(ui)))), |app| {
-            app.label(LabellingAction::GiveLabel)
+            app.label(LabellingAction::GiveLabel);
         });
         let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
         actions.on(&ui.button(again).on_hover_text("Record again; an unlabelled trial is discarded"), |app| {
-            app.label(LabellingAction::Record)
+            app.label(LabellingAction::Record);
         });
         actions.on(&ui.button("Discard  D"), |app| app.label(LabellingAction::Discard));
         let mut unsure = trial.unsure;
@@ -266,7 +266,7 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
 fn object_row(ui: &mut Ui, pictures: &Thumbnails, place: usize, name: &str, chosen: bool, new: bool) -> egui::Response {
     let colours = theme::of(ui).colours();
     let title = if new { format!("{name} (new)") } else { object_title(name) };
-    let (rect, response) = selectable_row(ui, 23.0, chosen, format!("Label {title}"));
+    let (rect, response) = selectable_row(ui, 23.0, chosen, &format!("Label {title}"));
     let builder =
         egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));
     let mut inside = ui.new_child(builder);

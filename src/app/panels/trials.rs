@@ -26,7 +26,7 @@ pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Action
         for shown in TrialFilter::ALL {
             let text = format!("{} {}", shown.title(), shown.of(view).len());
             actions.on(&ui.selectable_label(draft.filter == shown, RichText::new(text).small()), move |app| {
-                app.label(LabellingAction::Filter(shown))
+                app.label(LabellingAction::Filter(shown));
             });
         }
     });
@@ -77,7 +77,7 @@ fn row_ui(
     let (id, colours) = (trial.id, theme::of(ui).colours());
     let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
     let height = ROW - ui.spacing().item_spacing.y;
-    let (rect, response) = selectable_row(ui, height, current, format!("Trial {}, {name}", trial.id));
+    let (rect, response) = selectable_row(ui, height, current, &format!("Trial {}, {name}", trial.id));
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
     sparkline(ui, &trial.sparkline, picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);

@@ -162,7 +162,7 @@ pub fn grasp_until_agreement(
 ) -> Option<SimulatedTrial> {
     let run = |solver: &Solver| {
         let scene = Scene { solver: solver.clone(), ..scene.clone() };
-        prepare(&scene, object, seed).to_end(&scene, cancelled)
+        prepare(&scene, object, seed).run_to_end(&scene, cancelled)
     };
     // A run that was cancelled ends the search at once: those that follow are cancelled too.
     let agree = |coarse: &Option<SimulatedTrial>, fine: &Option<SimulatedTrial>| match (coarse, fine) {

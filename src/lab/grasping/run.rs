@@ -162,7 +162,7 @@ impl GraspRun {
     }
 
     /// Runs to the end; `None` if it was cancelled.
-    pub(crate) fn to_end(mut self, scene: &Scene, cancelled: &dyn Fn() -> bool) -> Option<SimulatedTrial> {
+    pub(crate) fn run_to_end(mut self, scene: &Scene, cancelled: &dyn Fn() -> bool) -> Option<SimulatedTrial> {
         while self.next_frame().is_some() {
             if cancelled() {
                 return None;

@@ -29,7 +29,7 @@ pub fn accuracy_cost(
 ) -> Option<AccuracyCost> {
     let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
     let (trial, cpu) = timed_grasp(scene, object, cancelled)?;
-    let refined = prepare_refined(scene, object, 0).to_end(scene, cancelled)?;
+    let refined = prepare_refined(scene, object, 0).run_to_end(scene, cancelled)?;
     let mut band = ErrorBand::new(scene, sensors.channels().len());
     for (frame, finer) in trial.frames().iter().zip(refined.frames()) {
         band.push(frame.t, &sensors.read(frame), &sensors.read(finer));
@@ -64,7 +64,8 @@ fn persists(
     }
     let mut finer = scene.clone();
     finer.solver = scene.solver.refined();
-    let second = ErrorNorms::of_whole_fingers(refined, &prepare_refined(&finer, object, 0).to_end(&finer, cancelled)?);
+    let second =
+        ErrorNorms::of_whole_fingers(refined, &prepare_refined(&finer, object, 0).run_to_end(&finer, cancelled)?);
     let stays = [second.curvature_share > LEFT * first.curvature_share, second.force_share > LEFT * first.force_share];
     Some(far(&second).into_iter().zip(stays).any(|(far, stays)| far && stays))
 }

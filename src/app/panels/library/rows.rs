@@ -184,7 +184,9 @@ fn answer(ui: &Ui, response: &Response, trial: &LibraryTrial, selected: bool, ac
     response.context_menu(|ui| {
         let gone = trial.row.deleted.is_some();
         let logged = trial.row.place == TrialPlace::DemoLog;
-        let choices: [(bool, &str, fn(&mut App)); 5] = [
+        /// Whether it is offered, its name, and what it does.
+        type Choice = (bool, &'static str, fn(&mut App));
+        let choices: [Choice; 5] = [
             (!gone, "Open", App::open_selected),
             (!gone, "Compare", App::pin_selected),
             (!gone && logged, "Keep", |app| app.library.edit(TrialEdit::Keep)),

@@ -166,7 +166,7 @@ fn more_ui(ui: &mut Ui, data: &DisplayedData<'_>, measures: &Measures, actions: 
     // Beside the button for another object.
     let width = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
     actions.on(&ui.add_sized([width, measures.button], more).on_hover_text(hint), |app| {
-        app.simulation.send(Command::GraspOnceMore)
+        app.simulation.send(Command::GraspOnceMore);
     });
 }
 

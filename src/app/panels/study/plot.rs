@@ -89,5 +89,5 @@ fn pointed_ui<'a>(
     Tooltip::always_open(ctx, response.layer_id, response.id, rect).show(|ui| about_row_ui(ui, result, table, row));
     let Some(trials) = opening(result, row) else { return };
     ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    actions.on(&response, move |app| app.open_trials(&trials));
+    actions.on(response, move |app| app.open_trials(&trials));
 }

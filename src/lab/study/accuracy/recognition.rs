@@ -80,7 +80,7 @@ impl RecognitionData {
             let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &|_| (), stop };
             let recogniser = (method.fit)(&train, &fitting).map_err(|cause| match cause {
                 LearnError::Stopped => StudyError::Stopped,
-                cause => StudyError::Fit { method: key.clone(), cause },
+                cause @ LearnError::Refused(_) => StudyError::Fit { method: key.clone(), cause },
             })?;
             let answers = answer(recogniser.as_ref(), &self.test);
             decided.insert(key.clone(), answers.verdicts.iter().map(|verdict| verdict.pmf.top().0).collect());

@@ -148,7 +148,7 @@ impl<'a> StudyData<'a> {
         };
         fit(&fitting).map_err(|cause| match cause {
             LearnError::Stopped => StudyError::Stopped,
-            cause => StudyError::Fit { method: method.to_owned(), cause },
+            cause @ LearnError::Refused(_) => StudyError::Fit { method: method.to_owned(), cause },
         })
     }
 }

@@ -133,7 +133,7 @@ fn read_again(bench: &StudyData<'_>, data: &Dataset, settings: &PhysicalLike) ->
         let missing = || StudyError::Missing("simulated grasps".to_owned());
         let trial = bench.simulated(example.id)?.ok_or_else(missing)?;
         let clean = SensorView::default().signals(&trial);
-        let clean = clean.map_err(|cause| crate::datasets::DatasetError::Layout(cause))?;
+        let clean = clean.map_err(crate::datasets::DatasetError::Layout)?;
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         read.push(sequence_of(&settings.apply(&clean, noise_seed(&trial.header)).until(end)));
     }

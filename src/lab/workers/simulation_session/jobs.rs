@@ -82,7 +82,7 @@ pub(super) fn check_job(wake: Wake) -> Job<CheckRequest, CheckResult> {
 fn compare(subject: &Subject, cancelled: &dyn Fn() -> bool) -> Option<CheckResult> {
     let solver = subject.scene.solver.finer()?;
     let scene = Scene { solver, ..Scene::clone(&subject.scene) };
-    let trial = prepare(&scene, subject.object.as_deref(), subject.seed).to_end(&scene, cancelled)?;
+    let trial = prepare(&scene, subject.object.as_deref(), subject.seed).run_to_end(&scene, cancelled)?;
     let alike = subject.end.as_ref().zip(EndState::of(trial.frames())).is_some_and(|(a, b)| a.is_like(&b));
     Some(CheckResult::Compared { grasp: subject.grasp, agrees: alike && trial.data.quality.is_sound() })
 }
