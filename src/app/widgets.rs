@@ -76,9 +76,8 @@ pub(super) fn job_ui<C, O>(
     actions: &mut Actions,
     controls: impl FnOnce(&mut Ui, &mut Actions),
 ) -> Option<Result<Arc<O>, JobFailure>> {
-    // Read first: a job that ends meanwhile shows its outcome in the next frame, not beside its progress.
-    let last = job.last();
-    match job.running().map(|running| running.progress) {
+    let (running, last) = job.state();
+    match running.map(|running| running.progress) {
         Some(progress) => {
             ui.add(ProgressBar::new(progress.share as f32).text(progress.words));
             if let Some(remark) = remark {

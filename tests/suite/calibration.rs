@@ -529,7 +529,6 @@ fn take_points<'a>(
         bench.until_shown(true, instruction);
         bench.until_shown(true, &format!("{wanted:.0} counts, settled"));
         bench.harness.get_by_label("Take point").click();
-        bench.harness.step();
         bench.until_shown(false, instruction);
     }
     bench.until_shown(true, "all points are taken");
@@ -567,7 +566,6 @@ fn the_window_calibrates_step_by_step() {
     assert!(bench.harness.query_by_label("Empty close").is_none(), "a strip has no such zero");
     compare("calibration_done", &bench.picture(), "the CPU renderer of the tests");
     bench.harness.get_by_label("Save").click();
-    bench.harness.step();
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
     // A pad, and what bending does to it.
     begin_calibration(&mut bench, Sensor::PadRight, "P3");
@@ -583,7 +581,6 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "let the empty hand close once");
     *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0), seconds: 0 };
     bench.harness.get_by_label("Empty close").click();
-    bench.harness.step();
     bench.until_shown(true, "zero shift by bending, up to");
     *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None, seconds: 0 };
     bench.until_shown(true, "0 counts, settled");
@@ -591,7 +588,6 @@ fn the_window_calibrates_step_by_step() {
     bench.harness.run_steps(4);
     compare("calibration_pad", &bench.picture(), "the CPU renderer of the tests");
     bench.harness.get_by_label("Save").click();
-    bench.harness.step();
     bench.until_shown(true, "version 1 of \"P3\", the right pad");
     let store = bench.store();
     let serving = store.calibrations().serving(None, &[]).unwrap().calibrations;

@@ -122,7 +122,6 @@ fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
         let setup = BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() };
         let mut bench = bench("gripper", theme, setup);
         bench.harness.get_by_label("Connect").click();
-        bench.harness.step();
         bench.until_shown(true, "only members of the group dialout");
         // Below stand the ports of whatever computer this is.
         bench.harness.run_steps(3);
@@ -207,7 +206,6 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
         // What it says above the button changes once the fingers have rested.
         bench.until_shown(true, "Press the right pad firmly");
         bench.harness.get_by_label("Stop").click();
-        bench.harness.step();
         bench.until_shown(true, "The right flex strip follows the left flex strip by 10.0 %: +60 counts");
         bench.until_shown(true, "Skipped: left pad, right pad");
         assert!(bench.harness.query_by_label_contains("STOP").is_none());
@@ -258,7 +256,6 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.tell(|app| _ = app.gripper.send(calibrate()));
     bench.wait();
     bench.harness.get_by_label("Test for crosstalk").click();
-    bench.harness.step();
     bench.until_shown(true, "a calibration is running: end it first");
     bench.tell(|app| _ = app.gripper.send(GripperCommand::Calibrate(CalibrationCommand::Stop)));
     bench.harness.get_by_label("Test for crosstalk").click();
@@ -327,7 +324,6 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         let mut bench = bench("doctor", theme, setup);
         assert!(bench.harness.query_by_label_contains("Checks that a board is connected").is_some());
         bench.harness.get_by_label("Examine").click();
-        bench.harness.step();
         bench.until_shown(true, "No faults found");
         assert!(bench.harness.query_by_label("crosstalk: ok").is_some());
         // Which button the pointer is on is known a frame later.
@@ -344,7 +340,6 @@ fn the_doctor_looks_tells_and_can_be_stopped() {
         bench.until_shown(true, "listening, 2 of 8 s");
         assert!(bench.harness.query_by_label("crosstalk: ok").is_some());
         bench.harness.get_by_label("Stop").click();
-        bench.harness.step();
         bench.until_shown(true, "faults found");
         bench.until_shown(true, "then stopped");
         assert!(bench.harness.query_by_label("lines: FAILED").is_some());
@@ -477,7 +472,6 @@ fn trials_that_cannot_be_fitted_say_why() {
     bench.harness.get_by_label_contains("1  empty close").click();
     bench.harness.step();
     bench.harness.get_by_label("Fit").click();
-    bench.harness.step();
     bench.until_shown(true, "trial 1 has no curvature of either finger");
 }
 

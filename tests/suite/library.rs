@@ -148,7 +148,6 @@ fn the_panel_finds_sorts_and_selects() {
         bench.harness.step();
         until_rows(&mut bench, &["6", "5", "4", "3", "2", "1"]);
         bench.harness.get_by_label("yesterday").click();
-        bench.harness.step();
         bench.until_shown(true, "No trial matches");
         bench.harness.get_by_label("Clear").click();
         bench.harness.step();
@@ -262,7 +261,6 @@ fn keys_walk_through_the_library_and_open_trials() {
     bench.until_shown(true, "1 selected");
     press(&mut bench, Modifiers::NONE, Key::Enter);
     bench.harness.get_by_label("This trial").click();
-    bench.harness.step();
     bench.until_shown(true, "Phases");
     press(&mut bench, Modifiers::NONE, Key::Delete);
     bench.until_told("1 trial discarded");
@@ -315,7 +313,6 @@ fn the_library_marks_the_demo_log_and_keeps_the_selection() {
     bench.until_shown(true, "Trial 2, Tomato");
     assert!(bench.harness.query_by_label("Trial 1, Lemon").is_some(), "both are listed");
     bench.harness.get_by_label("demo log 1").click();
-    bench.harness.step();
     bench.until_shown(false, "Trial 1, Lemon");
     bench.harness.get_by_label("Trial 2, Tomato").click();
     bench.harness.run_steps(3);

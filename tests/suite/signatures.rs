@@ -24,7 +24,6 @@ fn a_click_in_a_heat_map_over_time_moves_the_cursor() {
         [("Joint angle over time, left finger", "2.00"), ("Row pressure over time, right finger", "2.00")]
     {
         bench.harness.get_by_label_contains(map).click();
-        bench.harness.step();
         bench.until_shown(true, &format!("cursor at {shown}\u{2009}s"));
     }
 }

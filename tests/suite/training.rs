@@ -214,7 +214,6 @@ fn the_window_trains_and_uses_what_it_trained() {
         assert!(bench.harness.get_by_label("the shipped model is in use").accesskit_node().is_disabled());
         let label = "Use knn-20";
         bench.harness.query_all_by_label_contains(label).next().unwrap().click();
-        bench.harness.step();
         bench.until_shown(true, "is in use");
         while bench.workbench().view().gripper_model.is_none() {
             bench.harness.step();

@@ -48,7 +48,6 @@ fn select(bench: &mut Bench) {
 fn a_word_typed_with_a_trial_selected_arrives_whole_in_each_field_of_each_mode() {
     let mut bench = window();
     bench.tell(|app| app.show_panel("library"));
-    bench.harness.step();
     bench.until_shown(true, "Trial 1, ");
     let mut seen = Vec::new();
     for panel in &ALL_PANELS {
@@ -88,7 +87,6 @@ fn a_word_typed_with_a_trial_selected_arrives_whole_in_each_field_of_each_mode()
 fn a_word_typed_right_after_slash_goes_to_the_search_field() {
     let mut bench = window();
     bench.tell(|app| app.set_mode(Mode::Inspect));
-    bench.harness.step();
     bench.until_shown(true, "Trial 1, ");
     for letters_per_frame in [6, 2, 1] {
         select(&mut bench);

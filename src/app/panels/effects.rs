@@ -31,7 +31,7 @@ const BEFORE: &str = "of the scene before";
 const LEAST_CHANGE: f64 = 1e-3;
 
 pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
-    let (running, last) = (simulation.effects.running(), simulation.effects.last());
+    let (running, last) = simulation.effects.state();
     let fresh = last.as_ref().filter(|ended| *ended.command == simulation.scene);
     if fresh.is_none() && running.as_ref().is_none_or(|running| *running.command != simulation.scene) {
         actions.push(|app| app.simulation.measure_effects());

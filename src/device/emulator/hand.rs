@@ -329,7 +329,7 @@ impl LiveGrasp {
             }
         }
         let [(before_s, before), (after_s, after)] = self.frames;
-        // Before the first frame there is nothing to go from.
+        // No frame yet: nothing to interpolate from.
         if !after_s.is_finite() || after_s <= before_s {
             return after;
         }

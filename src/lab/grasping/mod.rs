@@ -36,6 +36,7 @@ pub use identify::{Identification, IdentificationView, IdentifyError, Recognised
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 pub use presentation::Presentation;
+pub(crate) use pressure_watch::PressureFault;
 pub use row::Row;
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

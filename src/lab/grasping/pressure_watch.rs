@@ -29,7 +29,7 @@ const SAME_BAR: f64 = 0.006;
 
 /// What a board did wrong while it set a pressure, and what to try.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub(super) enum PressureFault {
+pub(crate) enum PressureFault {
     /// No readings, or unreadable ones.
     #[error(
         "no readable line came from the board for {for_s:.1} s. Check its cable and supply; `palpate doctor` examines both"

@@ -1,5 +1,6 @@
 //! Writer of a trial of the real gripper: pending data, and statistics for its header.
 
+use crate::grasping::PressureFault;
 use crate::labelling::{Observed, decimated, flags_of, sparkline};
 use palpate_device::protocol::DecodedEvent;
 use palpate_device::serial::{LinkEvent, LinkStatus};
@@ -214,9 +215,9 @@ impl BoardWriter {
             warnings.push(format!("nothing was recorded: {}", status.state.sentence()));
         }
         let Cadence { lost, gaps, restarts, .. } = *cadence;
-        // Whether readings came after the restart that ended a grasp depends on when it was vented.
-        let is_said = self.interruptions.iter().any(|cause| cause.contains("restarted"));
-        if restarts > 0 && !is_said {
+        // Whether the restart that ended a grasp is counted depends on when the fingers were vented.
+        let ended_by_one = self.interruptions.contains(&PressureFault::Restarted.to_string());
+        if restarts > 0 && !ended_by_one {
             warnings.push(format!(
                 "the board restarted {restarts} time(s), and what it took meanwhile is missing: check its supply and its cable"
             ));

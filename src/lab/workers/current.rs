@@ -34,8 +34,9 @@ impl Current {
         if force != DVec3::ZERO && !self.pulled {
             self.pulled = true;
             let t = self.frame.t;
-            self.run
-                .warn(format!("the object was pulled by hand from {t:.2} s on: the scene alone does not repeat it"));
+            self.run.warn(format!(
+                "the object was pulled by hand from {t:.2} s on, so the scene alone cannot reproduce this grasp"
+            ));
         }
         if self.pulled {
             self.run.pull_object(force);

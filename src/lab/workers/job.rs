@@ -158,11 +158,17 @@ impl<C, O> Job<C, O> {
         }
     }
 
-    /// The running command, or the newer one that replaces it.
-    pub fn running(&self) -> Option<RunningJob<C>> {
+    /// The running command, where a newer one replaces it that newer one; and the command that ended last with an outcome or a
+    /// failure. Both are of one moment: a command that has just ended is not running.
+    pub fn state(&self) -> (Option<RunningJob<C>>, Option<EndedJob<C, O>>) {
         let state = locked(&self.shared.state);
         let newest = state.waiting.back().filter(|_| self.shared.newer == Newer::Replaces);
-        newest.or(state.running.as_ref()).cloned()
+        (newest.or(state.running.as_ref()).cloned(), state.last.clone())
+    }
+
+    /// The running command of [`Self::state`].
+    pub fn running(&self) -> Option<RunningJob<C>> {
+        self.state().0
     }
 
     /// Commands that wait.
@@ -175,9 +181,9 @@ impl<C, O> Job<C, O> {
         locked(&self.shared.state).running.is_none()
     }
 
-    /// The command that ended last with an outcome or a failure.
+    /// The ended command of [`Self::state`].
     pub fn last(&self) -> Option<EndedJob<C, O>> {
-        locked(&self.shared.state).last.clone()
+        self.state().1
     }
 
     /// The last outcome; none after a failure.

@@ -2,7 +2,7 @@
 //! once. What `auto` leaves out must not be seen by the sensors.
 //!
 //! A change is seen where curvature differs by more than [`SEEN`]'s or force by more than its, root mean square over the
-//! trial and both fingers, and by more than twice what means nothing: the change of the same scene at a tenth of the
+//! trial and both fingers, and by more than twice the numerical noise: the change of the same scene at a tenth of the
 //! tolerance, and after pushes of the gripper by 10 µm along each axis. Objects that slip or roll change that much by
 //! themselves.
 //!
@@ -18,11 +18,11 @@ use super::frame::{Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError
 use super::timed_grasp::timed_grasp;
 use crate::grasping::ErrorNorms;
 use palpate_sim::frame::Plan;
-use palpate_sim::objects::{ObjectError, ObjectModel};
+use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Effect, Scene, Setting};
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Sensors, SignalDefinition};
-use scenes::{Drawn, ObjectCache};
+use scenes::{RandomScene, random_scene};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -30,7 +30,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct EffectAudit {
     scenes: u32,
     seed: u64,
-    shelf: ObjectCache,
 }
 
 /// Difference of two trials: root mean squares over all samples of both fingers.
@@ -44,9 +43,9 @@ pub struct EffectSize {
 
 /// Differences above either of these are seen.
 pub const SEEN: EffectSize = EffectSize { curvature_per_m: 0.1, force_n: 0.010 };
-/// Factor on what means nothing.
+/// Factor on the noise.
 const CLEAR_OF_NOISE: f64 = 2.0;
-/// Push of the gripper that means nothing (m).
+/// Push of the gripper that shows the noise (m).
 const PUSH: f64 = 1e-5;
 
 impl EffectSize {
@@ -80,7 +79,7 @@ impl EffectSize {
 pub struct AuditedScene {
     /// Settings that make it, for `--set`.
     pub settings: Vec<String>,
-    /// Change that means nothing.
+    /// Numerical noise.
     pub noise: EffectSize,
     /// Change with all effects on.
     pub all_on: EffectSize,
@@ -117,8 +116,8 @@ impl EffectAudit {
     pub const SCENES: u32 = 500;
 
     /// An audit of so many random scenes of a seed.
-    pub fn new(scenes: u32, seed: u64) -> Result<Self, ObjectError> {
-        Ok(Self { scenes, seed, shelf: ObjectCache::load()? })
+    pub fn new(scenes: u32, seed: u64) -> Self {
+        Self { scenes, seed }
     }
 }
 
@@ -147,7 +146,7 @@ impl Experiment for EffectAudit {
     }
 
     fn measure(&self, SceneNumber(number): &SceneNumber, stop: &AtomicBool) -> Result<AuditedScene, StudyError> {
-        audit_one(&self.shelf.draw(self.seed, *number), stop).ok_or(StudyError::Stopped)
+        audit_one(&random_scene(self.seed, *number)?, stop).ok_or(StudyError::Stopped)
     }
 
     fn report(&self, found: Vec<(SceneNumber, AuditedScene)>) -> AuditReport {
@@ -163,8 +162,8 @@ impl Experiment for EffectAudit {
     }
 }
 
-fn audit_one(drawn: &Drawn, cancelled: &AtomicBool) -> Option<AuditedScene> {
-    let Drawn { scene, object, settings } = drawn;
+fn audit_one(drawn: &RandomScene, cancelled: &AtomicBool) -> Option<AuditedScene> {
+    let RandomScene { scene, object, settings } = drawn;
     let object = object.as_ref();
     let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Contact);
     let stopped = || cancelled.load(Ordering::Relaxed);
@@ -231,7 +230,7 @@ mod tests {
 
     #[test]
     fn an_audit_repeats_and_flips_every_possible_effect() -> TestResult {
-        let (audit, stop) = (EffectAudit::new(3, 5)?, AtomicBool::new(false));
+        let (audit, stop) = (EffectAudit::new(3, 5), AtomicBool::new(false));
         let audited = || audit.grid().iter().map(|cell| audit.measure(cell, &stop)).collect::<Result<Vec<_>, _>>();
         for (scene, again) in audited()?.iter().zip(&audited()?) {
             assert_eq!((scene.noise, scene.all_on), (again.noise, again.all_on));

@@ -14,7 +14,7 @@ pub struct AuditReport {
     pub scenes: usize,
     /// Scenes in which switching all effects on is seen.
     pub missed: usize,
-    /// Scenes in which it changes as much, but no more than what means nothing.
+    /// Scenes in which it changes as much, but within the noise.
     pub within_noise: usize,
     /// Rows, in the order of [`Effect::ALL`].
     pub effects: Vec<AuditRow>,
@@ -30,7 +30,7 @@ pub struct AuditRow {
     pub off: usize,
     /// Of these, scenes in which switching it on is seen.
     pub missed: usize,
-    /// Of these, scenes in which it changes as much, but no more than what means nothing.
+    /// Of these, scenes in which it changes as much, but within the noise.
     pub within_noise: usize,
     /// Scenes in which `auto` has it on.
     pub on: usize,

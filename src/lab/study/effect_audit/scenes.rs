@@ -2,17 +2,14 @@
 //! Ranges reach to where an effect begins or ceases to matter, evenly over their logarithms.
 
 use palpate_sim::gripper::Sideways;
-use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue, load};
+use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::{Auto, Faces, PoseSpread, Scene, SupportKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Objects with the settings that a scene loads them with by default.
-pub(super) struct ObjectCache(Vec<(String, Option<ObjectModel>)>);
-
 /// A random scene.
-pub(super) struct Drawn {
+pub(super) struct RandomScene {
     pub(super) scene: Scene,
     pub(super) object: Option<ObjectModel>,
     /// Settings that make it.
@@ -29,36 +26,26 @@ const SOFT_SHARE: f64 = 0.5;
 const SLOW_SHARE: f64 = 0.5;
 const SIDEWAYS_SHARE: f64 = 0.25;
 
-impl ObjectCache {
-    pub(super) fn load() -> Result<Self, ObjectError> {
-        let options = Scene::default().load_options();
-        let names = catalogue().iter().map(|built_in| built_in.name.clone());
-        names.map(|name| Ok((name.clone(), load(&name, &options)?))).collect::<Result<_, _>>().map(Self)
+/// The scene of an index.
+pub(super) fn random_scene(seed: u64, index: u32) -> Result<RandomScene, ObjectError> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(u64::from(index));
+    let mut scene = Scene::default();
+    let mut draw = Draw { random: &mut random };
+    let built_in = (!draw.happens(EMPTY_SHARE)).then(|| draw.one_of(catalogue()));
+    built_in.map_or(EMPTY, |built_in| built_in.name.as_str()).clone_into(&mut scene.object.source);
+    let mut object = scene.load_object()?;
+    if built_in.is_some() {
+        draw.object(&mut scene, object.as_mut());
     }
-
-    /// The scene of an index.
-    pub(super) fn draw(&self, seed: u64, index: u32) -> Drawn {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(u64::from(index));
-        let mut scene = Scene::default();
-        let mut draw = Draw { random: &mut random };
-        let object = (!draw.happens(EMPTY_SHARE)).then(|| draw.one_of(&self.0));
-        EMPTY.clone_into(&mut scene.object.source);
-        let mut model = None;
-        if let Some((name, loaded)) = object {
-            scene.object.source.clone_from(name);
-            model.clone_from(loaded);
-            draw.object(&mut scene, model.as_mut());
-        }
-        draw.gripper(&mut scene);
-        draw.surroundings(&mut scene);
-        draw.sideways(&mut scene);
-        // The widest shifts and turns of the presets, on whichever side it lies.
-        scene.pose = PoseSpread { shift: [0.010; 3], yaw_deg: 90.0, faces: Faces::Nominal, ..PoseSpread::default() };
-        let (scene, _) = jittered(&scene, model.as_ref(), u64::from(index) ^ seed);
-        let settings = differing_settings(&scene);
-        Drawn { scene, object: model, settings }
-    }
+    draw.gripper(&mut scene);
+    draw.surroundings(&mut scene);
+    draw.sideways(&mut scene);
+    // The widest shifts and turns of the presets, on whichever side it lies.
+    scene.pose = PoseSpread { shift: [0.010; 3], yaw_deg: 90.0, faces: Faces::Nominal, ..PoseSpread::default() };
+    let (scene, _) = jittered(&scene, object.as_ref(), u64::from(index) ^ seed);
+    let settings = differing_settings(&scene);
+    Ok(RandomScene { scene, object, settings })
 }
 
 /// Settings in which a scene differs from the default one.
@@ -178,10 +165,9 @@ mod tests {
 
     #[test]
     fn scenes_are_valid_differ_and_repeat_by_their_settings() -> Result<(), Box<dyn std::error::Error>> {
-        let shelf = ObjectCache::load()?;
         let mut seen = Vec::new();
         for index in 0..40 {
-            let drawn = shelf.draw(1, index);
+            let drawn = random_scene(1, index)?;
             assert_eq!(drawn.scene.check(), Ok(()), "scene {index}");
             let again = Scene::default().with_settings(&drawn.settings)?;
             assert_eq!(again, drawn.scene, "scene {index}");

@@ -26,7 +26,7 @@ pub trait StudyCell: Sync {
         None
     }
 
-    /// Name of its result in files: results of another version of the method are others.
+    /// Name of its result in files, with the version of its method: a new version is measured anew.
     fn stored_name(&self) -> String {
         let version = self.method().map(|method| format!(" ({})", method.fingerprint()));
         self.name() + &version.unwrap_or_default()

@@ -68,7 +68,7 @@ impl Study for Models {
         crossed(plan, &[Balance::Balanced, Balance::Imbalanced], &methods, |kind| match kind.factor {
             Balance::Balanced if is_costly(kind.method) => 1,
             Balance::Balanced => kind.usual_parts(plan),
-            // What imbalance does is asked once, of the paper's comparison.
+            // Imbalance is measured only for the paper's comparison.
             Balance::Imbalanced => {
                 usize::from(plan.sensors.first() == Some(&kind.sensors) && is_of_papers_table(kind.method))
             }

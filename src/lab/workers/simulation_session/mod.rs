@@ -177,7 +177,7 @@ impl Session {
             Command::Play => {
                 self.status.playing = true;
                 if self.status.finished {
-                    // More of the same, not the same once more: the next poses are new ones.
+                    // The next poses are new ones, not those of the round before.
                     self.begin_round();
                 } else {
                     self.set_pace();

@@ -40,7 +40,7 @@ impl StudyCell for Case {
     fn name(&self) -> String {
         match self {
             Self::Answers { question, method, draw } => {
-                // Answers of another shipped model are others.
+                // Answers depend on the shipped model.
                 let shipped = match question.learns {
                     Learns::Shipped(shipped) => format!(", {:08x}", shipped.model_content()),
                     Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Given { .. } => {
