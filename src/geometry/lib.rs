@@ -18,6 +18,7 @@
 //! | 4 | `distance` | signed distance of solids |
 //! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay; figures with axes; heat maps |
 //! | 5 | `bake` | distance grids of meshes |
+//! | 6 | `grid_file` | grids kept in files |
 //!
 //! # Example
 //!
@@ -39,6 +40,7 @@ mod convex;
 mod distance;
 pub mod drawing;
 mod finish;
+mod grid_file;
 mod hull;
 mod mass;
 mod mesh;
@@ -57,6 +59,7 @@ pub use circle::signed_curvature;
 pub use convex::convex_hull;
 pub use distance::{DistanceField, DistanceGrid};
 pub use finish::Finish;
+pub use grid_file::bake_once;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};

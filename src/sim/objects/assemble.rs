@@ -4,8 +4,8 @@ use super::{CollisionShape, LoadOptions, ObjectError, ObjectModel, Resting};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::three_digits;
 use palpate_geometry::{
-    Bounds, ColouredPart, DistanceField, Finish, MassProperties, Pose, Primitive, SolidPart, SurfaceMesh, TriMesh,
-    bake, choose_cell, mass_properties, repair, support_points,
+    BakeError, Bounds, ColouredPart, DistanceField, DistanceGrid, Finish, MassProperties, Pose, Primitive, SolidPart,
+    SurfaceMesh, TriMesh, bake, bake_once, choose_cell, mass_properties, repair, support_points,
 };
 use std::sync::Arc;
 
@@ -112,8 +112,19 @@ impl Blueprint {
         });
     }
 
-    /// Builds the object with the options of a scene.
-    pub(super) fn build(mut self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+    /// Builds the object with the options of a scene. The baked distances are kept in files of the folder for caches.
+    pub(super) fn build(self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
+        let folders = directories::ProjectDirs::from("", "", "palpate");
+        let Some(folders) = folders else { return self.build_with(options, bake) };
+        self.build_with(options, |solids, cell| bake_once(solids, cell, &folders.cache_dir().join("grids")))
+    }
+
+    /// The same with another way to bake distances.
+    pub(super) fn build_with(
+        mut self,
+        options: &LoadOptions,
+        bake: impl FnOnce(&[SolidPart], f64) -> Result<DistanceGrid, BakeError>,
+    ) -> Result<ObjectModel, ObjectError> {
         if self.triangles > MOST_TRIANGLES {
             let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
             return Err(ObjectError::malformed(&self.name, &cause));

@@ -5,7 +5,7 @@ use super::assemble::{Blueprint, ShapeSource};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, ShapeClass};
 use glam::DVec3;
-use palpate_geometry::{ColouredPart, Finish, Pose, Primitive, TriMesh, cube_sphere};
+use palpate_geometry::{ColouredPart, Finish, Pose, Primitive, TriMesh, bake, cube_sphere};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::RangeInclusive;
@@ -88,7 +88,7 @@ impl RandomShape {
         Self { class, name: format!("{PREFIX}{seed}"), solids, density, friction }
     }
 
-    /// Builds the object.
+    /// Builds the object. Each is needed once, so its distances are not kept in a file.
     pub(super) fn build(&self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
         let mut blueprint = Blueprint::new(&self.name);
         for (solid, place) in &self.solids {
@@ -96,7 +96,7 @@ impl RandomShape {
         }
         let volume: f64 = self.solids.iter().map(|(solid, _)| solid.volume()).sum();
         let mass = (volume * self.density).clamp(*MASSES.start(), *MASSES.end());
-        let object = blueprint.build(&LoadOptions { mass: options.mass.or(Some(mass)), ..*options })?;
+        let object = blueprint.build_with(&LoadOptions { mass: options.mass.or(Some(mass)), ..*options }, bake)?;
         let content = crate::fingerprint([self.name.as_bytes(), &REVISION.to_le_bytes()]);
         Ok(ObjectModel { friction: self.friction, content, ..object })
     }
