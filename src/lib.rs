@@ -11,13 +11,14 @@
 //! | [`palpate-geometry`](palpate_geometry) | `src/geometry` | meshes, solids, distance grids, mass; draw list, camera, colours, units | | 2480 |
 //! | [`palpate-sim`](palpate_sim) | `src/sim` | a scene in, frames out: objects, gripper, scene files, physics, poses | `geometry` | 9270 |
 //! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | simulated frames or raw converter counts in, sensor channels (curvature, pressure, force) out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
-//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files | | 8350 |
+//! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files, comparison of methods | | 8750 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5350 |
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5100 |
-//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25450 |
+//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14450 |
+//! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 10650 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
-//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 20100 |
-//! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 1450 |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `study` `render` | 20100 |
+//! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `study` `render` | 1450 |
 //!
 //! # One path for every grasp
 //!
@@ -78,11 +79,11 @@
 //! | step | what happens |
 //! |---|---|
 //! | [`palpate_lab::grasping::collect()`], [`palpate_lab::datasets`] | grasps: simulated for the study, or chosen from a store |
-//! | [`palpate_lab::study::paper::StudyPlan`] | what a study runs on: size, preset, sensors, trials, seed; a study lists its cells from it (one combination of factors, tested on one part of the grasps) |
+//! | [`palpate_study::paper::StudyPlan`] | what a study runs on: size, preset, sensors, trials, seed; a study lists its cells from it (one combination of factors, tested on one part of the grasps) |
 //! | [`palpate_learn::METHODS`], [`palpate_learn::evaluation`] | a recogniser fitted on some grasps and judged on others |
-//! | [`palpate_lab::study::Experiment`] | what all studies have: a grid of cells, how one is measured, the report on all |
-//! | [`palpate_lab::study::paper::Finding`] | a claim: a sentence of the paper, a verdict, the intervals that decide |
-//! | `assets/studies`, [`palpate_lab::study::generated_sections`] | stored results, and the tables that the manual prints of them |
+//! | [`palpate_study::Experiment`] | what all studies have: a grid of cells, how one is measured, the report on all |
+//! | [`palpate_study::Finding`] | a claim: a sentence of the paper, a verdict, the intervals that decide |
+//! | `assets/studies`, [`palpate_study::generated_sections`] | stored results, and the tables that the manual prints of them |
 //!
 //! # Programs to begin with
 //!
@@ -90,7 +91,7 @@
 //! |---|---|
 //! | `src/lab/examples/grasp_to_csv.rs` | a simulated grasp of an object, as a table |
 //! | `src/lab/examples/recognise_trial.rs` | the answer of the shipped model to a stored trial |
-//! | `src/lab/examples/own_study.rs` | a study of your own: a grid of grasps in parallel, kept, resumed, as a table |
+//! | `src/study/examples/own_study.rs` | a study of your own: a grid of grasps in parallel, kept, resumed, as a table |
 //! | `src/learn/examples/plain_candle.rs` | a network in plain candle, judged like the built-in recognisers |
 //! | `src/device/examples/read_board.rs` | readings of a board on a serial port |
 //! | `src/render/examples/draw_trial.rs` | a picture of a stored trial |
@@ -123,10 +124,10 @@
 //! | the CSV export of trials | `src/store/trial_export.rs` |
 //! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
 //! | another file format for exported trials (MCAP, NPZ, ..) | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
-//! | a background task of the window | a function in `src/lab/workers/` that returns a `Job`, and the feature that owns it |
-//! | a study | an `Experiment` in a file of `src/lab/study/`, and its arguments in `src/cli/study/` |
-//! | a study of the paper | a file in `src/lab/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
-//! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/lab/study/generated.rs` |
+//! | a background task of the window | a function in `src/lab/workers/` or `src/study/jobs/` that returns a `Job`, and the feature that owns it |
+//! | a study | an `Experiment` in a file of `src/study/`, and its arguments in `src/cli/study/` |
+//! | a study of the paper | a file in `src/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
+//! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/study/generated.rs` |
 //! | a surface finish (metal, rubber, ..) | a variant in `src/geometry/finish.rs`, and its shading in `src/render/passes/solid.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!

@@ -1,7 +1,6 @@
 //! Contents of the window: it starts the features, lets panels draw, and hands their actions to the features.
 
 use crate::app::actions::Actions;
-use crate::app::bars;
 use crate::app::features::App;
 use crate::app::features::files::{FileFeature, drop_hint};
 use crate::app::features::gripper::GripperFeature;
@@ -16,30 +15,28 @@ use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::ViewState;
 use crate::app::frame_rate::FrameRate;
-use crate::app::keys;
-use crate::app::modes;
-use crate::app::palette;
 use crate::app::panels::PanelKind;
 use crate::app::path_dialog::{Closed, PathDialog};
-use crate::app::presenter;
 use crate::app::shown::Inspected;
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::tiling::{Tiling, panel_frame};
 use crate::app::viewport::Viewport;
+use crate::app::{bars, keys, modes, palette, presenter};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tile;
 use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::workers::{
-    Explain, Explainer, GripperSetup, GripperWorker, LabelWorker, LibraryWorker, MeasuredAccuracy, SimWorker,
-    SimWorkerSetup, Snapshot, Wake, effects_job, examine_port, explain_scene, fit_trials, open_trial_job,
+    Explainer, GripperSetup, GripperWorker, LabelWorker, LibraryWorker, MeasuredAccuracy, SimWorker, SimWorkerSetup,
+    Snapshot, Wake, examine_port, open_trial_job,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
+use palpate_study::jobs::{Explain, effects_job, explain_scene, fit_trials};
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -6,11 +6,11 @@ mod library;
 use super::Failure;
 use super::terminal::{Page, Report};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{
+use palpate_sim::scene::Accuracy;
+use palpate_study::{
     CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
     physics_truth,
 };
-use palpate_sim::scene::Accuracy;
 use serde::Serialize;
 
 /// Arguments of `palpate bench`.

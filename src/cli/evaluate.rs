@@ -2,7 +2,7 @@
 
 use super::learning::{DataArguments, known_method, parts};
 use super::prelude::*;
-use palpate_lab::study::{ComparisonRow, Controls, in_table_order};
+use palpate_learn::comparison::{ComparisonRow, Controls, in_table_order};
 use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan};
 
 /// Arguments of `palpate evaluate`.

@@ -2,8 +2,8 @@
 
 use super::prelude::*;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{Certainty, FingerFit, RecordedGrasps, fit_finger};
 use palpate_store::CalibrationId;
+use palpate_study::{Certainty, FingerFit, RecordedGrasps, fit_finger};
 
 /// Arguments of `palpate fit`.
 #[derive(Debug, clap::Args)]

@@ -4,7 +4,7 @@ use super::origin::OriginFilters;
 use super::prelude::*;
 use super::setup::{self};
 use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView, check_model_path, models_folder};
-use palpate_lab::study::{Compared, Comparison, MethodResult, compare};
+use palpate_learn::comparison::{Compared, Comparison, MethodResult, compare};
 use palpate_learn::{Dataset, METHODS, Method, Split, StopRule, counted, method};
 use palpate_store::CalibrationId;
 use palpate_tactile::model::SensorModel;

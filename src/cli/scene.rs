@@ -3,8 +3,8 @@
 use super::prelude::*;
 use super::setup::threads;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{ExplainedEffect, Explanation, Measuring, StudyProgress, explain_effects};
 use palpate_sim::scene::{SCENES, Scene};
+use palpate_study::{ExplainedEffect, Explanation, Measuring, StudyProgress, explain_effects};
 
 /// Arguments of `palpate scene`.
 #[derive(Debug, clap::Args)]

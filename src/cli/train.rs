@@ -3,8 +3,8 @@
 use super::learning::{DataArguments, known_method, model_file};
 use super::prelude::*;
 use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
-use palpate_lab::study::{SearchRow, search};
 use palpate_learn::evaluation::Evaluation;
+use palpate_learn::search::{SearchRow, search};
 use palpate_learn::{Dataset, Fitting, LearnError, METHODS, Method, Model, SplitPlan};
 
 /// Arguments of `palpate train`.

@@ -1,4 +1,4 @@
-//! Work with a gripper: grasp, record, recognise, label, study.
+//! Work with a gripper: grasp, record, recognise, label.
 //!
 //! # Terms
 //!
@@ -20,11 +20,10 @@
 //! |---|---|---|
 //! | 0 | [`gripper`] | the trait [`gripper::Gripper`]; simulated, serial and replayed grippers |
 //! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, trials to review |
-//! | 0 | [`datasets`] | trials of a store as a data set; saved models |
+//! | 0 | [`datasets`] | trials of a store as a data set; training on labelled trials; saved models |
 //! | 0 | [`picture`] | scene and frame to a draw list; frames to heat maps |
-//! | 1 | [`grasping`] | the grasp controller, runs, computing again, collections, identification, error bands |
+//! | 1 | [`grasping`] | the grasp controller, runs, computing again, cost and error, collections, identification, error bands |
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
-//! | 2 | [`study`] | measurements and comparisons as functions |
 //! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
 //! | 4 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
 //! | 4 | [`exchange`] | trials as files of other programs: MCAP, NPZ, Parquet |
@@ -59,6 +58,5 @@ pub mod inspection;
 pub mod labelling;
 pub mod picture;
 pub mod recording;
-pub mod study;
 pub mod why;
 pub mod workers;

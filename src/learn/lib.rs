@@ -27,6 +27,7 @@
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
 //! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution. The geometry encoder |
 //! | 6 | `methods` | table of all methods |
+//! | 7 | [`comparison`], [`search`] | methods fitted and judged on the same grasps; a grid search for settings |
 //! | 7 | `model_file` | model files; the shipped models |
 //!
 //! To add a recogniser, write its file and add one line to [`METHODS`].
@@ -62,6 +63,7 @@
 mod arrays;
 mod baselines;
 mod belief;
+pub mod comparison;
 #[cfg(test)]
 mod conformance_tests;
 mod data;
@@ -80,6 +82,7 @@ pub mod network;
 mod pmf;
 mod recogniser;
 mod rows;
+pub mod search;
 mod signatures;
 mod split;
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::{Failure, report};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{CollectionPlan, KnownTouches, Stance, collect, random_shapes};
-use palpate_lab::study::Comparison;
+use palpate_learn::comparison::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
 use palpate_learn::{Dataset, Fitting, Model, Shipped, Signatures, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};

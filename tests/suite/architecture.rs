@@ -5,17 +5,28 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Folders of packages below `src`. The root package has the rest of `src`.
-const PACKAGES: [&str; 9] = ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "render", "workshop"];
+const PACKAGES: [&str; 10] =
+    ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "study", "render", "workshop"];
 
 /// Where each third-party crate may be named.
 const HOMES: &[(&str, &[&str])] = &[
     ("ab_glyph", &["src/render/text.rs"]),
     ("bytemuck", &["src/render", "src/geometry"]),
-    ("candle_core", &["src/learn/baselines", "src/lab/study/network_cost.rs"]),
-    ("candle_nn", &["src/learn/baselines", "src/lab/study/network_cost.rs"]),
+    ("candle_core", &["src/learn/baselines", "src/study/network_cost.rs"]),
+    ("candle_nn", &["src/learn/baselines", "src/study/network_cost.rs"]),
     ("cc", &["src/device/build.rs"]),
     ("clap", &["src/cli", "src/workshop"]),
-    ("cpu_time", &["src/cli", "src/lab/study", "src/learn/evaluation.rs", "src/learn/methods.rs", "src/sim/bench"]),
+    (
+        "cpu_time",
+        &[
+            "src/cli",
+            "src/lab/grasping/timed_grasp.rs",
+            "src/study",
+            "src/learn/evaluation.rs",
+            "src/learn/methods.rs",
+            "src/sim/bench",
+        ],
+    ),
     (
         "crc32fast",
         &[
@@ -61,7 +72,7 @@ const HOMES: &[(&str, &[&str])] = &[
             "src/lab/grasping/error_band.rs",
             "src/lab/grasping/known_geometry.rs",
             "src/lab/grasping/lessons.rs",
-            "src/lab/study",
+            "src/study",
         ],
     ),
     ("rusqlite", &["src/store"]),
@@ -89,10 +100,10 @@ const RANDOM: &[&str] = &[
     "src/cli/demo",
     "src/lab/grasping/known_geometry.rs",
     "src/lab/grasping/shuffled_objects.rs",
-    "src/lab/study/effect_audit",
-    "src/lab/study/network_cost.rs",
-    "src/lab/study/paper",
-    "src/lab/study/stability",
+    "src/study/effects",
+    "src/study/network_cost.rs",
+    "src/study/paper",
+    "src/study/stability",
     "src/learn",
     "src/sim/objects/random_shape.rs",
     "src/sim/physics/placement.rs",

@@ -12,15 +12,13 @@ use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenP
 use palpate_device::protocol::{DecodedEvent, Decoder};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::gripper::Listen;
-use palpate_lab::study::{Certainty, FingerFit, Observation, Trust, fit_finger};
-use palpate_sim::gripper::Phase;
-use palpate_sim::gripper::{GripperModel, Side, TorquePoint};
+use palpate_sim::gripper::{GripperModel, Phase, Side, TorquePoint};
 use palpate_sim::objects::{EMPTY, ObjectModel};
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
+use palpate_study::{Certainty, FingerFit, Observation, Trust, fit_finger};
 use palpate_tactile::board::{Board, Reading, Sensor};
-use palpate_tactile::calibration::Input;
-use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Procedure, Readout, SensorKind};
+use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Input, Procedure, Readout, SensorKind};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use palpate_tactile::electronics::StripPart;
 use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};

@@ -2,14 +2,17 @@
 
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::Shard;
-use palpate_lab::study::accuracy::stored_accuracy;
-use palpate_lab::study::paper::{
-    Cell, FigureMark, PAPER_STUDIES, PaperStudy, StudyData, StudyError, StudyPlan, StudyProgress, StudyReport,
-    StudyRow, StudySize, StudyStep, is_current, paper_study, stored_report, study_fingerprint,
-};
-use palpate_lab::study::{Measuring, StoredStudy, StudyOutcome, generated_sections, merged_units, program};
 use palpate_render::figure_svg;
 use palpate_store::Store;
+use palpate_study::accuracy::stored_accuracy;
+use palpate_study::paper::{
+    PAPER_STUDIES, PaperStudy, StudyData, StudyPlan, StudySize, is_current, paper_study, stored_report,
+    study_fingerprint,
+};
+use palpate_study::{
+    Cell, FigureMark, Measuring, StoredStudy, StudyError, StudyOutcome, StudyProgress, StudyReport, StudyRow,
+    StudyStep, generated_sections, merged_units, program,
+};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -7,14 +7,11 @@ use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
 use palpate::app::Mode;
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::StoredStudy;
-use palpate_lab::study::paper::{
-    Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StudyPlan, StudyReport, StudySize, StudyTable, paper_study,
-    study_fingerprint,
-};
-use palpate_lab::workers::StudyRequest;
 use palpate_learn::metrics::Interval;
 use palpate_store::Store;
+use palpate_study::jobs::StudyRequest;
+use palpate_study::paper::{StudyPlan, StudySize, paper_study, study_fingerprint};
+use palpate_study::{Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StoredStudy, StudyReport, StudyTable};
 
 const SAMPLE: StudySize = StudySize::Sample { objects: 4, trials: 6 };
 

@@ -2,12 +2,13 @@
 
 use super::App;
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::paper::{LinkedFigure, PAPER_STUDIES, PaperStudy, StudySize, paper_study};
-use palpate_lab::workers::{
-    Job, JobFailure, RunningJob, StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner,
-    Wake, study_files_job, study_runner,
-};
+use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
 use palpate_render::figure_svg;
+use palpate_study::LinkedFigure;
+use palpate_study::jobs::{
+    StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner, study_files_job, study_runner,
+};
+use palpate_study::paper::{PAPER_STUDIES, PaperStudy, StudySize, paper_study};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

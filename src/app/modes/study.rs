@@ -6,8 +6,8 @@ use crate::app::features::App;
 use crate::app::features::view::Mode;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
-use palpate_lab::study::paper::StudySize;
-use palpate_lab::workers::StudyRequest;
+use palpate_study::jobs::StudyRequest;
+use palpate_study::paper::StudySize;
 
 pub(super) const KIND: ModeKind = ModeKind {
     mode: Mode::Study,

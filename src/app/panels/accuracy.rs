@@ -7,10 +7,10 @@ use crate::app::theme::{self, colour};
 use egui::{Button, Pos2, RichText, ScrollArea, Tooltip, Ui};
 use palpate_geometry::drawing::Plot;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::accuracy::{
+use palpate_sim::scene::Scene;
+use palpate_study::accuracy::{
     AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, Spread, accuracy_plot,
 };
-use palpate_sim::scene::Scene;
 
 pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
     let group = SceneGroup::of(simulation.scene.holds_object());

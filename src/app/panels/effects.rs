@@ -9,9 +9,9 @@ use crate::app::widgets::capital;
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{ExplainedEffect, Explanation};
 use palpate_sim::frame::PlannedEffect;
 use palpate_sim::scene::{Effect, Setting};
+use palpate_study::{ExplainedEffect, Explanation};
 
 /// Height of a row (points).
 const ROW: f32 = 23.0;

@@ -10,12 +10,12 @@ use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
 use palpate_geometry::units::three_digits;
-use palpate_lab::study::{Certainty, Estimate, FingerFit, FingerMotion, Remainder};
-use palpate_lab::workers::FittedFinger;
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_store::TrialRow;
+use palpate_study::jobs::FittedFinger;
+use palpate_study::{Certainty, Estimate, FingerFit, FingerMotion, Remainder};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 

@@ -10,8 +10,7 @@ use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui
 use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
-use palpate_sim::objects::catalogue;
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::{catalogue, object_title};
 use palpate_store::labels::{LabelledTrial, NextTrial};
 
 /// Side of the picture of an object (points).

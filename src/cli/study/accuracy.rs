@@ -2,7 +2,7 @@
 
 use super::super::prelude::*;
 use super::output::StudyOutput;
-use palpate_lab::study::accuracy::{AccuracyExperiment, AccuracyPlan};
+use palpate_study::accuracy::{AccuracyExperiment, AccuracyPlan};
 
 /// Arguments of `palpate study accuracy`.
 #[derive(Debug, clap::Args)]

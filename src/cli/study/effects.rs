@@ -2,7 +2,7 @@
 
 use super::super::prelude::*;
 use super::output::StudyOutput;
-use palpate_lab::study::EffectAudit;
+use palpate_study::EffectAudit;
 
 /// Arguments of `palpate study effects`.
 #[derive(Debug, clap::Args)]

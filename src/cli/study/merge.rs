@@ -1,7 +1,7 @@
 //! `palpate study merge`: joins the parts of a study.
 
 use super::super::prelude::*;
-use palpate_lab::study::merged_units;
+use palpate_study::merged_units;
 
 /// Arguments of `palpate study merge`.
 #[derive(Debug, clap::Args)]

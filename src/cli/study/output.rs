@@ -5,9 +5,11 @@ use super::super::setup::threads;
 use super::super::terminal::table;
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::Shard;
-use palpate_lab::study::paper::{Cell, Finding, LinkedFigure, StudyFolder, StudyReport, StudyTable};
-use palpate_lab::study::{Experiment, Measuring, StoredStudy, StudyOutcome, StudyProgress, run_experiment};
 use palpate_render::figure_svg;
+use palpate_study::{
+    Cell, Experiment, Finding, LinkedFigure, Measuring, StoredStudy, StudyFolder, StudyOutcome, StudyProgress,
+    StudyReport, StudyTable, run_experiment,
+};
 use serde::de::DeserializeOwned;
 
 /// Where a study writes, its threads, and the form of its output.

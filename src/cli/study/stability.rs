@@ -2,7 +2,7 @@
 
 use super::super::prelude::*;
 use super::output::StudyOutput;
-use palpate_lab::study::stability::{CaseRow, StabilityPlan, StabilityReport};
+use palpate_study::stability::{CaseRow, StabilityPlan, StabilityReport};
 
 /// Arguments of `palpate study stability`.
 #[derive(Debug, clap::Args)]

@@ -1,16 +1,20 @@
-//! Data sets from the store, and the folder of trained models.
+//! Data sets from the store, training on labelled trials, and the folder of trained models.
 
 mod card;
+mod labelled_training;
 mod origin;
 mod query;
 mod reading;
 mod sampling;
 mod saved_models;
 
-pub(crate) use query::noise_seed;
+pub use labelled_training::{
+    HELD_BACK, JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage,
+    labelled_classes,
+};
 pub use query::{
     DatasetError, DatasetQuery, NoPhysicsVersion, PhysicsVersion, SensorView, TrialSignals, labels_of_catalogue,
-    sequence_of, trial_signals,
+    noise_seed, sequence_of, trial_signals,
 };
 pub use sampling::{Cut, NoCut};
 pub use saved_models::{

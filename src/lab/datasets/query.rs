@@ -409,7 +409,7 @@ const NEXT_DRAW: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Seed of the sensors' noise in a trial. Poses of different objects may share a seed; their noise must not. FNV-1a of the
 /// name: changing it would change every data set with noisy sensors.
-pub(crate) fn noise_seed(header: &TrialHeader) -> u64 {
+pub fn noise_seed(header: &TrialHeader) -> u64 {
     let mix = |seed: u64, byte: u8| (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     header.object.bytes().fold(header.seed, mix)
 }

@@ -55,7 +55,7 @@ impl Shard {
     }
 
     /// True for the units of this part, by their place in the whole work.
-    pub(crate) fn has(self, place: usize) -> bool {
+    pub fn has(self, place: usize) -> bool {
         place % self.of as usize + 1 == self.number as usize
     }
 }
@@ -142,7 +142,7 @@ struct Task {
 
 /// Grasps in a row before the object is placed again, if objects stay as released: as many as the study of successive
 /// grasps looks at.
-pub(crate) const SUCCESSION: u64 = 8;
+pub const SUCCESSION: u64 = 8;
 
 /// The sixteen and the empty hand.
 pub fn all_objects() -> Vec<String> {

@@ -2,6 +2,7 @@
 //! an object by successive grasps, and advice on the next one. Adapting to a real gripper by one close of its empty hand.
 //! Lessons: grasps by which a model learns new objects. Presentations: the objects and poses of a demo.
 
+mod accuracy_cost;
 mod adaptation;
 mod agreement;
 mod collect;
@@ -18,14 +19,15 @@ mod row;
 mod run;
 mod shuffled_objects;
 mod summary;
+mod timed_grasp;
 
+pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use adaptation::{AdaptError, Adaptation, AdaptedSensor};
 pub use agreement::{
     Agreed, EndState, Recompute, ends_alike, grasp_soundly, grasp_until_agreement, has_lost_object, until_agreement,
 };
-pub(crate) use collect::SUCCESSION;
 pub use collect::{
-    CollectionError, CollectionPlan, CollectionProgress, CollectionReport, NoShard, ReadyCollection, Shard,
+    CollectionError, CollectionPlan, CollectionProgress, CollectionReport, NoShard, ReadyCollection, SUCCESSION, Shard,
     all_objects, collect,
 };
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
@@ -42,3 +44,4 @@ pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;
 pub(crate) use summary::CONTACT_FORCE;
 pub use summary::{GraspSummary, HoldSummary, OutOfPlaneSummary, ShakenSummary};
+pub use timed_grasp::{posed_object, timed_grasp, truth_of};

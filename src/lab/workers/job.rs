@@ -287,7 +287,7 @@ impl JobRun<'_> {
 }
 
 /// Number of threads for background tasks, beside the window and a simulation.
-pub(super) fn spare_threads() -> usize {
+pub fn spare_threads() -> usize {
     std::thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1))
 }
 

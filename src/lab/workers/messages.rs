@@ -1,9 +1,8 @@
 //! Messages of the simulation thread: commands in, snapshots, rows and notices out.
 
 use crate::datasets::SensorView;
-use crate::grasping::{GraspSummary, GripperMove, IdentificationView, Row};
+use crate::grasping::{AccuracyCost, GraspSummary, GripperMove, IdentificationView, Row};
 use crate::picture::Stage;
-use crate::study::AccuracyCost;
 use glam::DVec3;
 use palpate_learn::Models;
 use palpate_sim::frame::{Frame, Plan};

@@ -21,16 +21,12 @@
 //! | job | command | outcome | newer |
 //! |---|---|---|---|
 //! | [`doctor_job`] | a port | findings | replaces |
-//! | [`fit_job`] | recorded trials | a fitted finger | replaces |
-//! | [`recorded_trials_job`] [`training_data_job`] [`study_files_job`] | | what the store and its folders hold | replaces |
+//! | [`training_data_job`] | | what the store and its folders hold | replaces |
 //! | [`training_job`] [`class_training_job`] [`load_model_job`] | method, object, file | a model | waits |
 //! | [`advice_job`] | a grasp | the move before the next one | replaces |
 //! | [`Explainer`] | a grasp | why the model gave its answer; the nearest trials | replaces |
-//! | [`effects_job`] | a scene | cost and change of each effect | replaces |
-//! | [`study_runner`] | a study of the paper | its result | waits |
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
 //! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
-//!
 //!
 //! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows and recorded frames
 //! keep their order and none is lost.
@@ -39,8 +35,6 @@ mod advice;
 mod class_training;
 mod current;
 mod doctor;
-mod effects;
-mod fit;
 mod gripper;
 mod held_object;
 mod job;
@@ -61,7 +55,6 @@ mod sim;
 #[cfg(test)]
 mod sim_tests;
 mod simulation_session;
-mod study_runner;
 mod training;
 mod why;
 mod worker;
@@ -69,14 +62,12 @@ mod worker;
 pub use advice::advice_job;
 pub use class_training::{TeachRequest, class_training_job};
 pub use doctor::{DiagnosticsReport, Examine, ExamineRequest, doctor_job, examine_port};
-pub use effects::{Explain, effects_job, explain_scene};
-pub use fit::{FitTrials, FittedFinger, fit_job, fit_trials, recorded_trials_job};
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
     CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
     RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
 };
-pub use job::{EndedJob, Job, JobError, JobFailure, JobProgress, JobRun, Newer, RunningJob};
+pub use job::{EndedJob, Job, JobError, JobFailure, JobProgress, JobRun, Newer, RunningJob, spare_threads};
 pub use label_worker::{LabelCommand, LabelView, LabelWorker};
 pub use labelling_session::{
     LabelDraft, LabellingAction, LabellingEffect, LabellingSession, SessionContext, TrialFilter, TrialInSight,
@@ -92,10 +83,6 @@ pub use object_search::NUMBERED_OBJECTS;
 pub use open_trial::{OpenRequest, open_trial_job};
 pub use portraits::{PORTRAIT_SIDE, portrait_job};
 pub use sim::SimWorker;
-pub use study_runner::{
-    DrawFigure, StudyEnd, StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner,
-    has_other_units, study_files_job, study_runner,
-};
 pub use training::{
     FinishedTraining, TrainRequest, TrainedModel, TrainingData, load_model_job, training_data_job, training_job,
 };

@@ -3,9 +3,9 @@
 
 use super::job::{Job, JobError, JobRun, Newer};
 use super::messages::Wake;
-use crate::datasets::{SavedModel, make_models_folder, new_model_path, save_model, saved_models};
-use crate::study::{
-    JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage, labelled_classes,
+use crate::datasets::{
+    JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, SavedModel, TrainingError, TrainingStage,
+    labelled_classes, make_models_folder, new_model_path, save_model, saved_models,
 };
 use palpate_learn::{Method, Model, ModelError, method};
 use palpate_store::{Store, StoreError};

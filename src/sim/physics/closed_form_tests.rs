@@ -1,5 +1,5 @@
 //! The step against answers from textbooks. Every scene is tiny and its answer can be checked by hand. Hard cases stand
-//! in `study::stability`.
+//! in `palpate-study`.
 
 use super::contact::SHEAR_SHARE;
 use super::detect::detect;

@@ -10,8 +10,9 @@ use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
 use palpate_geometry::drawing::{Figure, LineStyle, Marker};
 use palpate_geometry::palette::{Theme, series_colour};
-use palpate_lab::study::paper::{LinkedFigure, StudySize};
-use palpate_lab::workers::{StudyOrigin, StudyResult};
+use palpate_study::LinkedFigure;
+use palpate_study::jobs::{StudyOrigin, StudyResult};
+use palpate_study::paper::StudySize;
 
 /// Least width of a plot (points).
 const LEAST_WIDTH: f32 = 300.0;

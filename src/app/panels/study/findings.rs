@@ -7,7 +7,7 @@ use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::study::paper::{Agreement, Cell, Finding};
+use palpate_study::{Agreement, Cell, Finding};
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
     let Some(result) = result_ui(ui, studies, "study-findings", "findings", actions) else { return };

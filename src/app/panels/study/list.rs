@@ -6,9 +6,10 @@ use crate::app::theme::{self, accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, ThemeColours};
-use palpate_lab::study::paper::{PAPER_STUDIES, StudyCard, StudySize};
-use palpate_lab::workers::{JobProgress, StudyFiles, StudyOrigin, StudyRequest, has_other_units};
+use palpate_lab::workers::JobProgress;
 use palpate_store::Store;
+use palpate_study::jobs::{StudyFiles, StudyOrigin, StudyRequest, has_other_units};
+use palpate_study::paper::{PAPER_STUDIES, StudyCard, StudySize};
 
 /// Height of a row (points).
 const ROW: f32 = 40.0;

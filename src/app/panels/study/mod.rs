@@ -11,8 +11,8 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{RichText, Ui};
-use palpate_lab::study::paper::{Cell, StudyRow, StudyTable};
-use palpate_lab::workers::{StudyOrigin, StudyResult};
+use palpate_study::jobs::{StudyOrigin, StudyResult};
+use palpate_study::{Cell, StudyRow, StudyTable};
 use palpate_tactile::trial::TrialId;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@ use crate::app::figure_plot::{self, ShownPlot};
 use crate::app::theme::{self, colour};
 use egui::{Rect, RichText, Stroke, StrokeKind, Tooltip, Ui, Vec2};
 use palpate_geometry::drawing::Plot;
-use palpate_lab::study::paper::{FigureLink, FigureMark, LinkedFigure};
-use palpate_lab::workers::StudyResult;
+use palpate_study::jobs::StudyResult;
+use palpate_study::{FigureLink, FigureMark, LinkedFigure};
 
 /// Distance within which the pointer means a point (points).
 const NEAR: f32 = 12.0;

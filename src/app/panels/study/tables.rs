@@ -6,8 +6,8 @@ use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_lab::study::paper::{Cell, StudyColumn, StudyRow, StudyTable};
-use palpate_lab::workers::StudyResult;
+use palpate_study::jobs::StudyResult;
+use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
 
 /// Height of a row, room between columns, widest column (points).
 const ROW: f32 = 21.0;

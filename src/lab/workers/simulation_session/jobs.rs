@@ -3,8 +3,7 @@
 
 use super::super::job::{Job, Newer};
 use super::super::messages::{GhostGrasp, MeasuredAccuracy, Wake};
-use crate::grasping::{EndState, grasp_until_agreement, prepare};
-use crate::study::accuracy_cost;
+use crate::grasping::{EndState, accuracy_cost, grasp_until_agreement, prepare};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;

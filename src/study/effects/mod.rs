@@ -1,0 +1,9 @@
+//! Physical effects: what each one costs and changes in a scene, and an audit of the rules that switch them on.
+
+mod audit;
+mod explanation;
+
+pub use audit::{
+    AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectSize, SEEN, SceneNumber, stored_effects,
+};
+pub use explanation::{EffectChange, ExplainedEffect, Explanation, explain_effects};

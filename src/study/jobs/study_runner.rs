@@ -1,0 +1,225 @@
+//! Studies of the paper beside the window, on its store. Their files lie in folders beside the store; the command line
+//! continues them there, and is continued.
+
+use crate::frame::{
+    LinkedFigure, Measuring, ResultFileError, StoredStudy, StudyError, StudyProgress, StudyReport, StudyStep, program,
+};
+use crate::paper::{
+    PAPER_STUDIES, PaperStudy, StudyData, StudyPlan, StudySize, is_current, paper_study, stored_report,
+};
+use palpate_lab::grasping::Shard;
+use palpate_lab::workers::{Job, JobError, JobFailure, JobRun, Newer, Wake, spare_threads};
+use palpate_store::Store;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A run of a study.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StudyRequest {
+    /// Key of the study.
+    pub key: String,
+    /// Amount of work.
+    pub size: StudySize,
+    /// Forget what is finished so far.
+    pub anew: bool,
+}
+
+/// Where a result comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StudyOrigin {
+    /// A run here.
+    Run(StudySize),
+    /// The full run that comes with the program; its trials are not in the store.
+    Shipped,
+}
+
+/// Result of a study with its figures.
+#[derive(Clone, Debug)]
+pub struct StudyResult {
+    /// Where it comes from.
+    pub origin: StudyOrigin,
+    /// The result.
+    pub stored: StoredStudy<StudyReport>,
+    /// Figures, drawn from its tables.
+    pub figures: Vec<LinkedFigure>,
+    /// True where physics, methods and settings are those of a run today.
+    pub current: bool,
+}
+
+/// Files of a study.
+#[derive(Clone, Debug, Default)]
+pub struct StudyFiles {
+    /// Results: full, quick, sample, shipped.
+    pub results: Vec<Arc<StudyResult>>,
+    /// Sizes with finished units, but without a result.
+    pub begun: Vec<StudySize>,
+    /// Files that cannot be read.
+    pub unreadable: Vec<String>,
+}
+
+/// Files of all studies, by their keys.
+pub type StudyFilesByKey = BTreeMap<&'static str, StudyFiles>;
+
+/// End of a run.
+#[derive(Clone, Debug)]
+pub struct StudyEnd {
+    /// False where it was stopped; the next run resumes it.
+    pub finished: bool,
+    /// Files of all studies after it.
+    pub files: StudyFilesByKey,
+}
+
+/// Draws a figure as SVG.
+pub type DrawFigure = Arc<dyn Fn(&LinkedFigure) -> std::io::Result<String> + Send + Sync>;
+
+/// Runs studies, one after the other, and resumes them.
+pub type StudyRunner = Job<StudyRequest, StudyEnd>;
+
+/// The runner. Grasps are read from the store and collected there; figures are written as `draw` draws them.
+pub fn study_runner(store: PathBuf, draw: DrawFigure, wake: Wake) -> StudyRunner {
+    Job::new("study", Newer::Waits, wake, move |request: &StudyRequest, run| {
+        let finished = finish(&store, request, &draw, run)?;
+        Ok(Some(StudyEnd { finished, files: study_files(&store) }))
+    })
+}
+
+/// The job that reads the files of all studies.
+pub fn study_files_job(store: PathBuf, wake: Wake) -> Job<(), StudyFilesByKey> {
+    Job::new("study-files", Newer::Replaces, wake, move |(), _run| Ok(Some(study_files(&store))))
+}
+
+/// Runs a study to its end; false where it was stopped.
+fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<'_>) -> Result<bool, JobError> {
+    let study = paper_study(&request.key).ok_or_else(|| format!("there is no study \"{}\"", request.key))?;
+    let (folder, key) = (request.size.folder(store), study.card().key);
+    if request.anew {
+        folder.forget_units(key)?;
+    }
+    let plan = StudyPlan::of_size(request.size);
+    let progress = |StudyProgress { step, done, of }: StudyProgress| {
+        let words = match step {
+            StudyStep::Collecting => format!("simulating grasps, {done} of {of}"),
+            StudyStep::Measuring => format!("measuring, {done} of {of} parts"),
+        };
+        run.count(done, of, words);
+    };
+    let work = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
+    let bench = StudyData::new(Store::open(store)?, &plan, work);
+    let outcome = study.run(&bench, Some(&folder.units(key)), Shard::WHOLE)?;
+    let Some(stored) = outcome.whole() else { return Ok(false) };
+    folder.write(key, &stored, &stored.result.tables, study.figures(&stored.result), draw.as_ref())?;
+    Ok(true)
+}
+
+/// True where the finished units of a study are of another version or plan: it has to begin anew.
+pub fn has_other_units(failure: &JobFailure) -> bool {
+    let results = match failure.downcast_ref() {
+        Some(StudyError::Results(results)) => Some(results),
+        _ => failure.downcast_ref(),
+    };
+    matches!(results, Some(ResultFileError::Other { .. }))
+}
+
+fn study_files(store: &Path) -> StudyFilesByKey {
+    let program = program();
+    PAPER_STUDIES.iter().map(|study| (study.card().key, files_of(store, *study, &program))).collect()
+}
+
+fn files_of(store: &Path, study: &dyn PaperStudy, program: &str) -> StudyFiles {
+    let key = study.card().key;
+    let mut files = StudyFiles::default();
+    for size in [StudySize::Full, StudySize::Quick, StudySize::Sample { objects: 0, trials: 0 }] {
+        let folder = size.folder(store);
+        match folder.read(key) {
+            Ok(Some(stored)) => files.results.push(shown(study, StudyOrigin::Run(size), stored, program)),
+            Ok(None) if folder.has_begun(key) => files.begun.push(size),
+            Ok(None) => {}
+            Err(cause) => files.unreadable.push(cause.to_string()),
+        }
+    }
+    match stored_report(study) {
+        Ok(Some(stored)) => files.results.push(shown(study, StudyOrigin::Shipped, stored, program)),
+        Ok(None) => {}
+        Err(cause) => files.unreadable.push(format!("the result that comes with the program: {cause}")),
+    }
+    files
+}
+
+/// A result with its figures.
+fn shown(
+    study: &dyn PaperStudy,
+    origin: StudyOrigin,
+    stored: StoredStudy<StudyReport>,
+    program: &str,
+) -> Arc<StudyResult> {
+    let is_current = |size| is_current(&stored.result, study, &StudyPlan::of_size(size));
+    let current = match origin {
+        // Samples are of many sizes.
+        StudyOrigin::Run(StudySize::Sample { .. }) => true,
+        StudyOrigin::Run(size) => is_current(size),
+        StudyOrigin::Shipped => is_current(StudySize::Full),
+    };
+    let (current, figures) = (current && stored.program == program, study.figures(&stored.result));
+    Arc::new(StudyResult { origin, stored, figures, current })
+}
+
+impl StudyOrigin {
+    /// Word on a button.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Run(StudySize::Full) => "full",
+            Self::Run(StudySize::Quick) => "quick",
+            Self::Run(StudySize::Sample { .. }) => "sample",
+            Self::Shipped => "shipped",
+        }
+    }
+
+    /// True for two results of the same kind.
+    pub fn is_like(self, other: Self) -> bool {
+        self.title() == other.title()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::watch::{settled, until, waker};
+    use super::*;
+
+    #[test]
+    fn a_study_is_stopped_continued_and_refused_where_it_is_another() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = folder.path().join("trials.sqlite");
+        let (wake, woken) = waker();
+        let draw: DrawFigure = Arc::new(|linked| Ok(linked.figure.title.clone()));
+        let looks = study_files_job(store.clone(), Arc::clone(&wake));
+        looks.start(());
+        assert_eq!(settled(&looks, &woken).expect("looked").expect("read").len(), PAPER_STUDIES.len());
+        let runner = study_runner(store.clone(), draw, wake);
+        let size = StudySize::Sample { objects: 4, trials: 6 };
+        let request = |anew| StudyRequest { key: "models".to_owned(), size, anew };
+        runner.start(request(false));
+        runner.start(request(false));
+        until(&woken, || runner.running().filter(|running| !running.progress.words.is_empty()));
+        runner.stop();
+        assert!(settled(&runner, &woken).expect("ended").is_ok_and(|end| !end.finished));
+        assert_eq!(runner.take().len(), 1, "the one that waited did not begin");
+        runner.start(request(false));
+        let end = settled(&runner, &woken).expect("ended").expect("runs");
+        let result = &end.files["models"].results[0];
+        assert!(end.finished && result.origin.is_like(StudyOrigin::Run(size)));
+        assert!(!result.figures.is_empty() && result.current);
+        let files = size.folder(&store);
+        for name in ["models.json", "models.jsonl", "models.csv", "models.svg"] {
+            assert!(files.path().join(name).is_file(), "{name}");
+        }
+        // Units of another plan are not continued, but can be forgotten.
+        let other = StudySize::Sample { objects: 3, trials: 6 };
+        runner.start(StudyRequest { size: other, ..request(false) });
+        let cause = settled(&runner, &woken).expect("ended").expect_err("another plan");
+        assert!(has_other_units(&cause), "{cause}");
+        runner.start(StudyRequest { key: "none".to_owned(), ..request(true) });
+        let cause = settled(&runner, &woken).expect("ended").expect_err("no such study");
+        assert_eq!(cause.to_string(), "there is no study \"none\"");
+    }
+}

@@ -1,0 +1,51 @@
+//! Studies: a grid of factors in; tables, figures and claims out. Without a window; command line and window run them.
+//!
+//! An [`Experiment`] names the cells of its grid, measures one, and reports on all. [`run_experiment`] measures cells in
+//! parallel, keeps what is finished, and resumes.
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | `frame` | what all studies have: grid, rows and columns, claims, figures, files |
+//! | 0 | `finger_fit` | the simulated finger, fitted to recorded grasps |
+//! | 0 | `network_cost`, `physics_cost` | CPU time of networks and of the physics, for `palpate bench` |
+//! | 0 | `shipped` | the shipped models in the manual |
+//! | 1 | `effects` | cost and influence of physical effects; an audit of the rules that switch them on |
+//! | 1 | [`stability`] | hard cases, holds that chatter, random scenes |
+//! | 1 | [`paper`] | the studies of the paper |
+//! | 2 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
+//! | 3 | `generated` | sections of manual and README, written from stored results |
+//! | 3 | [`jobs`] | background tasks of the window |
+
+pub mod accuracy;
+mod effects;
+mod finger_fit;
+mod frame;
+mod generated;
+pub mod jobs;
+mod network_cost;
+pub mod paper;
+mod physics_cost;
+mod shipped;
+pub mod stability;
+
+pub use effects::{
+    AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectChange, EffectSize, ExplainedEffect,
+    Explanation, SEEN, SceneNumber, explain_effects, stored_effects,
+};
+pub use finger_fit::{
+    Certainty, Estimate, FingerFit, FingerFitError, FingerMotion, FitWatch, MOST_STEPS, Observation,
+    RecordedGraspError, RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+};
+pub use frame::{
+    Agreement, Cell, ClaimNumber, Experiment, FigureLink, FigureMark, Finding, GeneratedSection, IntervalStrip,
+    LinkedFigure, Measuring, PERCENT, POINTS, ResultFile, ResultFileError, StoredStudy, StudyCell, StudyColumn,
+    StudyCommand, StudyError, StudyFolder, StudyOutcome, StudyProgress, StudyReport, StudyRow, StudyStep, StudyTable,
+    TrialNumbers, markdown_table, merged_units, program, run_experiment,
+};
+pub use generated::generated_sections;
+pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
+pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};

@@ -1,0 +1,191 @@
+//! Studies that cross factors: fits of methods to grasps read by sensors, pooled over parts into rows, and compared in pairs.
+
+use super::StudyPlan;
+use super::answers::{PARTS, Pool, TestAnswers};
+use crate::frame::{Column, Gains, PERCENT, StudyCell, TableRows, grouped, unique};
+use palpate_learn::metrics::{Interval, holm};
+use palpate_learn::{Method, method};
+use palpate_tactile::model::SensorModel;
+
+/// What a study varies beside sensors and methods.
+pub(super) trait Factor: Clone + PartialEq + Sync {
+    /// Name of a fit, for the names of results.
+    fn named(&self, sensors: &str, method: &str) -> String;
+}
+
+impl Factor for () {
+    fn named(&self, sensors: &str, method: &str) -> String {
+        format!("{sensors}, {method}")
+    }
+}
+
+/// Fits of one kind: grasps read by sensors, a method, and the factor of the study.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind<F> {
+    pub(super) sensors: SensorModel,
+    pub(super) method: &'static Method,
+    pub(super) factor: F,
+}
+
+impl<F: PartialEq> PartialEq for Kind<F> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.sensors, self.method.key, &self.factor) == (other.sensors, other.method.key, &other.factor)
+    }
+}
+
+impl<F> Kind<F> {
+    /// The same sensors and method with another factor.
+    pub(super) fn with<G>(&self, factor: G) -> Kind<G> {
+        Kind { sensors: self.sensors, method: self.method, factor }
+    }
+
+    /// Parts on which a study tests: the fits of networks on any but the first sensors take too long for more than one.
+    pub(super) fn usual_parts(&self, plan: &StudyPlan) -> usize {
+        let once = self.method.recipe.is_some() && plan.sensors.first() != Some(&self.sensors);
+        plan.pick(if once { 1 } else { PARTS }, 1, 1)
+    }
+
+    /// Fits on so many parts.
+    pub(super) fn fits(&self, parts: usize) -> Vec<Fit<F>>
+    where
+        F: Clone,
+    {
+        (0..parts).map(|part| Fit { kind: self.clone(), part }).collect()
+    }
+
+    /// Sensors and method.
+    pub(super) fn model(&self) -> String {
+        format!("{}, {}", self.sensors.name(), self.method.key)
+    }
+}
+
+/// A cell: a kind of fits, judged on one part of the grasps.
+pub(super) struct Fit<F> {
+    pub(super) kind: Kind<F>,
+    pub(super) part: usize,
+}
+
+impl<F: Factor> StudyCell for Fit<F> {
+    fn name(&self) -> String {
+        let Kind { sensors, method, factor } = &self.kind;
+        format!("{}, part {}", factor.named(sensors.name(), method.key), self.part + 1)
+    }
+
+    fn method(&self) -> Option<&'static Method> {
+        Some(self.kind.method)
+    }
+}
+
+/// Grid of the plan's sensors, the values of a factor and methods, each with as many parts as `parts` says.
+pub(super) fn crossed<F: Clone>(
+    plan: &StudyPlan,
+    factors: &[F],
+    methods: &[&str],
+    parts: impl Fn(&Kind<F>) -> usize,
+) -> Vec<Fit<F>> {
+    let mut cells = Vec::new();
+    for &sensors in &plan.sensors {
+        for factor in factors {
+            for method in methods.iter().filter_map(|key| method(key)) {
+                let kind = Kind { sensors, method, factor: factor.clone() };
+                cells.extend(kind.fits(parts(&kind)));
+            }
+        }
+    }
+    cells
+}
+
+/// Answers of one kind of fits, pooled over parts.
+pub(super) struct Row<F> {
+    pub(super) kind: Kind<F>,
+    pub(super) parts: Vec<TestAnswers>,
+    pub(super) pool: Pool,
+    pub(super) f1: Option<Interval>,
+    pub(super) accuracy: Option<Interval>,
+    /// Difference of macro F1 to the reference.
+    pub(super) gain: Option<Interval>,
+    /// p-value of that difference with Holm's correction.
+    pub(super) p: Option<f64>,
+}
+
+impl<F: 'static> Row<F> {
+    pub(super) const SENSORS: Column<'static, Self> = Column("sensors", "", &|row| row.kind.sensors.name().into());
+    pub(super) const MODEL: Column<'static, Self> = Column("model", "", &|row| row.kind.method.key.into());
+    pub(super) const F1: Column<'static, Self> = Column("F1", PERCENT, &|row| row.f1.into());
+    pub(super) const ACCURACY: Column<'static, Self> = Column("accuracy", PERCENT, &|row| row.accuracy.into());
+    pub(super) const HOLM: Column<'static, Self> = Column("p (Holm)", "", &|row| row.p.into());
+    pub(super) const TESTED: Column<'static, Self> = Column("tested", "grasps", &|row| row.pool.len().into());
+
+    /// Column of differences to the reference.
+    pub(super) const fn gain(name: &'static str) -> Column<'static, Self> {
+        Column(name, PERCENT, &|row| row.gain.into())
+    }
+
+    /// Table of rows with some misjudged trials behind each.
+    pub(super) fn table<'a>(name: &'a str, title: impl Into<String>, rows: &'a [Self]) -> TableRows<'a, Self> {
+        TableRows::new(name, title, rows).with_trials(&|row| row.pool.misjudged())
+    }
+}
+
+impl<F> Row<F> {
+    /// Row of a pool of decisions.
+    pub(super) fn of_pool(kind: Kind<F>, pool: Pool) -> Self {
+        let (f1, accuracy) = (pool.f1(), pool.accuracy());
+        Self { kind, parts: Vec::new(), pool, f1, accuracy, gain: None, p: None }
+    }
+}
+
+/// The answers of all kinds of fits, in the order in which the kinds first came.
+pub(super) fn pooled<F: PartialEq>(answers: impl IntoIterator<Item = (Kind<F>, TestAnswers)>) -> Vec<Row<F>> {
+    let row = |(kind, parts): (Kind<F>, Vec<TestAnswers>)| {
+        let pool = Pool::of(parts.iter().filter_map(TestAnswers::answers));
+        Row { parts, ..Row::of_pool(kind, pool) }
+    };
+    grouped(answers).into_iter().map(row).collect()
+}
+
+/// Descriptions of the data behind rows.
+pub(super) fn described<F>(rows: &[Row<F>]) -> Vec<String> {
+    let answers = rows.iter().flat_map(|row| &row.parts).filter_map(TestAnswers::answers);
+    unique(answers.map(|answers| answers.data.clone()))
+}
+
+/// Rows of the same sensors and method.
+pub(super) fn by_model<F>(rows: &[Row<F>]) -> Vec<Vec<&Row<F>>> {
+    let groups = grouped(rows.iter().map(|row| (row.kind.with(()), row)));
+    groups.into_iter().map(|(_, rows)| rows).collect()
+}
+
+/// Row of a kind.
+pub(super) fn find<'a, F: PartialEq>(rows: &'a [Row<F>], kind: &Kind<F>) -> Option<&'a Row<F>> {
+    rows.iter().find(|row| row.kind == *kind)
+}
+
+/// Sets the paired difference of each row to its reference, and its p-value with Holm's correction over all rows.
+pub(super) fn compare<F: PartialEq>(rows: &mut [Row<F>], reference: impl Fn(&Kind<F>) -> Option<Kind<F>>) {
+    let difference = |row: &Row<F>| {
+        let other = reference(&row.kind).filter(|other| *other != row.kind)?;
+        row.pool.against(&find(rows, &other)?.pool)
+    };
+    let differences: Vec<_> = rows.iter().map(difference).collect();
+    let mut corrected =
+        holm(&differences.iter().flatten().map(|difference| difference.p).collect::<Vec<_>>()).into_iter();
+    for (row, difference) in rows.iter_mut().zip(differences) {
+        (row.gain, row.p) = (difference.map(|own| own.f1), difference.and_then(|_| corrected.next()));
+    }
+}
+
+/// Gains of macro F1 of rows over others that `others` names, each with its group and its name.
+pub(super) fn gains_over<F: PartialEq>(
+    rows: &[Row<F>],
+    others: impl Fn(&Kind<F>) -> Vec<(String, String, Kind<F>)>,
+) -> Vec<(String, Gains)> {
+    let of_row = |row| {
+        let gain = move |(group, name, other): (String, String, Kind<F>)| {
+            let row: &Row<F> = row;
+            Some((group, (name, row.pool.against(&find(rows, &other)?.pool)?.f1)))
+        };
+        others(&row.kind).into_iter().filter_map(gain).collect::<Vec<_>>()
+    };
+    grouped(rows.iter().flat_map(of_row))
+}
