@@ -27,7 +27,6 @@
 //! | 2 | [`study`] | measurements and comparisons as functions |
 //! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
 //! | 4 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
-//! | 4 | [`exchange`] | trials as files of other programs: MCAP, NPZ, Parquet |
 //! | 5 | [`workers`] | threads for the window: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
@@ -52,7 +51,6 @@
 //!   threads.
 
 pub mod datasets;
-pub mod exchange;
 pub mod grasping;
 pub mod gripper;
 pub mod inspection;
