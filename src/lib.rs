@@ -13,11 +13,12 @@
 //! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | simulated frames or raw converter counts in, sensor channels (curvature, pressure, force) out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
 //! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files, comparison of methods | | 8750 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5350 |
-//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite; CSV in and out | `geometry` `sim` `tactile` | 5100 |
+//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite | `geometry` `sim` `tactile` | 3950 |
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14450 |
+//! | [`palpate-exchange`](palpate_exchange) | `src/exchange` | trials as files of other programs: CSV, MCAP, NPZ, Parquet | `geometry` `sim` `tactile` `learn` `store` `lab` | 2900 |
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 10650 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
-//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `study` `render` | 20100 |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` | 20100 |
 //! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `study` `render` | 1450 |
 //!
 //! # One path for every grasp
@@ -89,7 +90,7 @@
 //!
 //! | program | shows |
 //! |---|---|
-//! | `src/lab/examples/grasp_to_csv.rs` | a simulated grasp of an object, as a table |
+//! | `src/exchange/examples/grasp_to_csv.rs` | a simulated grasp of an object, as a table |
 //! | `src/lab/examples/recognise_trial.rs` | the answer of the shipped model to a stored trial |
 //! | `src/study/examples/own_study.rs` | a study of your own: a grid of grasps in parallel, kept, resumed, as a table |
 //! | `src/learn/examples/plain_candle.rs` | a network in plain candle, judged like the built-in recognisers |
@@ -121,9 +122,9 @@
 //! | a flag of recorded trials | `src/store/labels/flag.rs` and its rule in `src/lab/labelling/flags.rs` |
 //! | a filter or column of the trial library | `src/store/library/`, its option in `src/cli/trials/selection.rs` |
 //! | an edit of many trials | `src/store/labels/edit.rs` and `src/store/label_repository.rs` |
-//! | the CSV export of trials | `src/store/trial_export.rs` |
+//! | a column of CSV files of trials | `src/exchange/csv_files/` |
 //! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
-//! | another file format for exported trials (MCAP, NPZ, ..) | a file in `src/lab/exchange/` and a line in [`palpate_lab::exchange::FORMATS`] |
+//! | another file format for exported trials (MCAP, NPZ, ..) | a file in `src/exchange/` and a line in [`palpate_exchange::FORMATS`] |
 //! | a background task of the window | a function in `src/lab/workers/` or `src/study/jobs/` that returns a `Job`, and the feature that owns it |
 //! | a study | an `Experiment` in a file of `src/study/`, and its arguments in `src/cli/study/` |
 //! | a study of the paper | a file in `src/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |

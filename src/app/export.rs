@@ -1,8 +1,8 @@
 //! Files out of the window: figures, the 3-D view and trials, written beside the window.
 
+use palpate_exchange::{Exported, TrialExport, export_labelled, sound_ones, write_trials};
 use palpate_geometry::drawing::{DrawList, Figure};
 use palpate_geometry::palette::Theme;
-use palpate_lab::exchange::write_trials;
 use palpate_lab::inspection::OpenOptions;
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, figure_picture, figure_svg};
@@ -18,13 +18,15 @@ pub enum ExportRequest {
     Figure(Figure, Theme, [u32; 2]),
     /// The 3-D view, width and height in points: .png with two pixels per point.
     View3d(Box<DrawList>, [u32; 2]),
-    /// Trials of a store: the formats of [`palpate_lab::exchange::FORMATS`].
+    /// Sound trials of a store: the formats of [`palpate_exchange::FORMATS`]; as CSV into a new folder.
     Trials(PathBuf, Vec<TrialId>, OpenOptions),
+    /// All labelled trials of a store, into a new folder.
+    Labelled(PathBuf),
 }
 
 impl ExportRequest {
-    /// Writes it; the file appears whole or not at all. `stop` ends an export of trials.
-    pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<(), JobError> {
+    /// Writes it and says so; the file appears whole or not at all. `stop` ends an export of trials.
+    pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<String, JobError> {
         let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
         let is = |wanted: FileKind| kind == Some(wanted);
         let unknown = |known: &str| Err(format!("cannot write \"{}\": choose {known}", path.display()).into());
@@ -40,19 +42,52 @@ impl ExportRequest {
                 Picture::draw(&gpu, &mut renderer, list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
             Self::View3d(..) => return unknown("a .png file"),
-            Self::Trials(store, ids, options) => {
-                let store = Store::open(store)?;
-                write_trials(&store, ids, options, path, &mut |_, _| !stop.load(Ordering::Relaxed))?;
-                return Ok(());
-            }
+            Self::Trials(store, ids, options) => return write_sound(&Store::open(store)?, ids, options, path, stop),
+            Self::Labelled(store) => return write_labelled(&Store::open(store)?, path),
         };
         write_whole(path, kind.unwrap_or(FileKind::Png), &bytes)
-            .map_err(|cause| format!("cannot write \"{}\": {cause}", path.display()).into())
+            .map_err(|cause| format!("cannot write \"{}\": {cause}", path.display()))?;
+        Ok(format!("Saved as {}.", path.display()))
     }
 }
 
+fn write_sound(
+    store: &Store,
+    ids: &[TrialId],
+    options: &OpenOptions,
+    path: &Path,
+    stop: &AtomicBool,
+) -> Result<String, JobError> {
+    // A name without ending is that of a folder.
+    let path = if path.extension().is_none() { unused(path) } else { path.to_owned() };
+    let (sound, _unsound) = sound_ones(store, ids)?;
+    let export = TrialExport { store, ids: &sound, options, is_stopped: &|| stop.load(Ordering::Relaxed) };
+    let written = sound.len() - write_trials(&export, &path)?.left_out.len();
+    let unsound = match ids.len() - written {
+        0 => String::new(),
+        count => format!("; {count} unsound or damaged left out"),
+    };
+    Ok(format!("{written} of {} trials exported into {}{unsound}", ids.len(), path.display()))
+}
+
+fn write_labelled(store: &Store, path: &Path) -> Result<String, JobError> {
+    let Exported { folder, trials, derived, left_out } = export_labelled(store, &unused(path))?;
+    let missing = match left_out.first() {
+        Some((id, why)) => format!("; {} without signals, such as trial {id}: {why}", left_out.len()),
+        None => String::new(),
+    };
+    Ok(format!("{trials} labelled trials exported into {}, {derived} with signals{missing}", folder.display()))
+}
+
+/// A name that nothing has yet: export, export-2, export-3 ..
+fn unused(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let others = (2..=u32::MAX).map(|k| path.with_file_name(format!("{name}-{k}")));
+    std::iter::once(path.to_owned()).chain(others).find(|path| !path.exists()).unwrap_or_else(|| path.to_owned())
+}
+
 /// The job that writes files. One that is stopped leaves no file.
-pub(super) fn export_job(wake: Wake) -> Job<(PathBuf, ExportRequest), ()> {
+pub(super) fn export_job(wake: Wake) -> Job<(PathBuf, ExportRequest), String> {
     Job::new("export", Newer::Waits, wake, |(path, request): &(PathBuf, ExportRequest), run| {
         Ok(Some(request.write(path, run.stop())?))
     })
@@ -64,6 +99,20 @@ mod tests {
     use std::sync::Arc;
     use std::sync::mpsc::channel;
     use std::time::Duration;
+
+    #[test]
+    fn trials_are_written_into_a_new_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (store, out) = (folder.path().join("s.sqlite"), folder.path().join("export"));
+        std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/data/store.sqlite"), &store).expect("copies");
+        std::fs::create_dir(&out).expect("a folder of this name");
+        let request = ExportRequest::Trials(store, vec![1, 2, 4], OpenOptions::default());
+        let said = request.write(&out, &AtomicBool::new(false)).expect("writes");
+        assert!(said.starts_with("3 of 3 trials exported into") && said.ends_with("export-2"), "{said}");
+        for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
+            assert!(folder.path().join("export-2").join(name).is_file(), "{name}");
+        }
+    }
 
     #[test]
     fn a_figure_is_written_by_a_job_in_the_format_of_its_file() {

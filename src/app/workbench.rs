@@ -114,7 +114,7 @@ impl Workbench {
         // Before the other threads, so that it opens the store first and can report what an update did to the file.
         let labels =
             LabelWorker::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the labelling thread"))?;
-        let labelling = LabellingFeature::new(labels, store.clone());
+        let labelling = LabellingFeature::new(labels);
         let library =
             LibraryWorker::start(store.clone(), Arc::clone(&wake)).map_err(ThreadError::of("the trial library"))?;
         let worker = SimWorker::start(SimWorkerSetup {

@@ -5,7 +5,8 @@ mod manage;
 mod zero;
 
 use super::prelude::*;
-use palpate_store::{CalibrationId, StoredCalibration, read_points_csv};
+use palpate_exchange::read_points_csv;
+use palpate_store::{CalibrationId, StoredCalibration};
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::calibration::{Calibration, Input, Record, SensorKind};
 

@@ -2,14 +2,15 @@
 
 use super::prelude::*;
 use super::setup::RecomputeArguments;
+use palpate_exchange::{contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{ErrorNorms, GraspSummary, error_band, grasp_soundly};
 use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
+use palpate_store::Stored;
 use palpate_store::labels::class_name;
-use palpate_store::{Stored, contacts_path, write_contacts_csv, write_trial_csv};
 use palpate_tactile::{Sensors, SignalDefinition};
 
 /// Arguments of `palpate grasp`.

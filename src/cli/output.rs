@@ -2,7 +2,7 @@
 
 use super::Failure;
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use palpate_lab::exchange::FORMATS;
+use palpate_exchange::FORMATS;
 use palpate_store::{FileKind, check_target, write_whole};
 use std::path::{Path, PathBuf};
 
@@ -28,9 +28,9 @@ pub(super) fn file_or_folder(kinds: &'static [FileKind]) -> impl TypedValueParse
 
 /// Parser of the name of a file or folder for trials.
 pub(super) fn trials_target() -> impl TypedValueParser<Value = PathBuf> {
-    let kinds: Vec<FileKind> = std::iter::once(FileKind::Csv).chain(FORMATS.iter().map(|format| format.kind)).collect();
+    let kinds: Vec<FileKind> = FORMATS.iter().map(|format| format.kind()).collect();
     PathBufValueParser::new().try_map(move |path| {
-        let is_parquet = FileKind::of(&path, &[FileKind::Parquet]).is_some();
+        let is_parquet = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
         let checked = checked(path, &kinds, true);
         let built = "this build writes no Parquet; build with --features parquet, or";
         checked.map_err(|why| if is_parquet { format!("{built} {}", why.trim_start_matches(UNKNOWN)) } else { why })
@@ -42,7 +42,11 @@ const UNKNOWN: &str = "no format has this ending; ";
 /// Refuses a name with an ending that none of the kinds has. A folder's name has none, unless the folder exists, or nothing but
 /// a folder can be meant: then only the ending of a known kind is refused.
 fn checked(path: PathBuf, kinds: &[FileKind], folder: bool) -> Result<PathBuf, String> {
-    let is_folder = || names_folder(&path) || (kinds.is_empty() && FileKind::of(&path, &FileKind::ALL).is_none());
+    let is_file = || {
+        let others = FORMATS.iter().map(|format| format.kind());
+        FileKind::of(&path, &FileKind::ALL.into_iter().chain(others).collect::<Vec<_>>()).is_some()
+    };
+    let is_folder = || names_folder(&path) || (kinds.is_empty() && !is_file());
     if FileKind::of(&path, kinds).is_some() || (folder && is_folder()) {
         return Ok(path);
     }

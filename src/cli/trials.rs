@@ -1,6 +1,5 @@
 //! `palpate trials`: manages the store of trials.
 
-mod exchange;
 mod labels;
 mod selection;
 mod show;
@@ -8,15 +7,14 @@ mod show;
 use super::output::trials_target;
 use super::prelude::*;
 use labels::LabelCommand;
-use palpate_lab::exchange::ExchangeFormat;
+use palpate_exchange::{CSV, TrialExport, format_of, read_trials};
+use palpate_lab::inspection::OpenOptions;
+use palpate_learn::{Model, Models};
 use palpate_store::labels::shown_title;
-use palpate_store::{
-    ExportError, Library, Shown, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow, export_trial,
-};
-use palpate_tactile::{SensorLayout, SignalDefinition};
+use palpate_store::{Library, Shown, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow};
 use selection::{Filters, Numbers, chosen};
-use std::collections::BTreeSet;
 use std::io::IsTerminal as _;
+use std::sync::Arc;
 
 /// Arguments of `palpate trials`.
 #[derive(Debug, clap::Args)]
@@ -164,10 +162,8 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Export { ids, filters, out, signals, unsound, model, .. } => {
             let ids = &chosen(&store, ids, filters, Shown::Kept)?;
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
-            if let Some(format) = ExchangeFormat::of(out) {
-                return exchange::export(&store, (&ids, format), (out, model.as_deref()), signals.view());
-            }
-            export(&store, &ids, out, (&signals.view().shown()?, signals.signals))
+            let options = OpenOptions { sensors: signals.view(), ..OpenOptions::default() };
+            export(&store, &ids, out, options, model.as_deref())
         }
         TrialsCommand::Import { files, label } => {
             for file in files {
@@ -224,7 +220,7 @@ fn numbers(ids: &[TrialId]) -> String {
 const NONE_YET: &str = "no trials yet: `palpate grasp lemon` records one";
 
 fn import(store: &mut Store, file: &Path, label: Option<&str>) -> Result<(), Failure> {
-    let import = exchange::read(file, label)?;
+    let import = read_trials(file, label)?;
     for warning in &import.warnings {
         warn(warning);
     }
@@ -315,12 +311,9 @@ fn remark(row: &TrialRow) -> String {
     remarks.join(", ")
 }
 
-/// Excludes unsound trials, whose flaws a CSV file would not show.
+/// Excludes unsound trials.
 fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
-    // A damaged trial gives its own reason where it is read.
-    let is_unsound = |row: &&TrialRow| !row.sound && !row.damaged;
-    let unsound: BTreeSet<TrialId> = store.list(false)?.iter().filter(is_unsound).map(|row| row.id).collect();
-    let (left_out, kept): (Vec<TrialId>, Vec<TrialId>) = ids.iter().partition(|id| unsound.contains(id));
+    let (kept, left_out) = palpate_exchange::sound_ones(store, ids)?;
     if left_out.is_empty() {
         return Ok(kept);
     }
@@ -339,19 +332,22 @@ fn export(
     store: &Store,
     ids: &[TrialId],
     out: &Path,
-    channels: (&SensorLayout, SignalDefinition),
+    mut options: OpenOptions,
+    model: Option<&Path>,
 ) -> Result<(), Failure> {
-    let as_file = FileKind::of(out, &[FileKind::Csv]).is_some();
-    if as_file && ids.len() > 1 {
-        return Err("several trials need a folder: --out FOLDER".into());
+    let format = format_of(out).unwrap_or(CSV);
+    if format.kind() != FileKind::Csv {
+        check_new(out, format.kind())?;
+        options.models = match model {
+            Some(path) => Models::all(&Arc::new(Model::load(path)?)),
+            None => Models::shipped()?,
+        };
     }
-    for id in ids {
-        match export_trial(store, *id, out, channels) {
-            Err(ExportError::Store(error)) if error.is_damage() && ids.len() > 1 => warn(&error.to_string()),
-            written => say(written?.display())?,
-        }
-    }
-    Ok(())
+    let stop = stop_flag()?;
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let written = format.write(&TrialExport { store, ids, options: &options, is_stopped: &is_stopped }, out)?;
+    written.left_out.iter().for_each(|(_, why)| warn(why));
+    written.files.iter().try_for_each(|file| say(file.display()))
 }
 
 #[cfg(test)]

@@ -26,7 +26,6 @@
 //! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
 //! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
 //! | 4 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
-//! | 4 | [`exchange`] | trials as files of other programs: MCAP, NPZ, Parquet |
 //! | 5 | [`workers`] | threads for the window: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
@@ -51,7 +50,6 @@
 //!   threads.
 
 pub mod datasets;
-pub mod exchange;
 pub mod grasping;
 pub mod gripper;
 pub mod inspection;

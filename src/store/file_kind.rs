@@ -19,25 +19,30 @@ pub enum FileKind {
     /// Animated GIF.
     Gif,
     Json,
-    Mcap,
     /// Recognition model of this program.
     Model,
-    /// Arrays of numpy.
-    Npz,
-    Parquet,
     /// PNG picture.
     Png,
     Scene,
     /// SVG figure.
     Svg,
+    /// Format of another program.
+    Other {
+        /// Name on screen.
+        title: &'static str,
+        /// Endings of its names, without the dot.
+        endings: &'static [&'static str],
+        /// First bytes.
+        begin: &'static [u8],
+    },
 }
 
 /// Bytes at the beginning of a file by which its kind is known.
 const HEAD: u64 = 4096;
 
 impl FileKind {
-    /// All kinds.
-    pub const ALL: [Self; 14] = [
+    /// All kinds but those of other programs.
+    pub const ALL: [Self; 11] = [
         Self::Apng,
         Self::BoardLines,
         Self::Capture,
@@ -45,10 +50,7 @@ impl FileKind {
         Self::Csv,
         Self::Gif,
         Self::Json,
-        Self::Mcap,
         Self::Model,
-        Self::Npz,
-        Self::Parquet,
         Self::Png,
         Self::Scene,
         Self::Svg,
@@ -63,13 +65,11 @@ impl FileKind {
             Self::Contacts | Self::Csv => &["csv"],
             Self::Gif => &["gif"],
             Self::Json => &["json"],
-            Self::Mcap => &["mcap"],
             Self::Model => &["safetensors"],
-            Self::Npz => &["npz"],
-            Self::Parquet => &["parquet"],
             Self::Png => &["png"],
             Self::Scene => &["toml"],
             Self::Svg => &["svg"],
+            Self::Other { endings, .. } => endings,
         }
     }
 
@@ -88,12 +88,10 @@ impl FileKind {
             Self::Csv => "CSV table",
             Self::Gif => "GIF picture",
             Self::Json => "JSON file",
-            Self::Mcap => "MCAP file",
             Self::Model => "model of Palpate",
-            Self::Npz => "NPZ archive",
-            Self::Parquet => "Parquet file",
             Self::Scene => "scene",
             Self::Svg => "SVG figure",
+            Self::Other { title, .. } => title,
         }
     }
 
@@ -110,12 +108,10 @@ impl FileKind {
                 Self::Csv => is_text && line().lines().next().is_some_and(|first| first.contains([',', ';', '\t'])),
                 Self::Gif => head.starts_with(b"GIF8"),
                 Self::Json => is_text && line().starts_with(['{', '[']),
-                Self::Mcap => head.starts_with(b"\x89MCAP0\r\n"),
                 Self::Model => head.get(8..).is_some_and(|rest| rest.starts_with(br#"{"__metadata__":{"palpate""#)),
-                Self::Npz => head.starts_with(b"PK"),
-                Self::Parquet => head.starts_with(b"PAR1"),
                 Self::Scene => is_text && line().lines().any(is_toml),
                 Self::Svg => is_text && line().starts_with('<') && line().contains("<svg"),
+                Self::Other { begin, .. } => head.starts_with(begin),
             }
     }
 }
@@ -188,6 +184,8 @@ fn head(path: &Path, length: u64) -> io::Result<Vec<u8>> {
 mod tests {
     use super::*;
 
+    const NPZ: FileKind = FileKind::Other { title: "NPZ archive", endings: &["npz"], begin: b"PK" };
+
     #[test]
     fn stores_and_what_belongs_to_them_are_never_a_target() -> Result<(), Box<dyn std::error::Error>> {
         let folder = tempfile::tempdir()?;
@@ -214,7 +212,7 @@ mod tests {
     fn each_kind_replaces_its_own_and_no_other() -> io::Result<()> {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("there");
-        let own: [(&[FileKind], &[u8]); 13] = [
+        let own: [(&[FileKind], &[u8]); 11] = [
             (&[FileKind::Apng, FileKind::Png], b"\x89PNG\r\n\x1a\n...."),
             (&[FileKind::BoardLines], b"# tactile-gripper fw=2 adc=12"),
             (&[FileKind::Capture], b"PPB1\0"),
@@ -222,17 +220,15 @@ mod tests {
             (&[FileKind::Csv], b"\xef\xbb\xbft_s;a\n0;1\n"),
             (&[FileKind::Gif], b"GIF89a"),
             (&[FileKind::Json], b"\n [{}]"),
-            (&[FileKind::Mcap], b"\x89MCAP0\r\n"),
             (&[FileKind::Model], b"\x40\0\0\0\0\0\0\0{\"__metadata__\":{\"palpate\":\"{}\"}}"),
-            (&[FileKind::Npz], b"PK\x03\x04"),
-            (&[FileKind::Parquet], b"PAR1"),
+            (&[NPZ], b"PK\x03\x04"),
             (&[FileKind::Scene], b"# mine\n[object]\nsource = \"lemon\"\n"),
             (&[FileKind::Svg], b"<?xml version=\"1.0\"?>\n<svg/>"),
         ];
         let foreign: [&[u8]; 3] = [b"dear diary", b"\x40\0\0\0\0\0\0\0{\"a\":{\"dtype\":\"F32\"}}", b"\x7fELF\x02\0,,"];
         for (kinds, bytes) in own.into_iter().chain(foreign.map(|bytes| (&[][..], bytes))) {
             std::fs::write(&path, bytes)?;
-            for kind in FileKind::ALL {
+            for kind in FileKind::ALL.into_iter().chain([NPZ]) {
                 let outcome = check_target(&path, kind);
                 assert_eq!(outcome.is_ok(), kinds.contains(&kind), "{kind:?} over {bytes:?}: {outcome:?}");
             }

@@ -8,12 +8,26 @@
 //! ```
 
 use super::chunks::all_there;
-use super::csv_import::ImportedTrial;
 use super::store::Store;
 use super::store_error::{StoreError, fault, row_fault};
 use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{OptionalExtension, params};
+
+/// One recorded grasp from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedTrial {
+    /// Name in the file.
+    pub name: String,
+    /// Label in the file.
+    pub label: String,
+    /// Size of the object, where the file states it for the label: `tiny` or `large`.
+    pub size: Option<String>,
+    /// Shape of the object, where the file states it for the label: `cubic`, `cylindrical` or `spherical`.
+    pub shape: Option<String>,
+    /// Readings: at least two samples, all finite, times as in the file or even from its first one on.
+    pub signals: Signals,
+}
 
 const MAGIC: &[u8; 4] = b"PPS1";
 const HEADER: usize = 12;

@@ -1,4 +1,4 @@
-//! Trials on disk: an SQLite store that survives kills and that several programs can share; CSV import and export.
+//! Trials on disk: an SQLite store that survives kills and that several programs can share.
 //!
 //! # Terms
 //!
@@ -16,7 +16,6 @@
 //! | 0 | [`labels`] | class names, flags, plan, labelled trials, sparklines: plain values |
 //! | 0 | `file_kind` | kinds of files, and what each may replace |
 //! | 1 | `new_file` | the one way to write a file or folder that a person names |
-//! | 2 | `csv_export`, `csv_import`, `points_csv` | trials and calibration points as CSV |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
 //! | 2 | `schema`, `free_space`, `open_file` | tables; free space on the disk; whether the open file is still there |
@@ -24,12 +23,11 @@
 //! | 4 | `chunks` | chunks of a trial, checked |
 //! | 4 | `trial_rows` | the list of trials |
 //! | 4 | `calibrations`, `journal`, `merge` | calibrations, undoable changes, merging of stores |
-//! | 5 | `board_trials`, `imported_trials` | trials of a board and of CSV files |
+//! | 5 | `board_trials`, `imported_trials` | trials of a board and of imported files |
 //! | 5 | `library` | search, filters and order of all trials ([`Library`]) |
 //! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
-//! | 5 | `board_export`, `board_signals` | counts of a board trial as CSV; its signals by the calibrations |
-//! | 6 | `labelled_trials`, `labelled_export` | lists of trials with labels; export for training |
-//! | 7 | `trial_export` | export of any trial |
+//! | 5 | `board_signals` | signals of a board trial by the calibrations |
+//! | 6 | `labelled_trials` | lists of trials with labels |
 //!
 //! # Example
 //!
@@ -44,14 +42,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod board_export;
 mod board_signals;
 mod board_trials;
 mod calibrations;
 mod checksum;
 mod chunks;
-mod csv_export;
-mod csv_import;
 #[cfg(test)]
 mod damage_tests;
 mod demo_log;
@@ -70,7 +65,6 @@ mod journal_tests;
 #[cfg(test)]
 mod kept_store_tests;
 mod label_repository;
-mod labelled_export;
 mod labelled_trials;
 pub mod labels;
 mod library;
@@ -79,7 +73,6 @@ mod library_tests;
 mod merge;
 mod new_file;
 mod open_file;
-mod points_csv;
 mod reading_blob;
 mod schema;
 mod store;
@@ -89,31 +82,25 @@ mod store_tests;
 mod tares;
 #[cfg(test)]
 mod test_trials;
-mod trial_export;
 mod trial_rows;
 
-pub use board_export::write_board_csv;
 pub use board_signals::BoardSignals;
 pub use board_trials::{BoardChunk, BoardInfo};
 pub use calibrations::{CalibrationId, CalibrationRepository, Serving, StoredCalibration};
-pub use csv_export::{contacts_path, write_contacts_csv, write_signals_csv, write_trial_csv};
-pub use csv_import::{Import, ImportError, ImportedTrial, read_trials, read_trials_csv};
 pub use demo_log::{DEMO_LOG_TRIALS, TrialPlace};
 pub use file_kind::{FileKind, check_target};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use identity::Stored;
+pub use imported_trials::ImportedTrial;
 pub use journal::{Change, JournalEntry, JournalRepository};
 pub use label_repository::{LabelRepository, LabelRevision};
-pub use labelled_export::{Exported, export_board_trial, export_labelled, file_name_of};
 pub use library::{
     Counted, Day, Library, LibraryCounts, LibraryTrial, Shown, TrialColumn, TrialOrder, TrialQuality, TrialQuery,
 };
 pub use merge::Merged;
 pub use new_file::{NewFile, NewFolder, write_whole};
-pub use points_csv::{PointsError, read_points_csv};
 pub use store::Store;
-pub use store_error::{ExportError, StoreError};
+pub use store_error::StoreError;
 pub use tares::{PartTare, StoredTare};
-pub use trial_export::export_trial;
 pub use trial_rows::TrialRow;

@@ -1,7 +1,6 @@
 //! Errors of the store, as sentences for the user.
 
 use crate::labels::LabelError;
-use palpate_tactile::LayoutError;
 use palpate_tactile::trial::TrialId;
 use rusqlite::ErrorCode;
 use std::fmt::Display;
@@ -59,7 +58,7 @@ impl StoreError {
     }
 
     /// A trial whose row does not match its checksum.
-    pub(super) fn altered(id: TrialId) -> Self {
+    pub fn altered(id: TrialId) -> Self {
         Self::bad_info(id, "it does not match its checksum")
     }
 
@@ -89,24 +88,6 @@ impl StoreError {
     /// True where one trial is damaged and others are not affected.
     pub fn is_damage(&self) -> bool {
         matches!(self, Self::Damaged { .. })
-    }
-}
-
-/// Error of an export.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    #[error("{0}")]
-    Refused(String),
-}
-
-impl ExportError {
-    /// A file or folder that cannot be written.
-    pub(super) fn cannot_write(path: &Path, cause: &dyn Display) -> Self {
-        Self::Refused(format!("cannot write \"{}\": {cause}", path.display()))
     }
 }
 

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Folders of packages below `src`. The root package has the rest of `src`.
-const PACKAGES: [&str; 10] =
-    ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "study", "render", "workshop"];
+const PACKAGES: [&str; 11] =
+    ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "exchange", "study", "render", "workshop"];
 
 /// Where each third-party crate may be named.
 const HOMES: &[(&str, &[&str])] = &[
@@ -32,11 +32,11 @@ const HOMES: &[(&str, &[&str])] = &[
         &[
             "src/geometry/grid_file.rs",
             "src/store/checksum.rs",
-            "src/lab/exchange/mcap",
+            "src/exchange/mcap",
             "src/lab/inspection/figures.rs",
         ],
     ),
-    ("csv", &["src/store"]),
+    ("csv", &["src/exchange/csv_files"]),
     ("ctrlc", &["src/cli/interrupt.rs"]),
     ("directories", &["src/sim/objects/assemble.rs", "src/store/store.rs"]),
     ("eframe", &["src/app"]),
@@ -53,9 +53,9 @@ const HOMES: &[(&str, &[&str])] = &[
     ("include_dir", &["src/sim/objects"]),
     ("indicatif", &["src/cli"]),
     ("libloading", &["src/app/startup.rs"]),
-    ("lz4_flex", &["src/lab/exchange/mcap"]),
+    ("lz4_flex", &["src/exchange/mcap"]),
     ("matrixmultiply", &["src/learn/network/gemm.rs"]),
-    ("parquet", &["src/lab/exchange"]),
+    ("parquet", &["src/exchange"]),
     ("parry3d", &["src/geometry"]),
     ("plotters", &["src/render/figure"]),
     ("png", &["src/render/movie.rs"]),
@@ -76,7 +76,7 @@ const HOMES: &[(&str, &[&str])] = &[
         ],
     ),
     ("rusqlite", &["src/store"]),
-    ("ruzstd", &["src/lab/exchange/mcap/reader.rs"]),
+    ("ruzstd", &["src/exchange/mcap/reader.rs"]),
     ("safetensors", &["src/learn/tensor_file.rs"]),
     ("serde", &["src"]),
     ("serde_json", &["src"]),
@@ -92,7 +92,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("wgpu", &["src/render", "src/app"]),
     ("wide", &["src/sim/physics/hessian.rs"]),
     ("winit", &["src/app/startup.rs"]),
-    ("zip", &["src/lab/exchange/npz.rs"]),
+    ("zip", &["src/exchange/npz.rs"]),
 ];
 
 /// Where random numbers are drawn, always from a seed.

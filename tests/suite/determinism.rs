@@ -2,10 +2,11 @@
 //! dates are what differs between two trials, and are left out.
 
 use crate::program::palpate;
+use palpate_exchange::{write_contacts_csv, write_trial_csv};
 use palpate_lab::grasping::grasp;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
-use palpate_store::{Store, encode_frames, write_contacts_csv, write_trial_csv};
+use palpate_store::{Store, encode_frames};
 use palpate_tactile::trial::{SimulatedData, SimulatedTrial};
 use palpate_tactile::{SensorLayout, Sensors, SignalDefinition};
 use std::path::Path;

@@ -4,10 +4,11 @@
 use crate::calibration::{calibrated, model_of_contact, model_of_pads, parts, readings, scenes, stored};
 use crate::program::{json, refused, run};
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
+use palpate_exchange::export_labelled;
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
-use palpate_store::{Store, export_labelled};
+use palpate_store::Store;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use std::path::Path;
 

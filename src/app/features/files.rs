@@ -3,7 +3,7 @@
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
 use palpate_geometry::palette::Theme;
-use palpate_lab::inspection::{FigureOptions, OpenTrial, comparison_figure};
+use palpate_lab::inspection::{FigureOptions, OpenOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
 use palpate_sim::scene::Scene;
 use palpate_store::{FileKind, write_whole};
@@ -37,12 +37,14 @@ pub(in crate::app) struct FileFeature {
     pub(in crate::app) question: Option<Question>,
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
-    exports: Job<(PathBuf, ExportRequest), ()>,
+    exports: Job<(PathBuf, ExportRequest), String>,
+    /// All labelled trials are exported as soon as the store has their labels.
+    labelled: bool,
 }
 
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake) -> Self {
-        Self { question: None, folder: None, exports: export_job(wake) }
+        Self { question: None, folder: None, exports: export_job(wake), labelled: false }
     }
 
     /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
@@ -66,7 +68,7 @@ impl FileFeature {
         let (title, extensions) = match request {
             ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
-            ExportRequest::Trials(..) => ("Export trials", &["mcap", "npz"][..]),
+            ExportRequest::Trials(..) | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
         };
         let name = Some(format!("palpate.{}", extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
@@ -88,9 +90,13 @@ impl App {
     pub(super) fn poll_files(&mut self) {
         for ended in self.files.exports.take() {
             match ended.outcome {
-                Ok(_written) => self.notices.info(format!("Saved as {}.", ended.command.0.display())),
+                Ok(said) => self.notices.info(said.as_str()),
                 Err(cause) => self.notices.error(cause.to_string()),
             }
+        }
+        if self.files.labelled && self.labelling.is_settled() {
+            self.files.labelled = false;
+            self.files.exports.start((self.export_folder(), ExportRequest::Labelled(self.store.clone())));
         }
         for file in self.ctx.input(|i| i.raw.dropped_files.clone()) {
             self.open(&file.path().to_string_lossy());
@@ -147,6 +153,21 @@ impl App {
             return self.notices.warning("Select trials in the library first.");
         }
         self.files.export(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options.clone()));
+    }
+
+    /// Exports the trials selected in the library as CSV, into a folder beside the store.
+    pub(in crate::app) fn export_tables(&mut self) {
+        let request = ExportRequest::Trials(self.store.clone(), self.library.selection.ids(), OpenOptions::default());
+        self.files.exports.start((self.export_folder(), request));
+    }
+
+    /// Exports all labelled trials into a folder beside the store.
+    pub(in crate::app) fn export_labelled(&mut self) {
+        self.files.labelled = true;
+    }
+
+    fn export_folder(&self) -> PathBuf {
+        self.store.with_file_name("export")
     }
 }
 

@@ -7,7 +7,6 @@ use palpate_lab::workers::{
     SessionContext, TrialInSight,
 };
 use palpate_tactile::trial::TrialId;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// State of labelling in the window.
@@ -23,14 +22,19 @@ pub(in crate::app) struct LabellingFeature {
 }
 
 impl LabellingFeature {
-    pub(in crate::app) fn new(worker: LabelWorker, store: PathBuf) -> Self {
+    pub(in crate::app) fn new(worker: LabelWorker) -> Self {
         worker.send(LabelCommand::Refresh);
-        Self { worker, labels: None, session: LabellingSession::new(store), blind: false, shown: None }
+        Self { worker, labels: None, session: LabellingSession::default(), blind: false, shown: None }
     }
 
     /// Reads the store again.
     pub(super) fn refresh(&self) {
         self.worker.send(LabelCommand::Refresh);
+    }
+
+    /// True when the store has all labels that were given.
+    pub(super) fn is_settled(&self) -> bool {
+        self.worker.is_settled()
     }
 }
 

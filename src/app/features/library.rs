@@ -149,11 +149,6 @@ impl LibraryFeature {
         self.edit_one(id, TrialEdit::Keep);
         self.kept = Some(id);
     }
-
-    /// Exports the selected trials as CSV, into a folder beside the store.
-    pub(in crate::app) fn export(&self) {
-        self.worker.send(LibraryCommand::Export(self.selection.ids()));
-    }
 }
 
 impl App {

@@ -33,7 +33,7 @@ const KEYS: &[Act] = &[
     }),
     key(NONE, Key::M, "actuation: manual, board or untimed", App::next_control),
     key(NONE, Key::W, "detect trials automatically", App::toggle_watch),
-    key(COMMAND, Key::E, "export all labelled trials", |app| app.label(LabellingAction::Export)),
+    key(COMMAND, Key::E, "export all labelled trials", App::export_labelled),
     key(COMMAND, Key::T, "train on all labelled trials", App::train_and_use),
     key(NONE, Key::Slash, "find an object", |app| app.label(LabellingAction::FocusSearch(String::new()))),
     key(NONE, Key::Num1, "choose the first object; 2 to 9: the others", |app| choose(app, 0)),

@@ -3,9 +3,10 @@
 use super::super::output::names_folder;
 use super::super::prelude::*;
 use super::selection::{Filters, Numbers, chosen};
+use palpate_exchange::export_labelled;
 use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::{TrialEdit, class_name, compared};
-use palpate_store::{JournalEntry, Shown, export_labelled};
+use palpate_store::{JournalEntry, Shown};
 use std::collections::BTreeMap;
 
 /// Subcommands that change or show labels.

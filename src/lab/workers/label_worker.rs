@@ -7,9 +7,9 @@ use super::own_store::OwnStore;
 use super::worker::Worker;
 use crate::labelling::{Disagreement, disagreements};
 use palpate_store::labels::{LabelError, LabelPlan, LabelledTrial, NextTrial, Progress};
-use palpate_store::{ExportError, Exported, JournalEntry, LabelRevision, Store, StoreError, export_labelled};
+use palpate_store::{JournalEntry, LabelRevision, Store, StoreError};
 use palpate_tactile::trial::TrialId;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Command to the label worker.
@@ -37,8 +37,6 @@ pub enum LabelCommand {
     Want(String, u32),
     /// Remove an object from the plan; its trials stay.
     Unplan(String),
-    /// Write all labelled trials into a folder that does not exist or is empty.
-    Export(PathBuf),
 }
 
 /// Contents of the store, for display.
@@ -136,7 +134,6 @@ impl LabelService {
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
-            LabelCommand::Export(folder) => return Ok(Some(exported(store, folder)?)),
         };
         Ok(done?)
     }
@@ -153,15 +150,6 @@ impl LabelService {
         self.seen = Some(seen);
         Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal })
     }
-}
-
-fn exported(store: &Store, folder: &Path) -> Result<String, ExportError> {
-    let Exported { folder, trials, derived, left_out } = export_labelled(store, folder)?;
-    let missing = match left_out.first() {
-        Some((id, why)) => format!("; {} without signals, such as trial {id}: {why}", left_out.len()),
-        None => String::new(),
-    };
-    Ok(format!("{trials} labelled trials exported into {}, {derived} with signals{missing}", folder.display()))
 }
 
 fn change_plan(

@@ -15,7 +15,6 @@ use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::LabelledTrial;
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
-use std::path::{Path, PathBuf};
 
 /// State that a session decides by.
 #[derive(Clone, Copy)]
@@ -65,8 +64,6 @@ pub enum LabellingAction {
     ToggleUnsure,
     /// Hide or show the model's prediction until the label is given.
     ToggleBlind,
-    /// Export all labelled trials into a new folder beside the store.
-    Export,
     /// Change labels or plan.
     Edit(LabelCommand),
 }
@@ -234,7 +231,6 @@ impl LabelDraft {
 /// A labelling session.
 #[derive(Clone, Debug, Default)]
 pub struct LabellingSession {
-    store: PathBuf,
     draft: LabelDraft,
     /// A trial was running at the last look.
     recording: bool,
@@ -247,11 +243,6 @@ pub struct LabellingSession {
 }
 
 impl LabellingSession {
-    /// A session on the store at `store`.
-    pub fn new(store: PathBuf) -> Self {
-        Self { store, ..Self::default() }
-    }
-
     /// Label that is being chosen.
     pub fn draft(&self) -> &LabelDraft {
         &self.draft
@@ -339,9 +330,6 @@ impl LabellingSession {
                 let state = if now.blind { "shown" } else { "hidden until the label is given" };
                 effects.push(LabellingEffect::SetBlind(!now.blind));
                 effects.push(LabellingEffect::Inform(format!("Model prediction: {state}.")));
-            }
-            LabellingAction::Export => {
-                effects.push(LabellingEffect::Edit(LabelCommand::Export(new_export_folder(&self.store))));
             }
             LabellingAction::Edit(command) => effects.push(LabellingEffect::Edit(command)),
         }
@@ -475,14 +463,6 @@ impl LabellingSession {
 /// Splits tags at commas.
 pub fn parse_tags(text: &str) -> Vec<String> {
     text.split(',').map(|tag| tag.trim().to_owned()).filter(|tag| !tag.is_empty()).collect()
-}
-
-/// A folder beside the store that does not exist yet: export, export-2, export-3 ..
-pub(super) fn new_export_folder(store: &Path) -> PathBuf {
-    let beside = store.parent().unwrap_or(Path::new(""));
-    let name = |k: u32| if k == 1 { "export".to_owned() } else { format!("export-{k}") };
-    let free = (1..=u32::MAX).map(|k| beside.join(name(k))).find(|folder| !folder.exists());
-    free.unwrap_or_else(|| beside.join("export"))
 }
 
 #[cfg(test)]

@@ -1,19 +1,15 @@
-//! Library worker: a thread "library" that reads all trials, finds those that match a query, edits and exports them. It
+//! Library worker: a thread "library" that reads all trials, finds those that match a query, edits them. It
 //! notices what other threads and programs change. The window never waits for the disk.
 
 use super::job::JobError;
 use super::label_worker::GLANCE;
-use super::labelling_session::new_export_folder;
 use super::messages::{Notice, Wake};
 use super::own_store::OwnStore;
 use super::worker::Worker;
 use crate::labelling::stored_sparkline;
 use palpate_store::labels::{Sparkline, TrialEdit};
-use palpate_store::{
-    ExportError, Library, LibraryCounts, LibraryTrial, Store, StoreError, TrialQuality, TrialQuery, export_trial,
-};
+use palpate_store::{Library, LibraryCounts, LibraryTrial, Store, StoreError, TrialQuery};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{SensorLayout, SignalDefinition};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,8 +24,6 @@ pub enum LibraryCommand {
     Draw(Vec<TrialId>),
     /// Change trials; one undo takes it back.
     Edit(Vec<TrialId>, TrialEdit),
-    /// Export trials into a new folder beside the store, without unsound ones.
-    Export(Vec<TrialId>),
 }
 
 /// Trials that were found, for display.
@@ -55,8 +49,6 @@ const PORTION: usize = 2000;
 const SPARKLINES: usize = 2000;
 /// Sparklines made between two pictures of the window.
 const AT_ONCE: usize = 4;
-/// Channels of exported simulated trials, as on the command line.
-const EXPORT_LAYOUT: &str = "C1";
 
 /// Handle of the thread.
 pub type LibraryWorker = Worker<LibraryCommand, LibraryView>;
@@ -69,9 +61,8 @@ impl LibraryWorker {
             let (mut patience, mut trouble) = (None, None);
             while let Ok(command) = inbox.next(patience) {
                 let (told, mut notices) = (command.is_some(), Vec::new());
-                let is_ending = || publisher.is_ending();
                 let opened = store.open().map_err(JobError::from);
-                let worked = opened.and_then(|store| service.work(store, command, &mut notices, &is_ending));
+                let worked = opened.and_then(|store| service.work(store, command, &mut notices));
                 let cause = worked.as_ref().err().map(ToString::to_string);
                 // Trouble that lasts is reported once.
                 let is_new = cause.is_some() && (told || cause != trouble);
@@ -112,7 +103,6 @@ impl LibraryService {
         store: &Store,
         command: Option<LibraryCommand>,
         notices: &mut Vec<Notice>,
-        is_ending: &dyn Fn() -> bool,
     ) -> Result<bool, JobError> {
         match command {
             Some(LibraryCommand::Find(query)) => {
@@ -132,10 +122,6 @@ impl LibraryService {
                 }
                 let undo = if edit == TrialEdit::Discard { "; Ctrl+Z brings them back" } else { "" };
                 let done = format!("{}{undo}", edited?.sentence(&edit));
-                notices.push(Notice::Info(done));
-            }
-            Some(LibraryCommand::Export(ids)) => {
-                let done = self.exported(store, &ids, is_ending)?;
                 notices.push(Notice::Info(done));
             }
             None => {
@@ -190,29 +176,6 @@ impl LibraryService {
         made.extend(next.into_iter().map(|id| (id, stored_sparkline(store, id).unwrap_or_default())));
         self.view.sparklines = Arc::new(made);
         true
-    }
-
-    fn exported(&self, store: &Store, ids: &[TrialId], is_ending: &dyn Fn() -> bool) -> Result<String, ExportError> {
-        let signals = SignalDefinition::Parts;
-        let layout = SensorLayout::named(EXPORT_LAYOUT)?.shown(signals);
-        let folder = new_export_folder(store.path());
-        let is_sound = |id: &&TrialId| self.library.trial(**id).is_none_or(|t| t.quality() < TrialQuality::Unsound);
-        let sound: Vec<TrialId> = ids.iter().filter(is_sound).copied().collect();
-        let (mut written, mut damaged) = (0, 0);
-        for id in &sound {
-            if is_ending() {
-                break;
-            }
-            match export_trial(store, *id, &folder, (&layout, signals)) {
-                Err(ExportError::Store(error)) if error.is_damage() && ids.len() > 1 => damaged += 1,
-                outcome => written += outcome.map(|_path| 1)?,
-            }
-        }
-        let unsound = match ids.len() - sound.len() + damaged {
-            0 => String::new(),
-            count => format!("; {count} unsound or damaged left out"),
-        };
-        Ok(format!("{written} of {} trials exported into {}{unsound}", ids.len(), folder.display()))
     }
 }
 
@@ -294,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn sparklines_and_files_are_made_on_request() {
+    fn sparklines_are_made_on_request() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.sqlite");
         let kept = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/suite/data/store.sqlite");
@@ -307,10 +270,5 @@ mod tests {
         let view = shown(&library, &woken, |view| view.sparklines.len() == 99);
         let drawn = |id: TrialId| view.sparklines[&id].iter().all(|finger| finger.iter().any(Option::is_some));
         assert_eq!((1..=99).filter(|id| drawn(*id)).collect::<Vec<_>>(), [1, 2, 4, 5]);
-        library.send(LibraryCommand::Export(vec![1, 2, 4]));
-        assert!(matches!(told(&library, &woken), Notice::Info(text) if text.starts_with("3 of 3 trials exported")));
-        for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
-            assert!(folder.path().join("export").join(name).is_file(), "{name}");
-        }
     }
 }

@@ -142,11 +142,6 @@ impl<V> Publisher<V> {
     pub(super) fn set_detached(&self, detached: bool) {
         self.shared.detached.store(detached, Ordering::Relaxed);
     }
-
-    /// True once the window closes.
-    pub(super) fn is_ending(&self) -> bool {
-        self.shared.ending.load(Ordering::Relaxed)
-    }
 }
 
 impl<C: Send + 'static, V: Send + Sync + 'static> Worker<C, V> {

@@ -62,7 +62,7 @@ fn edits_ui(
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
         if ui.button("CSV into a folder beside the store").clicked() {
-            actions.push(|app| app.library.export());
+            actions.push(App::export_tables);
             ui.close();
         }
         if ui.button("MCAP or NPZ file ..").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {

@@ -5,14 +5,14 @@
 //! world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave their planes the
 //! sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
 
-use super::file_kind::FileKind;
-use super::new_file::NewFile;
-use super::store_error::ExportError;
+use super::writing::{number, write_file};
+use crate::format::ExchangeError;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, Sway};
 use palpate_sim::scene::Scene;
+use palpate_store::FileKind;
+use palpate_tactile::Sensors;
 use palpate_tactile::trial::SimulatedTrial;
-use palpate_tactile::{Sensors, Signals};
 use std::path::{Path, PathBuf};
 
 /// Path of the file with the contacts, beside a trial's file: `trial.csv` has `trial.contacts.csv`.
@@ -26,7 +26,7 @@ pub fn write_trial_csv(
     trial: &SimulatedTrial,
     scene: &Scene,
     sensors: &Sensors,
-) -> Result<(), ExportError> {
+) -> Result<(), ExchangeError> {
     write_file(path, FileKind::Csv, |out| {
         let sway = trial.frames().iter().any(|frame| frame.sways != [Sway::NONE; 2]);
         out.write_record(header(scene, sensors, trial, sway))?;
@@ -37,22 +37,10 @@ pub fn write_trial_csv(
     })
 }
 
-/// Writes an imported trial: time, then its channels unchanged.
-pub fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), ExportError> {
-    write_file(path, FileKind::Csv, |out| {
-        out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
-        for (sample, t) in signals.t_s.iter().enumerate() {
-            let values = signals.row(sample).iter().map(ToString::to_string);
-            out.write_record(std::iter::once(number(*t)).chain(values))?;
-        }
-        Ok(())
-    })
-}
-
 /// Writes one row per loaded taxel and sample: its position in the world and the force on it.
 ///
 /// Positions are those of the undeformed skin, which is indented by at most the pad's thickness.
-pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), ExportError> {
+pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), ExchangeError> {
     let header = [
         "t_s",
         "finger",
@@ -85,28 +73,6 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
         }
         Ok(())
     })
-}
-
-/// Writes a file that appears whole or not at all, and its folder where there is none.
-pub(super) fn write_file(
-    path: &Path,
-    kind: FileKind,
-    fill: impl FnOnce(&mut csv::Writer<NewFile>) -> csv::Result<()>,
-) -> Result<(), ExportError> {
-    let write = || -> std::io::Result<()> {
-        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder)?;
-        }
-        let mut out = csv::Writer::from_writer(NewFile::create(path, kind)?);
-        fill(&mut out)?;
-        out.into_inner().map_err(|e| std::io::Error::other(e.to_string()))?.finish()
-    };
-    write().map_err(|cause| ExportError::cannot_write(path, &cause))
-}
-
-/// Shortest text that reads back as the same number.
-pub(super) fn number(x: f64) -> String {
-    x.to_string()
 }
 
 /// `sway` adds the shapes of fingers that leave their planes.
@@ -156,8 +122,8 @@ fn row(frame: &Frame, trial: &SimulatedTrial, (scene, sensors): (&Scene, &Sensor
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_trials::grasp;
     use palpate_geometry::Primitive;
+    use palpate_lab::grasping::grasp;
     use palpate_sim::objects::ObjectModel;
     use palpate_tactile::{SensorLayout, SignalDefinition};
 

@@ -3,8 +3,8 @@
 //! Columns: `trial`, `label`, `source`, `seed`, `sample`, `t_s`, `line_bar`, `phase`, then a column of every channel. Units
 //! stand in the file's key-value metadata under `units`, as JSON.
 
-use super::content::{Contents, TrialContent};
-use super::{Allow, ExchangeError, Request, step};
+use crate::content::TrialContent;
+use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
 use ::parquet::errors::ParquetError;
@@ -28,25 +28,29 @@ const FIXED: [(&str, Physical); 8] = [
     ("phase", Physical::BYTE_ARRAY),
 ];
 
-/// Writes trials as one table, a row group each.
-pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
-    let failed = |error: &dyn std::fmt::Display| ExchangeError::write(path, error);
-    let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path, FileKind::Parquet).map_err(|e| failed(&e))?;
-    // Every trial has to be seen before the columns are known.
-    let mut trials = Vec::new();
-    for (done, id) in request.ids.iter().enumerate() {
-        step(allow, done, request.ids.len())?;
-        trials.push(contents.load(*id)?);
+/// Tables of Parquet, a row group for each trial.
+pub(crate) struct Parquet;
+
+impl TrialFormat for Parquet {
+    fn kind(&self) -> FileKind {
+        FileKind::Other { title: "Parquet file", endings: &["parquet"], begin: b"PAR1" }
     }
-    let mut channels: Vec<(String, &'static str)> = Vec::new();
-    for column in trials.iter().flat_map(|trial| &trial.open.columns) {
-        if !channels.iter().any(|(name, _)| *name == column.name) {
-            channels.push((column.name.clone(), column.unit));
+
+    fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
+        let failed = |error: &dyn std::fmt::Display| ExchangeError::cannot_write(path, error);
+        let file = new_file(path, self.kind())?;
+        // Every trial has to be seen before the columns are known.
+        let trials = export.contents()?.collect::<Result<Vec<_>, _>>()?;
+        let mut channels: Vec<(String, &'static str)> = Vec::new();
+        for column in trials.iter().flat_map(|trial| &trial.open.columns) {
+            if !channels.iter().any(|(name, _)| *name == column.name) {
+                channels.push((column.name.clone(), column.unit));
+            }
         }
+        let written = table(&trials, &channels, file).map_err(|e| failed(&e))?;
+        written.finish().map_err(|e| failed(&e))?;
+        Ok(Written::whole(path))
     }
-    let written = table(&trials, &channels, file).map_err(|e| failed(&e))?;
-    written.finish().map_err(|e| failed(&e))
 }
 
 fn table(trials: &[TrialContent], channels: &[(String, &'static str)], file: NewFile) -> Result<NewFile, ParquetError> {

@@ -30,7 +30,7 @@ mod property_tests;
 #[cfg(test)]
 mod tests;
 
-use palpate_tactile::Signals;
+use crate::format::{Import, ImportError, file_name};
 use std::io::Read;
 use std::path::Path;
 
@@ -58,56 +58,19 @@ const MOST_VALUES: usize = 200_000_000;
 /// Latest time (s). Seconds since 1970 are below it, milliseconds since 1970 above; a double still resolves milliseconds.
 const FARTHEST_TIME_S: f64 = 1e11;
 
-/// Trials of an imported file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Import {
-    /// Trials in the order in which they begin in the file, all with the same channels.
-    pub trials: Vec<ImportedTrial>,
-    /// Changes and doubtful values, one sentence each.
-    pub warnings: Vec<String>,
-}
-
-/// One recorded grasp from a file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImportedTrial {
-    /// Name in the file.
-    pub name: String,
-    /// Label in the file.
-    pub label: String,
-    /// Size of the object, where the file states it for the label: `tiny` or `large`.
-    pub size: Option<String>,
-    /// Shape of the object, where the file states it for the label: `cubic`, `cylindrical` or `spherical`.
-    pub shape: Option<String>,
-    /// Readings: at least two samples, all finite, times as in the file or even from its first one on.
-    pub signals: Signals,
-}
-
-/// Error of an import, with its place in the file.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot import \"{name}\"{}: {fault}", line.map(|n| format!(", line {n}")).unwrap_or_default())]
-pub struct ImportError {
-    /// Name of the file.
-    pub name: String,
-    /// Line, counted from 1, where the fault has one.
-    pub line: Option<u64>,
-    /// The fault, as a sentence with advice.
-    pub fault: String,
-}
-
 /// Reads a file of grasps.
-pub fn read_trials_csv(path: &Path) -> Result<Import, ImportError> {
-    let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
+pub(super) fn read_file(path: &Path) -> Result<Import, ImportError> {
     let opened = std::fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let fault = match opened {
         Ok((length, _)) if length > LARGEST_FILE => rows::file_too_large(),
-        Ok((_, file)) => return read_trials(file, &name),
+        Ok((_, file)) => return read_csv(file, &file_name(path)),
         Err(cause) => cause.to_string(),
     };
-    Err(ImportError { name, line: None, fault })
+    Err(ImportError::of(path, fault))
 }
 
 /// Reads grasps from any source; `name` stands in error messages.
-pub fn read_trials(reader: impl Read, name: &str) -> Result<Import, ImportError> {
+pub(crate) fn read_csv(reader: impl Read, name: &str) -> Result<Import, ImportError> {
     let mut warnings = Vec::new();
     let trials = rows::read_rows(reader, &mut warnings).and_then(|rows| mend::finish(rows, &mut warnings));
     match trials {

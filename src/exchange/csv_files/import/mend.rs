@@ -3,7 +3,8 @@
 
 use super::resample::{self, three_digits};
 use super::rows::{Fault, RawTrial, Rows, no_channels, too_many_values};
-use super::{ImportedTrial, MOST_SAMPLES, MOST_VALUES, brief};
+use super::{MOST_SAMPLES, MOST_VALUES, brief};
+use palpate_store::ImportedTrial;
 use palpate_tactile::Signals;
 
 /// Most memory for the names of the channels of all trials (bytes); a thousand times what a large study takes.

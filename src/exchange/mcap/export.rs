@@ -3,11 +3,11 @@
 use super::container::{McapWriter, Pairs};
 use super::messages::{self, MessageKind};
 use super::{CHANNELS, TRIAL};
-use crate::exchange::content::{Contents, TrialContent, joint_name, segment_name, segment_pose};
-use crate::exchange::urdf::gripper_urdf;
-use crate::exchange::{Allow, ExchangeError, Request, step};
-use crate::inspection::scene_hash;
+use crate::content::{TrialContent, joint_name, segment_name, segment_pose};
+use crate::format::{ExchangeError, TrialExport, new_file};
+use crate::urdf::gripper_urdf;
 use palpate_geometry::Pose;
+use palpate_lab::inspection::scene_hash;
 use palpate_learn::Pmf;
 use palpate_sim::gripper::Side;
 use palpate_store::{FileKind, NewFile};
@@ -21,23 +21,19 @@ use std::path::Path;
 const BETWEEN: u64 = 1_000_000_000;
 
 /// Writes trials into one file.
-pub(crate) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
-    let failed = |error: io::Error| ExchangeError::write(path, &error);
-    let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path, FileKind::Mcap).map_err(failed)?;
+pub(super) fn write(export: &TrialExport<'_>, path: &Path, kind: FileKind) -> Result<(), ExchangeError> {
+    let failed = |error: io::Error| ExchangeError::cannot_write(path, &error);
     let library = format!("palpate {}", env!("CARGO_PKG_VERSION"));
     let mut out = Bag {
-        writer: McapWriter::new(file, &library).map_err(failed)?,
+        writer: McapWriter::new(new_file(path, kind)?, &library).map_err(failed)?,
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
     };
     let mut earliest = 0;
-    for (done, id) in request.ids.iter().enumerate() {
-        step(allow, done, request.ids.len())?;
-        let content = contents.load(*id)?;
+    for content in export.contents()? {
+        let content = content?;
         let recorded = utc_ns(&content.open.created).unwrap_or(0);
-        let begin = recorded.max(earliest);
-        let end = out.trial(&content, begin).map_err(failed)?;
+        let end = out.trial(&content, recorded.max(earliest)).map_err(failed)?;
         earliest = end + BETWEEN;
     }
     out.writer.finish().and_then(NewFile::finish).map_err(failed)

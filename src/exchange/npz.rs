@@ -2,10 +2,10 @@
 //!
 //! NPY is a header of text, padded to 64 bytes, and the numbers in rows. Source: numpy, *numpy.lib.format*, version 1.0.
 
-use super::content::{Contents, TrialContent};
-use super::{Allow, ExchangeError, Request, step};
-use crate::inspection::{TouchPhase, scene_hash};
+use crate::content::TrialContent;
+use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
 use palpate_geometry::Pose;
+use palpate_lab::inspection::{TouchPhase, scene_hash};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
 use palpate_store::{FileKind, NewFile};
@@ -18,30 +18,37 @@ const MOST_BYTES: u64 = 4 << 30;
 /// Numbers of a pose: x y z, then the rotation as qx qy qz qw.
 const POSE: usize = 7;
 
-/// Writes all trials as arrays of one archive.
-pub(super) fn write(request: &Request<'_>, path: &Path, allow: Allow<'_>) -> Result<(), ExchangeError> {
-    let contents = Contents::new(request.store, request.options)?;
-    let file = NewFile::create(path, FileKind::Npz).map_err(|e| ExchangeError::write(path, &e))?;
-    let mut trials = Vec::new();
-    let mut bytes = 0;
-    for (done, id) in request.ids.iter().enumerate() {
-        step(allow, done, request.ids.len())?;
-        let trial = contents.load(*id)?;
-        let joints = joints_of(&trial);
-        let each = 8 * (trial.open.columns.len() + joints + 2 * POSE + 4) as u64;
-        bytes = u64::max(bytes, each * trial.samples.len() as u64);
-        let gigabytes = (bytes * request.ids.len() as u64) as f64 / 1e9;
-        if bytes.saturating_mul(request.ids.len() as u64) > MOST_BYTES {
-            let most = MOST_BYTES >> 30;
-            return Err(ExchangeError::Refused(format!(
-                "the arrays would take {gigabytes:.1} GB, more than the limit of {most} GB; export fewer trials at once"
-            )));
-        }
-        trials.push(trial);
+/// Archives of numpy.
+pub(crate) struct Npz;
+
+impl TrialFormat for Npz {
+    fn kind(&self) -> FileKind {
+        FileKind::Other { title: "NPZ archive", endings: &["npz"], begin: b"PK" }
     }
-    let mut archive = Archive { zip: zip::ZipWriter::new(file) };
-    let written = arrays(&trials, &mut archive).and_then(|()| archive.zip.finish().map_err(io::Error::other));
-    written.and_then(NewFile::finish).map_err(|e| ExchangeError::write(path, &e))
+
+    fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
+        let file = new_file(path, self.kind())?;
+        let mut trials = Vec::new();
+        let mut bytes = 0;
+        for trial in export.contents()? {
+            let trial = trial?;
+            let joints = joints_of(&trial);
+            let each = 8 * (trial.open.columns.len() + joints + 2 * POSE + 4) as u64;
+            bytes = u64::max(bytes, each * trial.samples.len() as u64);
+            let gigabytes = (bytes * export.ids.len() as u64) as f64 / 1e9;
+            if bytes.saturating_mul(export.ids.len() as u64) > MOST_BYTES {
+                let most = MOST_BYTES >> 30;
+                return Err(ExchangeError::Refused(format!(
+                    "the arrays would take {gigabytes:.1} GB, more than the limit of {most} GB; export fewer trials at once"
+                )));
+            }
+            trials.push(trial);
+        }
+        let mut archive = Archive { zip: zip::ZipWriter::new(file) };
+        let written = arrays(&trials, &mut archive).and_then(|()| archive.zip.finish().map_err(io::Error::other));
+        written.and_then(NewFile::finish).map_err(|e| ExchangeError::cannot_write(path, &e))?;
+        Ok(Written::whole(path))
+    }
 }
 
 fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>) -> io::Result<()> {
@@ -235,10 +242,10 @@ fn header(kind: &str, shape: &[usize]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::write_trials;
     use super::*;
-    use crate::grasping::grasp;
-    use crate::inspection::{OpenOptions, OpenTrial};
+    use crate::write_trials;
+    use palpate_lab::grasping::grasp;
+    use palpate_lab::inspection::{OpenOptions, OpenTrial};
     use palpate_sim::scene::Scene;
     use palpate_store::Store;
     use std::collections::BTreeMap;
@@ -283,7 +290,8 @@ mod tests {
             store.insert(&grasp(&scene, scene.load_object()?.as_ref(), 3))?;
         }
         let path = folder.path().join("out.npz");
-        write_trials(&store, &[1, 2], &OpenOptions::default(), &path, &mut |_, _| true)?;
+        let options = OpenOptions::default();
+        write_trials(&TrialExport { store: &store, ids: &[1, 2], options: &options, is_stopped: &|| false }, &path)?;
         let arrays = read(&path);
         let shape = |name: &str, wanted: &str| {
             let header = &arrays[&format!("{name}.npy")].0;

@@ -11,14 +11,12 @@
 //! The folder appears whole or not at all: it is written under another name and renamed. Unlabelled, deleted and incomplete
 //! trials are left out.
 
-use super::board_export::write_board_csv;
-use super::csv_export::number;
-use super::file_kind::FileKind;
-use super::new_file::{NewFolder, write_whole};
-use super::store::Store;
-use super::store_error::{ExportError, StoreError};
-use crate::labels::LabelledTrial;
+use super::board::write_board_csv;
+use super::writing::number;
+use crate::format::ExchangeError;
 use palpate_sim::objects::catalogue;
+use palpate_store::labels::LabelledTrial;
+use palpate_store::{FileKind, NewFolder, Store, StoreError, write_whole};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Channel, SignalDefinition, Signals, whole_fingers};
 use serde::Serialize;
@@ -46,53 +44,53 @@ pub fn file_name_of(object: &str) -> String {
 }
 
 /// Writes a trial of the real gripper: counts as CSV, and its bytes beside it. False for a trial of another kind.
-pub fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<bool, ExportError> {
+pub(super) fn export_board_trial(store: &Store, id: TrialId, path: &Path) -> Result<bool, ExchangeError> {
     let Some(trial) = store.board_log(id)? else { return Ok(false) };
     write_board_csv(path, &trial)?;
     let bytes = path.with_extension("bytes");
     let received = store.board_bytes(id)?.unwrap_or_default();
-    write_whole(&bytes, FileKind::Capture, &received).map_err(|e| ExportError::cannot_write(&bytes, &e))?;
+    write_whole(&bytes, FileKind::Capture, &received).map_err(|e| ExchangeError::cannot_write(&bytes, &e))?;
     Ok(true)
 }
 
 /// Writes all labelled trials into a folder that is empty or does not exist.
-pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExportError> {
+pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, ExchangeError> {
     let trials = store.labels().trials()?;
     let rows: Vec<&LabelledTrial> = trials.iter().filter(|trial| trial.counts()).collect();
     if rows.is_empty() {
         let cause = "no trial of the real gripper is labelled; label one with `palpate trials label ID NAME`";
-        return Err(ExportError::Refused(cause.to_owned()));
+        return Err(ExchangeError::Refused(cause.to_owned()));
     }
     if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         let folder = folder.display();
-        return Err(ExportError::Refused(format!("\"{folder}\" is not empty; choose an empty or new folder")));
+        return Err(ExchangeError::Refused(format!("\"{folder}\" is not empty; choose an empty or new folder")));
     }
-    let new = NewFolder::create(folder).map_err(|e| ExportError::cannot_write(folder, &e))?;
+    let new = NewFolder::create(folder).map_err(|e| ExchangeError::cannot_write(folder, &e))?;
     let mut left_out = write_all(store, &rows, new.unfinished())?;
-    new.finish().map_err(|e| ExportError::cannot_write(folder, &e))?;
+    new.finish().map_err(|e| ExchangeError::cannot_write(folder, &e))?;
     let derived = rows.len() - left_out.len();
     let damaged = trials.iter().filter(|trial| trial.damaged && !trial.discarded);
     left_out.extend(damaged.map(|trial| (trial.id, StoreError::altered(trial.id).to_string())));
     Ok(Exported { folder: folder.to_owned(), trials: rows.len(), derived, left_out })
 }
 
-fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExportError> {
+fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExchangeError> {
     let raw = folder.join("raw");
-    std::fs::create_dir_all(&raw).map_err(|e| ExportError::cannot_write(&raw, &e))?;
+    std::fs::create_dir_all(&raw).map_err(|e| ExchangeError::cannot_write(&raw, &e))?;
     let channels = whole_fingers(SignalDefinition::Parts);
     let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
     let mut list_out = create(&list)?;
     let mut signals_out = create(&signals)?;
-    list_out.write_record(LIST_COLUMNS).map_err(|e| ExportError::cannot_write(&list, &e))?;
+    list_out.write_record(LIST_COLUMNS).map_err(|e| ExchangeError::cannot_write(&list, &e))?;
     let with_units = channels.iter().map(|channel| format!("{} [{}]", channel.name(), channel.quantity.unit()));
     let header = ["trial", "label", "size", "shape", "t_s"].into_iter().map(str::to_owned).chain(with_units);
-    signals_out.write_record(header).map_err(|e| ExportError::cannot_write(&signals, &e))?;
+    signals_out.write_record(header).map_err(|e| ExchangeError::cannot_write(&signals, &e))?;
     let mut left_out = Vec::new();
     for row in rows {
         let label = row.object.as_deref().unwrap_or_default();
         let name = format!("trial_{}_{}.csv", row.id, file_name_of(label));
         match export_board_trial(store, row.id, &raw.join(&name)) {
-            Err(ExportError::Store(error)) if error.is_damage() => {
+            Err(ExchangeError::Store(error)) if error.is_damage() => {
                 left_out.push((row.id, error.to_string()));
                 continue;
             }
@@ -101,16 +99,16 @@ fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Ve
         let read = store.board_signals(row.id, &[])?.unwrap_or_default();
         list_out
             .write_record(list_row(row, &read.serving.ids, &name))
-            .map_err(|e| ExportError::cannot_write(&list, &e))?;
+            .map_err(|e| ExchangeError::cannot_write(&list, &e))?;
         let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
         match read.grasp(&wanted) {
             Some(chosen) => write_signals(&mut signals_out, row, label, &chosen)
-                .map_err(|e| ExportError::cannot_write(&signals, &e))?,
+                .map_err(|e| ExchangeError::cannot_write(&signals, &e))?,
             None => left_out.push((row.id, read.derived.warnings.join("; "))),
         }
     }
-    list_out.flush().map_err(|e| ExportError::cannot_write(&list, &e))?;
-    signals_out.flush().map_err(|e| ExportError::cannot_write(&signals, &e))?;
+    list_out.flush().map_err(|e| ExchangeError::cannot_write(&list, &e))?;
+    signals_out.flush().map_err(|e| ExchangeError::cannot_write(&signals, &e))?;
     Ok(left_out)
 }
 
@@ -171,6 +169,6 @@ fn write_signals(out: &mut Out, row: &LabelledTrial, label: &str, signals: &Sign
     Ok(())
 }
 
-fn create(path: &Path) -> Result<Out, ExportError> {
-    Ok(csv::Writer::from_writer(BufWriter::new(File::create(path).map_err(|e| ExportError::cannot_write(path, &e))?)))
+fn create(path: &Path) -> Result<Out, ExchangeError> {
+    Ok(csv::Writer::from_writer(BufWriter::new(File::create(path).map_err(|e| ExchangeError::cannot_write(path, &e))?)))
 }

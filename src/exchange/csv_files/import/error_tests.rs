@@ -4,7 +4,7 @@ use super::*;
 
 /// The error's text.
 fn refusal(text: &[u8]) -> String {
-    read_trials(text, "f").expect_err("must be refused").to_string()
+    read_csv(text, "f").expect_err("must be refused").to_string()
 }
 
 fn refused(text: &str, essence: &[&str]) {
@@ -72,7 +72,7 @@ fn rows_that_do_not_fit() {
 
 #[test]
 fn an_endless_row_is_cut() {
-    let said = read_trials(std::io::repeat(b'x'), "f").expect_err("never ends").to_string();
+    let said = read_csv(std::io::repeat(b'x'), "f").expect_err("never ends").to_string();
     assert!(said.contains("longer than 1 MiB"), "{said}");
 }
 

@@ -46,7 +46,7 @@ const GOOD: &str = "trial,label,t_s,size,shape,p,q [Pa]\n\
     a,x,0,tiny,cubic,1,9\na,x,1,tiny,cubic,2,8\nb,y,0,,,3,7\na,x,2,,,3,7\nb,y,1,,,,6\nb,y,1.5,,,-3,5\nb,y,3,,,0,1\n";
 
 fn is_sound(bytes: &[u8]) -> Result<(), TestCaseError> {
-    let import = match read_trials(bytes, "any") {
+    let import = match read_csv(bytes, "any") {
         Ok(import) => import,
         Err(error) => {
             let text = error.to_string();

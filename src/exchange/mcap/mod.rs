@@ -21,10 +21,29 @@ mod import;
 mod messages;
 mod reader;
 
-pub(super) use export::write;
-pub use import::{McapImportError, read_mcap};
+use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+use palpate_store::FileKind;
+use std::path::Path;
 
 /// Topic of all channels.
 const CHANNELS: &str = "/palpate/channels";
 /// Name of the metadata record of a trial.
 const TRIAL: &str = "palpate:trial";
+
+/// Messages of ROS 2 over time.
+pub(crate) struct Mcap;
+
+impl TrialFormat for Mcap {
+    fn kind(&self) -> FileKind {
+        FileKind::Other { title: "MCAP file", endings: &["mcap"], begin: b"\x89MCAP0\r\n" }
+    }
+
+    fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
+        export::write(export, path, self.kind())?;
+        Ok(Written::whole(path))
+    }
+
+    fn read(&self, path: &Path, label: &str) -> Result<Import, ImportError> {
+        import::read_mcap(path, label)
+    }
+}

@@ -1,12 +1,12 @@
 //! The gripper as URDF, for viewers of ROS: a chain of boxes per finger, with the joints that the messages name.
 
-use super::content::{joint_name, segment_name};
+use crate::content::{joint_name, segment_name};
 use palpate_sim::gripper::{GripperModel, Side};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 /// URDF of a gripper. Its root is the link `palm`; segments have z towards the tip and x out of the pad.
-pub(super) fn gripper_urdf(gripper: &GripperModel) -> String {
+pub(crate) fn gripper_urdf(gripper: &GripperModel) -> String {
     let finger = &gripper.finger;
     let lengths: Vec<f64> = finger.segment_lengths().collect();
     let (pad, back, width) = (gripper.pad.thickness, finger.back, finger.width);

@@ -1,10 +1,10 @@
-//! Simulates a grasp of an object and writes its samples: `cargo run --release -p palpate-lab --example grasp_to_csv -- lemon`.
+//! Simulates a grasp of an object and writes its samples: `cargo run --release -p palpate-exchange --example grasp_to_csv -- lemon`.
 
 #![expect(clippy::print_stdout, reason = "an example that says what it did")]
 
+use palpate_exchange::write_trial_csv;
 use palpate_lab::grasping::{GraspSummary, grasp};
 use palpate_sim::scene::Scene;
-use palpate_store::write_trial_csv;
 use palpate_tactile::{Sensors, SignalDefinition};
 use std::path::Path;
 

@@ -4,11 +4,12 @@ use super::container::Pairs;
 use super::messages::{MessageKind, read_numbers};
 use super::reader::{ContainerFault, Record, read_records};
 use super::{CHANNELS, TRIAL};
+use crate::csv_files::read_csv;
+use crate::format::{Import, ImportError, file_name};
 use palpate_sim::objects::catalogue;
-use palpate_store::{Import, ImportError, ImportedTrial, read_trials};
+use palpate_store::ImportedTrial;
 use palpate_tactile::Signals;
 use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -21,35 +22,17 @@ const MOST_TRIALS: usize = 100_000;
 /// Longest name of a channel or label (characters).
 const LONGEST_NAME: usize = 200;
 
-/// Error of an import of MCAP.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct McapImportError(String);
-
-impl From<ImportError> for McapImportError {
-    fn from(error: ImportError) -> Self {
-        Self(error.to_string())
-    }
-}
-
-impl McapImportError {
-    fn new(name: &str, cause: impl Display) -> Self {
-        Self(format!("cannot import \"{name}\": {cause}"))
-    }
-}
-
 /// Reads the trials of an MCAP file. A file of another program is one trial with this label.
-pub fn read_mcap(path: &Path, label: &str) -> Result<Import, McapImportError> {
-    let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
-    let file = File::open(path).map_err(|e| McapImportError(format!("cannot open \"{name}\": {e}")))?;
-    read_bag(BufReader::new(file), &name, label)
+pub(super) fn read_mcap(path: &Path, label: &str) -> Result<Import, ImportError> {
+    let file = File::open(path).map_err(|cause| ImportError::of(path, cause))?;
+    read_bag(BufReader::new(file), &file_name(path), label)
 }
 
 /// Reads the trials of an MCAP file from any source.
-fn read_bag(source: impl Read, name: &str, label: &str) -> Result<Import, McapImportError> {
+fn read_bag(source: impl Read, name: &str, label: &str) -> Result<Import, ImportError> {
     let mut bag = Bag::new(name);
     let whole = read_records(source, |record| bag.take(record));
-    let whole = whole.map_err(|fault: String| McapImportError::new(name, fault))?;
+    let whole = whole.map_err(|fault: String| ImportError::new(name, fault))?;
     let mut import = if bag.own.is_empty() || bag.rows.is_empty() {
         bag.foreign(label)?
     } else {
@@ -168,15 +151,15 @@ impl<'a> Bag<'a> {
     }
 
     /// Trials of this program, by their descriptions.
-    fn trials(&mut self) -> Result<Vec<ImportedTrial>, McapImportError> {
+    fn trials(&mut self) -> Result<Vec<ImportedTrial>, ImportError> {
         self.rows.sort_by_key(|(_, ns, _)| *ns);
         self.own.iter().map(|pairs| self.trial(pairs)).collect()
     }
 
-    fn trial(&self, pairs: &Pairs) -> Result<ImportedTrial, McapImportError> {
+    fn trial(&self, pairs: &Pairs) -> Result<ImportedTrial, ImportError> {
         let field = |name: &str| pairs.get(name).map(String::as_str).unwrap_or_default();
         let id: String = field("trial").chars().take(20).collect();
-        let problem = |problem: &str| McapImportError::new(self.file, format!("trial {id} {problem}"));
+        let problem = |problem: &str| ImportError::new(self.file, format!("trial {id} {problem}"));
         let [begin, end] = ["begin_ns", "end_ns"].map(|name| field(name).parse::<u64>().ok());
         let (Some(begin), Some(end)) = (begin, end) else { return Err(problem("has no times")) };
         let [first, after] = [begin, end.saturating_add(1)].map(|ns| self.rows.partition_point(|row| row.1 < ns));
@@ -215,7 +198,7 @@ impl<'a> Bag<'a> {
     }
 
     /// One trial of another program: the channel with most samples gives the times, the others are interpolated.
-    fn foreign(&self, label: &str) -> Result<Import, McapImportError> {
+    fn foreign(&self, label: &str) -> Result<Import, ImportError> {
         let clock = self.numbers.values().max_by_key(|samples| samples.len()).filter(|samples| samples.len() > 1);
         let Some(clock) = clock else {
             let topic = |topic: &Topic| match topic.kind {
@@ -227,17 +210,17 @@ impl<'a> Bag<'a> {
                 topics.push("no topics".to_owned());
             }
             let topics = topics.join(", ");
-            return Err(McapImportError(format!(
-                "\"{}\" has no channel that can be imported; JointState, FluidPressure, Float32, Float64 and their arrays in \
-                 CDR can be. It has: {topics}",
-                self.file
-            )));
+            let fault = format!(
+                "it has no channel that can be imported; JointState, FluidPressure, Float32, Float64 and their arrays in \
+                 CDR can be. It has: {topics}"
+            );
+            return Err(ImportError::new(self.file, fault));
         };
         let mut times: Vec<u64> = clock.iter().map(|(ns, _)| *ns).collect();
         times.sort_unstable();
         times.dedup();
         if times.len().saturating_mul(self.numbers.len()) > MOST_NUMBERS {
-            return Err(McapImportError::new(self.file, too_large(MOST_NUMBERS, "numbers")));
+            return Err(ImportError::new(self.file, too_large(MOST_NUMBERS, "numbers")));
         }
         let origin = times.first().copied().unwrap_or(0);
         let columns: Vec<Vec<f64>> = self.numbers.values().map(|samples| at_times(samples, &times)).collect();
@@ -261,7 +244,7 @@ impl<'a> Bag<'a> {
             line.into_bytes()
         });
         let text = Lines { rest: csv.into_bytes(), at: 0, lines };
-        let mut import = read_trials(text, self.file)?;
+        let mut import = read_csv(text, self.file)?;
         let mut warnings = self.warnings();
         let others = self.topics.values().filter(|topic| topic.kind.is_none()).count();
         if others > 0 {

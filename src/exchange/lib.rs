@@ -1,0 +1,96 @@
+//! Trials as files of other programs: CSV, MCAP, NPZ and Parquet.
+//!
+//! [`FORMATS`] is the one list of formats: command line and window read it. To add a format, write a file with its
+//! [`TrialFormat`] and add it to the list.
+//!
+//! # Modules, lowest layer first
+//!
+//! A module imports only from lower layers.
+//!
+//! | layer | module | holds |
+//! |---|---|---|
+//! | 0 | `format` | the trait [`TrialFormat`], what is written and read, errors |
+//! | 1 | `content` | a stored trial as other programs see it |
+//! | 1 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
+//! | 2 | `urdf` | the gripper for viewers of ROS |
+//! | 2 | `npz`, `parquet` | arrays and tables |
+//! | 3 | `mcap` | messages of ROS 2 |
+//!
+//! # Example
+//!
+//! ```
+//! use palpate_exchange::read_trials;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("grasps.csv");
+//! std::fs::write(&path, "trial,label,t_s,grip [N]\n1,mug,0.0,0\n1,mug,0.1,2.5\n")?;
+//! let import = read_trials(&path, None)?;
+//! assert_eq!(import.trials[0].signals.channels, ["grip"]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod content;
+mod csv_files;
+mod format;
+mod mcap;
+mod npz;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(test)]
+mod tests;
+mod urdf;
+
+pub use csv_files::{
+    Exported, PointsError, contacts_path, export_labelled, file_name_of, read_points_csv, write_board_csv,
+    write_contacts_csv, write_trial_csv,
+};
+pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+
+use palpate_store::{FileKind, Store, StoreError};
+use palpate_tactile::trial::TrialId;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// CSV: a file for each trial.
+pub const CSV: &dyn TrialFormat = &csv_files::Csv;
+
+/// All formats.
+pub const FORMATS: &[&dyn TrialFormat] = &[
+    CSV,
+    &mcap::Mcap,
+    &npz::Npz,
+    #[cfg(feature = "parquet")]
+    &parquet::Parquet,
+];
+
+/// The format that the ending of a name stands for; CSV for a name without ending, which is that of a folder.
+pub fn format_of(path: &Path) -> Option<&'static dyn TrialFormat> {
+    let named = FORMATS.iter().copied().find(|format| FileKind::of(path, &[format.kind()]).is_some());
+    named.or_else(|| path.extension().is_none().then_some(CSV))
+}
+
+/// Writes trials in the format that the path stands for.
+pub fn write_trials(export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
+    let format = format_of(path).ok_or_else(|| {
+        let known: Vec<&str> = FORMATS.iter().flat_map(|format| format.kind().endings()).copied().collect();
+        let (path, known) = (path.display(), known.join(", "));
+        ExchangeError::Refused(format!("no format for \"{path}\": its extension has to be {known}"))
+    })?;
+    format.write(export, path)
+}
+
+/// Reads the trials of a file, as CSV where its ending stands for no format. `label` names the object of a file that does
+/// not; without it the file does.
+pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportError> {
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let label = label.or(stem.as_deref()).unwrap_or("import");
+    format_of(path).unwrap_or(CSV).read(path, label)
+}
+
+/// Trials that are sound, and those that diverged, did not converge or did not come to rest: a file of another program would
+/// not show that. Damaged trials count as sound; they say what is wrong where they are read.
+pub fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<(Vec<TrialId>, Vec<TrialId>), StoreError> {
+    let rows = store.list(false)?;
+    let unsound: BTreeSet<TrialId> = rows.iter().filter(|row| !row.sound && !row.damaged).map(|row| row.id).collect();
+    Ok(ids.iter().partition(|id| !unsound.contains(id)))
+}

@@ -1,0 +1,122 @@
+//! Trials written and read back, in every format.
+
+use super::*;
+use palpate_lab::grasping::grasp;
+use palpate_lab::inspection::{OpenOptions, OpenTrial};
+use palpate_sim::scene::Scene;
+use palpate_store::{ImportedTrial, Store};
+use palpate_tactile::Signals;
+use palpate_tactile::trial::TrialId;
+use std::cell::Cell;
+
+fn store_of(objects: &[&str]) -> (tempfile::TempDir, Store) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
+    for object in objects {
+        let mut scene = Scene::default();
+        scene.object.source = (*object).to_owned();
+        scene.timing.duration_s = 1.5;
+        let model = scene.load_object().expect("built in");
+        store.insert(&grasp(&scene, model.as_ref(), 0)).expect("stored");
+    }
+    (folder, store)
+}
+
+/// Writes trials, unless it is stopped.
+fn write(
+    store: &Store,
+    ids: &[TrialId],
+    options: &OpenOptions,
+    (path, is_stopped): (&Path, &dyn Fn() -> bool),
+) -> Result<Written, ExchangeError> {
+    write_trials(&TrialExport { store, ids, options, is_stopped }, path)
+}
+
+fn bits(signals: &Signals) -> (Vec<u64>, Vec<u32>) {
+    (signals.t_s.iter().map(|t| t.to_bits()).collect(), signals.values.iter().map(|v| v.to_bits()).collect())
+}
+
+#[test]
+fn channels_come_back_from_mcap_bit_by_bit() -> Result<(), Box<dyn std::error::Error>> {
+    let (folder, mut store) = store_of(&["lemon", "ball"]);
+    // Numbers with all bits in use, at uneven times.
+    let awkward = Signals {
+        channels: vec!["grip".to_owned(), "a b, \"c\" [N]".to_owned()],
+        t_s: vec![-0.1, 1.0 / 3.0, 0.333_333_333_333_333_4, 2e9 + 1e-7],
+        values: vec![1e-45, -0.0, f32::MIN_POSITIVE, 0.1, f32::MAX, 1.0 + f32::EPSILON, -3.3, 7.0],
+    };
+    let imported = ImportedTrial {
+        name: "first".to_owned(),
+        label: "mug".to_owned(),
+        size: None,
+        shape: None,
+        signals: awkward.clone(),
+    };
+    store.insert_imported("mine", &[imported])?;
+    let path = folder.path().join("out.mcap");
+    let models = palpate_learn::Models::shipped()?;
+    let options = OpenOptions { models, ..OpenOptions::default() };
+    assert_eq!(write(&store, &[1, 2, 3], &options, (&path, &|| false))?.files, [path.as_path()]);
+    let import = read_trials(&path, Some("unused"))?;
+    assert!(import.warnings.is_empty(), "{:?}", import.warnings);
+    let labels: Vec<&str> = import.trials.iter().map(|trial| trial.label.as_str()).collect();
+    assert_eq!(labels, ["lemon", "ball", "mug"]);
+    for (trial, id) in import.trials.iter().zip([1, 2]) {
+        let stored = store.load(id)?;
+        let open = OpenTrial::open(&store, id, &OpenOptions::default())?;
+        let wanted = palpate_tactile::Sensors::new(
+            &palpate_tactile::SensorLayout::named("C1+F")?,
+            &stored.header.scene.gripper,
+            palpate_tactile::SignalDefinition::Parts,
+        )?;
+        // Where a pressure is undefined, recognisers take none: so do imported trials.
+        assert_eq!(bits(&trial.signals), bits(&wanted.signals(stored.frames())));
+        assert_eq!(trial.signals.t_s, open.t_s);
+        assert!(trial.size.is_some() && trial.shape.is_some());
+    }
+    let back = &import.trials[2];
+    assert_eq!(bits(&back.signals), bits(&awkward));
+    // A second way through the store and a file changes nothing more.
+    let mut other = Store::open(&folder.path().join("other.sqlite"))?;
+    assert_eq!(other.insert_imported("bag", &import.trials)?, 3);
+    let again = folder.path().join("again.mcap");
+    write(&other, &[1, 2, 3], &OpenOptions::default(), (&again, &|| false))?;
+    for (first, second) in import.trials.iter().zip(read_trials(&again, None)?.trials) {
+        assert_eq!((bits(&first.signals), &first.label), (bits(&second.signals), &second.label));
+    }
+    Ok(())
+}
+
+#[test]
+fn an_export_that_ends_early_leaves_no_file() {
+    let (folder, store) = store_of(&["ball", "ball"]);
+    let options = OpenOptions::default();
+    for format in FORMATS.iter().filter(|format| format.kind() != FileKind::Csv) {
+        let ending = format.kind().endings()[0];
+        let path = folder.path().join(format!("out.{ending}"));
+        let asked = Cell::new(0);
+        let is_stopped = || asked.replace(asked.get() + 1) > 0;
+        let outcome = write(&store, &[1, 2], &options, (&path, &is_stopped));
+        assert!(matches!(outcome, Err(ExchangeError::Stopped)), "{ending}");
+        assert_eq!(asked.get(), 2);
+        let outcome = write(&store, &[1, 99], &options, (&path, &|| false));
+        assert!(matches!(outcome, Err(ExchangeError::Open(_) | ExchangeError::Store(_))), "{ending}");
+        let nowhere = folder.path().join(format!("no/such/out.{ending}"));
+        let outcome = write(&store, &[1], &options, (&nowhere, &|| false));
+        assert!(matches!(outcome, Err(ExchangeError::Refused(_))), "{ending}");
+    }
+    let names: Vec<String> = std::fs::read_dir(folder.path())
+        .expect("reads")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .filter(|name| !name.starts_with("trials.sqlite"))
+        .collect();
+    assert!(names.is_empty(), "{names:?}");
+    for (ids, path, wanted) in
+        [(&[1][..], "a.xyz", "csv, mcap, npz"), (&[1, 2], "a.csv", "several trials need a folder")]
+    {
+        let error = write(&store, ids, &options, (Path::new(path), &|| false)).expect_err("refused").to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+    let error = read_trials(Path::new("a.npz"), None).expect_err("refused").to_string();
+    assert!(error.contains("\"a.npz\": trials are only written in this format"), "{error}");
+}
