@@ -13,8 +13,8 @@
 //! | [`palpate-tactile`](palpate_tactile) | `src/tactile` | simulated frames or raw converter counts in, sensor channels (curvature, pressure, force) out: trials, layouts, sensor models, calibration | `geometry` `sim` | 3050 |
 //! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files, comparison of methods | | 8750 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5350 |
-//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite | `geometry` `sim` `tactile` | 3950 |
-//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14450 |
+//! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite | `geometry` `sim` `tactile` | 3850 |
+//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14300 |
 //! | [`palpate-exchange`](palpate_exchange) | `src/exchange` | trials as files of other programs: CSV, MCAP, NPZ, Parquet | `geometry` `sim` `tactile` `learn` `store` `lab` | 2900 |
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 10650 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
@@ -59,7 +59,7 @@
 //! | step | what happens |
 //! |---|---|
 //! | [`palpate_device::serial::SerialLink`] | bytes of the port, with the times at which they came |
-//! | [`palpate_device::protocol::Decoder`] | bytes to readings, gaps, replies |
+//! | [`palpate_device::protocol::Decoder`] | bytes to [`palpate_device::protocol::BoardEvent`]: readings, gaps, replies |
 //! | [`palpate_lab::gripper::SerialGripper`] | the same events as those of the simulated gripper |
 //! | [`palpate_tactile::calibration::Readout`] | counts of a reading to curvature and force |
 //! | [`palpate_lab::grasping::Row`] | one value per channel, for plots and recognisers |
@@ -69,7 +69,7 @@
 //!
 //! | step | what happens |
 //! |---|---|
-//! | [`palpate_lab::recording::Recorder`] | frames, or bytes and readings, into the store while the grasp runs |
+//! | [`palpate_lab::recording::Recorder`] | a simulated trial into the store at its end; bytes and readings of a board while the grasp runs |
 //! | [`palpate_store::Store`] | trials on disk; [`palpate_lab::labelling`]: flags, and where a grasp begins and ends |
 //! | [`palpate_tactile::Sensors`] | channels of a frame, derived when the trial is read |
 //! | [`palpate_lab::inspection::OpenTrial`] | a trial opened: channels, phases, answers over time |

@@ -102,7 +102,7 @@ impl TraceHistory {
             for earlier in &mut self.grasps {
                 (earlier.frames, earlier.answers) = Default::default();
             }
-            let channels = vec![Vec::new(); row.values.len()];
+            let channels = vec![Vec::new(); row.sample.values.len()];
             let errors = vec![Vec::new(); row.errors.len()];
             self.grasps.push_back(GraspTrace {
                 grasp: row.grasp,
@@ -114,15 +114,15 @@ impl TraceHistory {
         }
         let Some(last) = self.grasps.back_mut() else { return };
         // A grasp that is computed again replaces its trace.
-        if !row.rolling && last.t.len() > 1 && row.t <= last.t[0] {
+        if !row.rolling && last.t.len() > 1 && row.sample.t_s <= last.t[0] {
             last.clear();
         }
-        last.t.push(row.t);
-        last.line_bar.push(row.line_bar);
+        last.t.push(row.sample.t_s);
+        last.line_bar.push(row.sample.line_bar);
         last.frames.push(row.frame.clone());
         last.answers.push(row.answer.clone());
         // A changed layout has other channels; a trace never mixes two.
-        for (channel, value) in last.channels.iter_mut().zip(row.values.iter()) {
+        for (channel, value) in last.channels.iter_mut().zip(row.sample.values.iter()) {
             channel.push(*value);
         }
         for (channel, error) in last.errors.iter_mut().zip(row.errors.iter()) {
@@ -173,23 +173,19 @@ impl TraceHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_lab::grasping::Row;
+
+    fn row(grasp: u64, rolling: bool, t_s: f64, values: impl Into<Box<[f32]>>) -> TraceRow {
+        let sample = Row { t_s, line_bar: 0.5, phase: None, values: values.into() };
+        TraceRow { grasp, rolling, sample, errors: Box::default(), frame: None, answer: None }
+    }
 
     #[test]
     fn the_last_few_grasps_are_kept_apart() {
         let mut traces = TraceHistory::default();
         for grasp in 1..=6 {
             for k in 0..3 {
-                let t = f64::from(k) * 0.1;
-                traces.push(&TraceRow {
-                    grasp,
-                    rolling: false,
-                    t,
-                    line_bar: 0.5,
-                    values: Box::new([grasp as f32, f32::NAN]),
-                    errors: Box::default(),
-                    frame: None,
-                    answer: None,
-                });
+                traces.push(&row(grasp, false, f64::from(k) * 0.1, [grasp as f32, f32::NAN]));
             }
         }
         assert_eq!(traces.current().map(|t| (t.grasp, t.t.len())), Some((6, 3)));
@@ -199,17 +195,7 @@ mod tests {
         assert_eq!(traces.earlier().map(|t| t.grasp).collect::<Vec<u64>>(), [5]);
         // Computed again.
         for t in [0.0, 0.1] {
-            let values = Box::new([7.0, 7.0]);
-            traces.push(&TraceRow {
-                grasp: 6,
-                rolling: false,
-                t,
-                line_bar: 0.5,
-                values,
-                errors: Box::default(),
-                frame: None,
-                answer: None,
-            });
+            traces.push(&row(6, false, t, [7.0, 7.0]));
         }
         let again = traces.current().map(|t| (t.grasp, t.t.clone(), t.channels[0].clone()));
         assert_eq!(again, Some((6, vec![0.0, 0.1], vec![7.0, 7.0])));
@@ -221,18 +207,9 @@ mod tests {
     fn a_live_stream_is_bounded_and_has_gaps() {
         let mut traces = TraceHistory::default();
         let mut push = |t: f64, value: f32| {
-            let line_bar = if value.is_nan() { f64::NAN } else { 0.0 };
-            let values = Box::new([value]);
-            traces.push(&TraceRow {
-                grasp: 1,
-                rolling: true,
-                t,
-                line_bar,
-                values,
-                errors: Box::default(),
-                frame: None,
-                answer: None,
-            });
+            let mut row = row(1, true, t, [value]);
+            row.sample.line_bar = value.into();
+            traces.push(&row);
         };
         for k in 0..100_000u32 {
             push(0.01 * f64::from(k), 1.0);
@@ -244,33 +221,13 @@ mod tests {
         assert_eq!(trace.gaps(), [[1000.0, 1002.5]]);
         // A recording without an end is bounded as well.
         for k in 0..100_000u32 {
-            let (t, values) = (0.01 * f64::from(k), Box::new([1.0]));
-            traces.push(&TraceRow {
-                grasp: 9,
-                rolling: false,
-                t,
-                line_bar: 0.0,
-                values,
-                errors: Box::default(),
-                frame: None,
-                answer: None,
-            });
+            traces.push(&row(9, false, 0.01 * f64::from(k), [1.0]));
         }
         assert!(traces.current().is_some_and(|trace| (12_000..=15_001).contains(&trace.t.len())));
         traces.clear();
         // A grasp stays in sight where that is wanted.
         for (grasp, rolling) in [(2, false), (3, true)] {
-            let row = TraceRow {
-                grasp,
-                rolling,
-                t: 0.0,
-                line_bar: 0.0,
-                values: Box::new([1.0]),
-                errors: Box::default(),
-                frame: None,
-                answer: None,
-            };
-            traces.push(&row);
+            traces.push(&row(grasp, rolling, 0.0, [1.0]));
         }
         assert_eq!(traces.current().map(|trace| trace.grasp), Some(3));
         traces.hold_grasp(true);

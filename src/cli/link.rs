@@ -2,8 +2,8 @@
 
 use super::Failure;
 use super::terminal::note;
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkOptions, PortTrouble, SerialLink};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
 use palpate_tactile::board::Reading;
 use std::time::{Duration, Instant};
 
@@ -46,9 +46,5 @@ pub(super) fn open(
 
 /// Readings of the board, waited for as long as `patience`.
 pub(super) fn readings(link: &SerialLink, patience: Duration) -> impl Iterator<Item = Reading> {
-    link.take(patience).into_iter().filter_map(|event| match event {
-        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading),
-        LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_))
-        | LinkEvent::Captured(_) => None,
-    })
+    link.take(patience).into_iter().filter_map(BoardEvent::into_reading)
 }

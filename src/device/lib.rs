@@ -21,14 +21,14 @@
 //! # Example
 //!
 //! ```
-//! use palpate_device::protocol::{DecodedEvent, Decoder};
+//! use palpate_device::protocol::{BoardEvent, Decoder};
 //!
 //! let (mut decoder, mut events) = (Decoder::default(), Vec::new());
 //! for sample in 0..20 {
 //!     let line = format!("{},512,498,33,41\n", sample * 10); // ms, two strips, two pads
 //!     decoder.push(line.as_bytes(), f64::from(sample) * 0.01, &mut events);
 //! }
-//! let readings = events.iter().filter(|event| matches!(event, DecodedEvent::Reading(_))).count();
+//! let readings = events.iter().filter(|event| matches!(event, BoardEvent::Reading(_))).count();
 //! assert!(readings >= 10);
 //! ```
 

@@ -67,6 +67,17 @@ impl TrialContent {
     }
 }
 
+/// Channels of any trial with their units, in the order in which they appear.
+pub(crate) fn channels_of(trials: &[TrialContent]) -> Vec<(&str, &'static str)> {
+    let mut channels: Vec<(&str, &'static str)> = Vec::new();
+    for column in trials.iter().flat_map(|trial| &trial.open.columns) {
+        if !channels.iter().any(|(name, _)| *name == column.name) {
+            channels.push((&column.name, column.unit));
+        }
+    }
+    channels
+}
+
 /// Pose of a finger's segment in the gripper: z towards the tip, x out of the pad, so that joints turn about y.
 pub(crate) fn segment_pose(frame: &Frame, gripper: &GripperModel, side: Side, segment: usize) -> Pose {
     let finger = frame.placed(gripper, side);

@@ -41,12 +41,12 @@ mod tests;
 mod urdf;
 
 pub use csv_files::{
-    Exported, PointsError, contacts_path, export_labelled, file_name_of, read_points_csv, write_board_csv,
-    write_contacts_csv, write_trial_csv,
+    Exported, PointsError, contacts_path, export_labelled, file_name_of, read_points_csv, write_contacts_csv,
+    write_trial_csv,
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
 
-use palpate_store::{FileKind, Store, StoreError};
+use palpate_store::{FileKind, Store, StoreError, TrialQuality};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -91,6 +91,7 @@ pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportErr
 /// not show that. Damaged trials count as sound; they say what is wrong where they are read.
 pub fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<(Vec<TrialId>, Vec<TrialId>), StoreError> {
     let rows = store.list(false)?;
-    let unsound: BTreeSet<TrialId> = rows.iter().filter(|row| !row.sound && !row.damaged).map(|row| row.id).collect();
+    let unsound: BTreeSet<TrialId> =
+        rows.iter().filter(|row| TrialQuality::of(row) == TrialQuality::Unsound).map(|row| row.id).collect();
     Ok(ids.iter().partition(|id| !unsound.contains(id)))
 }

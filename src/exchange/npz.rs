@@ -2,7 +2,7 @@
 //!
 //! NPY is a header of text, padded to 64 bytes, and the numbers in rows. Source: numpy, *numpy.lib.format*, version 1.0.
 
-use crate::content::TrialContent;
+use crate::content::{TrialContent, channels_of};
 use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
 use palpate_geometry::Pose;
 use palpate_lab::inspection::{TouchPhase, scene_hash};
@@ -54,13 +54,7 @@ impl TrialFormat for Npz {
 fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>) -> io::Result<()> {
     let count = trials.len();
     let samples = trials.iter().map(|trial| trial.samples.len()).max().unwrap_or(0);
-    // Every channel of any trial, in the order in which they appear.
-    let mut channels: Vec<(&str, &str)> = Vec::new();
-    for column in trials.iter().flat_map(|trial| &trial.open.columns) {
-        if !channels.iter().any(|(name, _)| *name == column.name) {
-            channels.push((&column.name, column.unit));
-        }
-    }
+    let channels = channels_of(trials);
     archive.texts("channels", channels.iter().map(|(name, _)| (*name).to_owned()))?;
     archive.texts("units", channels.iter().map(|(_, unit)| (*unit).to_owned()))?;
     archive.array("trial", &[count], trials.iter().map(|trial| trial.open.id))?;

@@ -3,7 +3,7 @@
 //! Columns: `trial`, `label`, `source`, `seed`, `sample`, `t_s`, `line_bar`, `phase`, then a column of every channel. Units
 //! stand in the file's key-value metadata under `units`, as JSON.
 
-use crate::content::TrialContent;
+use crate::content::{TrialContent, channels_of};
 use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
@@ -41,19 +41,13 @@ impl TrialFormat for Parquet {
         let file = new_file(path, self.kind())?;
         // Every trial has to be seen before the columns are known.
         let trials = export.contents()?.collect::<Result<Vec<_>, _>>()?;
-        let mut channels: Vec<(String, &'static str)> = Vec::new();
-        for column in trials.iter().flat_map(|trial| &trial.open.columns) {
-            if !channels.iter().any(|(name, _)| *name == column.name) {
-                channels.push((column.name.clone(), column.unit));
-            }
-        }
-        let written = table(&trials, &channels, file).map_err(|e| failed(&e))?;
+        let written = table(&trials, &channels_of(&trials), file).map_err(|e| failed(&e))?;
         written.finish().map_err(|e| failed(&e))?;
         Ok(Written::whole(path))
     }
 }
 
-fn table(trials: &[TrialContent], channels: &[(String, &'static str)], file: NewFile) -> Result<NewFile, ParquetError> {
+fn table(trials: &[TrialContent], channels: &[(&str, &'static str)], file: NewFile) -> Result<NewFile, ParquetError> {
     let field = |name: &str, physical: Physical| -> Result<Arc<Type>, ParquetError> {
         let text = (physical == Physical::BYTE_ARRAY).then_some(LogicalType::String);
         let field = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
@@ -64,7 +58,7 @@ fn table(trials: &[TrialContent], channels: &[(String, &'static str)], file: New
     let fields = fixed.chain(numbers).collect::<Result<Vec<_>, _>>()?;
     let schema = Arc::new(Type::group_type_builder("palpate").with_fields(fields).build()?);
     let units: serde_json::Map<String, serde_json::Value> =
-        channels.iter().map(|(name, unit)| (name.clone(), (*unit).into())).collect();
+        channels.iter().map(|(name, unit)| ((*name).to_owned(), (*unit).into())).collect();
     let metadata = [
         ("units".to_owned(), serde_json::Value::from(units).to_string()),
         ("palpate".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),

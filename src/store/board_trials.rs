@@ -4,7 +4,7 @@ use super::checksum::{BYTES, READINGS};
 use super::chunks::all_there;
 use super::reading_blob::{decode_readings, encode_readings};
 use super::store::{Store, count_chunk, insert_recorded, json, set_complete};
-use super::store_error::{StoreError, fault, row_fault};
+use super::store_error::{StoreError, row_fault};
 use crate::labels::{FlagRemark, Sparkline};
 use palpate_sim::frame::Quality;
 use palpate_tactile::board::{Gap, Reading};
@@ -47,12 +47,10 @@ impl BoardChunk {
 impl Store {
     /// Begins a trial of a real gripper; chunks follow with [`Store::append_board`].
     pub fn begin_board(&mut self, header: &TrialHeader, about: &BoardInfo) -> Result<TrialId, StoreError> {
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
-        let id = insert_recorded(&transaction, header).map_err(fault)?;
-        set_about(&transaction, id, about).map_err(fault)?;
-        self.commit(transaction)?;
+        let id = self.in_transaction(|transaction| {
+            let id = insert_recorded(transaction, header)?;
+            set_about(transaction, id, about).map(|()| id)
+        })?;
         self.calibrations().note_parts(id)?;
         Ok(id)
     }
@@ -68,27 +66,23 @@ impl Store {
             let _infallible = piece.write(&mut bytes);
         }
         let (readings, gaps) = (encode_readings(&chunk.readings), json(&chunk.gaps));
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
         let sql = "WITH new (uid, number) AS (SELECT uid, chunks FROM trials WHERE id = ?1)
             INSERT INTO board_chunks (trial, number, readings, gaps, bytes, checksum, bytes_checksum)
             VALUES (?1, (SELECT number FROM new), ?2, ?3, ?4, (SELECT checksum(uid, number, ?2, ?3) FROM new),
                 (SELECT checksum(uid, number, ?4) FROM new))";
-        transaction.execute(sql, params![id, readings, gaps, bytes]).map_err(fault)?;
-        count_chunk(&transaction, id, chunk.readings.len()).map_err(fault)?;
-        set_about(&transaction, id, about).map_err(fault)?;
-        self.commit(transaction)
+        self.in_transaction(|transaction| {
+            transaction.execute(sql, params![id, readings, gaps, bytes])?;
+            count_chunk(transaction, id, chunk.readings.len())?;
+            set_about(transaction, id, about)
+        })
     }
 
     /// Ends a trial of a real gripper.
     pub fn finish_board(&mut self, id: TrialId, about: &BoardInfo, warnings: &[String]) -> Result<(), StoreError> {
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
-        set_about(&transaction, id, about).map_err(fault)?;
-        set_complete(&transaction, id, &Quality::default(), warnings).map_err(fault)?;
-        self.commit(transaction)
+        self.in_transaction(|transaction| {
+            set_about(transaction, id, about)?;
+            set_complete(transaction, id, &Quality::default(), warnings)
+        })
     }
 
     /// Data of a trial of a real gripper, without its header; none for a trial of another kind.

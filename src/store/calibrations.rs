@@ -9,7 +9,7 @@ use super::store_error::StoreError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Record, SensorKind};
 use palpate_tactile::trial::TrialId;
-use rusqlite::{OptionalExtension, Row, Transaction, params};
+use rusqlite::{Row, Transaction, params};
 use serde::{Deserialize, Serialize};
 
 /// Number of a calibration in its store.
@@ -82,62 +82,49 @@ impl Store {
 impl CalibrationRepository<'_> {
     /// Stores a record as the newest calibration of its part.
     pub fn add(&self, record: &Record) -> Result<StoredCalibration, StoreError> {
-        let transaction = self.store.write()?;
-        let id = insert(&transaction, record, None).map_err(|e| self.store.fault(&e))?;
-        self.store.commit(transaction)?;
-        self.get(id)
+        self.get(self.store.in_transaction(|transaction| insert(transaction, record, None))?)
     }
 
     /// Imports calibrations of another store, all or none; known ones stay unchanged. Returns how many were added.
     pub fn import(&self, others: &[StoredCalibration]) -> Result<usize, StoreError> {
-        let fault = |e: rusqlite::Error| self.store.fault(&e);
-        let transaction = self.store.write()?;
-        let mut added = 0;
-        for other in others {
-            let known = "SELECT EXISTS (SELECT 1 FROM calibrations WHERE uid = ?1)";
-            if !transaction.query_row(known, [&other.uid], |row| row.get::<_, bool>(0)).map_err(fault)? {
-                insert(&transaction, &other.record, Some(other)).map_err(fault)?;
-                added += 1;
+        self.store.in_transaction(|transaction| {
+            let mut added = 0;
+            for other in others {
+                let known = "SELECT EXISTS (SELECT 1 FROM calibrations WHERE uid = ?1)";
+                if !transaction.query_row(known, [&other.uid], |row| row.get::<_, bool>(0))? {
+                    insert(transaction, &other.record, Some(other))?;
+                    added += 1;
+                }
             }
-        }
-        self.store.commit(transaction)?;
-        Ok(added)
+            Ok(added)
+        })
     }
 
     /// One calibration.
     pub fn get(&self, id: CalibrationId) -> Result<StoredCalibration, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE id = ?1");
-        let found = self.store.connection.query_row(&sql, [id], of_row).optional().map_err(|e| self.store.fault(&e))?;
-        found.unwrap_or_else(|| Err(no_calibration(id)))
+        self.store.first(&sql, [id], of_row)?.unwrap_or_else(|| Err(no_calibration(id)))
     }
 
     /// All calibrations, or those of one part, oldest first.
     pub fn list(&self, part: Option<&str>) -> Result<Vec<StoredCalibration>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE ?1 IS NULL OR part = ?1 ORDER BY created, id");
-        let rows: rusqlite::Result<Vec<_>> = self
-            .store
-            .connection
-            .prepare(&sql)
-            .and_then(|mut statement| statement.query_map([part], of_row)?.collect());
-        rows.map_err(|e| self.store.fault(&e))?.into_iter().collect()
+        self.store.all::<_, Vec<_>>(&sql, [part], of_row)?.into_iter().collect()
     }
 
     /// Withdraws a calibration, so that it serves only where it is asked for, or restores it.
     pub fn withdraw(&self, id: CalibrationId, withdrawn: bool) -> Result<(), StoreError> {
         let sql = "UPDATE calibrations SET withdrawn =
                    CASE WHEN ?2 THEN strftime('%Y-%m-%dT%H:%M:%fZ', 'now') ELSE NULL END WHERE id = ?1";
-        let transaction = self.store.write()?;
-        let changed = transaction.execute(sql, params![id, withdrawn]).map_err(|e| self.store.fault(&e))?;
-        self.store.commit(transaction)?;
+        let changed = self.store.in_transaction(|transaction| transaction.execute(sql, params![id, withdrawn]))?;
         if changed == 0 { Err(no_calibration(id)) } else { Ok(()) }
     }
 
     /// Mounts a part in a place from now on.
     pub fn mount(&self, sensor: Sensor, part: &str) -> Result<(), StoreError> {
-        let transaction = self.store.write()?;
         let sql = "INSERT INTO mountings (sensor, part) VALUES (?1, ?2)";
-        transaction.execute(sql, params![sensor.channel(), part.trim()]).map_err(|e| self.store.fault(&e))?;
-        self.store.commit(transaction)
+        let values = params![sensor.channel(), part.trim()];
+        self.store.in_transaction(|transaction| transaction.execute(sql, values)).map(drop)
     }
 
     /// The part mounted in each place, in the order of [`Sensor::ALL`].
@@ -151,9 +138,7 @@ impl CalibrationRepository<'_> {
                    ORDER BY ?2 IS NULL OR since <= ?2 DESC, CASE WHEN ?2 IS NULL OR since <= ?2 THEN -id ELSE id END LIMIT 1";
         let mut parts = [const { None }; 4];
         for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
-            let found =
-                self.store.connection.query_row(sql, params![sensor.channel(), at], |row| row.get(0)).optional();
-            *part = found.map_err(|e| self.store.fault(&e))?;
+            *part = self.store.first(sql, params![sensor.channel(), at], |row| row.get(0))?;
         }
         Ok(parts)
     }
@@ -161,28 +146,24 @@ impl CalibrationRepository<'_> {
     /// Stores which parts a trial is recorded with: those mounted now. To be called when it begins.
     pub(super) fn note_parts(&self, trial: TrialId) -> Result<(), StoreError> {
         let parts = self.mounted()?;
-        let fault = |e: rusqlite::Error| self.store.fault(&e);
-        let transaction = self.store.write()?;
-        for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
-            let Some(part) = part else { continue };
-            let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
-            transaction.execute(sql, params![trial, sensor.channel(), part]).map_err(fault)?;
-        }
-        self.store.commit(transaction)
+        let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
+        let mut known = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor, part?)));
+        self.store.in_transaction(|transaction| {
+            known.try_for_each(|(sensor, part)| {
+                transaction.execute(sql, params![trial, sensor.channel(), part]).map(drop)
+            })
+        })
     }
 
     /// The parts a trial was recorded with; where none are stored, those mounted at its time.
     pub fn parts_of(&self, trial: TrialId) -> Result<[Option<String>; 4], StoreError> {
-        let fault = |e: rusqlite::Error| self.store.fault(&e);
-        let sql = "SELECT created FROM trials WHERE id = ?1";
         let created: Option<String> =
-            self.store.connection.query_row(sql, [trial], |row| row.get(0)).optional().map_err(fault)?;
+            self.store.first("SELECT created FROM trials WHERE id = ?1", [trial], |row| row.get(0))?;
         let mut parts = self.mounted_at(created.as_deref())?;
         for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
             let sql = "SELECT part FROM parts WHERE trial = ?1 AND sensor = ?2";
-            let noted =
-                self.store.connection.query_row(sql, params![trial, sensor.channel()], |row| row.get(0)).optional();
-            *part = noted.map_err(fault)?.or(part.take());
+            let noted = self.store.first(sql, params![trial, sensor.channel()], |row| row.get(0))?;
+            *part = noted.or(part.take());
         }
         Ok(parts)
     }
@@ -340,14 +321,14 @@ pub(super) mod tests {
         let mut store = store(&folder, "s");
         assert_eq!(store.calibrations().mounted()?, [const { None }; 4]);
         let begun = crate::test_trials::without_frames("empty");
-        let untold = store.begin(&begun)?;
+        let untold = store.insert(&begun)?.id();
         // Times are stored to the millisecond.
         std::thread::sleep(std::time::Duration::from_millis(3));
         store.calibrations().mount(Sensor::FlexLeft, "A")?;
-        let first = store.begin(&begun)?;
+        let first = store.insert(&begun)?.id();
         store.calibrations().note_parts(first)?;
         store.calibrations().mount(Sensor::FlexLeft, "B")?;
-        let second = store.begin(&begun)?;
+        let second = store.insert(&begun)?.id();
         store.calibrations().note_parts(second)?;
         let left = |trial| store.calibrations().parts_of(trial).map(|parts| parts[0].clone());
         assert_eq!((left(first)?.as_deref(), left(second)?.as_deref()), (Some("A"), Some("B")));
@@ -362,7 +343,7 @@ pub(super) mod tests {
         let mut store = store(&folder, "s");
         store.calibrations().mount(Sensor::FlexLeft, "A")?;
         let begun = crate::test_trials::without_frames("empty");
-        let trial = store.begin(&begun)?;
+        let trial = store.insert(&begun)?.id();
         store.calibrations().note_parts(trial)?;
         assert!(store.calibrations().serving(Some(trial), &[])?.warnings[0].contains("has no calibration"));
         let reading = {

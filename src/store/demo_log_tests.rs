@@ -45,8 +45,7 @@ fn the_oldest_grasps_leave_the_log_and_kept_ones_stay() -> Outcome {
     let ids = log(&store)?;
     assert_eq!((ids.len(), ids[0]), (DEMO_LOG_TRIALS as usize, 5), "the first two of the log are gone");
     assert!(store.load(kept).is_ok() && store.load(own).is_ok());
-    // One that is being recorded counts, and pushes out one more when it is begun.
-    let begun = store.begin_in(TrialPlace::DemoLog, &trial(most + 9))?;
+    let begun = logged(&mut store, most + 9)?.id();
     assert_eq!((log(&store)?[0], log(&store)?.len()), (6, DEMO_LOG_TRIALS as usize));
     // One that is given up leaves nothing, not even an entry of the journal.
     let entries = store.journal().entries(9)?.len();
@@ -118,12 +117,9 @@ fn a_grasp_is_in_one_place_only() -> Outcome {
     assert!(library.catch_up(&store)? && library.counts().demo_log == 0);
 
     let second = logged(&mut store, 2)?.id();
-    let copy = trial(2);
-    let begun = store.begin(&copy)?;
-    assert_eq!(store.finish(begun, &copy.data.quality, &copy.header)?, Stored::Kept(second));
+    assert_eq!(store.insert(&trial(2))?, Stored::Kept(second));
     let third = logged(&mut store, 3)?.id();
-    let begun = store.begin_in(TrialPlace::DemoLog, &trial(3))?;
-    assert_eq!(store.finish(begun, &copy.data.quality, &trial(3).header)?, Stored::Known(third));
+    assert_eq!(logged(&mut store, 3)?, Stored::Known(third));
     let mut collected = trial(3);
     collected.header.collection = Some("set".to_owned());
     assert_eq!(store.insert_collected([&collected].into_iter())?, 0);

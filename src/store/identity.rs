@@ -31,12 +31,11 @@ impl Stored {
     }
 }
 
-/// Oldest complete trial with this identity that is not deleted, other than `but`.
-pub(super) fn known(connection: &Connection, header: &TrialHeader, but: TrialId) -> rusqlite::Result<Option<TrialId>> {
+/// Oldest complete trial with this identity that is not deleted.
+pub(super) fn known(connection: &Connection, header: &TrialHeader) -> rusqlite::Result<Option<TrialId>> {
     let Some(identity) = header.identity() else { return Ok(None) };
-    let sql = "SELECT min(id) FROM trials
-        WHERE identity = ?1 AND state = 'complete' AND deleted IS NULL AND id <> ?2";
-    connection.query_row(sql, params![identity, but], |row| row.get(0)).optional().map(Option::flatten)
+    let sql = "SELECT min(id) FROM trials WHERE identity = ?1 AND state = 'complete' AND deleted IS NULL";
+    connection.query_row(sql, [identity], |row| row.get(0)).optional().map(Option::flatten)
 }
 
 /// Adds a trial to a collection other than its own.

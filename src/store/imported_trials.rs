@@ -8,8 +8,8 @@
 //! ```
 
 use super::chunks::all_there;
-use super::store::Store;
-use super::store_error::{StoreError, fault, row_fault};
+use super::store::{Store, json};
+use super::store_error::{StoreError, row_fault};
 use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialId, TrialSource};
 use rusqlite::{OptionalExtension, params};
@@ -67,42 +67,34 @@ impl Store {
     /// Stores imported trials as a collection, all or none; trials that the collection has already stay unchanged. Returns
     /// how many were added.
     pub fn insert_imported(&mut self, collection: &str, trials: &[ImportedTrial]) -> Result<u32, StoreError> {
-        let path = self.path().to_owned();
-        let fault = |e: rusqlite::Error| fault(&path, &e);
-        let transaction = self.write()?;
-        let mut added = 0;
-        for (number, trial) in trials.iter().enumerate() {
-            let inserted = transaction
-                .execute(
-                    "INSERT OR IGNORE INTO trials (state, rig, object, seed, scene, world_from_gripper, quality,
-                         warnings, version, samples, collection, size, shape)
-                     VALUES ('complete', ?10, ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)",
-                    params![
-                        trial.label,
-                        number as i64 + 1,
-                        serde_json::to_string(&palpate_geometry::Pose::IDENTITY).unwrap_or_default(),
-                        serde_json::to_string(&palpate_sim::frame::Quality::default()).unwrap_or_default(),
-                        env!("CARGO_PKG_VERSION"),
-                        trial.signals.len() as i64,
-                        collection,
-                        trial.size,
-                        trial.shape,
-                        TrialSource::Imported.name(),
-                    ],
-                )
-                .map_err(fault)?;
-            if inserted > 0 {
-                let id = transaction.last_insert_rowid();
-                let channels = serde_json::to_string(&trial.signals.channels).unwrap_or_default();
-                let samples = encode(&trial.signals);
-                let sql = "INSERT INTO readings (trial, channels, samples, checksum)
-                    SELECT id, ?2, ?3, checksum(uid, ?2, ?3) FROM trials WHERE id = ?1";
-                transaction.execute(sql, params![id, channels, samples]).map_err(fault)?;
-                added += 1;
+        let new = "INSERT OR IGNORE INTO trials (state, rig, object, seed, scene, world_from_gripper, quality,
+                warnings, version, samples, collection, size, shape)
+            VALUES ('complete', ?10, ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)";
+        let sql = "INSERT INTO readings (trial, channels, samples, checksum)
+            SELECT id, ?2, ?3, checksum(uid, ?2, ?3) FROM trials WHERE id = ?1";
+        self.in_transaction(|transaction| {
+            let mut added = 0;
+            for (number, trial) in trials.iter().enumerate() {
+                let values = params![
+                    trial.label,
+                    number as i64 + 1,
+                    json(&palpate_geometry::Pose::IDENTITY),
+                    json(&palpate_sim::frame::Quality::default()),
+                    env!("CARGO_PKG_VERSION"),
+                    trial.signals.len() as i64,
+                    collection,
+                    trial.size,
+                    trial.shape,
+                    TrialSource::Imported.name(),
+                ];
+                if transaction.execute(new, values)? > 0 {
+                    let (id, signals) = (transaction.last_insert_rowid(), &trial.signals);
+                    transaction.execute(sql, params![id, json(&signals.channels), encode(signals)])?;
+                    added += 1;
+                }
             }
-        }
-        self.commit(transaction)?;
-        Ok(added)
+            Ok(added)
+        })
     }
 
     /// Channels of an imported trial; none for a trial of another kind.

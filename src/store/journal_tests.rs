@@ -143,7 +143,7 @@ fn programs_share_one_history() -> Outcome {
 fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon", "cube", ""])?;
-    let simulated = store.begin(&without_frames("cube"))?;
+    let simulated = store.insert(&without_frames("cube"))?.id();
     store.labels().set_note(2, "before")?;
     // A label leaves the simulated one alone, and says so.
     let label = TrialEdit::Label("mug".to_owned());
@@ -194,7 +194,7 @@ fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
 fn nonsense_is_refused_and_changes_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
-    let simulated = store.begin(&without_frames("cube"))?;
+    let simulated = store.insert(&without_frames("cube"))?.id();
     let message = |outcome: Result<(), StoreError>| outcome.expect_err("refused").to_string();
     assert!(message(store.labels().set_label(1, "  ")).contains("cannot be empty"));
     assert!(message(store.labels().set_label(simulated, "ball")).contains("only trials of the real gripper"));

@@ -143,7 +143,7 @@ impl LabelRepository<'_> {
     pub fn guess(&self, id: TrialId) -> Result<Option<Guess>, StoreError> {
         let sql = "SELECT model, pmf FROM guesses WHERE trial = ?1";
         let columns = |row: &Row<'_>| Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?));
-        let found = self.store.connection.query_row(sql, [id], columns).optional().map_err(|e| self.store.fault(&e))?;
+        let found = self.store.first(sql, [id], columns)?;
         let bad = |e: serde_json::Error| StoreError::bad_info(id, format!("its prediction: {e}"));
         found.map(|(model, pmf)| Ok(Guess { model, pmf: serde_json::from_str(&pmf).map_err(bad)? })).transpose()
     }
@@ -175,16 +175,15 @@ impl LabelRepository<'_> {
     /// Sets how many trials of each object are wanted.
     pub fn set_plan(&self, plan: &LabelPlan) -> Result<(), StoreError> {
         let to = plan.checked()?;
-        let fault = |e: rusqlite::Error| self.store.fault(&e);
-        let transaction = self.store.write()?;
-        let from = plan_in(&transaction).map_err(fault)?;
-        if from == to {
-            return Ok(());
-        }
         let sql = "INSERT INTO label_plan (only, plan) VALUES (1, ?1) ON CONFLICT (only) DO UPDATE SET plan = ?1";
-        transaction.execute(sql, params![json(&to)]).map_err(fault)?;
-        append(&transaction, None, &Change::Plan { from, to }, Links::default()).map_err(fault)?;
-        self.store.commit(transaction)
+        self.store.in_transaction(|transaction| {
+            let from = plan_in(transaction)?;
+            if from == to {
+                return Ok(());
+            }
+            transaction.execute(sql, params![json(&to)])?;
+            append(transaction, None, &Change::Plan { from, to }, Links::default())
+        })
     }
 
     /// Makes the changes that follow from the present states of trials, all or none. A known object is an error only where

@@ -69,11 +69,6 @@ impl LabelRepository<'_> {
              LEFT JOIN guesses ON guesses.trial = trials.id WHERE rig = ?1 ORDER BY trials.id",
             is_intact()
         );
-        let rows = self
-            .store
-            .connection
-            .prepare(&sql)
-            .and_then(|mut s| s.query_map([TrialSource::Recorded.name()], of_row)?.collect());
-        rows.map_err(|e| self.store.fault(&e))
+        self.store.all(&sql, [TrialSource::Recorded.name()], of_row)
     }
 }

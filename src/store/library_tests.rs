@@ -34,13 +34,16 @@ fn known_grasp() -> SimulatedTrial {
     trial
 }
 
-/// Records that grasp alone, with a note, so that it stays where another trial holds it.
+/// Stores that grasp alone and once more, while the trials that hold it are discarded.
 fn copy(store: &mut Store) -> Result<TrialId, StoreError> {
     let mut trial = known_grasp();
     trial.header.collection = None;
-    let id = store.begin(&trial)?;
-    store.labels().set_note(id, "kept")?;
-    Ok(store.finish(id, &trial.data.quality, &trial.header)?.id())
+    let rows = store.list(false)?;
+    let others: Vec<TrialId> = rows.iter().filter(|row| row.identity.is_some()).map(|row| row.id).collect();
+    store.delete(&others)?;
+    let id = store.insert(&trial)?.id();
+    store.restore(&others)?;
+    Ok(id)
 }
 
 fn import(store: &mut Store, label: &str) -> Result<u32, StoreError> {
@@ -76,9 +79,9 @@ fn filled(folder: &tempfile::TempDir) -> Result<Store, StoreError> {
 fn words_and_filters_find_trials() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = filled(&folder)?;
-    let damaged = palpate_sim::frame::Quality { finite: false, ..Default::default() };
-    let unsound = store.begin(&without_frames("cube"))?;
-    store.finish(unsound, &damaged, &without_frames("cube").header)?;
+    let mut unsound = without_frames("cube");
+    unsound.data.quality.finite = false;
+    store.insert(&unsound)?;
     let library = Library::read(&store)?;
     let found = |change: &dyn Fn(&mut TrialQuery)| {
         let mut query = by_number();

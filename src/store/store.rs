@@ -19,13 +19,13 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{
     SimulatedData, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource, UnknownSource,
 };
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Params, Row, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Samples per chunk when a whole trial is stored at once: about a second.
+/// Samples per chunk: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
 
 /// An open store.
@@ -174,6 +174,39 @@ impl Store {
         Ok(transaction)
     }
 
+    /// Does some work in a transaction: all of it or nothing.
+    pub(super) fn in_transaction<T>(
+        &self,
+        work: impl FnOnce(&Transaction<'_>) -> rusqlite::Result<T>,
+    ) -> Result<T, StoreError> {
+        let transaction = self.write()?;
+        let done = work(&transaction).map_err(|e| self.fault(&e))?;
+        self.commit(transaction)?;
+        Ok(done)
+    }
+
+    /// The first row of a query, if any.
+    pub(super) fn first<T>(
+        &self,
+        sql: &str,
+        values: impl Params,
+        read: impl FnOnce(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Option<T>, StoreError> {
+        let found = self.connection.prepare_cached(sql).and_then(|mut found| found.query_row(values, read).optional());
+        found.map_err(|e| self.fault(&e))
+    }
+
+    /// All rows of a query.
+    pub(super) fn all<T, C: FromIterator<T>>(
+        &self,
+        sql: &str,
+        values: impl Params,
+        read: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<C, StoreError> {
+        let found = self.connection.prepare_cached(sql).and_then(|mut found| found.query_map(values, read)?.collect());
+        found.map_err(|e| self.fault(&e))
+    }
+
     /// Commits a transaction. An error where the file is no longer the one that was opened: what was written is lost then.
     pub(super) fn commit(&self, transaction: Transaction<'_>) -> Result<(), StoreError> {
         transaction.commit().map_err(|e| self.fault(&e))?;
@@ -183,7 +216,7 @@ impl Store {
     /// Current time, UTC, in the format of [`TrialRow::created`](crate::TrialRow::created): `2026-11-21T15:36:00.123Z`.
     pub fn now(&self) -> Result<String, StoreError> {
         let sql = "SELECT strftime('%Y-%m-%dT%H:%M:%fZ', 'now')";
-        self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| fault(&self.path, &e))
+        self.connection.query_row(sql, [], |row| row.get(0)).map_err(|e| self.fault(&e))
     }
 
     /// The local day this many days ago: `2026-11-21`.
@@ -199,55 +232,18 @@ impl Store {
         version.map_err(|e| self.fault(&e))
     }
 
-    /// Begins a simulated trial in the store, without its frames: they follow with [`Store::append`].
-    pub fn begin(&mut self, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
-        self.begin_in(TrialPlace::Store, trial)
-    }
-
-    /// Begins a simulated trial in the store or in the demo log.
-    pub fn begin_in(&mut self, place: TrialPlace, trial: &SimulatedTrial) -> Result<TrialId, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let id = insert_simulated(&transaction, trial, place).map_err(|e| fault(&path, &e))?;
-        self.commit(transaction)?;
-        Ok(id)
-    }
-
     /// Place of a trial.
     pub fn place(&self, id: TrialId) -> Result<TrialPlace, StoreError> {
         place_of(&self.connection, id).map_err(|e| self.fault(&e))?.ok_or_else(|| self.no_trial(id))
     }
 
-    /// Gives up a trial that is being recorded, or that another replaces: one of the demo log is removed, any other marked as
-    /// deleted.
+    /// Gives up a trial that another replaces: one of the demo log is removed, any other marked as deleted.
     pub fn give_up(&mut self, id: TrialId) -> Result<(), StoreError> {
         let removed = self.connection.execute("DELETE FROM trials WHERE id = ?1 AND demo = 1", [id]);
         if removed.map_err(|e| self.fault(&e))? == 0 {
             self.delete(&[id])?;
         }
         Ok(())
-    }
-
-    /// Adds frames to a trial that is being recorded; once this returns, a kill cannot lose them.
-    pub fn append(&mut self, id: TrialId, frames: &[Frame]) -> Result<(), StoreError> {
-        if frames.is_empty() {
-            return Ok(());
-        }
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        insert_chunk(&transaction, id, frames).map_err(|e| fault(&path, &e))?;
-        self.commit(transaction)
-    }
-
-    /// Ends a trial, whose quality, warnings and pulls are now known. It is removed where another trial holds the same
-    /// grasp, unless it has a note, tag or other change by a person. A trial of the demo log that holds a grasp recorded into
-    /// the store is kept.
-    pub fn finish(&mut self, id: TrialId, quality: &Quality, header: &TrialHeader) -> Result<Stored, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let stored = end(&transaction, id, quality, header).map_err(|e| fault(&path, &e))?;
-        self.commit(transaction)?;
-        Ok(stored)
     }
 
     /// Stores a whole simulated trial, all or nothing, unless another trial holds the same grasp.
@@ -257,15 +253,10 @@ impl Store {
 
     /// The same in the store or in the demo log.
     pub fn insert_in(&mut self, place: TrialPlace, trial: &SimulatedTrial) -> Result<Stored, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let insert = || match known(&transaction, &trial.header, 0)? {
-            Some(id) => held(&transaction, id, place),
-            None => insert_whole(&transaction, trial, place).map(Stored::New),
-        };
-        let stored = insert().map_err(|e| fault(&path, &e))?;
-        self.commit(transaction)?;
-        Ok(stored)
+        self.in_transaction(|transaction| match known(transaction, &trial.header)? {
+            Some(id) => held(transaction, id, place),
+            None => insert_whole(transaction, trial, place).map(Stored::New),
+        })
     }
 
     /// Stores the trials of a collection that are not in the store yet, all or nothing; returns how many. A grasp that another
@@ -274,46 +265,39 @@ impl Store {
         &mut self,
         trials: impl Iterator<Item = &'a SimulatedTrial>,
     ) -> Result<u32, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let mut stored = 0;
-        for trial in trials {
-            let header = &trial.header;
-            if is_collected(&transaction, header).map_err(|e| fault(&path, &e))? {
-                continue;
-            }
-            match known(&transaction, header, 0).map_err(|e| fault(&path, &e))? {
-                Some(id) => {
-                    add_to(&transaction, id, header.collection.as_deref())
-                        .and_then(|()| keep(&transaction, id))
-                        .map_err(|e| fault(&path, &e))?;
+        self.in_transaction(|transaction| {
+            let mut stored = 0;
+            for trial in trials {
+                let header = &trial.header;
+                if is_collected(transaction, header)? {
+                    continue;
                 }
-                None => {
-                    insert_whole(&transaction, trial, TrialPlace::Store).map_err(|e| fault(&path, &e))?;
-                    stored += 1;
+                match known(transaction, header)? {
+                    Some(id) => {
+                        add_to(transaction, id, header.collection.as_deref())?;
+                        keep(transaction, id)?;
+                    }
+                    None => {
+                        insert_whole(transaction, trial, TrialPlace::Store)?;
+                        stored += 1;
+                    }
                 }
             }
-        }
-        self.commit(transaction)?;
-        Ok(stored)
+            Ok(stored)
+        })
     }
 
     /// Object and seed of every trial of a collection; deleted ones too, so that they are not made again.
     pub fn collected(&self, collection: &str) -> Result<BTreeSet<(String, u64)>, StoreError> {
         let sql = "SELECT object, seed FROM trials WHERE collection = ?1 UNION SELECT object, seed FROM trials
             JOIN memberships ON memberships.trial = trials.id WHERE memberships.collection = ?1";
-        let rows = self
-            .connection
-            .prepare(sql)
-            .and_then(|mut statement| statement.query_map([collection], object_and_seed)?.collect());
-        rows.map_err(|e| self.fault(&e))
+        self.all(sql, [collection], object_and_seed)
     }
 
     /// Time of a trial's beginning, UTC.
     pub fn created(&self, id: TrialId) -> Result<String, StoreError> {
         let sql = "SELECT created FROM trials WHERE id = ?1";
-        let found = self.connection.query_row(sql, [id], |row| row.get(0)).optional().map_err(|e| self.fault(&e))?;
-        found.ok_or_else(|| self.no_trial(id))
+        self.first(sql, [id], |row| row.get(0))?.ok_or_else(|| self.no_trial(id))
     }
 
     /// One trial with its data.
@@ -366,12 +350,7 @@ impl Store {
 
     /// Removes all deleted trials for good; returns how many.
     pub fn purge(&mut self) -> Result<usize, StoreError> {
-        let path = self.path.clone();
-        let transaction = self.write()?;
-        let removed =
-            transaction.execute("DELETE FROM trials WHERE deleted IS NOT NULL", []).map_err(|e| fault(&path, &e))?;
-        self.commit(transaction)?;
-        Ok(removed)
+        self.in_transaction(|transaction| transaction.execute("DELETE FROM trials WHERE deleted IS NOT NULL", []))
     }
 }
 
@@ -382,11 +361,15 @@ fn held(transaction: &Transaction<'_>, id: TrialId, place: TrialPlace) -> rusqli
 }
 
 fn insert_whole(transaction: &Transaction<'_>, trial: &SimulatedTrial, place: TrialPlace) -> rusqlite::Result<TrialId> {
-    let id = insert_simulated(transaction, trial, place)?;
-    for frames in trial.frames().chunks(FRAMES_PER_CHUNK) {
+    let SimulatedData { world_from_gripper, plan, quality, frames } = &trial.data;
+    let id = insert_header(transaction, TrialSource::Simulated, &trial.header, (world_from_gripper, quality, plan))?;
+    if place == TrialPlace::DemoLog {
+        log(transaction, id)?;
+    }
+    for frames in frames.chunks(FRAMES_PER_CHUNK) {
         insert_chunk(transaction, id, frames)?;
     }
-    set_complete(transaction, id, &trial.data.quality, &trial.header.warnings)?;
+    set_complete(transaction, id, quality, &trial.header.warnings)?;
     Ok(id)
 }
 
@@ -458,19 +441,6 @@ pub(super) fn source_named(id: TrialId, name: &str) -> Result<TrialSource, Store
     })
 }
 
-fn insert_simulated(
-    transaction: &Transaction<'_>,
-    trial: &SimulatedTrial,
-    place: TrialPlace,
-) -> rusqlite::Result<TrialId> {
-    let SimulatedData { world_from_gripper, plan, quality, frames: _ } = &trial.data;
-    let id = insert_header(transaction, TrialSource::Simulated, &trial.header, (world_from_gripper, quality, plan))?;
-    if place == TrialPlace::DemoLog {
-        log(transaction, id)?;
-    }
-    Ok(id)
-}
-
 /// Begins a recorded trial. Columns that only simulated trials use get neutral values.
 pub(super) fn insert_recorded(transaction: &Transaction<'_>, header: &TrialHeader) -> rusqlite::Result<TrialId> {
     let unused = (&Pose::IDENTITY, &Quality::default(), &Plan::default());
@@ -528,35 +498,6 @@ pub(super) fn count_chunk(transaction: &Transaction<'_>, id: TrialId, samples: u
 fn object_and_seed(row: &Row<'_>) -> rusqlite::Result<(String, u64)> {
     let object = row.get_ref(0)?.as_bytes().map_or_else(|_| String::new(), |name| String::from_utf8_lossy(name).into());
     Ok((object, row.get::<_, i64>(1)?.cast_unsigned()))
-}
-
-/// Completes a simulated trial, or removes it where another trial holds the same grasp and nobody has annotated this one.
-fn end(
-    transaction: &Transaction<'_>,
-    id: TrialId,
-    quality: &Quality,
-    header: &TrialHeader,
-) -> rusqlite::Result<Stored> {
-    if let Some(other) = known(transaction, header, id)?
-        && !is_annotated(transaction, id)?
-    {
-        let place = place_of(transaction, id)?.unwrap_or_default();
-        transaction.execute("DELETE FROM trials WHERE id = ?1", [id])?;
-        return held(transaction, other, place);
-    }
-    set_complete(transaction, id, quality, &header.warnings)?;
-    transaction.execute(
-        "UPDATE trials SET origin = ?2, identity = ?3 WHERE id = ?1",
-        params![id, header.origin.as_ref().map(json), header.identity()],
-    )?;
-    Ok(Stored::New(id))
-}
-
-/// True for a trial with a note, a tag or any change in the journal.
-fn is_annotated(transaction: &Transaction<'_>, id: TrialId) -> rusqlite::Result<bool> {
-    let sql = "SELECT EXISTS (SELECT 1 FROM trials WHERE id = ?1 AND (note <> '' OR tags <> '[]'
-        OR EXISTS (SELECT 1 FROM journal WHERE journal.trial = trials.uid)))";
-    transaction.query_row(sql, [id], |row| row.get(0))
 }
 
 pub(super) fn set_complete(

@@ -34,41 +34,19 @@ fn a_trial_survives_storing() -> Result<(), StoreError> {
 }
 
 #[test]
-fn a_trial_recorded_in_chunks_is_the_same_trial() -> Result<(), StoreError> {
-    let folder = folder();
-    let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
-    let trial = trial(1);
-    let id = store.begin(&trial)?;
-    for frames in trial.frames().chunks(7) {
-        store.append(id, frames)?;
-    }
-    assert_eq!(store.list(false)?[0].state, "recording");
-    store.finish(id, &trial.data.quality, &trial.header)?;
-    assert!(store.load(id)? == trial.clone().into());
-    Ok(())
-}
-
-#[test]
-fn a_copy_goes_at_its_end_unless_somebody_annotated_it() -> Result<(), StoreError> {
+fn a_grasp_is_stored_once_and_copies_are_told() -> Result<(), StoreError> {
     let folder = folder();
     let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
     let mut trial = trial(1);
     trial.header.origin = Some(GraspOrigin::default());
     let first = store.insert(&trial)?.id();
-    let (quality, header) = (&trial.data.quality, &trial.header);
-    let plain = store.begin(&trial)?;
-    assert_eq!(store.finish(plain, quality, header)?, Stored::Known(first));
-
-    let noted = store.begin(&trial)?;
-    store.labels().set_note(noted, "slipped")?;
-    assert_eq!(store.finish(noted, quality, header)?, Stored::New(noted));
-    let undone = store.begin(&trial)?;
-    store.labels().set_tags(undone, &["wet".to_owned()])?;
-    store.journal().undo()?;
-    assert_eq!(store.finish(undone, quality, header)?, Stored::New(undone));
+    assert_eq!(store.insert(&trial)?, Stored::Known(first));
+    store.delete(&[first])?;
+    let second = store.insert(&trial)?.id();
+    store.restore(&[first])?;
     let rows = store.list(false)?;
-    let told: Vec<_> = rows.iter().map(|row| (row.id, row.duplicate_of, row.note.as_str())).collect();
-    assert_eq!(told, [(first, None, ""), (noted, Some(first), "slipped"), (undone, Some(first), "")]);
+    let told: Vec<_> = rows.iter().map(|row| (row.id, row.duplicate_of)).collect();
+    assert_eq!(told, [(first, None), (second, Some(first))]);
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use super::calibrations::CalibrationRepository;
 use super::store_error::StoreError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::Zero;
-use rusqlite::{OptionalExtension, params};
+use rusqlite::params;
 use serde::Serialize;
 
 /// Tare of one part.
@@ -37,16 +37,16 @@ impl CalibrationRepository<'_> {
     /// newer tare or calibration of the part. Leaves out sensors without a calibration or a zero.
     pub fn add_tare(&self, zero: &Zero) -> Result<StoredTare, StoreError> {
         let serving = self.serving(None, &[])?;
-        let fault = |e: rusqlite::Error| self.store.fault(&e);
-        let transaction = self.store.write()?;
-        for ((sensor, calibration), id) in serving.calibrations.iter().zip(&serving.ids) {
-            let Some(offset) = zero.offsets[*sensor as usize].filter(|offset| offset.is_finite()) else { continue };
-            let sql = "INSERT INTO tares (part, version, calibration, zero)
-                       SELECT ?1, (SELECT coalesce(max(version), 0) + 1 FROM tares WHERE part = ?1), uid, ?3
-                       FROM calibrations WHERE id = ?2";
-            transaction.execute(sql, params![calibration.record.part, id, offset]).map_err(fault)?;
-        }
-        self.store.commit(transaction)?;
+        let sql = "INSERT INTO tares (part, version, calibration, zero)
+                   SELECT ?1, (SELECT coalesce(max(version), 0) + 1 FROM tares WHERE part = ?1), uid, ?3
+                   FROM calibrations WHERE id = ?2";
+        self.store.in_transaction(|transaction| {
+            for ((sensor, calibration), id) in serving.calibrations.iter().zip(&serving.ids) {
+                let Some(offset) = zero.offsets[*sensor as usize].filter(|offset| offset.is_finite()) else { continue };
+                transaction.execute(sql, params![calibration.record.part, id, offset])?;
+            }
+            Ok(())
+        })?;
         Ok(self.tare()?.unwrap_or_default())
     }
 
@@ -59,8 +59,7 @@ impl CalibrationRepository<'_> {
             let sql = "SELECT zero, version, taken FROM tares WHERE part = ?1
                        AND calibration = (SELECT uid FROM calibrations WHERE id = ?2) ORDER BY id DESC LIMIT 1";
             let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?));
-            let found = self.store.connection.query_row(sql, params![part, id], row).optional();
-            let Some((offset, version, taken)) = found.map_err(|e| self.store.fault(&e))? else { continue };
+            let Some((offset, version, taken)) = self.store.first(sql, params![part, id], row)? else { continue };
             tare.zero.offsets[*sensor as usize] = Some(offset);
             tare.parts.push(PartTare { sensor: *sensor, part: part.clone(), version, taken });
         }

@@ -214,10 +214,6 @@ impl Store {
         let sql = format!(
             "{ROWS}, {columns} FROM trials LEFT JOIN board_trials ON board_trials.trial = trials.id {condition}"
         );
-        let rows = self
-            .connection
-            .prepare_cached(&sql)
-            .and_then(|mut statement| statement.query_map(values, |row| reader.read(row))?.collect());
-        rows.map_err(|e| self.fault(&e))
+        self.all(&sql, values, |row| reader.read(row))
     }
 }

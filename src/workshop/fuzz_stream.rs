@@ -1,7 +1,7 @@
 //! Random streams for the protocol decoder, and what must hold for its events whatever the stream. The same seed gives the
 //! same stream.
 
-use palpate_device::protocol::{DecodedEvent, Decoder, checksum};
+use palpate_device::protocol::{BoardEvent, Decoder, checksum};
 
 /// Largest number of channels of a board.
 const MOST_CHANNELS: usize = 64;
@@ -19,7 +19,7 @@ pub(crate) struct FuzzStream {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BrokenRule {
     #[error("{rule}: {event:?}")]
-    Event { rule: &'static str, event: DecodedEvent },
+    Event { rule: &'static str, event: BoardEvent },
     #[error("cadence counts {counted} readings, {decoded} were decoded")]
     Count {
         /// Readings by the cadence.
@@ -33,7 +33,7 @@ pub(crate) enum BrokenRule {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FuzzListener {
     decoder: Decoder,
-    events: Vec<DecodedEvent>,
+    events: Vec<BoardEvent>,
     last_s: Option<f64>,
     channels: usize,
     readings: u64,
@@ -143,9 +143,9 @@ impl FuzzListener {
         if counted == self.readings { Ok(()) } else { Err(BrokenRule::Count { counted, decoded: self.readings }) }
     }
 
-    fn check(&mut self, event: &DecodedEvent) -> Result<(), &'static str> {
+    fn check(&mut self, event: &BoardEvent) -> Result<(), &'static str> {
         match event {
-            DecodedEvent::Reading(reading) => {
+            BoardEvent::Reading(reading) => {
                 self.readings += 1;
                 let before = self.last_s.replace(reading.t_s);
                 if before.is_some_and(|before| reading.t_s <= before) {
@@ -158,18 +158,18 @@ impl FuzzListener {
                     return Err("a number is not finite");
                 }
             }
-            DecodedEvent::Gap(gap) => {
+            BoardEvent::Gap(gap) => {
                 if self.last_s != Some(gap.from_s) || gap.to_s <= gap.from_s {
                     return Err("a gap does not follow the last reading");
                 }
             }
-            DecodedEvent::Board(board) => {
+            BoardEvent::Board(board) => {
                 if board.channels.len() < self.channels || board.channels.len() > MOST_CHANNELS {
                     return Err("channels were removed, or are too many");
                 }
                 self.channels = board.channels.len();
             }
-            DecodedEvent::Reply(_) => {}
+            BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use crate::streams::alike;
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::ALL_PANELS;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
-use palpate_device::protocol::{DecodedEvent, Decoder};
+use palpate_device::protocol::{BoardEvent, Decoder};
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::gripper::Listen;
 use palpate_sim::gripper::{GripperModel, Phase, Side, TorquePoint};
@@ -52,11 +52,7 @@ pub(crate) fn readings(
         gripper.advance(now);
         decoder.push(&gripper.take_bytes(), now, &mut events);
     }
-    let reading = |events| match events {
-        DecodedEvent::Reading(reading) => Some(reading),
-        DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
-    };
-    (decoder.board().clone(), events.into_iter().filter_map(reading).collect())
+    (decoder.board().clone(), events.into_iter().filter_map(BoardEvent::into_reading).collect())
 }
 
 /// The steps of a script that hold angles (degrees) and then loads (kg), 2 s each.

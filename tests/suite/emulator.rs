@@ -10,8 +10,8 @@ use crate::program::{palpate, ran, refused};
 use crate::serial::{HANG, TOO_BUSY, finished, interrupt, start};
 use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, parse_faults};
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkOptions, SerialLink};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::{LinkOptions, SerialLink};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{Recording, TrialRequest, record};
 use palpate_sim::objects::EMPTY;
@@ -223,9 +223,9 @@ fn listen(link: &SerialLink, mut is_enough: impl FnMut(&[Reading]) -> bool) -> (
         assert!(began.elapsed() < HANG, "it hangs after {} readings: {:?}", readings.len(), link.status());
         for event in link.take(Duration::from_millis(50)) {
             match event {
-                LinkEvent::Decoded(DecodedEvent::Reading(reading)) => readings.push(reading),
-                LinkEvent::Decoded(DecodedEvent::Gap(gap)) => gaps.push(gap),
-                LinkEvent::Decoded(_) | LinkEvent::Captured(_) => {}
+                BoardEvent::Reading(reading) => readings.push(reading),
+                BoardEvent::Gap(gap) => gaps.push(gap),
+                BoardEvent::Board(_) | BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
             }
         }
     }

@@ -203,8 +203,9 @@ fn a_driven_trial_is_recorded_with_its_rest_and_its_phases() {
     // What was plotted: a stretch that is only watched, the trial from its rest on, and watching again.
     desk.until(|view| view.grasp == 3);
     let own: Vec<&TraceRow> = desk.rows.iter().filter(|row| row.grasp == 2).collect();
-    assert!(own.iter().all(|row| !row.rolling && row.values.len() == 6 + 4));
-    assert!(own[0].t < -0.9 && own.last().unwrap().t > 3.9, "{} to {}", own[0].t, own.last().unwrap().t);
+    assert!(own.iter().all(|row| !row.rolling && row.sample.values.len() == 6 + 4));
+    let [first_s, last_s] = [own[0], own[own.len() - 1]].map(|row| row.sample.t_s);
+    assert!(first_s < -0.9 && last_s > 3.9, "{first_s} to {last_s}");
     assert!(desk.rows.iter().filter(|row| row.grasp == 1).all(|row| row.rolling));
 }
 
@@ -324,7 +325,7 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
     }
     // At rest the fingers are straight, and nothing presses; in a close they bend inward, both alike.
     let of_trial = desk.rows.iter().filter(|row| row.grasp == 5);
-    let most = |k: usize| of_trial.clone().map(|row| row.values[k]).fold(f32::MIN, f32::max);
+    let most = |k: usize| of_trial.clone().map(|row| row.sample.values[k]).fold(f32::MIN, f32::max);
     assert!(most(0) > 3.0 && (most(0) - most(1)).abs() < 0.5, "{} {}", most(0), most(1));
     desk.command(GripperCommand::Tare);
     let tared =
@@ -399,7 +400,7 @@ fn trials_begin_and_end_by_themselves_with_their_phases() {
     desk.connect();
     desk.command(GripperCommand::Watch(Some(request)));
     for number in 1..=2 {
-        desk.until_said(&format!("Stored({number})"));
+        desk.until_said(&format!("Stored(New({number}))"));
         let store = desk.store();
         let trial = store.board_log(number).unwrap().unwrap();
         let phases: Vec<Phase> = trial.course.phases.iter().map(|mark| mark.phase).collect();
@@ -433,7 +434,7 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     assert!((most - 0.55).abs() < 1e-9, "{most} bar");
     assert!(trial.readings.iter().all(|reading| reading.line_bar <= Some(0.501)));
     let rows = desk.rows.iter().filter(|row| row.grasp == 2);
-    assert!(rows.map(|row| row.line_bar).all(|bar| bar.is_nan() || bar < 0.501), "the board knows better");
+    assert!(rows.map(|row| row.sample.line_bar).all(|bar| bar.is_nan() || bar < 0.501), "the board knows better");
 }
 
 #[test]
@@ -508,7 +509,9 @@ fn a_store_that_cannot_be_written_ends_a_trial_before_the_fingers_close() {
     }));
     desk.until_said("not a store");
     let view = desk.until(|view| view.trial.is_none());
-    assert!(view.is_connected() && desk.rows.iter().all(|row| row.line_bar.is_nan() || row.line_bar <= 0.01));
+    assert!(
+        view.is_connected() && desk.rows.iter().all(|row| row.sample.line_bar.is_nan() || row.sample.line_bar <= 0.01)
+    );
     desk.command(GripperCommand::Disconnect);
     desk.until(|view| !view.is_connected());
 }

@@ -46,7 +46,7 @@ fn a_stored_grasp_opens_as_it_was_live() {
     while finished().is_none_or(|grasps| (stored.len() as u64) < grasps) {
         rows.extend(worker.rows());
         stored.extend(worker.notices().filter_map(|notice| match notice {
-            Notice::Stored(id) => Some(id),
+            Notice::Stored(stored) => Some(stored.id()),
             _ => None,
         }));
         std::thread::sleep(Duration::from_millis(5));
@@ -62,12 +62,16 @@ fn a_stored_grasp_opens_as_it_was_live() {
         let options =
             OpenOptions { models: Models::all(&model), grasps: Some(3), keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options).unwrap();
-        assert_eq!(open.t_s, live.iter().map(|row| row.t).collect::<Vec<f64>>());
-        assert_eq!(open.line_bar, live.iter().map(|row| row.line_bar).collect::<Vec<f64>>());
+        assert_eq!(open.t_s, live.iter().map(|row| row.sample.t_s).collect::<Vec<f64>>());
+        assert_eq!(open.line_bar, live.iter().map(|row| row.sample.line_bar).collect::<Vec<f64>>());
         for (k, row) in live.iter().enumerate() {
             let values: Vec<u32> = open.columns.iter().map(|column| column.values[k].to_bits()).collect();
-            assert_eq!(values, row.values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>(), "sample {k}");
-            let now = open.at(row.t).unwrap();
+            assert_eq!(
+                values,
+                row.sample.values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>(),
+                "sample {k}"
+            );
+            let now = open.at(row.sample.t_s).unwrap();
             assert_eq!((now.sample, now.frame), (k, row.frame.as_ref()));
             let (then, live) = (now.answer.unwrap(), row.answer.as_ref().unwrap());
             assert_eq!((&then.verdict, then.listening), (&live.verdict, live.listening), "trial {id}, sample {k}");

@@ -6,8 +6,8 @@ use crate::gripper::{Desk, FAST, scene, store_calibrations};
 use crate::program::{json, refused, run};
 use crate::streams::Emulated;
 use palpate_device::emulator::{EmulatorSetup, HandPlan};
-use palpate_device::protocol::ConsoleLine;
-use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, SendError, SerialLink};
+use palpate_device::protocol::{BoardEvent, ConsoleLine};
+use palpate_device::serial::{LinkOptions, LinkStatus, SendError, SerialLink};
 use palpate_lab::grasping::{Identification, Row, grasp};
 use palpate_lab::gripper::{BoardStream, SerialGripper};
 use palpate_lab::recording::{Replay, TrialRequest, record};
@@ -74,7 +74,7 @@ impl FaultyLink {
 }
 
 impl BoardStream for FaultyLink {
-    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+    fn take(&mut self, patience: Duration) -> Vec<BoardEvent> {
         if let BoardFault::Emulated(fault, seconds) = self.fault
             && self.is_past(STRIKES_S)
             && !std::mem::replace(&mut self.struck, true)
@@ -89,7 +89,7 @@ impl BoardStream for FaultyLink {
         let cause = "the board was unplugged".to_owned();
         let piece = Captured::Interrupted { at_s: self.inner.now_s(), cause };
         let first = !std::mem::replace(&mut self.struck, true);
-        first.then_some(LinkEvent::Captured(piece)).into_iter().collect()
+        first.then_some(BoardEvent::Captured(piece)).into_iter().collect()
     }
 
     fn status(&self) -> LinkStatus {

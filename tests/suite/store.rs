@@ -70,32 +70,6 @@ fn regrasped(trial: &Trial, object: Option<&ObjectModel>) -> Trial {
 }
 
 #[test]
-fn a_recording_cut_short_keeps_its_chunks_and_harms_no_other_trial() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("live.sqlite");
-    let mut scene = Scene::default();
-    "cube".clone_into(&mut scene.object.source);
-    let trial = grasp(&scene, scene.load_object().unwrap().as_ref(), 0);
-    let mut store = Store::open(&path).unwrap();
-    store.insert(&trial).unwrap();
-    let cut = store.begin(&trial).unwrap();
-    for chunk in trial.frames().chunks(75).take(3) {
-        store.append(cut, chunk).unwrap();
-    }
-    // What a power cut would leave: the files as they are, while they are in use.
-    let left = folder.path().join("left.sqlite");
-    for suffix in ["", "-wal"] {
-        let with = |path: &Path| format!("{}{suffix}", path.display());
-        std::fs::copy(with(&path), with(&left)).unwrap();
-    }
-    let found = Store::open(&left).unwrap();
-    assert!(*found.load(cut).unwrap().frames() == trial.frames()[..225]);
-    assert!(found.load(1).unwrap() == trial.into());
-    let states: Vec<String> = found.list(false).unwrap().into_iter().map(|row| row.state).collect();
-    assert_eq!(states, ["complete", "recording"]);
-}
-
-#[test]
 fn two_programs_record_into_one_store() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shared.sqlite");

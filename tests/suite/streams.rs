@@ -3,8 +3,8 @@
 
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, parse_faults};
 use palpate_device::protocol::AdcRange;
-use palpate_device::protocol::{ConsoleLine, DecodedEvent, Decoder};
-use palpate_device::serial::{BoardKind, LinkEvent, LinkState, LinkStatus, PortInfo, SendError};
+use palpate_device::protocol::{BoardEvent, ConsoleLine, Decoder};
+use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, SendError};
 use palpate_lab::gripper::BoardStream;
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
@@ -41,7 +41,7 @@ pub(crate) struct MadeUp<F> {
 }
 
 /// Fifty readings of a second at a time, all alike.
-pub(crate) fn alike(counts: impl Fn() -> Vec<Option<f32>>) -> MadeUp<impl FnMut(Duration) -> (f64, Vec<LinkEvent>)> {
+pub(crate) fn alike(counts: impl Fn() -> Vec<Option<f32>>) -> MadeUp<impl FnMut(Duration) -> (f64, Vec<BoardEvent>)> {
     let mut t_s = 0.0;
     let next = move |_| {
         std::thread::sleep(Duration::from_millis(2));
@@ -54,15 +54,15 @@ pub(crate) fn alike(counts: impl Fn() -> Vec<Option<f32>>) -> MadeUp<impl FnMut(
 
 /// Three seconds of strips that bend and pads that are pressed, at 50 Hz, of which eight tenths are missing; and silence
 /// behind them.
-pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<LinkEvent>)> {
+pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<BoardEvent>)> {
     let sample = |k: u32| {
         let t_s = 0.02 * f64::from(k);
         let wave = (std::f64::consts::PI * t_s / 3.0).sin() as f32;
         reading(t_s, [1420.0 + 500.0 * wave, 1400.0 + 450.0 * wave, 900.0 * wave, 700.0 * wave].map(Some).to_vec())
     };
     let gap = Gap { from_s: 1.0, to_s: 1.8, lost: Some(39), cause: "the board was unplugged".to_owned() };
-    let gap = LinkEvent::Decoded(DecodedEvent::Gap(gap));
-    let mut events: Vec<LinkEvent> = (0..=50).map(sample).chain([gap]).chain((90..=150).map(sample)).collect();
+    let gap = BoardEvent::Gap(gap);
+    let mut events: Vec<BoardEvent> = (0..=50).map(sample).chain([gap]).chain((90..=150).map(sample)).collect();
     let next = move |patience| {
         if events.is_empty() {
             std::thread::sleep(patience);
@@ -72,12 +72,12 @@ pub(crate) fn once_with_a_gap() -> MadeUp<impl FnMut(Duration) -> (f64, Vec<Link
     MadeUp { next, t_s: 3.0 }
 }
 
-fn reading(t_s: f64, counts: Vec<Option<f32>>) -> LinkEvent {
-    LinkEvent::Decoded(DecodedEvent::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }))
+fn reading(t_s: f64, counts: Vec<Option<f32>>) -> BoardEvent {
+    BoardEvent::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None })
 }
 
-impl<F: FnMut(Duration) -> (f64, Vec<LinkEvent>)> BoardStream for MadeUp<F> {
-    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+impl<F: FnMut(Duration) -> (f64, Vec<BoardEvent>)> BoardStream for MadeUp<F> {
+    fn take(&mut self, patience: Duration) -> Vec<BoardEvent> {
         let (t_s, events) = (self.next)(patience);
         self.t_s = t_s;
         events
@@ -138,7 +138,7 @@ impl Emulated {
 }
 
 impl BoardStream for Emulated {
-    fn take(&mut self, _: Duration) -> Vec<LinkEvent> {
+    fn take(&mut self, _: Duration) -> Vec<BoardEvent> {
         std::thread::sleep(self.look);
         self.t_s += LOOK_S;
         self.gripper.advance(self.t_s);
@@ -148,8 +148,8 @@ impl BoardStream for Emulated {
             return Vec::new();
         }
         self.decoder.push(&bytes, self.t_s, &mut decoded);
-        let piece = LinkEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
-        std::iter::once(piece).chain(decoded.into_iter().map(LinkEvent::Decoded)).collect()
+        let piece = BoardEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
+        std::iter::once(piece).chain(decoded).collect()
     }
 
     fn status(&self) -> LinkStatus {

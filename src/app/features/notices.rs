@@ -6,6 +6,7 @@ use crate::app::theme::colour;
 use egui::{Frame, Label, Margin, Panel, RichText, Ui};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::workers::{LabelCommand, Notice};
+use palpate_store::Stored;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
@@ -84,9 +85,11 @@ impl Notices {
             Notice::Warning(text) => self.warning(text),
             Notice::Failed(text) => self.error(text),
             Notice::SceneRefused(refusal) => self.error(refusal.cause),
-            Notice::Stored(id) => self.info(format!("Trial {id} stored.")),
-            Notice::Known(id) => self.info(format!("Not stored again: trial {id} is the same grasp.")),
-            Notice::Kept(id) => self.info(format!("Trial {id} of the demo log is the same grasp: kept in the store.")),
+            Notice::Stored(Stored::New(id)) => self.info(format!("Trial {id} stored.")),
+            Notice::Stored(Stored::Known(id)) => self.info(format!("Not stored again: trial {id} is the same grasp.")),
+            Notice::Stored(Stored::Kept(id)) => {
+                self.info(format!("Trial {id} of the demo log is the same grasp: kept in the store."));
+            }
             Notice::Logged(..) => {}
         }
     }

@@ -141,8 +141,8 @@ impl App {
                 Notice::SceneRefused(refusal) => notices.error(simulation.take_refusal(*refusal)),
                 // The bar offers to keep it.
                 Notice::Logged(id, place) => simulation.last_trial = Some((id, place)),
-                Notice::Stored(id) | Notice::Known(id) | Notice::Kept(id) => {
-                    simulation.last_trial = Some((id, TrialPlace::Store));
+                Notice::Stored(stored) => {
+                    simulation.last_trial = Some((stored.id(), TrialPlace::Store));
                     notices.show(notice);
                 }
                 other => notices.show(other),

@@ -11,7 +11,7 @@ use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
 use palpate_sim::objects::{catalogue, object_title};
-use palpate_store::labels::{LabelledTrial, NextTrial};
+use palpate_store::labels::{LabelledTrial, NextTrial, TrialEdit};
 
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
@@ -202,7 +202,7 @@ fn question_ui(
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {
             let id = trial.id;
-            actions.push(move |app| app.edit_labels(LabelCommand::Unsure(id, unsure)));
+            actions.push(move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Unsure(unsure))));
         }
     });
     let (names, chosen) = (draft.objects(view), draft.place(view));
@@ -292,7 +292,7 @@ fn remarks_ui(ui: &mut Ui, draft: &LabelDraft, trial: &LabelledTrial, actions: &
             actions.push(move |app| app.label(LabellingAction::WriteNote(id, note)));
         }
         if response.lost_focus() && note != trial.note {
-            actions.push(move |app| app.edit_labels(LabelCommand::Note(id, note)));
+            actions.push(move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Note(note))));
         }
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
@@ -305,7 +305,7 @@ fn remarks_ui(ui: &mut Ui, draft: &LabelDraft, trial: &LabelledTrial, actions: &
         }
         let list = parse_tags(&tags);
         if response.lost_focus() && list != trial.tags {
-            actions.push(move |app| app.edit_labels(LabelCommand::Tags(id, list)));
+            actions.push(move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Tags(list))));
         }
         ui.end_row();
     });

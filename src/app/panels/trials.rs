@@ -7,7 +7,7 @@ use crate::app::widgets::{selectable_row, sparkline};
 use egui::{Align2, FontId, Rect, RichText, ScrollArea, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
 use palpate_sim::objects::object_title;
-use palpate_store::labels::LabelledTrial;
+use palpate_store::labels::{LabelledTrial, TrialEdit};
 use palpate_tactile::trial::TrialId;
 
 /// Height of a row (points).
@@ -119,7 +119,7 @@ fn row_ui(
         if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
             actions.push(move |app| app.edit_labels(LabelCommand::Reviewed(id)));
         }
-        actions.on(&ui.button("Discard"), move |app| app.edit_labels(LabelCommand::Discard(id)));
+        actions.on(&ui.button("Discard"), move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Discard)));
     });
     if clicked {
         actions.push(move |app| app.label(LabellingAction::Select(Some(id))));

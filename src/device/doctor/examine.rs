@@ -1,8 +1,8 @@
 //! Observations of a port: open it, ask the board for its handshake, listen.
 
 use super::{ChannelTraces, Observations};
-use crate::protocol::{ConsoleLine, DecodedEvent, LineKind};
-use crate::serial::{LinkEvent, LinkOptions, SerialLink, is_capture, is_running, list_ports};
+use crate::protocol::{ConsoleLine, LineKind};
+use crate::serial::{LinkOptions, SerialLink, is_capture, is_running, list_ports};
 use std::time::{Duration, Instant};
 
 /// Longest wait for events.
@@ -57,9 +57,7 @@ pub fn examine(options: &LinkOptions, listen: Duration, goes_on: &mut dyn FnMut(
             let _sent = link.send("?");
         }
         for event in link.take(PATIENCE) {
-            if let LinkEvent::Decoded(DecodedEvent::Reading(reading)) = event {
-                seen.traces.add(&reading);
-            }
+            event.reading().into_iter().for_each(|reading| seen.traces.add(reading));
         }
     }
     seen.listened_s = if is_file { seen.traces.seconds() } else { began.elapsed().as_secs_f64() };

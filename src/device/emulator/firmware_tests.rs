@@ -1,7 +1,7 @@
 //! The firmware as it goes onto the board, with a script for its pins.
 
 use super::firmware::{BoardSetup, FirmwareBoard};
-use crate::protocol::{DecodedEvent, Decoder};
+use crate::protocol::{BoardEvent, Decoder};
 
 /// What happens to the board.
 #[derive(Clone, Debug)]
@@ -123,10 +123,8 @@ fn the_parser_reads_what_it_prints_and_takes_no_line_that_lost_a_digit() {
             }
             decoder.push(&bytes, 0.02 * k as f64, &mut events);
         }
-        let counts = events.iter().filter_map(|events| match events {
-            DecodedEvent::Reading(reading) => Some((reading.seq, reading.counts.clone())),
-            DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
-        });
+        let readings = events.iter().filter_map(BoardEvent::reading);
+        let counts = readings.map(|reading| (reading.seq, reading.counts.clone()));
         (counts.collect::<Vec<_>>(), decoder.cadence())
     };
     let (whole, cadence) = hear(&|_| None);

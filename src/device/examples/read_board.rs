@@ -3,8 +3,8 @@
 
 #![expect(clippy::print_stdout, reason = "an example that says what it did")]
 
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkOptions, SerialLink};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::{LinkOptions, SerialLink};
 use std::time::Duration;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,19 +13,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut channels = Vec::new();
     while !link.is_over() {
         for event in link.take(Duration::from_millis(200)) {
-            let LinkEvent::Decoded(event) = event else { continue };
             match event {
-                DecodedEvent::Board(board) => channels = board.channels,
-                DecodedEvent::Reading(reading) => {
+                BoardEvent::Board(board) => channels = board.channels,
+                BoardEvent::Reading(reading) => {
                     let counts = channels.iter().zip(&reading.counts);
                     let counts =
                         counts.map(|(name, count)| format!("{name} {}", count.map_or("-".into(), |c| c.to_string())));
                     println!("{:9.3} s  {}", reading.t_s, counts.collect::<Vec<_>>().join("  "));
                 }
-                DecodedEvent::Gap(gap) => {
+                BoardEvent::Gap(gap) => {
                     println!("nothing from {:.3} s to {:.3} s: {}", gap.from_s, gap.to_s, gap.cause);
                 }
-                DecodedEvent::Reply(_) => {}
+                BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
             }
         }
     }

@@ -14,10 +14,13 @@ use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, Saturati
 use super::shape::{Candidate, LineVerdict, Role, Shapes};
 use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
 use palpate_tactile::cadence::Cadence;
+use palpate_tactile::capture::Captured;
 
-/// Event of the decoder, in order.
+/// Event of a board's stream, in order. A link adds the bytes; the decoder gives the rest.
 #[derive(Clone, Debug, PartialEq)]
-pub enum DecodedEvent {
+pub enum BoardEvent {
+    /// Raw bytes, or a mark that the connection was lost. The events decoded from them follow.
+    Captured(Captured),
     /// A line of numbers.
     Reading(Reading),
     /// Readings are missing before the next one.
@@ -26,6 +29,18 @@ pub enum DecodedEvent {
     Board(Board),
     /// A reply or remark of the board.
     Reply(BoardReply),
+}
+
+impl BoardEvent {
+    /// The reading, if it is one.
+    pub fn reading(&self) -> Option<&Reading> {
+        if let Self::Reading(reading) = self { Some(reading) } else { None }
+    }
+
+    /// The same by value.
+    pub fn into_reading(self) -> Option<Reading> {
+        if let Self::Reading(reading) = self { Some(reading) } else { None }
+    }
 }
 
 /// Decoder of one board's stream, in bounded memory.
@@ -73,7 +88,7 @@ fn is_same_channel(a: &str, b: &str) -> bool {
 
 impl Decoder {
     /// Decodes bytes that arrived at a time (s since the stream began) and appends their events to `events`.
-    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
+    pub fn push(&mut self, bytes: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         let Self { splitter, reader } = self;
         reader.meter.bytes(bytes, arrived_s);
         splitter.push(bytes, |line| match line {
@@ -172,7 +187,7 @@ impl Reader {
         }
     }
 
-    fn line(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
+    fn line(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, events);
         }
@@ -202,7 +217,7 @@ impl Reader {
 
     /// Skips the first line, which is most often the rest of one, unless it is a header: a board that restarts on connection
     /// begins with it. It is complete where its first name is known.
-    fn first(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
+    fn first(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
         if names.first().is_some_and(is_known) {
@@ -217,7 +232,7 @@ impl Reader {
         if wanted && !has_one { Err("checksum missing") } else { Ok(()) }
     }
 
-    fn remark(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
+    fn remark(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         let text = std::str::from_utf8(line).map_err(|_not_text| "not text");
         let (text, handshake) = match text.and_then(|text| Ok((text, handshake::parse(text)?))) {
             Ok(said) => said,
@@ -228,12 +243,12 @@ impl Reader {
             self.handshake = handshake;
             self.find_sensors();
             self.name_columns(events);
-            events.push(DecodedEvent::Board(self.board()));
+            events.push(BoardEvent::Board(self.board()));
         }
-        events.push(DecodedEvent::Reply(BoardReply::parse(text)));
+        events.push(BoardEvent::Reply(BoardReply::parse(text)));
     }
 
-    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, events: &mut Vec<DecodedEvent>) {
+    fn header(&mut self, names: Vec<String>, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         if !self.columns.set_header(names) {
             return self.bad(line, "neither numbers nor names of sensors", arrived_s);
         }
@@ -242,7 +257,7 @@ impl Reader {
     }
 
     /// Renames columns whose names have become known.
-    fn name_columns(&mut self, events: &mut Vec<DecodedEvent>) {
+    fn name_columns(&mut self, events: &mut Vec<BoardEvent>) {
         if self.shapes.format != Some(Format::Csv) {
             return;
         }
@@ -261,7 +276,7 @@ impl Reader {
         }
         self.shapes.roles(&mut self.channels);
         self.find_sensors();
-        events.push(DecodedEvent::Board(self.board()));
+        events.push(BoardEvent::Board(self.board()));
     }
 
     fn find_sensors(&mut self) {
@@ -274,7 +289,7 @@ impl Reader {
         self.strips = self.sensors.iter().map(is_strip).collect();
     }
 
-    fn reading(&mut self, line: &Candidate, events: &mut Vec<DecodedEvent>) {
+    fn reading(&mut self, line: &Candidate, events: &mut Vec<BoardEvent>) {
         let known = self.channels.len();
         let roles = self.shapes.roles(&mut self.channels);
         let mut counts = vec![None; self.channels.len()];
@@ -299,7 +314,7 @@ impl Reader {
         }
         if self.channels.len() != known {
             self.find_sensors();
-            events.push(DecodedEvent::Board(self.board()));
+            events.push(BoardEvent::Board(self.board()));
         }
         let stamp = if whole { self.clock.stamp(&counters, line.arrived_s) } else { None };
         let Some(stamp) = stamp else {
@@ -314,7 +329,7 @@ impl Reader {
         let ten_bits = self.saturation.adc_range() == AdcRange::LooksTenBit;
         self.saturation.add(&counts, &sent, stamp.t_s, if ten_bits { FULL_10_BIT } else { full_scale });
         let Stamp { t_s, seq, .. } = stamp;
-        events.push(DecodedEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
+        events.push(BoardEvent::Reading(Reading { t_s, arrived_s: line.arrived_s, seq, counts, line_bar }));
     }
 
     /// Largest count of the strips, and of all sensors; other channels need not come from the converter.
@@ -330,7 +345,7 @@ impl Reader {
         largest
     }
 
-    fn report_gap(&mut self, stamp: &Stamp, events: &mut Vec<DecodedEvent>) {
+    fn report_gap(&mut self, stamp: &Stamp, events: &mut Vec<BoardEvent>) {
         let unreadable = std::mem::take(&mut self.unreadable);
         let broken = self.broken.take();
         // After an interruption it was given power anew.
@@ -348,6 +363,6 @@ impl Reader {
             (None, false, n) => format!("{n} unreadable lines"),
         };
         self.meter.gap(stamp.missing);
-        events.push(DecodedEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
+        events.push(BoardEvent::Gap(Gap { from_s, to_s: stamp.t_s, lost: stamp.missing, cause }));
     }
 }

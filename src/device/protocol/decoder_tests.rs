@@ -6,7 +6,7 @@ use palpate_tactile::board::{Format, TimeSource};
 use proptest::prelude::*;
 
 /// What a stream says, with each chunk arriving at its time.
-fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<DecodedEvent>) {
+fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<BoardEvent>) {
     let mut decoder = Decoder::default();
     let mut events = Vec::new();
     for (t, bytes) in chunks {
@@ -16,17 +16,17 @@ fn hear<'a>(chunks: impl IntoIterator<Item = (f64, &'a [u8])>) -> (Decoder, Vec<
 }
 
 /// Lines that arrive every 20 ms, the first behind the end of another.
-fn hear_lines(lines: &[String]) -> (Decoder, Vec<DecodedEvent>) {
+fn hear_lines(lines: &[String]) -> (Decoder, Vec<BoardEvent>) {
     let lines: Vec<String> = lines.iter().map(|line| format!("\n{line}\n")).collect();
     hear(lines.iter().enumerate().map(|(i, line)| (0.02 * i as f64, line.as_bytes())))
 }
 
-fn readings(events: &[DecodedEvent]) -> Vec<&Reading> {
-    events.iter().filter_map(|h| if let DecodedEvent::Reading(reading) = h { Some(reading) } else { None }).collect()
+fn readings(events: &[BoardEvent]) -> Vec<&Reading> {
+    events.iter().filter_map(BoardEvent::reading).collect()
 }
 
-fn gaps(events: &[DecodedEvent]) -> Vec<&Gap> {
-    events.iter().filter_map(|h| if let DecodedEvent::Gap(gap) = h { Some(gap) } else { None }).collect()
+fn gaps(events: &[BoardEvent]) -> Vec<&Gap> {
+    events.iter().filter_map(|h| if let BoardEvent::Gap(gap) = h { Some(gap) } else { None }).collect()
 }
 
 fn firmware_line(i: u32) -> String {
@@ -264,7 +264,7 @@ fn another_sketch_after_an_interruption_is_another_board() {
             t += 0.02;
             decoder.push(format!("\n{line}\n").as_bytes(), t, &mut events);
         }
-        events.iter().rev().find_map(|h| if let DecodedEvent::Board(board) = h { Some(board.clone()) } else { None })
+        events.iter().rev().find_map(|h| if let BoardEvent::Board(board) = h { Some(board.clone()) } else { None })
     };
     let found = say(
         &mut decoder,
@@ -373,18 +373,18 @@ proptest! {
         let (mut last, mut channels) = (f64::NEG_INFINITY, 0);
         for event in &events {
             match event {
-                DecodedEvent::Reading(reading) => {
+                BoardEvent::Reading(reading) => {
                     prop_assert!(reading.t_s > last && reading.t_s <= reading.arrived_s + 1e-3, "{reading:?}");
                     prop_assert_eq!(reading.counts.len(), channels);
                     prop_assert!(reading.counts.iter().flatten().all(|count| count.is_finite()));
                     last = reading.t_s;
                 }
-                DecodedEvent::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
-                DecodedEvent::Board(board) => {
+                BoardEvent::Gap(gap) => prop_assert!(gap.from_s == last && gap.to_s > gap.from_s, "{gap:?}"),
+                BoardEvent::Board(board) => {
                     prop_assert!(board.channels.len() >= channels && board.channels.len() <= 64);
                     channels = board.channels.len();
                 }
-                DecodedEvent::Reply(_) => {}
+                BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
             }
         }
         prop_assert_eq!(decoder.cadence().samples as usize, readings(&events).len());

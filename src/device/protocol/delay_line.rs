@@ -170,7 +170,7 @@ mod tests {
         let mut line = DelayLine::new(None);
         for i in 0..1500u32 {
             let happened = 3.0 + 0.020_13 * f64::from(i);
-            // DecodedEvent in fives, as a busy host would.
+            // BoardEvent in fives, as a busy host would.
             let burst = 0.020_13 * f64::from(4 - i % 5);
             line.add(f64::from(i), happened + burst + delay(i));
         }

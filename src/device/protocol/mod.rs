@@ -28,7 +28,7 @@ mod shape;
 
 pub use capture::CaptureReader;
 pub use checksum::checksum;
-pub use decoder::{DecodedEvent, Decoder};
+pub use decoder::{BoardEvent, Decoder};
 pub use line_log::{ConsoleLine, LineKind};
 pub use lines::MAX_LINE;
 pub use reply::BoardReply;

@@ -12,11 +12,11 @@
 use super::baud::Baud;
 use super::port_error::PortError;
 use super::ports::{BoardKind, PortInfo, describe, list_ports};
-use super::queue::{LinkEvent, WhenFull, lock};
+use super::queue::{WhenFull, lock};
 use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
 use super::shared::{LinkOptions, LinkState, Shared};
-use crate::protocol::{AdcRange, ConsoleLine, Saturation};
+use crate::protocol::{AdcRange, BoardEvent, ConsoleLine, Saturation};
 use palpate_tactile::board::{Board, Detected, Sensor};
 use palpate_tactile::cadence::Cadence;
 use serde::Serialize;
@@ -190,7 +190,7 @@ impl SerialLink {
     }
 
     /// Takes the events since the last call; waits up to `patience` for the first.
-    pub fn take(&self, patience: Duration) -> Vec<LinkEvent> {
+    pub fn take(&self, patience: Duration) -> Vec<BoardEvent> {
         self.shared.events.take(patience)
     }
 

@@ -1,7 +1,7 @@
 //! A link over a real pseudo-terminal.
 
 use super::*;
-use crate::protocol::{BoardReply, DecodedEvent};
+use crate::protocol::{BoardEvent, BoardReply};
 use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::capture::Captured;
 use serialport::{SerialPort, TTYPort};
@@ -36,7 +36,7 @@ fn line(i: u32, channels: u32) -> String {
 }
 
 /// Takes until `done` says so of everything taken, or something hangs.
-fn take_until(link: &SerialLink, mut done: impl FnMut(&[LinkEvent]) -> bool) -> Vec<LinkEvent> {
+fn take_until(link: &SerialLink, mut done: impl FnMut(&[BoardEvent]) -> bool) -> Vec<BoardEvent> {
     let (mut taken, start) = (Vec::new(), Instant::now());
     while !done(&taken) && start.elapsed() < HANG {
         taken.extend(link.take(Duration::from_millis(20)));
@@ -44,19 +44,12 @@ fn take_until(link: &SerialLink, mut done: impl FnMut(&[LinkEvent]) -> bool) -> 
     taken
 }
 
-fn readings(events: &[LinkEvent]) -> Vec<&Reading> {
-    let reading = |event: &'_ LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
-    let found = events.iter().filter(|event| reading(event));
-    found
-        .filter_map(|event| if let LinkEvent::Decoded(DecodedEvent::Reading(r)) = event { Some(r) } else { None })
-        .collect()
+fn readings(events: &[BoardEvent]) -> Vec<&Reading> {
+    events.iter().filter_map(BoardEvent::reading).collect()
 }
 
-fn gaps(events: &[LinkEvent]) -> Vec<&Gap> {
-    events
-        .iter()
-        .filter_map(|e| if let LinkEvent::Decoded(DecodedEvent::Gap(gap)) = e { Some(gap) } else { None })
-        .collect()
+fn gaps(events: &[BoardEvent]) -> Vec<&Gap> {
+    events.iter().filter_map(|e| if let BoardEvent::Gap(gap) = e { Some(gap) } else { None }).collect()
 }
 
 #[test]
@@ -101,9 +94,7 @@ fn lines_go_to_the_board_and_its_remarks_come_back() {
     emulated.board.read_exact(&mut received).expect("receives the command");
     assert_eq!(&received, b"P 0.55\n");
     emulated.board.write_all(b"# ok p=0.55\n").expect("writes");
-    let said = |events: &[LinkEvent]| {
-        events.contains(&LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar: 0.55 })))
-    };
+    let said = |events: &[BoardEvent]| events.contains(&BoardEvent::Reply(BoardReply::Acknowledged { line_bar: 0.55 }));
     assert!(said(&take_until(&link, said)));
     drop(emulated.port);
 }
@@ -162,7 +153,7 @@ fn captured_bytes_are_heard_as_from_a_port() {
     let bytes: usize = taken
         .iter()
         .map(|event| match event {
-            LinkEvent::Captured(Captured::Bytes { bytes, .. }) => bytes.len(),
+            BoardEvent::Captured(Captured::Bytes { bytes, .. }) => bytes.len(),
             _ => 0,
         })
         .sum();
@@ -197,7 +188,7 @@ fn a_board_that_goes_on_at_another_speed_is_found_there() {
         speak_at(&mut emulated.board, 57_600, sent);
         sent += 20;
     }
-    let is_back = |events: &[LinkEvent]| !gaps(events).is_empty() && link.status().state == LinkState::Listening;
+    let is_back = |events: &[BoardEvent]| !gaps(events).is_empty() && link.status().state == LinkState::Listening;
     while !is_back(&events) && start.elapsed() < HANG {
         speak_at(&mut emulated.board, 57_600, sent);
         sent += 20;

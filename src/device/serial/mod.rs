@@ -17,5 +17,4 @@ pub(crate) use link::is_capture;
 pub use link::{LinkStatus, SendError, SerialLink};
 pub use port_error::{ACCESS_RULE, MODEM_MANAGER_COMMAND, MODEM_MANAGER_RULE, PortError, PortTrouble, is_running};
 pub use ports::{BoardKind, PortInfo, UsbIdentity, list_ports};
-pub use queue::LinkEvent;
 pub use shared::{LinkOptions, LinkState};

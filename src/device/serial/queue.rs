@@ -1,6 +1,6 @@
 //! Queues between the threads of a link. They are bounded: what does not fit is counted and reported.
 
-use crate::protocol::DecodedEvent;
+use crate::protocol::BoardEvent;
 use palpate_tactile::board::Gap;
 use palpate_tactile::capture::Captured;
 use std::collections::VecDeque;
@@ -11,15 +11,6 @@ use std::time::Duration;
 const WAITING_BYTES: usize = 4 << 20;
 /// Events that may wait to be taken: a minute at 1 kHz.
 const WAITING_EVENTS: usize = 120_000;
-
-/// Event of a link, in order.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LinkEvent {
-    /// Raw bytes, or a mark that the connection was lost. Their decoded events follow.
-    Captured(Captured),
-    /// Decoded event.
-    Decoded(DecodedEvent),
-}
 
 /// Behaviour of a full queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,7 +114,7 @@ pub(super) struct EventQueue {
 
 #[derive(Debug, Default)]
 struct Events {
-    events: VecDeque<LinkEvent>,
+    events: VecDeque<BoardEvent>,
     /// Readings dropped since the last call of `take`, and the time of the first of them (s).
     dropped: Option<(u64, f64)>,
     dropped_in_all: u64,
@@ -141,7 +132,7 @@ impl EventQueue {
         Self { state: Mutex::default(), changed: Condvar::new(), when_full, room }
     }
 
-    pub(super) fn push(&self, events: impl Iterator<Item = LinkEvent>) {
+    pub(super) fn push(&self, events: impl Iterator<Item = BoardEvent>) {
         let mut state = lock(&self.state);
         while self.when_full == WhenFull::Wait && state.events.len() >= self.room && !state.closed {
             let waited = self.changed.wait_timeout(state, Duration::from_millis(50));
@@ -152,12 +143,12 @@ impl EventQueue {
         let mut kept = Vec::new();
         while state.events.len() > self.room {
             match state.events.pop_front() {
-                Some(LinkEvent::Decoded(DecodedEvent::Reading(reading))) => {
+                Some(BoardEvent::Reading(reading)) => {
                     let (count, from_s) = state.dropped.unwrap_or((0, reading.t_s));
                     state.dropped = Some((count + 1, from_s));
                     state.dropped_in_all += 1;
                 }
-                Some(board @ LinkEvent::Decoded(DecodedEvent::Board(_))) => kept = vec![board],
+                Some(board @ BoardEvent::Board(_)) => kept = vec![board],
                 _ => {}
             }
         }
@@ -169,14 +160,14 @@ impl EventQueue {
     }
 
     /// Takes everything that waits; if nothing does, waits up to a time.
-    pub(super) fn take(&self, patience: Duration) -> Vec<LinkEvent> {
+    pub(super) fn take(&self, patience: Duration) -> Vec<BoardEvent> {
         let mut state = lock(&self.state);
         if state.events.is_empty() && !state.closed {
             let waited = self.changed.wait_timeout_while(state, patience, |s| s.events.is_empty() && !s.closed);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
-        let mut events: Vec<LinkEvent> = state.events.drain(..).collect();
-        let times: Vec<f64> = events.iter().filter_map(reading_time).collect();
+        let mut events: Vec<BoardEvent> = state.events.drain(..).collect();
+        let times: Vec<f64> = events.iter().filter_map(|event| Some(event.reading()?.t_s)).collect();
         if let Some((lost, from_s)) = state.dropped.take() {
             let gap = Gap {
                 from_s: state.taken_s.unwrap_or(from_s),
@@ -184,7 +175,7 @@ impl EventQueue {
                 lost: Some(lost),
                 cause: "this computer was too slow: readings were dropped".to_owned(),
             };
-            events.insert(0, LinkEvent::Decoded(DecodedEvent::Gap(gap)));
+            events.insert(0, BoardEvent::Gap(gap));
         }
         state.taken_s = times.last().copied().or(state.taken_s);
         drop(state);
@@ -209,40 +200,27 @@ impl EventQueue {
     }
 }
 
-fn reading_time(event: &LinkEvent) -> Option<f64> {
-    match event {
-        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use palpate_tactile::board::{Board, Reading};
 
-    fn reading(i: u32) -> LinkEvent {
+    fn reading(i: u32) -> BoardEvent {
         let t_s = f64::from(i);
-        LinkEvent::Decoded(DecodedEvent::Reading(Reading {
-            t_s,
-            arrived_s: t_s,
-            seq: None,
-            counts: vec![],
-            line_bar: None,
-        }))
+        BoardEvent::Reading(Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None })
     }
 
     #[test]
     fn readings_that_nobody_takes_become_one_gap() {
         let queue = EventQueue::with_room(WhenFull::Drop, 10);
-        queue.push([LinkEvent::Decoded(DecodedEvent::Board(Board::default())), reading(0)].into_iter());
+        queue.push([BoardEvent::Board(Board::default()), reading(0)].into_iter());
         assert_eq!(queue.take(Duration::ZERO).len(), 2);
         for i in 1..=100 {
             queue.push(std::iter::once(reading(i)));
         }
         let events = queue.take(Duration::ZERO);
         assert_eq!(events.len(), 11);
-        let LinkEvent::Decoded(DecodedEvent::Gap(gap)) = &events[0] else { panic!("{events:?}") };
+        let BoardEvent::Gap(gap) = &events[0] else { panic!("{events:?}") };
         assert_eq!((gap.from_s, gap.to_s, gap.lost), (0.0, 91.0, Some(90)));
         assert!(queue.dropped_readings() == 90 && queue.take(Duration::ZERO).is_empty());
     }

@@ -2,7 +2,8 @@
 
 use super::baud::Baud;
 use super::ports::PortInfo;
-use super::queue::{ByteQueue, EventQueue, LinkEvent, WhenFull, lock};
+use super::queue::{ByteQueue, EventQueue, WhenFull, lock};
+use crate::protocol::BoardEvent;
 use crate::protocol::Decoder;
 use palpate_tactile::capture::Captured;
 use serde::Serialize;
@@ -152,8 +153,7 @@ impl Shared {
                     }
                     self.readings.store(decoder.readings(), Ordering::Relaxed);
                 }
-                let events = decoded.drain(..).map(LinkEvent::Decoded);
-                self.events.push(std::iter::once(LinkEvent::Captured(piece)).chain(events));
+                self.events.push(std::iter::once(BoardEvent::Captured(piece)).chain(decoded.drain(..)));
             }
         }
         self.events.close();

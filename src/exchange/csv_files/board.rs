@@ -13,7 +13,7 @@ use palpate_tactile::trial::{BoardLog, PhaseMark};
 use std::path::Path;
 
 /// Writes one row per reading.
-pub fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), ExchangeError> {
+pub(super) fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), ExchangeError> {
     let channels = &trial.course.board.channels;
     write_file(path, FileKind::Csv, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();

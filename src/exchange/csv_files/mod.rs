@@ -10,7 +10,6 @@ mod points;
 mod simulated;
 mod writing;
 
-pub use board::write_board_csv;
 pub(crate) use import::read_csv;
 pub use labelled::{Exported, export_labelled, file_name_of};
 pub use points::{PointsError, read_points_csv};

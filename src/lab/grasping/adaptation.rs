@@ -291,7 +291,7 @@ mod tests {
     use super::*;
     use crate::grasping::{GraspController, GraspPlan};
     use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts};
-    use palpate_device::protocol::{DecodedEvent, Decoder};
+    use palpate_device::protocol::{BoardEvent, Decoder};
     use palpate_tactile::trial::{BoardCourse, Control};
 
     #[test]
@@ -336,12 +336,12 @@ mod tests {
                 phases.push(controller.mark(&command));
             }
         }
-        let reading = |event| match event {
-            DecodedEvent::Reading(reading) => Some(reading),
-            DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
-        };
         let course = BoardCourse { board: decoder.board(), phases, ..BoardCourse::default() };
-        BoardLog { course, readings: events.into_iter().filter_map(reading).collect(), gaps: Vec::new() }
+        BoardLog {
+            course,
+            readings: events.into_iter().filter_map(BoardEvent::into_reading).collect(),
+            gaps: Vec::new(),
+        }
     }
 
     #[test]

@@ -11,8 +11,7 @@
 
 use super::pressure_watch::PressureWatch;
 use crate::gripper::GripperEvent;
-use palpate_device::protocol::{BoardReply, DecodedEvent};
-use palpate_device::serial::LinkEvent;
+use palpate_device::protocol::{BoardEvent, BoardReply};
 use palpate_sim::gripper::{Phase, Programme};
 use palpate_sim::scene::Scene;
 use palpate_tactile::capture::Captured;
@@ -205,14 +204,14 @@ impl GraspController {
     /// cause if the board vented or disconnected in a grasp that is not driven and therefore continues.
     pub fn observe(&mut self, event: &GripperEvent) -> Option<String> {
         let cause = match event {
-            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Refused { reason }))) => {
+            GripperEvent::Board(BoardEvent::Reply(BoardReply::Refused { reason })) => {
                 self.abort(format!("the board refused a command ({reason})"));
                 return None;
             }
-            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Vented { cause }))) => {
+            GripperEvent::Board(BoardEvent::Reply(BoardReply::Vented { cause })) => {
                 format!("the board vented on its own ({cause})")
             }
-            GripperEvent::Board(LinkEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
+            GripperEvent::Board(BoardEvent::Captured(Captured::Interrupted { cause, .. })) => cause.clone(),
             GripperEvent::Board(event) => {
                 if let Some(Err(fault)) = self.watch.as_mut().map(|watch| watch.observe(event)) {
                     self.abort(fault.to_string());
@@ -332,7 +331,7 @@ mod tests {
     #[test]
     fn what_the_board_says_aborts_driven_grasps_only() {
         let vented = BoardReply::Vented { cause: "watchdog".to_owned() };
-        let vented = GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reply(vented)));
+        let vented = GripperEvent::Board(BoardEvent::Reply(vented));
         for (control, aborts) in [(Control::Driven, true), (Control::ByHand, false), (Control::Free, false)] {
             let mut controller = GraspController::new(plan(control), 0.0);
             let cause = "the board vented on its own (watchdog)";

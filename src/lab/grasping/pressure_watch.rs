@@ -8,8 +8,7 @@
 //!
 //! Times are those of the gripper's clock.
 
-use palpate_device::protocol::{BoardReply, DecodedEvent};
-use palpate_device::serial::LinkEvent;
+use palpate_device::protocol::{BoardEvent, BoardReply};
 use std::collections::VecDeque;
 
 /// Longest time to an acknowledgement (s): a converter of USB to serial adds 16 ms, a burst of lines a quarter of a second.
@@ -124,16 +123,16 @@ impl PressureWatch {
     }
 
     /// Checks an event of the board.
-    pub(super) fn observe(&mut self, event: &LinkEvent) -> Result<(), PressureFault> {
+    pub(super) fn observe(&mut self, event: &BoardEvent) -> Result<(), PressureFault> {
         match event {
-            LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar })) => self.answer(*line_bar),
-            LinkEvent::Decoded(DecodedEvent::Reply(reply)) if reply.is_handshake() => Err(PressureFault::Restarted),
-            LinkEvent::Decoded(DecodedEvent::Gap(gap)) if gap.is_restart() => Err(PressureFault::Restarted),
-            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
+            BoardEvent::Reply(BoardReply::Acknowledged { line_bar }) => self.answer(*line_bar),
+            BoardEvent::Reply(reply) if reply.is_handshake() => Err(PressureFault::Restarted),
+            BoardEvent::Gap(gap) if gap.is_restart() => Err(PressureFault::Restarted),
+            BoardEvent::Reading(reading) => {
                 self.heard_s = reading.arrived_s;
                 reading.line_bar.map_or(Ok(()), |bar| self.measure(bar, reading.arrived_s))
             }
-            LinkEvent::Decoded(_) | LinkEvent::Captured(_) => Ok(()),
+            _ => Ok(()),
         }
     }
 
@@ -175,13 +174,13 @@ mod tests {
     use super::*;
     use palpate_tactile::board::{Gap, Reading};
 
-    fn said(line_bar: f64) -> LinkEvent {
-        LinkEvent::Decoded(DecodedEvent::Reply(BoardReply::Acknowledged { line_bar }))
+    fn said(line_bar: f64) -> BoardEvent {
+        BoardEvent::Reply(BoardReply::Acknowledged { line_bar })
     }
 
-    fn reading(t_s: f64, line_bar: Option<f64>) -> LinkEvent {
+    fn reading(t_s: f64, line_bar: Option<f64>) -> BoardEvent {
         let reading = Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar };
-        LinkEvent::Decoded(DecodedEvent::Reading(reading))
+        BoardEvent::Reading(reading)
     }
 
     /// A watch over a vented hand.
@@ -225,12 +224,12 @@ mod tests {
         assert!(matches!(watch.check(2.5), Err(PressureFault::Silent { for_s }) if for_s > 0.5));
         let gap = |cause: &str| {
             let gap = Gap { from_s: 1.0, to_s: 1.1, lost: None, cause: cause.to_owned() };
-            LinkEvent::Decoded(DecodedEvent::Gap(gap))
+            BoardEvent::Gap(gap)
         };
         assert_eq!(watch.observe(&gap("lost in transit")), Ok(()));
         assert_eq!(watch.observe(&gap(Gap::RESTARTED)), Err(PressureFault::Restarted));
         let hello = BoardReply::Other("tactile-gripper fw=2 adc=12".to_owned());
-        let hello = LinkEvent::Decoded(DecodedEvent::Reply(hello));
+        let hello = BoardEvent::Reply(hello);
         assert_eq!(watch.observe(&hello), Err(PressureFault::Restarted));
     }
 

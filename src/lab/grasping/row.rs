@@ -21,12 +21,20 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of a board's reading: these derived channels, then so many counts of the board.
-    pub fn of_reading(reading: &Reading, estimate: &SensorEstimate, channels: &[Channel], counts: usize) -> Self {
+    /// The row of a board's reading: these derived channels, then so many counts of the board. The line pressure (bar) is
+    /// the reported one, which is more accurate, or else the commanded one.
+    pub fn of_reading(
+        reading: &Reading,
+        commanded: Option<f64>,
+        estimate: &SensorEstimate,
+        channels: &[Channel],
+        counts: usize,
+    ) -> Self {
         let derived = channels.iter().map(|channel| estimate.of(channel).map_or(f32::NAN, |value| value as f32));
         let count = |place: usize| reading.counts.get(place).copied().flatten().unwrap_or(f32::NAN);
         let values = derived.chain((0..counts).map(count)).collect();
-        Self { t_s: reading.t_s, line_bar: reading.line_bar.unwrap_or(f64::NAN), phase: None, values }
+        let line_bar = reading.line_bar.or(commanded).unwrap_or(f64::NAN);
+        Self { t_s: reading.t_s, line_bar, phase: None, values }
     }
 
     /// The row of a frame, as these sensors read it.

@@ -11,7 +11,8 @@ pub use serial::SerialGripper;
 pub use simulated::SimulatedGripper;
 pub use stream::{BoardStream, Listen, NotOpened, listen_to_port};
 
-use palpate_device::serial::{LinkEvent, SendError};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::SendError;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_sim::physics::SimulationError;
@@ -25,7 +26,7 @@ pub enum GripperEvent {
     /// A sample of the simulation.
     Sampled(Frame),
     /// Bytes, a reading, a gap or a reply of a board.
-    Board(LinkEvent),
+    Board(BoardEvent),
     /// A sample of an imported trial.
     Signals {
         /// Its time (s).

@@ -1,8 +1,7 @@
 //! A stored trial as a gripper: the same events in the same order, whatever pressure is set.
 
 use super::{Gripper, GripperError, GripperEvent};
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::LinkEvent;
+use palpate_device::protocol::BoardEvent;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_tactile::trial::{BoardLog, Trial, TrialData};
@@ -32,11 +31,11 @@ impl ReplayedGripper {
 }
 
 fn events_of(log: BoardLog) -> Vec<GripperEvent> {
-    let mut timed: Vec<(f64, DecodedEvent)> = vec![(f64::NEG_INFINITY, DecodedEvent::Board(log.course.board))];
-    timed.extend(log.gaps.into_iter().map(|gap| (gap.from_s.next_up(), DecodedEvent::Gap(gap))));
-    timed.extend(log.readings.into_iter().map(|reading| (reading.t_s, DecodedEvent::Reading(reading))));
+    let mut timed: Vec<(f64, BoardEvent)> = vec![(f64::NEG_INFINITY, BoardEvent::Board(log.course.board))];
+    timed.extend(log.gaps.into_iter().map(|gap| (gap.from_s.next_up(), BoardEvent::Gap(gap))));
+    timed.extend(log.readings.into_iter().map(|reading| (reading.t_s, BoardEvent::Reading(reading))));
     timed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    timed.into_iter().map(|(_, event)| GripperEvent::Board(LinkEvent::Decoded(event))).collect()
+    timed.into_iter().map(|(_, event)| GripperEvent::Board(event)).collect()
 }
 
 impl Gripper for ReplayedGripper {
@@ -48,7 +47,7 @@ impl Gripper for ReplayedGripper {
         let event = self.events.next().unwrap_or(GripperEvent::Finished);
         match &event {
             GripperEvent::Sampled(Frame { t: t_s, .. }) | GripperEvent::Signals { t_s, .. } => self.now_s = *t_s,
-            GripperEvent::Board(LinkEvent::Decoded(DecodedEvent::Reading(reading))) => self.now_s = reading.t_s,
+            GripperEvent::Board(BoardEvent::Reading(reading)) => self.now_s = reading.t_s,
             GripperEvent::Board(_) | GripperEvent::Tick | GripperEvent::Finished => {}
         }
         Ok(event)
@@ -106,13 +105,13 @@ mod tests {
         let id = store.begin_board(&TrialHeader::new("lemon", Scene::default()), &info)?;
         let chunk = BoardChunk { readings: readings.to_vec(), gaps: vec![gap.clone()], ..BoardChunk::default() };
         store.append_board(id, &info, &chunk)?;
-        let [first, second, third] = readings.map(DecodedEvent::Reading);
-        let expected = [DecodedEvent::Board(board), first, second, DecodedEvent::Gap(gap), third];
+        let [first, second, third] = readings.map(BoardEvent::Reading);
+        let expected = [BoardEvent::Board(board), first, second, BoardEvent::Gap(gap), third];
         let replayed = events(store.load(id)?);
         let times: Vec<f64> = replayed.iter().map(|(now_s, _)| *now_s).collect();
         assert_eq!(times, [0.0, 0.0, 0.02, 0.02, 0.06]);
         let replayed: Vec<GripperEvent> = replayed.into_iter().map(|(_, event)| event).collect();
-        assert_eq!(replayed, expected.map(|event| GripperEvent::Board(LinkEvent::Decoded(event))));
+        assert_eq!(replayed, expected.map(GripperEvent::Board));
 
         let signals = Signals { channels: vec!["p".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
         let (name, label) = ("1".to_owned(), "mug".to_owned());

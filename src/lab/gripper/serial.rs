@@ -2,7 +2,8 @@
 //! board: `P 0.55` sets the line pressure (bar), `K` keeps it, `V` vents.
 
 use super::{BoardStream, Gripper, GripperError, GripperEvent};
-use palpate_device::serial::{LinkEvent, SendError};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::SendError;
 use palpate_sim::gripper::Phase;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -13,7 +14,7 @@ const KEEP_ALIVE_S: f64 = 0.4;
 /// A board behind a stream. Dropping it vents the fingers if this program had set a pressure.
 pub struct SerialGripper {
     stream: Box<dyn BoardStream>,
-    waiting: VecDeque<LinkEvent>,
+    waiting: VecDeque<BoardEvent>,
     /// The last event of a batch was delivered.
     tick_due: bool,
     bar: f64,
@@ -106,7 +107,7 @@ impl Drop for SerialGripper {
 mod tests {
     use super::*;
     use crate::grasping::{GraspController, GraspPlan};
-    use palpate_device::protocol::{ConsoleLine, DecodedEvent};
+    use palpate_device::protocol::ConsoleLine;
     use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo};
     use palpate_sim::scene::Scene;
     use palpate_tactile::board::{Board, Reading};
@@ -121,10 +122,10 @@ mod tests {
     }
 
     impl BoardStream for FakeBoard {
-        fn take(&mut self, _patience: Duration) -> Vec<LinkEvent> {
+        fn take(&mut self, _patience: Duration) -> Vec<BoardEvent> {
             self.t_s += 0.01;
             let reading = |t_s| Reading { t_s, arrived_s: t_s, seq: None, counts: vec![], line_bar: None };
-            [self.t_s - 0.005, self.t_s].map(|t_s| LinkEvent::Decoded(DecodedEvent::Reading(reading(t_s)))).into()
+            [self.t_s - 0.005, self.t_s].map(|t_s| BoardEvent::Reading(reading(t_s))).into()
         }
 
         fn status(&self) -> LinkStatus {

@@ -1,7 +1,7 @@
 //! Stream of a board: a port, a file of captured bytes, or a test stream.
 
-use palpate_device::protocol::ConsoleLine;
-use palpate_device::serial::{LinkEvent, LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
+use palpate_device::protocol::{BoardEvent, ConsoleLine};
+use palpate_device::serial::{LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// Stream of a board.
 pub trait BoardStream {
     /// Events since the last call; waits up to a time for the first one.
-    fn take(&mut self, patience: Duration) -> Vec<LinkEvent>;
+    fn take(&mut self, patience: Duration) -> Vec<BoardEvent>;
 
     /// Status of the link.
     fn status(&self) -> LinkStatus;
@@ -28,7 +28,7 @@ pub trait BoardStream {
 }
 
 impl BoardStream for SerialLink {
-    fn take(&mut self, patience: Duration) -> Vec<LinkEvent> {
+    fn take(&mut self, patience: Duration) -> Vec<BoardEvent> {
         Self::take(self, patience)
     }
 

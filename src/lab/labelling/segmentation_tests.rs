@@ -2,7 +2,7 @@
 
 use super::segmentation::*;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, parse_faults, parse_script};
-use palpate_device::protocol::{DecodedEvent, Decoder};
+use palpate_device::protocol::{BoardEvent, Decoder};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
@@ -178,11 +178,7 @@ fn emulated(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
         gripper.advance(now);
         decoder.push(&gripper.take_bytes(), now, &mut decoded);
     }
-    let reading = |decoded| match decoded {
-        DecodedEvent::Reading(reading) => Some(reading),
-        DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
-    };
-    (decoder.board(), decoded.into_iter().filter_map(reading).collect())
+    (decoder.board(), decoded.into_iter().filter_map(BoardEvent::into_reading).collect())
 }
 
 #[test]

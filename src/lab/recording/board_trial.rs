@@ -6,8 +6,7 @@ use super::recent::RecentEvents;
 use super::recorder::{BoardTrialEnd, Recorder};
 use crate::grasping::{GraspController, GraspPlan};
 use crate::gripper::{Gripper, GripperEvent, SerialGripper};
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::LinkEvent;
+use palpate_device::protocol::BoardEvent;
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{Control, PhaseMark};
@@ -94,7 +93,7 @@ impl BoardTrialRecording {
     }
 
     /// Records an event of the board, and lets it abort a driven grasp. Readings after the end are left out.
-    pub fn take(&mut self, recorder: &Recorder, event: LinkEvent) {
+    pub fn take(&mut self, recorder: &Recorder, event: BoardEvent) {
         if let Some(t_s) = reading_time(&event) {
             self.over |= self.controller.end_s().is_some_and(|end_s| t_s >= end_s);
             self.newest_s = t_s;
@@ -107,7 +106,7 @@ impl BoardTrialRecording {
         let interrupted = self.controller.observe(&event);
         let GripperEvent::Board(event) = event else { return };
         // An interruption of the stream is recorded with the bytes.
-        if let Some(cause) = interrupted.filter(|_| !matches!(event, LinkEvent::Captured(_))) {
+        if let Some(cause) = interrupted.filter(|_| !matches!(event, BoardEvent::Captured(_))) {
             recorder.interrupted(&cause);
         }
         recorder.board(event);
@@ -178,9 +177,6 @@ impl BoardTrialRecording {
 }
 
 /// Time of a reading (s); none for other events.
-pub(super) fn reading_time(event: &LinkEvent) -> Option<f64> {
-    match event {
-        LinkEvent::Decoded(DecodedEvent::Reading(reading)) => Some(reading.t_s),
-        LinkEvent::Decoded(_) | LinkEvent::Captured(_) => None,
-    }
+pub(super) fn reading_time(event: &BoardEvent) -> Option<f64> {
+    event.reading().map(|reading| reading.t_s)
 }

@@ -2,8 +2,8 @@
 
 use crate::grasping::PressureFault;
 use crate::labelling::{Observed, decimated, flags_of, sparkline};
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkStatus};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::LinkStatus;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
 use palpate_tactile::board::{Gap, Sensor};
@@ -99,27 +99,27 @@ impl BoardWriter {
     }
 
     /// Handles an event of the link.
-    pub(super) fn take(&mut self, event: LinkEvent) {
+    pub(super) fn take(&mut self, event: BoardEvent) {
         match event {
-            LinkEvent::Captured(piece) => {
+            BoardEvent::Captured(piece) => {
                 if let Captured::Interrupted { cause, .. } = &piece {
                     self.interruptions.push(cause.clone());
                     self.last = self.last.take().map(|(t_s, _)| (t_s, Some(cause.clone())));
                 }
                 self.chunk.bytes.push(piece);
             }
-            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
+            BoardEvent::Reading(reading) => {
                 self.samples += 1;
                 self.last = Some((reading.t_s, None));
                 self.newest_s = Some(reading.t_s);
                 self.chunk.readings.push(reading);
             }
-            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => {
+            BoardEvent::Gap(gap) => {
                 self.lost += gap.lost.unwrap_or(0);
                 self.add_gap(gap);
             }
-            LinkEvent::Decoded(DecodedEvent::Board(board)) => self.about.course.board = board,
-            LinkEvent::Decoded(DecodedEvent::Reply(_)) => {}
+            BoardEvent::Board(board) => self.about.course.board = board,
+            BoardEvent::Reply(_) => {}
         }
     }
 

@@ -4,8 +4,7 @@ use super::recent::RecentEvents;
 use crate::grasping::{GraspController, GraspPlan, Identification, IdentifyError, Row};
 use crate::gripper::{Gripper, GripperError, GripperEvent, ReplayedGripper, SerialGripper};
 use crate::labelling::{SegmentEvent, Segmenter};
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::LinkEvent;
+use palpate_device::protocol::BoardEvent;
 use palpate_learn::{Model, StopRule};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
@@ -221,17 +220,17 @@ impl Replay {
         }
     }
 
-    fn take_event(&mut self, event: &LinkEvent) -> Option<Row> {
+    fn take_event(&mut self, event: &BoardEvent) -> Option<Row> {
         let RowReader::Board(reader) = &mut self.reader else { return None };
         reader.recent.push(event);
         match event {
-            LinkEvent::Decoded(DecodedEvent::Board(board)) => {
+            BoardEvent::Board(board) => {
                 reader.set_board(board);
                 self.channels.truncate(whole_fingers(SignalDefinition::Parts).len());
                 self.channels.extend(board.channels.iter().cloned());
                 None
             }
-            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
+            BoardEvent::Reading(reading) => {
                 let (began, marks) = reader.phases_until(reading);
                 if began {
                     self.controller = untimed(reading.t_s);
@@ -246,7 +245,7 @@ impl Replay {
                 let RowReader::Board(reader) = &self.reader else { return None };
                 Some(reader.row(reading))
             }
-            LinkEvent::Decoded(DecodedEvent::Gap(_) | DecodedEvent::Reply(_)) | LinkEvent::Captured(_) => None,
+            BoardEvent::Gap(_) | BoardEvent::Reply(_) | BoardEvent::Captured(_) => None,
         }
     }
 
@@ -291,13 +290,8 @@ impl BoardReader {
     }
 
     fn row(&self, reading: &Reading) -> Row {
-        let row = Row::of_reading(
-            reading,
-            &self.readout.estimate(reading),
-            &whole_fingers(SignalDefinition::Parts),
-            reading.counts.len(),
-        );
-        Row { line_bar: reading.line_bar.or(self.line_bar).unwrap_or(f64::NAN), ..row }
+        let channels = whole_fingers(SignalDefinition::Parts);
+        Row::of_reading(reading, self.line_bar, &self.readout.estimate(reading), &channels, reading.counts.len())
     }
 }
 

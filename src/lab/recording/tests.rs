@@ -3,8 +3,7 @@
 use super::board_writer::BoardWriter;
 use super::*;
 use palpate_device::protocol::CaptureReader;
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, LinkOptions, PortError, SerialLink};
+use palpate_device::serial::{LinkOptions, PortError, SerialLink};
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
@@ -120,11 +119,10 @@ fn what_a_kill_leaves_is_all_but_the_last_second() -> Result<(), Box<dyn std::er
     let whole = record(&mut store, &bytes)?.id;
     let link = replayed(&bytes)?;
     let mut writer = BoardWriter::begin(&mut store, &plan(&link, "cube"))?;
-    let is_reading = |event: &LinkEvent| matches!(event, LinkEvent::Decoded(DecodedEvent::Reading(_)));
     let mut readings = 0;
     while !link.is_over() {
         for event in link.take(Duration::from_millis(20)) {
-            let reading = is_reading(&event);
+            let reading = event.reading().is_some();
             writer.take(event);
             readings += u32::from(reading);
             if reading && readings % 50 == 0 {

@@ -5,6 +5,7 @@ use crate::picture::Stage;
 use glam::DVec3;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::scene::Scene;
+use palpate_store::TrialPlace;
 use palpate_tactile::Sensors;
 use palpate_tactile::trial::EarlierGrasps;
 use std::sync::Arc;
@@ -21,6 +22,8 @@ pub(super) struct Current {
     pub(super) frame: Arc<Frame>,
     /// Grasps of the same object before it.
     pub(super) earlier: Option<EarlierGrasps>,
+    /// Where its trial is stored at its end, if it is.
+    pub(super) recorded: Option<TrialPlace>,
     /// Warnings at its beginning; later ones are reported at its end.
     pub(super) warned: usize,
     /// The user has pulled at the object.

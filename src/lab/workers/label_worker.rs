@@ -6,7 +6,7 @@ use super::messages::{Notice, Wake};
 use super::own_store::OwnStore;
 use super::worker::Worker;
 use crate::labelling::{Disagreement, disagreements};
-use palpate_store::labels::{LabelError, LabelPlan, LabelledTrial, NextTrial, Progress};
+use palpate_store::labels::{LabelError, LabelPlan, LabelledTrial, NextTrial, Progress, TrialEdit};
 use palpate_store::{JournalEntry, LabelRevision, Store, StoreError};
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
@@ -17,16 +17,8 @@ use std::time::Duration;
 pub enum LabelCommand {
     /// Read the store again.
     Refresh,
-    /// Label a trial.
-    Label(TrialId, String),
-    /// Discard a trial; can be undone.
-    Discard(TrialId),
-    /// Set the note of a trial.
-    Note(TrialId, String),
-    /// Set the tags of a trial.
-    Tags(TrialId, Vec<String>),
-    /// Mark the label as unsure.
-    Unsure(TrialId, bool),
+    /// Change a trial; can be undone.
+    Edit(TrialId, TrialEdit),
     /// Mark the label as reviewed.
     Reviewed(TrialId),
     /// Undo the last change.
@@ -121,14 +113,10 @@ impl LabelService {
         let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done = match command {
             LabelCommand::Refresh => Ok(None),
-            LabelCommand::Label(id, object) => store.labels().set_label(*id, object).map(|()| None),
-            LabelCommand::Discard(id) => {
-                let text = format!("trial {id} discarded; Ctrl+Z brings it back");
-                store.delete(&[*id]).map(|()| Some(text))
+            LabelCommand::Edit(id, edit) => {
+                let discarded = || format!("trial {id} discarded; Ctrl+Z brings it back");
+                store.labels().edit(&[*id], edit).map(|_edited| (*edit == TrialEdit::Discard).then(discarded))
             }
-            LabelCommand::Note(id, note) => store.labels().set_note(*id, note).map(|()| None),
-            LabelCommand::Tags(id, tags) => store.labels().set_tags(*id, tags).map(|()| None),
-            LabelCommand::Unsure(id, unsure) => store.labels().set_unsure(*id, *unsure).map(|()| None),
             LabelCommand::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
             LabelCommand::Undo => store.journal().undo().map(|entry| outcome(entry.map(undone), "nothing to undo")),
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "nothing to redo")),
@@ -196,11 +184,11 @@ mod tests {
         let first = shown(&labels, &woken, |view| view.trials.len() == 2);
         assert_eq!((first.unlabelled().map(|trial| trial.id), first.progress.done()), (Some(ids[1]), 0));
         let next = first.next.clone().expect("all is to be done").object;
-        labels.send(LabelCommand::Label(ids[1], next.clone()));
+        labels.send(LabelCommand::Edit(ids[1], TrialEdit::Label(next.clone())));
         let labelled = shown(&labels, &woken, |view| view.progress.done() == 1);
         assert_eq!(labelled.unlabelled().map(|trial| trial.id), Some(ids[0]));
         assert_ne!(labelled.next.as_ref().map(|n| n.object.clone()), Some(next.clone()), "never twice in a row");
-        labels.send(LabelCommand::Discard(ids[0]));
+        labels.send(LabelCommand::Edit(ids[0], TrialEdit::Discard));
         shown(&labels, &woken, |view| view.unlabelled().is_none());
         for _ in 0..2 {
             labels.send(LabelCommand::Undo);
@@ -215,7 +203,7 @@ mod tests {
         shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
         labels.send(LabelCommand::Want("mug".to_owned(), 0));
         told_of(&labels, &woken, |notice| matches!(notice, Notice::Failed(_)));
-        labels.send(LabelCommand::Label(99, "mug".to_owned()));
+        labels.send(LabelCommand::Edit(99, TrialEdit::Label("mug".to_owned())));
         told_of(&labels, &woken, |notice| matches!(notice, Notice::Failed(text) if text.contains("99")));
     }
 

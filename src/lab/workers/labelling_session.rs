@@ -12,7 +12,7 @@ use super::label_worker::{LabelCommand, LabelView};
 use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_store::labels::LabelledTrial;
+use palpate_store::labels::{LabelledTrial, TrialEdit};
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
 
@@ -211,13 +211,12 @@ impl LabelDraft {
 
     /// Text that is not stored yet: note and tags.
     fn unsaved(&self, view: &LabelView) -> Vec<LabelCommand> {
-        let note = self
-            .note
-            .as_ref()
-            .and_then(|(id, text)| (view.trial(*id)?.note != *text).then(|| LabelCommand::Note(*id, text.clone())));
+        let note = self.note.as_ref().and_then(|(id, text)| {
+            (view.trial(*id)?.note != *text).then(|| LabelCommand::Edit(*id, TrialEdit::Note(text.clone())))
+        });
         let tags = self.tags.as_ref().and_then(|(id, text)| {
             let tags = parse_tags(text);
-            (view.trial(*id)?.tags != tags).then_some(LabelCommand::Tags(*id, tags))
+            (view.trial(*id)?.tags != tags).then_some(LabelCommand::Edit(*id, TrialEdit::Tags(tags)))
         });
         note.into_iter().chain(tags).collect()
     }
@@ -322,7 +321,9 @@ impl LabellingSession {
             LabellingAction::WriteTags(id, text) => self.draft.tags = Some((id, text)),
             LabellingAction::ToggleUnsure => {
                 effects.push(match self.in_question(now) {
-                    Some(trial) => LabellingEffect::Edit(LabelCommand::Unsure(trial.id, !trial.unsure)),
+                    Some(trial) => {
+                        LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Unsure(!trial.unsure)))
+                    }
                     None => self.no_question(now),
                 });
             }
@@ -419,7 +420,7 @@ impl LabellingSession {
         if self.has_trial(now) {
             effects.push(LabellingEffect::DiscardRunning);
         } else if let Some(trial) = self.in_question(now).filter(|trial| again && trial.object.is_none()) {
-            effects.push(LabellingEffect::Edit(LabelCommand::Discard(trial.id)));
+            effects.push(LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Discard)));
         }
         self.draft.reset();
         let request = TrialRequest { object: None, length_s: None, control: now.control, adds: !now.labelling };
@@ -437,7 +438,7 @@ impl LabellingSession {
             return vec![LabellingEffect::Inform(format!("No trial to discard: none is running {stored}."))];
         };
         self.draft.reset();
-        vec![LabellingEffect::Edit(LabelCommand::Discard(id))]
+        vec![LabellingEffect::Edit(LabelCommand::Edit(id, TrialEdit::Discard))]
     }
 
     fn give_label(&mut self, now: &SessionContext<'_>) -> Vec<LabellingEffect> {
@@ -451,7 +452,7 @@ impl LabellingSession {
             let text = format!("\"{text}\" may be {many} objects: choose one with the arrow keys or the mouse.");
             return vec![LabellingEffect::Inform(text)];
         };
-        let mut effects = vec![LabellingEffect::Edit(LabelCommand::Label(trial.id, label))];
+        let mut effects = vec![LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Label(label)))];
         if labels.disagreements.iter().any(|found| found.id == trial.id) {
             effects.push(LabellingEffect::Edit(LabelCommand::Reviewed(trial.id)));
         }

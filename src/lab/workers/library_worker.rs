@@ -185,7 +185,8 @@ mod tests {
     use super::super::worker::watch::{shown, told};
     use super::*;
     use palpate_sim::scene::Scene;
-    use palpate_store::{BoardInfo, Shown};
+    use palpate_store::{BoardChunk, BoardInfo, Shown};
+    use palpate_tactile::board::Reading;
     use palpate_tactile::trial::TrialHeader;
 
     fn record(store: &mut Store, object: &str) -> TrialId {
@@ -199,19 +200,22 @@ mod tests {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("s.sqlite");
         let mut theirs = Store::open(&path)?;
-        let scene = Scene::default();
-        let object = scene.load_object()?;
-        let mut trial = crate::grasping::grasp(&scene, object.as_ref(), 1);
-        let frames = std::mem::take(&mut trial.data.frames);
-        let id = theirs.begin(&trial)?;
-        theirs.append(id, &frames[..60])?;
+        let mut about = BoardInfo::default();
+        about.course.board.channels = vec!["fsrL".to_owned(), "fsrR".to_owned()];
+        let id = theirs.begin_board(&TrialHeader::new("lemon", Scene::default()), &about)?;
+        let reading = |k: u32| {
+            let (t_s, counts) = (0.02 * f64::from(k), vec![Some(k as f32); 2]);
+            Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
+        };
+        let chunk = |from: u32| BoardChunk { readings: (from..from + 50).map(reading).collect(), ..Default::default() };
+        theirs.append_board(id, &about, &chunk(0))?;
         let (wake, woken) = waker();
         let library = LibraryWorker::start(path, wake)?;
         library.send(LibraryCommand::Find(TrialQuery::default()));
         library.send(LibraryCommand::Draw(vec![id]));
         let begun = shown(&library, &woken, |view| view.sparklines.contains_key(&id)).sparklines[&id].clone();
-        theirs.append(id, &frames[60..])?;
-        theirs.finish(id, &trial.data.quality, &trial.header)?;
+        theirs.append_board(id, &about, &chunk(50))?;
+        theirs.finish_board(id, &about, &[])?;
         let whole = stored_sparkline(&theirs, id)?;
         assert_ne!(begun, whole);
         shown(&library, &woken, |view| view.sparklines[&id] == whole);

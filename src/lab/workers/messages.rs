@@ -8,7 +8,7 @@ use palpate_learn::Models;
 use palpate_sim::frame::{Frame, Plan};
 use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::{Accuracy, EngineKind, Scene};
-use palpate_store::TrialPlace;
+use palpate_store::{Stored, TrialPlace};
 use palpate_tactile::Channel;
 use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
@@ -71,11 +71,7 @@ pub enum Notice {
     /// A scene could not be set up; the previous one stays.
     SceneRefused(Box<Refusal>),
     /// A trial is in the store.
-    Stored(TrialId),
-    /// The store already has this grasp, as this trial; nothing was stored.
-    Known(TrialId),
-    /// The store had this grasp only in the demo log; that trial was moved to the store.
-    Kept(TrialId),
+    Stored(Stored),
     /// A grasp was sent to the demo log: the trial that now holds it, and where that trial is.
     Logged(TrialId, TrialPlace),
 }
@@ -98,33 +94,14 @@ pub struct TraceRow {
     pub grasp: u64,
     /// True outside of grasps: live view, of which plots show only the last seconds.
     pub rolling: bool,
-    /// Time in the grasp (s).
-    pub t: f64,
-    /// Line pressure (bar).
-    pub line_bar: f64,
-    /// One value per channel of the snapshot's list; NaN where undefined.
-    pub values: Box<[f32]>,
+    /// The sample, with its time in the grasp and a value per channel of the snapshot's list.
+    pub sample: Row,
     /// Estimated numerical error of each value, in its unit; empty without a refined run.
     pub errors: Box<[f32]>,
     /// Fingers and object at that time; none for a real gripper.
     pub frame: Option<Arc<Frame>>,
     /// The recogniser's answer at that time, where it has one.
     pub answer: Option<Arc<IdentificationView>>,
-}
-
-impl TraceRow {
-    /// Row of a board; time counts from `from_s`.
-    pub(super) fn placed(
-        row: Row,
-        grasp: u64,
-        from_s: f64,
-        rolling: bool,
-        answer: Option<Arc<IdentificationView>>,
-    ) -> Self {
-        let Row { t_s, line_bar, values, .. } = row;
-        let (t, errors) = (t_s - from_s, Box::default());
-        Self { grasp, rolling, t, line_bar, values, errors, frame: None, answer }
-    }
 }
 
 /// Cost and error of the accuracy of a scene.

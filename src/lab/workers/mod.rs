@@ -3,9 +3,9 @@
 //!
 //! ```text
 //!  UI                         "sim"                          "recorder"
-//!  Command -------------->    runs the grasp, keeps pace     
+//!  Command -------------->    runs the grasp, keeps pace
 //!  <--newest Snapshot-----    recognises, publishes          writes the store
-//!  <--every TraceRow------    derives         frames ----->  a chunk each second
+//!  <--every TraceRow------    derives         trial ------>  when a grasp has ended
 //!  <--Notice--------------                    <------------  Notice
 //!  <--MeasuredAccuracy----  "accuracy": whole grasps of each new scene, for what its accuracy costs
 //! ```
@@ -28,8 +28,8 @@
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
 //! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
 //!
-//! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows and recorded frames
-//! keep their order and none is lost.
+//! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows keep their order
+//! and none is lost.
 
 mod advice;
 mod class_training;

@@ -90,7 +90,7 @@ fn a_watched_grasp_is_the_same_as_a_headless_one_and_is_stored() {
     watched.until(|s| s.status.finished);
     let rows: Vec<TraceRow> = watched.worker.rows().collect();
     assert_eq!(rows.len(), 240, "two grasps of 120 samples, none lost");
-    assert!(rows.windows(2).all(|w| (w[0].grasp, w[0].t) < (w[1].grasp, w[1].t)), "in order");
+    assert!(rows.windows(2).all(|w| (w[0].grasp, w[0].sample.t_s) < (w[1].grasp, w[1].sample.t_s)), "in order");
     assert!(!watched.worker.take_rows_lost());
     drop(watched);
     let store = Store::open(&path).expect("opens");
@@ -121,7 +121,7 @@ fn a_finished_grasp_is_compared_and_computed_again_on_request() {
     assert!(again.status.checking.is_none() && !again.status.playing);
     let rows: Vec<TraceRow> = watched.worker.rows().collect();
     assert_eq!((first.len(), rows.len()), (120, 120));
-    assert!(rows.iter().zip(&first).all(|(a, b)| (a.grasp, a.t) == (b.grasp, b.t)) && rows != first);
+    assert!(rows.iter().zip(&first).all(|(a, b)| (a.grasp, a.sample.t_s) == (b.grasp, b.sample.t_s)) && rows != first);
     drop(watched);
     let store = Store::open(&path).expect("opens");
     assert_eq!((store.list(false).expect("lists").len(), store.list(true).expect("lists").len()), (1, 2));
@@ -232,7 +232,7 @@ fn a_companion_brings_errors_and_the_gauge_both_numbers() {
     let rows: Vec<TraceRow> = watched.worker.rows().collect();
     let banded: Vec<&TraceRow> = rows.iter().filter(|row| row.grasp == rows[rows.len() - 1].grasp).collect();
     assert_eq!(banded.len(), 120);
-    assert!(banded.iter().all(|row| row.errors.len() == row.values.len()));
+    assert!(banded.iter().all(|row| row.errors.len() == row.sample.values.len()));
     let largest = banded.iter().map(|row| row.errors[0]).fold(0.0, f32::max);
     assert!(largest > 1e-3 && largest < 1.0, "{largest} 1/m");
     let before = loop {

@@ -145,24 +145,18 @@ impl Library {
 
     /// Trials that have left the demo log since they were read: kept, or pushed out by newer ones.
     fn left_demo_log(&self, store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
-        let found = store.connection.prepare_cached("SELECT id FROM trials WHERE demo = 1");
-        let found = found.and_then(|mut statement| statement.query_map([], |row| row.get(0))?.collect());
-        let logged: BTreeSet<TrialId> = found.map_err(|e| store.fault(&e))?;
+        let logged: BTreeSet<TrialId> = store.all("SELECT id FROM trials WHERE demo = 1", [], |row| row.get(0))?;
         Ok(self.demo_log.difference(&logged).copied().collect())
     }
 
     /// Trials that have joined a further collection since they were read.
     fn joined(&self, store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
         let sql = "SELECT trial, count(*) FROM memberships GROUP BY trial";
-        let members = store.connection.prepare_cached(sql).and_then(|mut statement| {
-            let members = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-            members.collect::<Result<Vec<(TrialId, i64)>, _>>()
-        });
-        let members = members.map_err(|e| store.fault(&e))?.into_iter();
+        let members: Vec<(TrialId, i64)> = store.all(sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
         let other = |(id, count): &(TrialId, i64)| {
             self.trials.get(id).is_some_and(|trial| usize::try_from(*count) != Ok(trial.row.also_in.len()))
         };
-        Ok(members.filter(other).map(|(id, _)| id).collect())
+        Ok(members.into_iter().filter(other).map(|(id, _)| id).collect())
     }
 
     /// True where a row was new or other than before.
@@ -224,18 +218,14 @@ fn last_entry(store: &Store) -> Result<i64, StoreError> {
 /// Trials that have entries in the journal after this one.
 fn changed_since(store: &Store, entry: i64) -> Result<BTreeSet<TrialId>, StoreError> {
     let sql = "SELECT trials.id FROM journal JOIN trials ON trials.uid = journal.trial WHERE journal.number > ?1";
-    let found = store.connection.prepare_cached(sql);
-    let found = found.and_then(|mut statement| statement.query_map([entry], |row| row.get(0))?.collect());
-    found.map_err(|e| store.fault(&e))
+    store.all(sql, [entry], |row| row.get(0))
 }
 
 /// Trials that hold the same grasps as these.
 fn copies_of(store: &Store, trials: &BTreeSet<TrialId>) -> Result<BTreeSet<TrialId>, StoreError> {
     let sql = "SELECT other.id FROM trials JOIN trials AS other ON other.identity = trials.identity
         WHERE trials.id IN (SELECT value FROM json_each(?1))";
-    let found = store.connection.prepare_cached(sql);
-    let found = found.and_then(|mut statement| statement.query_map([json(trials)], |row| row.get(0))?.collect());
-    found.map_err(|e| store.fault(&e))
+    store.all(sql, [json(trials)], |row| row.get(0))
 }
 
 fn count(store: &Store) -> Result<usize, StoreError> {
@@ -244,7 +234,5 @@ fn count(store: &Store) -> Result<usize, StoreError> {
 }
 
 fn ids(store: &Store) -> Result<BTreeSet<TrialId>, StoreError> {
-    let found = store.connection.prepare("SELECT id FROM trials");
-    let found = found.and_then(|mut statement| statement.query_map([], |row| row.get(0))?.collect());
-    found.map_err(|e| store.fault(&e))
+    store.all("SELECT id FROM trials", [], |row| row.get(0))
 }

@@ -2,7 +2,7 @@
 
 use crate::frame::StudyError;
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step};
-use palpate_device::protocol::{DecodedEvent, Decoder};
+use palpate_device::protocol::{BoardEvent, Decoder};
 use palpate_lab::datasets::sequence_of;
 use palpate_lab::grasping::Adaptation;
 use palpate_learn::{Class, DataCard, Dataset, Example, Labels};
@@ -124,11 +124,7 @@ impl EmulatedGrippers<'_> {
             gripper.advance(now_s);
             decoder.push(&gripper.take_bytes(), now_s, &mut events);
         }
-        let reading = |event| match event {
-            DecodedEvent::Reading(reading) => Some(reading),
-            DecodedEvent::Gap(_) | DecodedEvent::Board(_) | DecodedEvent::Reply(_) => None,
-        };
-        Ok((decoder.board().clone(), events.into_iter().filter_map(reading).collect()))
+        Ok((decoder.board().clone(), events.into_iter().filter_map(BoardEvent::into_reading).collect()))
     }
 }
 

@@ -38,9 +38,8 @@ impl Plotted {
     }
 
     /// The row of a reading: derived channels, then counts of the board.
-    pub(super) fn row(&self, reading: &Reading, estimate: &SensorEstimate, line_bar: Option<f64>) -> Row {
-        let row = Row::of_reading(reading, estimate, &self.channels, self.counts);
-        Row { line_bar: line_bar.unwrap_or(f64::NAN), ..row }
+    pub(super) fn row(&self, reading: &Reading, estimate: &SensorEstimate, commanded: Option<f64>) -> Row {
+        Row::of_reading(reading, commanded, estimate, &self.channels, self.counts)
     }
 
     /// Adds a row; returns the rows to plot.

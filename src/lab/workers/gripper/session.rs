@@ -19,8 +19,8 @@ use crate::workers::own_store::OwnStore;
 use crate::workers::worker::{Inbox, Publisher};
 use crate::workers::{Notice, TraceRow};
 use palpate_device::doctor::CrosstalkSession;
-use palpate_device::protocol::DecodedEvent;
-use palpate_device::serial::{LinkEvent, PortInfo, list_ports};
+use palpate_device::protocol::BoardEvent;
+use palpate_device::serial::{PortInfo, list_ports};
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::board::{Board, Reading};
@@ -312,24 +312,24 @@ impl GripperSession {
         }
     }
 
-    fn take_event(&mut self, event: LinkEvent) {
+    fn take_event(&mut self, event: BoardEvent) {
         let Some(connection) = &mut self.connection else { return };
         let begun = self.begun;
         connection.recent.push(&event);
         match &event {
-            LinkEvent::Decoded(DecodedEvent::Reading(reading)) => {
+            BoardEvent::Reading(reading) => {
                 let reading = reading.clone();
                 self.take_reading(&reading);
             }
-            LinkEvent::Decoded(DecodedEvent::Board(board)) if connection.board != *board => {
+            BoardEvent::Board(board) if connection.board != *board => {
                 connection.board = board.clone();
                 self.read_calibrations();
             }
-            LinkEvent::Decoded(DecodedEvent::Gap(gap)) => {
+            BoardEvent::Gap(gap) => {
                 let rows = connection.plotted.gap(gap.from_s);
                 self.plot(rows);
             }
-            LinkEvent::Decoded(DecodedEvent::Board(_) | DecodedEvent::Reply(_)) | LinkEvent::Captured(_) => {}
+            BoardEvent::Board(_) | BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
         }
         // An event that began a trial is already part of it.
         if begun == self.begun
@@ -344,13 +344,11 @@ impl GripperSession {
         let Some(connection) = &mut self.connection else { return };
         let estimate = connection.readout.estimate(reading);
         let commanded = self.recording.as_ref().and_then(|recording| recording.controller.line_bar());
-        // The reported pressure is more accurate than the commanded one.
-        let line_bar = reading.line_bar.or(commanded);
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
-        let row = connection.plotted.row(reading, &estimate, line_bar);
+        let row = connection.plotted.row(reading, &estimate, commanded);
         let rows = connection.plotted.push(row.clone());
         let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&estimate));
-        connection.latest = Some(LatestReading { counts, estimate, beyond, line_bar });
+        connection.latest = Some(LatestReading { counts, estimate, beyond, line_bar: reading.line_bar.or(commanded) });
         self.plot(rows);
         self.watch(reading);
         self.recognise(&row);
@@ -367,7 +365,9 @@ impl GripperSession {
         let rolling = self.recording.is_none();
         let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
         for row in rows {
-            self.publisher.row(TraceRow::placed(row, grasp, from_s, rolling, answer.clone()));
+            let sample = Row { t_s: row.t_s - from_s, ..row };
+            let answer = answer.clone();
+            self.publisher.row(TraceRow { grasp, rolling, sample, errors: Box::default(), frame: None, answer });
         }
     }
 

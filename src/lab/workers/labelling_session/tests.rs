@@ -83,7 +83,7 @@ fn the_plan_is_proposed_and_typing_narrows_it_down() {
     assert_eq!(draft.label(&view).as_deref(), Some("garlic"));
     draft.note = Some((4, "slipped".to_owned()));
     draft.tags = Some((3, " ,".to_owned()));
-    assert_eq!(draft.unsaved(&view), [LabelCommand::Note(4, "slipped".to_owned())]);
+    assert_eq!(draft.unsaved(&view), [LabelCommand::Edit(4, TrialEdit::Note("slipped".to_owned()))]);
     draft.reset();
     assert_eq!(draft, LabelDraft::default());
 }
@@ -108,7 +108,7 @@ fn a_label_goes_to_the_trial_in_question_and_settles_a_disagreement() {
     let mut session = LabellingSession::default();
     let next = labels.next.as_ref().map(|next| next.object.clone()).expect("a plan");
     let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-    assert_eq!(given, [edit(LabelCommand::Label(4, next))]);
+    assert_eq!(given, [edit(LabelCommand::Edit(4, TrialEdit::Label(next)))]);
     // Not while the outcome of the last key is unknown.
     let busy = SessionContext { settled: false, ..now(&gripper, &labels) };
     assert!(matches!(session.apply(LabellingAction::GiveLabel, &busy)[..], [LabellingEffect::Inform(_)]));
@@ -117,7 +117,10 @@ fn a_label_goes_to_the_trial_in_question_and_settles_a_disagreement() {
     let labels = LabelView { disagreements: vec![found], ..labels };
     session.apply(LabellingAction::Select(Some(3)), &now(&gripper, &labels));
     let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-    assert_eq!(given, [edit(LabelCommand::Label(3, "ball".to_owned())), edit(LabelCommand::Reviewed(3))]);
+    assert_eq!(
+        given,
+        [edit(LabelCommand::Edit(3, TrialEdit::Label("ball".to_owned()))), edit(LabelCommand::Reviewed(3))]
+    );
 }
 
 #[test]
@@ -139,7 +142,7 @@ fn recording_again_discards_what_has_no_label() {
     assert_eq!(session.apply(LabellingAction::Discard, &now(&gripper, &labels)), [LabellingEffect::DiscardRunning]);
     let gripper = GripperView { handled: 7, ..GripperView::default() };
     let discarded = session.apply(LabellingAction::Discard, &now(&gripper, &labels));
-    assert_eq!(discarded, [edit(LabelCommand::Discard(4))]);
+    assert_eq!(discarded, [edit(LabelCommand::Edit(4, TrialEdit::Discard))]);
     // Elsewhere a grasp adds to the ones before.
     let elsewhere = SessionContext { labelling: false, ..now(&gripper, &labels) };
     let begun = session.apply(LabellingAction::Record, &elsewhere);
@@ -158,7 +161,7 @@ fn an_answer_typed_ahead_waits_for_its_question() {
     // Unsaved text is kept when a trial begins automatically.
     session.apply(LabellingAction::WriteNote(3, "slipped".to_owned()), &now(&idle, &labels));
     let kept = session.observe(&now(&during, &labels));
-    assert_eq!(kept, [edit(LabelCommand::Note(3, "slipped".to_owned()))]);
+    assert_eq!(kept, [edit(LabelCommand::Edit(3, TrialEdit::Note("slipped".to_owned())))]);
     session.apply(LabellingAction::FocusSearch("cu".to_owned()), &now(&during, &labels));
     session.apply(LabellingAction::SearchFocused, &now(&during, &labels));
     // It ends; the list does not have it yet, so no key is about an older trial.
@@ -172,7 +175,7 @@ fn an_answer_typed_ahead_waits_for_its_question() {
     session.apply(LabellingAction::Search("cube".to_owned()), &now(&after, &labels));
     assert_eq!(session.in_sight(&now(&after, &labels)), TrialInSight::Last);
     let given = session.apply(LabellingAction::GiveLabel, &now(&after, &labels));
-    assert_eq!(given, [edit(LabelCommand::Label(5, "cube".to_owned()))]);
+    assert_eq!(given, [edit(LabelCommand::Edit(5, TrialEdit::Label("cube".to_owned())))]);
 }
 
 #[test]
@@ -211,7 +214,7 @@ fn a_card_stays_while_further_trials_are_detected() {
     session.observe(&now(&after, &labels));
     assert_eq!(session.draft().selected, Some(4));
     let given = session.apply(LabellingAction::GiveLabel, &now(&after, &labels));
-    assert_eq!(given, [edit(LabelCommand::Label(4, "lemon".to_owned()))]);
+    assert_eq!(given, [edit(LabelCommand::Edit(4, TrialEdit::Label("lemon".to_owned())))]);
     labels.trials.iter_mut().filter(|trial| trial.id == 4).for_each(|trial| trial.object = Some("lemon".to_owned()));
     assert_eq!(session.draft().trial(&labels).map(|trial| trial.id), Some(5));
 }
@@ -241,7 +244,7 @@ fn keys_without_effect_say_why() {
     assert!(matches!(&given[..], [LabellingEffect::Inform(text)] if text.contains("2 objects")), "{given:?}");
     session.apply(LabellingAction::ChooseObject(1), &now(&gripper, &labels));
     let given = session.apply(LabellingAction::GiveLabel, &now(&gripper, &labels));
-    assert_eq!(given, [edit(LabelCommand::Label(4, "bigball".to_owned()))]);
+    assert_eq!(given, [edit(LabelCommand::Edit(4, TrialEdit::Label("bigball".to_owned())))]);
 }
 
 #[test]

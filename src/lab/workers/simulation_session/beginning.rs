@@ -52,7 +52,6 @@ impl Session {
     }
 
     pub(super) fn begin_grasp(&mut self) {
-        self.drop_recording();
         self.next_grasp_at = None;
         if let Err(cause) = self.load_object(&self.nominal.clone()) {
             // The file has changed for the worse since; the object as it was will do.
@@ -109,10 +108,6 @@ impl Session {
                 self.publisher.notify(Notice::Warning(warning.clone()));
             }
         }
-        if let (Some(place), Some(recorder)) = (self.status.recording, &self.recorder) {
-            recorder.begin(place, begun.clone());
-            self.recorder_busy = true;
-        }
         if let Some(warning) = self.recognition.as_mut().and_then(|recognition| {
             recognition.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
         }) {
@@ -137,6 +132,7 @@ impl Session {
             stage,
             reader,
             frame,
+            recorded: self.status.recording,
             warned,
             pulled: false,
             ended: false,

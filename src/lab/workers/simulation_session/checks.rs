@@ -80,13 +80,11 @@ impl Session {
         };
         let plotted = self.channels.len();
         for frame in trial.frames() {
-            let row = Row::of_frame(frame, &current.reader);
-            let values = row.values[..plotted].into();
-            let (t, line_bar, errors) = (row.t_s, row.line_bar, Box::default());
-            let frame = Some(Arc::new(frame.clone()));
+            let mut sample = Row::of_frame(frame, &current.reader);
+            sample.values = sample.values[..plotted].into();
+            let (errors, frame) = (Box::default(), Some(Arc::new(frame.clone())));
             // The recogniser has answered to the first computation only.
-            let row = TraceRow { grasp, rolling: false, t, line_bar, values, errors, frame, answer: None };
-            self.publisher.row(row);
+            self.publisher.row(TraceRow { grasp, rolling: false, sample, errors, frame, answer: None });
         }
         if let Some(frame) = trial.frames().last() {
             current.frame = Arc::new(frame.clone());

@@ -70,7 +70,6 @@ pub(super) struct Session {
     sampler: Option<PoseSampler>,
     pace: Pace,
     next_grasp_at: Option<Instant>,
-    recorder_busy: bool,
     /// Whether grasps get a ghost.
     ghost_wanted: bool,
     /// Chooses poses, where the scene asks for it.
@@ -83,14 +82,12 @@ impl Session {
         let notifier = publisher.notifier.clone();
         let recorder = Recorder::start(setup.store, move |notice| {
             notifier.notify(match notice {
-                RecorderNotice::Stored(id) => Notice::Stored(id),
-                RecorderNotice::Known(id) => Notice::Known(id),
-                RecorderNotice::Kept(id) => Notice::Kept(id),
+                RecorderNotice::Stored(stored) => Notice::Stored(stored),
                 RecorderNotice::Logged(id, place) => Notice::Logged(id, place),
                 RecorderNotice::Warning(text) => Notice::Warning(text),
                 RecorderNotice::Failed(text) => Notice::Failed(text),
                 // Only the real gripper's trials say so.
-                RecorderNotice::Begun(_) | RecorderNotice::Recorded(_) | RecorderNotice::Discarded(_) => return,
+                RecorderNotice::Begun(_) | RecorderNotice::Recorded(_) => return,
             });
         });
         let recorder = publisher.or_notice("trials cannot be stored", recorder);
@@ -128,7 +125,6 @@ impl Session {
             sampler: None,
             pace: Pace::starting_at(0.0),
             next_grasp_at: None,
-            recorder_busy: false,
             ghost_wanted: false,
             advisor: Advisor::default(),
             publisher,
@@ -137,7 +133,6 @@ impl Session {
         while session.wait_and_handle(inbox).is_ok() {
             session.advance();
         }
-        session.drop_recording();
     }
 
     /// Waits until something is due or a command comes; an error at the end.
@@ -225,10 +220,10 @@ impl Session {
                 self.poses_drawn = 0;
             }
             Command::SetRecording(recording) => {
-                // A trial that is being recorded ends where it began.
                 self.status.recording = recording;
-                if recording.is_none() {
-                    self.drop_recording();
+                // The grasp that goes on is stored where it was to be when it began, or not at all.
+                if let Some(current) = self.current.as_mut().filter(|_| recording.is_none()) {
+                    current.recorded = None;
                 }
             }
             Command::SetErrorBand(shown) => {
@@ -331,49 +326,32 @@ impl Session {
         }
     }
 
-    /// Runs to the next sample and passes it to plots, recogniser and recorder.
+    /// Runs to the next sample and passes it to plots and recogniser.
     fn take_frame(&mut self) {
         let Some(current) = self.current.as_mut().filter(|current| !current.ended) else { return };
         let Some(frame) = current.run.next_frame().cloned() else { return self.end_grasp() };
-        if self.recorder_busy
-            && let Some(recorder) = &self.recorder
-        {
-            recorder.frame(&frame);
-        }
         let read = current.reader.read(&frame);
-        let row = Row::of_values(&frame, &read);
+        let mut sample = Row::of_values(&frame, &read);
         if let Some(recognition) = &mut self.recognition {
-            recognition.push(row.t_s, &row);
+            recognition.push(sample.t_s, &sample);
         }
         let plotted = self.channels.len();
         let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, &current.reader));
         let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
         let frame = Arc::new(frame);
         current.frame = Arc::clone(&frame);
-        let row = TraceRow {
-            grasp: self.grasp,
-            rolling: false,
-            t: row.t_s,
-            line_bar: row.line_bar,
-            values: row.values[..plotted].into(),
-            errors,
-            frame: Some(frame),
-            answer: self.recognition.as_ref().and_then(LiveRecognition::view),
-        };
-        self.publisher.row(row);
+        sample.values = sample.values[..plotted].into();
+        let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
+        self.publisher.row(TraceRow { grasp: self.grasp, rolling: false, sample, errors, frame: Some(frame), answer });
     }
 
     fn end_grasp(&mut self) {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
-        let trial = current.run.finish(&current.scene);
+        let mut trial = current.run.finish(&current.scene);
+        trial.header.earlier.clone_from(&current.earlier);
         for warning in trial.header.warnings.iter().skip(current.warned) {
             self.publisher.notify(Notice::Warning(warning.clone()));
-        }
-        let recorded = self.recorder_busy;
-        if recorded && let Some(recorder) = &self.recorder {
-            recorder.finish(&trial.data.quality, &trial.header);
-            self.recorder_busy = false;
         }
         let subject = Subject {
             grasp: self.grasp,
@@ -381,15 +359,19 @@ impl Session {
             object: self.object.as_ref().and_then(|object| object.model.clone()),
             seed: trial.header.seed,
             end: EndState::of(trial.frames()),
-            recorded,
+            recorded: current.recorded.is_some(),
         };
         let repeatable = !current.pulled && current.scene.solver.finer().is_some();
         let summary = GraspSummary::new(&trial, &current.scene);
         let accuracy = current.scene.solver.accuracy;
         self.last = Some(Arc::new(FinishedGrasp { grasp: self.grasp, summary, accuracy, repeatable }));
+        let finite = trial.data.quality.finite;
+        if let (Some(place), Some(recorder)) = (current.recorded, &self.recorder) {
+            recorder.store(place, trial);
+        }
         self.begin_check(Some(subject).filter(|_| repeatable));
         self.status.actual_speed = 0.0;
-        if trial.data.quality.finite {
+        if finite {
             if let Some(recognition) = &mut self.recognition {
                 recognition.end_grasp();
             }
@@ -422,16 +404,6 @@ impl Session {
         self.next_grasp_at = None;
         self.status.finished = true;
         self.status.playing = false;
-    }
-
-    /// Gives up a trial that has not reached its end.
-    fn drop_recording(&mut self) {
-        if self.recorder_busy
-            && let Some(recorder) = &self.recorder
-        {
-            recorder.discard();
-        }
-        self.recorder_busy = false;
     }
 
     fn publish(&mut self) {

@@ -8,6 +8,7 @@ use crate::workers::Notice;
 use crate::workers::gripper::messages::{EndedTrial, TrialView};
 use crate::workers::live_recognition::LiveRecognition;
 use palpate_sim::gripper::Phase;
+use palpate_store::Stored;
 use palpate_store::labels::cadence_line;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
@@ -157,7 +158,7 @@ impl GripperSession {
                 RecorderNotice::Recorded(trial) => {
                     let Some((request, discarded)) = self.ending.pop_front() else { continue };
                     if !discarded {
-                        self.publisher.notify(Notice::Stored(trial.id));
+                        self.publisher.notify(Notice::Stored(Stored::New(trial.id)));
                     }
                     self.adapt_to(trial.id, discarded);
                     let cadence = cadence_line(&trial.about.course.cadence);
@@ -167,11 +168,7 @@ impl GripperSession {
                 }
                 RecorderNotice::Warning(text) => self.publisher.notify(Notice::Warning(text)),
                 RecorderNotice::Failed(cause) => self.stop_recording(&cause),
-                RecorderNotice::Stored(_)
-                | RecorderNotice::Known(_)
-                | RecorderNotice::Kept(_)
-                | RecorderNotice::Logged(..)
-                | RecorderNotice::Discarded(_) => {}
+                RecorderNotice::Stored(_) | RecorderNotice::Logged(..) => {}
             }
         }
     }
