@@ -17,7 +17,7 @@
 //! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, studies, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 25450 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
 //! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 20100 |
-//! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `render` | 1450 |
+//! | `palpate-workshop` | `src/workshop` | development only: makes objects and shipped models | `geometry` `sim` `tactile` `learn` `store` `lab` `render` | 1200 |
 //!
 //! # One path for every grasp
 //!

@@ -6,16 +6,13 @@
 //! | `cargo run -p palpate-workshop -- thumbnails` | their thumbnails, drawn from the built-in objects |
 //! | `cargo run --release -p palpate-workshop -- model [--any-gripper] --store FILE` | a recognition model below `models`, with its card |
 //! | `cargo run --release -p palpate-workshop -- encoder [--any-gripper]` | a geometry encoder below `models` |
-//! | `cargo run --release -p palpate-workshop -- signatures --store FILE` | the class signatures of that model; its weights stay |
+//! | `cargo run --release -p palpate-workshop -- touches [--any-gripper] --store FILE` | the grasps in known poses that guide the next grasp, below `models` |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
-//! | `cargo run --release -p palpate-workshop -- fuzz SECONDS` | nothing: feeds random bytes to the protocol decoder and checks its events |
 //!
 //! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
 //! Objects lie as placed: z up, long side along y, so that the fingers close across it along x.
 
 mod encoder;
-mod fuzz;
-mod fuzz_stream;
 mod live_model;
 mod sixteen;
 mod thumbnails;
@@ -85,15 +82,6 @@ enum Command {
     },
     /// Collect grasps and train a shipped recognition model.
     Model(ForModel),
-    /// Collect the training grasps again and store their class signatures in the shipped model, whose weights stay.
-    Signatures {
-        /// Folder of the model.
-        #[arg(long, default_value = "models")]
-        out: PathBuf,
-        /// Trial store that receives the grasps; a second run reuses them.
-        #[arg(long)]
-        store: PathBuf,
-    },
     /// Collect the grasps in known poses that guide the next grasp.
     Touches(ForModel),
     /// Grasp random shapes, and train a shipped geometry encoder on them.
@@ -113,11 +101,6 @@ enum Command {
     },
     /// Write the tables of the manual and the README, and the picture of the study of accuracy, from stored results.
     Tables,
-    /// Feed random bytes to the protocol decoder and check its events.
-    Fuzz {
-        /// Duration (s).
-        seconds: f64,
-    },
 }
 
 /// Shipped model that is made, or that files are made for: the one for perfect sensors and free objects, or another.
@@ -160,12 +143,10 @@ fn main() -> Result<(), Failure> {
         Command::Touches(ForModel { any_gripper, fixed, out, store }) => {
             live_model::make_touches(shipped(any_gripper, fixed), &out, &mut Store::open(&store)?)?;
         }
-        Command::Signatures { out, store } => live_model::add_signatures(&out, &mut Store::open(&store)?)?,
         Command::Encoder { any_gripper, out, shapes, poses } => {
             encoder::make(shipped(any_gripper, false), &out, shapes, poses)?;
         }
         Command::Tables => write_tables()?,
-        Command::Fuzz { seconds } => fuzz::run(seconds)?,
     }
     Ok(())
 }
