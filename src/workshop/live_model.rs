@@ -6,7 +6,7 @@ use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{CollectionPlan, KnownTouches, Stance, collect, random_shapes};
 use palpate_lab::study::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
-use palpate_learn::{Dataset, Fitting, Model, Shipped, StopRule, method};
+use palpate_learn::{Dataset, Fitting, Shipped, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;

@@ -2,7 +2,7 @@
 
 use super::super::output::names_folder;
 use super::super::prelude::*;
-use super::selection::{Filters, Numbers, chosen};
+use super::selection::{ChosenTrial, ChosenTrials};
 use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::{TrialEdit, class_name, compared};
 use palpate_store::{JournalEntry, Shown, export_labelled};
@@ -13,32 +13,25 @@ use std::collections::BTreeMap;
 pub(super) enum LabelCommand {
     /// Label trials of the real gripper with their object.
     Label {
-        /// Trial number; also 3,7-9, or `matching` with filters.
-        #[arg(value_name = "TRIALS")]
-        ids: Numbers,
+        #[command(flatten)]
+        trials: ChosenTrial,
         /// Label; `empty` for the empty hand.
         name: String,
         /// Mark the label as unsure.
         #[arg(long)]
         unsure: bool,
-        #[command(flatten)]
-        filters: Filters,
     },
     /// Set the note of a trial; an empty text removes it.
     Note {
-        /// Trial number; also 3,7-9, or `matching` with filters.
-        #[arg(value_name = "TRIALS")]
-        ids: Numbers,
+        #[command(flatten)]
+        trials: ChosenTrial,
         /// Note.
         text: String,
-        #[command(flatten)]
-        filters: Filters,
     },
     /// Set the tags of a trial; no tags removes them.
     Tag {
-        /// Trial number; also 3,7-9, or `matching` with filters.
-        #[arg(value_name = "TRIALS")]
-        ids: Numbers,
+        #[command(flatten)]
+        trials: ChosenTrial,
         /// Tags, which replace the present ones.
         tags: Vec<String>,
         /// Add the tags to the present ones.
@@ -47,17 +40,9 @@ pub(super) enum LabelCommand {
         /// Remove these tags and keep the others.
         #[arg(long, conflicts_with = "add")]
         remove: bool,
-        #[command(flatten)]
-        filters: Filters,
     },
     /// Move trials from the demo log to the store, where newer grasps do not push them out.
-    Keep {
-        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
-        #[arg(required = true, value_name = "TRIALS")]
-        ids: Vec<Numbers>,
-        #[command(flatten)]
-        filters: Filters,
-    },
+    Keep(ChosenTrials),
     /// Undo the last change of a label, note or tag, the last deletion, or the last `keep`; what was changed together is undone together.
     Undo,
     /// Redo the last undone change.
@@ -75,30 +60,23 @@ pub(super) enum LabelCommand {
 
 pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failure> {
     match command {
-        LabelCommand::Label { ids, name, unsure, filters } => label(store, &of(store, ids, filters)?, name, *unsure),
-        LabelCommand::Note { ids, text, filters } => {
+        LabelCommand::Label { trials, name, unsure } => label(store, &trials.of(store)?, name, *unsure),
+        LabelCommand::Note { trials, text } => {
             let removed = text.trim().is_empty();
             let done = if removed { "note removed" } else { "note set" };
-            edit(store, &of(store, ids, filters)?, &TrialEdit::Note(text.clone()), done)
+            edit(store, &trials.of(store)?, &TrialEdit::Note(text.clone()), done)
         }
-        LabelCommand::Tag { ids, tags, add, remove, filters } => {
+        LabelCommand::Tag { trials, tags, add, remove } => {
             let list = tags.clone();
-            let change = match (add, remove) {
-                (true, _) => TrialEdit::Tag(list),
-                (_, true) => TrialEdit::Untag(list),
-                _ => TrialEdit::Tags(list),
+            let (change, what) = match (add, remove) {
+                (true, _) => (TrialEdit::Tag(list), "added tags"),
+                (_, true) => (TrialEdit::Untag(list), "removed tags"),
+                _ => (TrialEdit::Tags(list), "tags"),
             };
-            let what = if *add {
-                "added tags"
-            } else if *remove {
-                "removed tags"
-            } else {
-                "tags"
-            };
-            edit(store, &of(store, ids, filters)?, &change, &format!("{what} [{}]", tags.join(", ")))
+            edit(store, &trials.of(store)?, &change, &format!("{what} [{}]", tags.join(", ")))
         }
-        LabelCommand::Keep { ids, filters } => {
-            let ids = chosen(store, ids, filters, Shown::Kept)?;
+        LabelCommand::Keep(trials) => {
+            let ids = trials.of(store, Shown::Kept)?;
             say(store.labels().edit(&ids, &TrialEdit::Keep)?.sentence(&TrialEdit::Keep))
         }
         LabelCommand::Undo => match store.journal().undo()? {
@@ -111,11 +89,6 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
         },
         LabelCommand::Journal { last, json } => JournalReport(store.journal().entries(*last)?).print(*json),
     }
-}
-
-/// Trials that are meant.
-fn of(store: &Store, numbers: &Numbers, filters: &Filters) -> Result<Vec<TrialId>, Failure> {
-    chosen(store, std::slice::from_ref(numbers), filters, Shown::Kept)
 }
 
 /// Changes trials and says so: of one trial in the words `done`.

@@ -73,8 +73,8 @@ pub use effects::{Explain, effects_job, explain_scene};
 pub use fit::{FitTrials, FittedFinger, fit_job, fit_trials, recorded_trials_job};
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
-    CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
-    RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
+    CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, Guided, LatestReading,
+    ObserveRequest, TrialView, keep_calibration,
 };
 pub use job::{EndedJob, Job, JobError, JobFailure, JobProgress, JobRun, Newer, RunningJob};
 pub use label_worker::{LabelCommand, LabelView, LabelWorker};
