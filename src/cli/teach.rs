@@ -45,7 +45,7 @@ pub(super) struct TeachArguments {
     #[arg(long = "class", value_name = "A,B,..", value_delimiter = ',')]
     classes: Vec<String>,
     /// Simulated grasps of each object.
-    #[arg(long, value_name = "N", default_value_t = LESSON_GRASPS, value_parser = within(10..=1000))]
+    #[arg(long, value_name = "N", default_value_t = LESSON_GRASPS, value_parser = within(10..=1000_usize))]
     grasps: usize,
     /// Random seed of poses and of the fit.
     #[arg(long, value_name = "N", default_value_t = 1)]

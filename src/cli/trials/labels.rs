@@ -2,7 +2,7 @@
 
 use super::super::output::names_folder;
 use super::super::prelude::*;
-use super::selection::{ChosenTrial, ChosenTrials};
+use super::selection::{ChosenTrials, Filters, Numbers, chosen};
 use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::{TrialEdit, class_name, compared};
 use palpate_store::{JournalEntry, Shown, export_labelled};
@@ -13,25 +13,32 @@ use std::collections::BTreeMap;
 pub(super) enum LabelCommand {
     /// Label trials of the real gripper with their object.
     Label {
-        #[command(flatten)]
-        trials: ChosenTrial,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Label; `empty` for the empty hand.
         name: String,
         /// Mark the label as unsure.
         #[arg(long)]
         unsure: bool,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Set the note of a trial; an empty text removes it.
     Note {
-        #[command(flatten)]
-        trials: ChosenTrial,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Note.
         text: String,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Set the tags of a trial; no tags removes them.
     Tag {
-        #[command(flatten)]
-        trials: ChosenTrial,
+        /// Trial number; also 3,7-9, or `matching` with filters.
+        #[arg(value_name = "TRIALS")]
+        ids: Numbers,
         /// Tags, which replace the present ones.
         tags: Vec<String>,
         /// Add the tags to the present ones.
@@ -40,6 +47,8 @@ pub(super) enum LabelCommand {
         /// Remove these tags and keep the others.
         #[arg(long, conflicts_with = "add")]
         remove: bool,
+        #[command(flatten)]
+        filters: Filters,
     },
     /// Move trials from the demo log to the store, where newer grasps do not push them out.
     Keep(ChosenTrials),
@@ -60,20 +69,20 @@ pub(super) enum LabelCommand {
 
 pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failure> {
     match command {
-        LabelCommand::Label { trials, name, unsure } => label(store, &trials.of(store)?, name, *unsure),
-        LabelCommand::Note { trials, text } => {
+        LabelCommand::Label { ids, name, unsure, filters } => label(store, &of(store, ids, filters)?, name, *unsure),
+        LabelCommand::Note { ids, text, filters } => {
             let removed = text.trim().is_empty();
             let done = if removed { "note removed" } else { "note set" };
-            edit(store, &trials.of(store)?, &TrialEdit::Note(text.clone()), done)
+            edit(store, &of(store, ids, filters)?, &TrialEdit::Note(text.clone()), done)
         }
-        LabelCommand::Tag { trials, tags, add, remove } => {
+        LabelCommand::Tag { ids, tags, add, remove, filters } => {
             let list = tags.clone();
             let (change, what) = match (add, remove) {
                 (true, _) => (TrialEdit::Tag(list), "added tags"),
                 (_, true) => (TrialEdit::Untag(list), "removed tags"),
                 _ => (TrialEdit::Tags(list), "tags"),
             };
-            edit(store, &trials.of(store)?, &change, &format!("{what} [{}]", tags.join(", ")))
+            edit(store, &of(store, ids, filters)?, &change, &format!("{what} [{}]", tags.join(", ")))
         }
         LabelCommand::Keep(trials) => {
             let ids = trials.of(store, Shown::Kept)?;
@@ -89,6 +98,11 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
         },
         LabelCommand::Journal { last, json } => JournalReport(store.journal().entries(*last)?).print(*json),
     }
+}
+
+/// Trials that are meant.
+fn of(store: &Store, numbers: &Numbers, filters: &Filters) -> Result<Vec<TrialId>, Failure> {
+    chosen(store, std::slice::from_ref(numbers), filters, Shown::Kept)
 }
 
 /// Changes trials and says so: of one trial in the words `done`.

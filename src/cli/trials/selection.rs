@@ -71,25 +71,9 @@ pub(super) struct ChosenTrials {
     filters: Filters,
 }
 
-/// Trial, or trials, that a command is about.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct ChosenTrial {
-    /// Trial number; also 3,7-9, or `matching` with filters.
-    #[arg(value_name = "TRIALS")]
-    ids: Numbers,
-    #[command(flatten)]
-    filters: Filters,
-}
-
 impl ChosenTrials {
     pub(super) fn of(&self, store: &Store, shown: Shown) -> Result<Vec<TrialId>, Failure> {
         chosen(store, &self.ids, &self.filters, shown)
-    }
-}
-
-impl ChosenTrial {
-    pub(super) fn of(&self, store: &Store) -> Result<Vec<TrialId>, Failure> {
-        chosen(store, std::slice::from_ref(&self.ids), &self.filters, Shown::Kept)
     }
 }
 
