@@ -19,7 +19,7 @@
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 10650 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
 //! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` | 20100 |
-//! | `palpate-workshop` | `src/workshop` | development only: makes objects, shipped models, fuzz input | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `study` `render` | 1450 |
+//! | `palpate-workshop` | `src/workshop` | development only: makes shipped models, thumbnails and generated tables | `geometry` `sim` `tactile` `learn` `store` `lab` `study` `render` | 340 |
 //!
 //! # One path for every grasp
 //!
@@ -103,7 +103,7 @@
 //!
 //! | what | the one place |
 //! |---|---|
-//! | a built-in object | a function in `src/workshop/sixteen.rs`; `cargo run -p palpate-workshop -- objects` writes its folder |
+//! | a built-in object | a folder of `assets/objects`: URDF, meshes, facts; `cargo run -p palpate-workshop -- thumbnails` draws its picture |
 //! | a panel | a file in `src/app/panels/` and a line in [`app::ALL_PANELS`]; its place in a layout of `src/app/modes/` |
 //! | a mode of the window | a file in `src/app/modes/` and its name in `src/app/features/view.rs` |
 //! | an action of the window | a method in `src/app/features/`; with a name, a line in `src/app/keys/common.rs` or in its mode |

@@ -3,7 +3,6 @@
 use super::calibrate::weigh;
 use super::link;
 use super::prelude::*;
-use palpate_device::serial::LinkOptions;
 use palpate_geometry::units::three_digits;
 use palpate_lab::grasping::{Adaptation, AdaptedSensor};
 use palpate_lab::gripper::SerialGripper;
@@ -111,12 +110,10 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
 /// Records a close of the empty hand.
 fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Path) -> Result<TrialId, Failure> {
     let stop = stop_flag()?;
-    let captured = arguments.port.as_deref().is_some_and(Path::is_file);
-    let replay_speed = if captured { f64::INFINITY } else { 1.0 };
-    let options = LinkOptions { path: arguments.port.clone(), replay_speed, ..LinkOptions::default() };
-    let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
+    let port = arguments.port.as_deref();
+    let link = link::open(&link::options(port, true), link::USUAL_WAIT_S, &stop)?;
     note("take everything out of the hand: it closes empty, without touching anything");
-    let control = match (captured, arguments.by_hand) {
+    let control = match (port.is_some_and(Path::is_file), arguments.by_hand) {
         (true, _) => Control::Free,
         (false, true) => Control::ByHand,
         (false, false) => Control::Driven,

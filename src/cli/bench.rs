@@ -4,7 +4,9 @@ mod frame;
 mod library;
 
 use super::Failure;
-use super::terminal::{Page, Report};
+use super::setup::within;
+use super::snapshot::sides_from;
+use super::terminal::{Column, Page, Report};
 use palpate_geometry::units::three_digits;
 use palpate_sim::scene::Accuracy;
 use palpate_study::{
@@ -60,10 +62,10 @@ enum Benchmark {
     /// nothing moves, frames per second with it, and the time from the start to the first frame.
     Frame {
         /// Width and height (pixels).
-        #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_window)]
+        #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = sides_from(320))]
         size: [u32; 2],
         /// Seconds of grasps.
-        #[arg(long, default_value_t = 20.0, value_parser = parse_seconds)]
+        #[arg(long, default_value_t = 20.0, value_parser = within(1.0..=600.0))]
         seconds: f64,
     },
     /// Measure a live step of the macro-layer: a sample in, probabilities out.
@@ -72,17 +74,6 @@ enum Benchmark {
         #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
     },
-}
-
-fn parse_window(text: &str) -> Result<[u32; 2], String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (320..=4096).contains(side));
-    let sides = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
-    sides.ok_or_else(|| "write WIDTHxHEIGHT, each from 320 to 4096, as in 1280x800".to_owned())
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|seconds| (1.0..=600.0).contains(seconds));
-    seconds.ok_or_else(|| "write 1 to 600 seconds".to_owned())
 }
 
 /// Tolerances in the table, beside the named accuracies.
@@ -102,14 +93,9 @@ struct Costs<R: 'static> {
     remarks: Vec<String>,
 }
 
-/// Heading of a column and its cell in a row.
-type Column<R> = (&'static str, fn(&R) -> String);
-
 impl<R: Serialize> Report for Costs<R> {
     fn text(&self, page: &mut Page) {
-        let header: Vec<&str> = self.columns.iter().map(|(name, _)| *name).collect();
-        let cells = |row: &R| self.columns.iter().map(|(_, cell)| cell(row)).collect::<Vec<_>>();
-        page.table(&header, self.rows.iter().map(cells));
+        page.columns(self.columns, &self.rows);
         self.remarks.iter().for_each(|remark| page.line(remark));
     }
 }

@@ -6,7 +6,8 @@ mod zero;
 
 use super::prelude::*;
 use palpate_exchange::read_points_csv;
-use palpate_store::{CalibrationId, StoredCalibration};
+use palpate_lab::workers::keep_calibration;
+use palpate_store::CalibrationId;
 use palpate_tactile::board::{Board, Sensor};
 use palpate_tactile::calibration::{Calibration, Input, Record, SensorKind};
 
@@ -30,7 +31,7 @@ pub(super) struct CalibrateArguments {
     #[command(subcommand)]
     command: Option<manage::CalibrateCommand>,
     /// Sensor: flexL, flexR, fsrL or fsrR.
-    #[arg(required = true, value_parser = parse_sensor)]
+    #[arg(required = true, value_parser = one_of(Sensor::ALL.map(|sensor| (sensor.channel(), sensor))))]
     sensor: Option<Sensor>,
     /// Name of the mounted part, such as the number written on it (default: the known one). Calibrations belong to parts,
     /// because parts get swapped.
@@ -59,12 +60,6 @@ pub(super) struct CalibrateArguments {
     json: bool,
 }
 
-/// Finds a sensor by the name of its channel.
-fn parse_sensor(text: &str) -> Result<Sensor, String> {
-    let found = Sensor::ALL.into_iter().find(|sensor| sensor.channel().eq_ignore_ascii_case(text));
-    found.ok_or_else(|| "choose flexL, flexR, fsrL or fsrR".to_owned())
-}
-
 pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
     if let Some(command) = &arguments.command {
         return match existing_store(store)? {
@@ -90,7 +85,7 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
         None
     } else {
         let mut store = known.map_or_else(|| open_store(store), Ok)?;
-        Some(keep(&mut store, sensor, &calibration)?)
+        Some(keep_calibration(&mut store, sensor, &calibration)?)
     };
     CalibrateReport {
         id: stored.as_ref().map(|stored| stored.id),
@@ -147,15 +142,6 @@ fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, fi
     input.divider.fixed_ohm = arguments.resistor.unwrap_or(input.divider.fixed_ohm);
     let points = read_points_csv(file, kind)?;
     Ok(Record { part: part.to_owned(), kind, input, points, bending: None, assumed: false, note: String::new() })
-}
-
-/// Stores a calibration, and mounts its part where it was calibrated.
-fn keep(store: &mut Store, sensor: Sensor, calibration: &Calibration) -> Result<StoredCalibration, Failure> {
-    let stored = store.calibrations().add(&calibration.record)?;
-    if store.calibrations().mounted()?[sensor as usize].as_ref() != Some(&stored.record.part) {
-        store.calibrations().mount(sensor, &stored.record.part)?;
-    }
-    Ok(stored)
 }
 
 /// The points with their residuals, and the summary.

@@ -1,15 +1,15 @@
 //! `palpate doctor`: diagnoses the connection between the gripper's board and this computer.
 
-use super::link;
+use super::link::Listener;
 use super::prelude::*;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use palpate_device::doctor::{
-    Bleed, CheckFinding, CheckStatus, CrosstalkSession, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
-    is_sound, not_checked, summary, write_sketch,
+    Bleed, CheckFinding, CheckStatus, CrosstalkTest, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings, is_sound,
+    not_checked, summary, write_sketch,
 };
 use palpate_device::serial::{Baud, LinkOptions};
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Arguments of `palpate doctor`.
 #[derive(Debug, clap::Args)]
@@ -142,38 +142,29 @@ impl Report for CrosstalkReport {
     }
 }
 
-/// Silence of the board that ends the test.
-const SILENCE: Duration = Duration::from_secs(10);
-
 /// Runs the crosstalk test: the user moves one sensor after the other.
 fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<ExitCode, Failure> {
-    let link = link::open(options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
-    let (mut session, mut shown, mut newest) = (CrosstalkSession::default(), String::new(), Instant::now());
-    let keys = typed_lines()?;
-    while !stop.load(Ordering::Relaxed) && !link.is_over() && !session.is_over() {
-        let readings = link::readings(&link, Duration::from_millis(50));
-        let board = link.status().board;
+    let mut board = Listener::open(options, stop)?;
+    let (mut test, mut shown, keys) = (CrosstalkTest::default(), String::new(), typed_lines()?);
+    while !stop.load(Ordering::Relaxed) && !test.is_over() {
+        let Some(readings) = board.next()? else { break };
+        let known = board.board();
         for reading in readings {
-            newest = Instant::now();
-            session.feed(&reading, &board)?;
-            let Some(test) = session.test().filter(|test| test.source().is_some()) else { continue };
+            test.feed(&reading, &known)?;
             let [step, of] = test.step();
-            let told = format!("{step} of {of}: {}", test.instruction());
-            if told != shown {
+            let told = test.instruction().map(|instruction| format!("{step} of {of}: {instruction}"));
+            if let Some(told) = told.filter(|told| *told != shown) {
                 note(&told);
                 shown = told;
             }
         }
         if keys.try_recv().is_ok() {
-            session.skip();
-        }
-        if newest.elapsed() > SILENCE {
-            let state = link.status().state.sentence();
-            return Err(format!("no readings for {:.0} s. {state}", SILENCE.as_secs_f64()).into());
+            test.skip();
         }
     }
-    let state = || format!("no readings from the board. {}", link.status().state.sentence());
-    let test = session.test().ok_or_else(state)?;
+    if !test.is_begun() {
+        return Err(format!("no readings from the board. {}", board.sentence()).into());
+    }
     let sound = test.is_sound();
     CrosstalkReport { sound, found: test.found().to_vec(), result: test.summary() }.print(json)?;
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -2,6 +2,7 @@
 
 use super::learning::{DataArguments, known_method, parts};
 use super::prelude::*;
+use super::terminal::Column;
 use palpate_learn::comparison::{ComparisonRow, Controls, in_table_order};
 use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan};
 
@@ -181,41 +182,28 @@ fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share)
 }
 
+fn or_none(share: Option<f64>) -> String {
+    share.map_or_else(|| "-".to_owned(), percent)
+}
+
+const COLUMNS: &[Column<ComparisonRow>] = &[
+    ("model", |row| row.model.clone()),
+    ("F1", |row| percent(row.evaluation.f1_macro)),
+    ("95 %", |row| format!("{}-{}", percent(row.evaluation.ci95[0]), percent(row.evaluation.ci95[1]))),
+    ("accuracy", |row| percent(row.evaluation.macro_accuracy)),
+    ("F1 (3)", |row| or_none(row.evaluation.f1_by_grasps.get(2).copied())),
+    ("F1 (5)", |row| or_none(row.evaluation.f1_by_grasps.get(4).copied())),
+    ("size F1", |row| or_none(row.evaluation.stage_one.as_ref().map(|scores| scores.size_f1))),
+    ("shape F1", |row| or_none(row.evaluation.stage_one.as_ref().map(|scores| scores.shape_f1))),
+    ("ECE", |row| format!("{:.3}", row.evaluation.ece)),
+    ("train s", |row| format!("{:.1}", row.train_cpu_s)),
+    ("us/sample", |row| format!("{:.1}", row.evaluation.step_us)),
+];
+
 impl Report for EvaluateReport {
     fn text(&self, page: &mut Page) {
         self.heading.iter().for_each(|line| page.line(line));
-        let or_none = |share: Option<f64>| share.map_or_else(|| "-".to_owned(), percent);
-        let row = |row: &ComparisonRow| {
-            let own = &row.evaluation;
-            let after = |grasps: usize| or_none(own.f1_by_grasps.get(grasps - 1).copied());
-            [
-                row.model.clone(),
-                percent(own.f1_macro),
-                format!("{}-{}", percent(own.ci95[0]), percent(own.ci95[1])),
-                percent(own.macro_accuracy),
-                after(3),
-                after(5),
-                or_none(own.stage_one.as_ref().map(|scores| scores.size_f1)),
-                or_none(own.stage_one.as_ref().map(|scores| scores.shape_f1)),
-                format!("{:.3}", own.ece),
-                format!("{:.1}", row.train_cpu_s),
-                format!("{:.1}", own.step_us),
-            ]
-        };
-        let header = [
-            "model",
-            "F1",
-            "95 %",
-            "accuracy",
-            "F1 (3)",
-            "F1 (5)",
-            "size F1",
-            "shape F1",
-            "ECE",
-            "train s",
-            "us/sample",
-        ];
-        page.table(&header, self.rows.iter().map(row));
+        page.columns(COLUMNS, &self.rows);
         page.line(
             "\nF1 and accuracy: means over the classes, in percent. (3), (5): after three and five grasps of the same \
              object.",

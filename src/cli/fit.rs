@@ -15,7 +15,7 @@ pub(super) struct FitArguments {
     #[arg(required = true)]
     trials: Vec<TrialId>,
     #[command(flatten)]
-    scene: SceneArguments,
+    scene: Option<SceneArguments>,
     /// Calibration numbers to use instead of the newest of each part.
     #[arg(long, value_name = "ID,..", value_delimiter = ',')]
     calibrations: Vec<CalibrationId>,
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
     }
     let store = read_store(store)?;
     // Only the gripper of the scene is used.
-    let scene = arguments.scene.any_given().then(|| arguments.scene.scene(None)).transpose()?;
+    let scene = arguments.scene.as_ref().map(|scene| scene.scene(None)).transpose()?;
     let gripper = scene.as_ref().map(|scene| &scene.gripper);
     let mut recorded = RecordedGrasps::default();
     for id in &arguments.trials {

@@ -2,7 +2,7 @@
 
 use super::origin::OriginFilters;
 use super::prelude::*;
-use super::setup::{self};
+use super::setup;
 use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView, check_model_path, models_folder};
 use palpate_learn::comparison::{Compared, Comparison, MethodResult, compare};
 use palpate_learn::{Dataset, METHODS, Method, Split, StopRule, counted, method};
@@ -38,7 +38,7 @@ pub(super) struct DataArguments {
     /// Sensor model for simulated trials: virtual (perfect), noisy (the same with slip, drift and noise), physical-like (as on
     /// the real gripper), adapted (the same after `palpate adapt`), or drawn (as on any gripper after it, another one for each
     /// grasp).
-    #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = parse_sensors)]
+    #[arg(long, value_name = "MODEL", default_value = "virtual", value_parser = one_of(SensorModel::ALL.map(|model| (model.name(), model))))]
     pub(super) sensors: SensorModel,
     /// With --sensors drawn or noisy: number of readings of each grasp for training, each by other sensors.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64), requires = "sensors")]
@@ -55,11 +55,6 @@ pub(super) struct DataArguments {
     /// Small networks and few epochs: quick, but worse results.
     #[arg(long)]
     pub(super) quick: bool,
-}
-
-/// Parser of a sensor model's name.
-pub(super) fn parse_sensors(text: &str) -> Result<SensorModel, String> {
-    SensorModel::named(text).ok_or_else(|| format!("choose {}", SensorModel::ALL.map(SensorModel::name).join(", ")))
 }
 
 impl QueryArguments {

@@ -3,8 +3,10 @@
 use super::Failure;
 use super::terminal::note;
 use palpate_device::protocol::BoardEvent;
-use palpate_device::serial::{LinkOptions, PortTrouble, SerialLink};
-use palpate_tactile::board::Reading;
+use palpate_device::serial::{LinkOptions, LinkState, PortTrouble, SerialLink};
+use palpate_tactile::board::{Board, Reading};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Default wait for a busy port (s): ModemManager probes a newly connected board for about this long.
@@ -13,14 +15,12 @@ pub(super) const USUAL_WAIT_S: f64 = 30.0;
 const RETRY: Duration = Duration::from_secs(1);
 /// Interval at which a stop request is checked.
 const POLL: Duration = Duration::from_millis(50);
+/// Longest wait for the first readings (s).
+pub(super) const PATIENCE_S: f64 = 10.0;
 
 /// Opens a port, a link to one, or a file. While another program has it, retries each second, for up to `wait_s` seconds or
-/// until `stopped` returns true.
-pub(super) fn open(
-    options: &LinkOptions,
-    wait_s: f64,
-    mut stopped: impl FnMut() -> bool,
-) -> Result<SerialLink, Failure> {
+/// until `stop` is set.
+pub(super) fn open(options: &LinkOptions, wait_s: f64, stop: &AtomicBool) -> Result<SerialLink, Failure> {
     let begun = Instant::now();
     let mut noted = false;
     loop {
@@ -36,7 +36,7 @@ pub(super) fn open(
         }
         let tried = Instant::now();
         while tried.elapsed() < RETRY {
-            if stopped() {
+            if stop.load(Ordering::Relaxed) {
                 return Err(error.into());
             }
             std::thread::sleep(POLL);
@@ -44,7 +44,52 @@ pub(super) fn open(
     }
 }
 
-/// Readings of the board, waited for as long as `patience`.
-pub(super) fn readings(link: &SerialLink, patience: Duration) -> impl Iterator<Item = Reading> {
-    link.take(patience).into_iter().filter_map(BoardEvent::into_reading)
+/// Options of a link to the board: captured bytes come as they were captured, or without a pause.
+pub(super) fn options(port: Option<&Path>, at_once: bool) -> LinkOptions {
+    let replay_speed = if at_once && port.is_some_and(Path::is_file) { f64::INFINITY } else { 1.0 };
+    LinkOptions { path: port.map(Path::to_owned), replay_speed, ..LinkOptions::default() }
+}
+
+/// Readings of a board, for a command that guides the user. It tells how the link stands.
+pub(super) struct Listener {
+    link: SerialLink,
+    /// State that was told last.
+    state: LinkState,
+    opened: Instant,
+    has_heard: bool,
+}
+
+impl Listener {
+    pub(super) fn open(options: &LinkOptions, stop: &AtomicBool) -> Result<Self, Failure> {
+        let link = open(options, USUAL_WAIT_S, stop)?;
+        Ok(Self { link, state: LinkState::Waiting, opened: Instant::now(), has_heard: false })
+    }
+
+    /// The board as it is known by now.
+    pub(super) fn board(&self) -> Board {
+        self.link.status().board
+    }
+
+    /// The next readings, which may be none yet; `None` where the stream has ended. Fails where none has ever come.
+    pub(super) fn next(&mut self) -> Result<Option<Vec<Reading>>, Failure> {
+        let readings: Vec<Reading> = self.link.take(POLL).into_iter().filter_map(BoardEvent::into_reading).collect();
+        let state = self.link.status().state;
+        if state != self.state {
+            if !matches!(state, LinkState::Listening | LinkState::Ended { .. }) {
+                note(&state.sentence());
+            }
+            self.state = state;
+        }
+        self.has_heard |= !readings.is_empty();
+        let is_over = readings.is_empty() && self.link.is_over();
+        if !self.has_heard && (is_over || self.opened.elapsed().as_secs_f64() > PATIENCE_S) {
+            return Err(format!("no readings from the board. {}", self.state.sentence()).into());
+        }
+        Ok((!is_over).then_some(readings))
+    }
+
+    /// How the stream stands, in a sentence.
+    pub(super) fn sentence(&self) -> String {
+        self.state.sentence()
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::output::{TemporaryFolder, cannot};
 use super::prelude::*;
-use super::snapshot::{Drawer, OpenDrawable, open_drawable, parse_size, parse_theme, parse_view};
+use super::snapshot::{Drawer, OpenDrawable, open_drawable, sides_from};
 use crate::app::{Mode, OffscreenWindow, film_presentation};
 use glam::Vec2;
 use palpate_geometry::drawing::StandardView;
@@ -32,13 +32,13 @@ pub(super) struct MovieArguments {
     #[arg(long, value_name = "SECONDS", value_parser = within(0.1..=600.0), conflicts_with_all = ["view", "from", "to", "no_forces", "bare"])]
     demo: Option<f64>,
     /// View: hand, front, back, left, right, top or bottom.
-    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = parse_view)]
+    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = one_of(StandardView::ALL.map(|view| (view.name(), view))))]
     view: StandardView,
     /// Width and height in pixels.
-    #[arg(long, value_name = "WxH", default_value = "640x400", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", default_value = "640x400", value_parser = sides_from(16))]
     size: [u32; 2],
     /// Theme: dark or light.
-    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
+    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = one_of(Theme::ALL.map(|theme| (theme.name(), theme))))]
     theme: Theme,
     /// Speed, as a multiple of real time.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = within(0.01..=64.0))]

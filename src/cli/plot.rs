@@ -1,7 +1,7 @@
 //! `palpate plot`: figures of stored trials, as SVG or PNG.
 
 use super::prelude::*;
-use super::snapshot::{parse_size, parse_theme};
+use super::snapshot::sides_from;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
@@ -24,7 +24,7 @@ pub(super) struct PlotArguments {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     channels: Vec<String>,
     /// Common time of several trials: start or contact.
-    #[arg(long, value_name = "NAME", default_value = "start", value_parser = parse_align)]
+    #[arg(long, value_name = "NAME", default_value = "start", value_parser = one_of(Alignment::ALL.map(|align| (align.name(), align))))]
     align: Alignment,
     /// Mean and standard deviation of the trials of each object, in place of single trials.
     #[arg(long, conflicts_with = "heat")]
@@ -33,15 +33,15 @@ pub(super) struct PlotArguments {
     #[arg(long, conflicts_with = "heat")]
     raw: bool,
     /// Heat maps over time: joints (angle of each) or pads (pressure on each row of taxels).
-    #[arg(long, value_name = "NAME", value_parser = parse_heat)]
+    #[arg(long, value_name = "NAME", value_parser = one_of([("joints", HeatKind::Joints), ("pads", HeatKind::Pads)]))]
     heat: Option<HeatKind>,
     #[command(flatten)]
     signals: SignalArguments,
     /// Theme: dark or light.
-    #[arg(long, value_name = "NAME", default_value = "light", value_parser = parse_theme)]
+    #[arg(long, value_name = "NAME", default_value = "light", value_parser = one_of(Theme::ALL.map(|theme| (theme.name(), theme))))]
     theme: Theme,
     /// Width and height in points; a PNG has two pixels per point (default: by the number of plots).
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = sides_from(16))]
     size: Option<[u32; 2]>,
     /// File to write: .svg or .png.
     #[arg(long, value_name = "FILE", value_parser = file_of(KINDS))]
@@ -50,19 +50,6 @@ pub(super) struct PlotArguments {
 
 /// Kinds of figures.
 const KINDS: &[FileKind] = &[FileKind::Svg, FileKind::Png];
-
-fn parse_align(text: &str) -> Result<Alignment, String> {
-    let found = Alignment::ALL.into_iter().find(|align| align.name() == text);
-    found.ok_or_else(|| "choose start or contact".to_owned())
-}
-
-fn parse_heat(text: &str) -> Result<HeatKind, String> {
-    match text {
-        "joints" => Ok(HeatKind::Joints),
-        "pads" => Ok(HeatKind::Pads),
-        _ => Err("choose joints or pads".to_owned()),
-    }
-}
 
 pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(), Failure> {
     let out = &arguments.out;

@@ -112,7 +112,7 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
         reconnect: !arguments.no_reconnect,
         replay_speed: if arguments.speed > 0.0 { arguments.speed } else { f64::INFINITY },
     };
-    let link = link::open(&options, arguments.wait, || stop.load(Ordering::Relaxed))?;
+    let link = link::open(&options, arguments.wait, &stop)?;
     let control = match (arguments.drive, arguments.by_hand) {
         (true, _) => Control::Driven,
         (false, true) => Control::ByHand,

@@ -4,13 +4,15 @@ use super::Failure;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::anchored;
-use palpate_sim::scene::{Accuracy, EngineKind, PosePreset, Scene};
+use palpate_sim::scene::{Accuracy, EngineKind, PRESETS, PosePreset, Scene};
 use palpate_store::Store;
 use palpate_store::labels::class_name;
 use palpate_tactile::SignalDefinition;
+use std::fmt::Display;
 use std::io::ErrorKind;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// Scene and changes to it.
 #[derive(Debug, clap::Args)]
@@ -23,14 +25,14 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "NAME|TOL")]
     pub(super) accuracy: Option<Accuracy>,
     /// Physics engine: palpate, or rapier for comparison.
-    #[arg(long, value_name = "NAME", value_parser = parse_engine)]
+    #[arg(long, value_name = "NAME", value_parser = one_of(EngineKind::ALL.map(|engine| (engine.name(), engine))))]
     pub(super) engine: Option<EngineKind>,
     /// Fix the object in place.
     #[arg(long)]
     pub(super) fixed: bool,
     /// Spread of random poses: A (3 mm, 10 degrees), M (5 mm, 25 degrees), B (8 mm, any turn, any resting face) or
     /// C (12 mm, any orientation).
-    #[arg(long, value_name = "A|M|B|C", value_parser = parse_preset)]
+    #[arg(long, value_name = "A|M|B|C", value_parser = one_of(PRESETS.map(|preset| (preset.name, preset))))]
     pub(super) preset: Option<PosePreset>,
     /// Set a key of the scene, e.g. --set gripper.finger.joints=20 (may be repeated).
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -45,7 +47,7 @@ pub(super) struct SignalArguments {
     pub(super) layout: String,
     /// Signals of simulated trials: parts (what strips and pads measure, as on a real gripper), contact (circle through
     /// all joints, force over participation area) or hull (force over the convex hull of the contacts, as in the paper).
-    #[arg(long, value_name = "NAME", default_value = "parts", value_parser = parse_signals)]
+    #[arg(long, value_name = "NAME", default_value = "parts", value_parser = one_of(SignalDefinition::ALL.map(|own| (own.name(), own))))]
     pub(super) signals: SignalDefinition,
 }
 
@@ -54,10 +56,6 @@ impl SignalArguments {
     pub(super) fn view(&self) -> SensorView {
         SensorView { layout: self.layout.clone(), signals: self.signals, ..SensorView::default() }
     }
-}
-
-fn parse_signals(text: &str) -> Result<SignalDefinition, String> {
-    SignalDefinition::named(text).ok_or_else(|| "choose parts, contact or hull".to_owned())
 }
 
 /// When a grasp is computed again at a finer accuracy.
@@ -81,33 +79,33 @@ pub(super) fn threads(asked: Option<u16>) -> usize {
 }
 
 /// Parser of a number within a range.
-pub(super) fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+pub(super) fn within<T: FromStr + PartialOrd + Display + Clone>(
+    range: RangeInclusive<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
     move |text| {
         let number = text.parse().ok().filter(|number| range.contains(number));
         number.ok_or_else(|| format!("write a number from {} to {}", range.start(), range.end()))
     }
 }
 
-fn parse_engine(text: &str) -> Result<EngineKind, String> {
-    let found = EngineKind::ALL.into_iter().find(|engine| engine.name() == text);
-    found.ok_or_else(|| "choose palpate or rapier".to_owned())
-}
-
-fn parse_preset(text: &str) -> Result<PosePreset, String> {
-    PosePreset::named(text).ok_or_else(|| "choose A, M, B or C".to_owned())
+/// Parser of one of several names, in either case.
+pub(super) fn one_of<T: Clone>(
+    all: impl IntoIterator<Item = (&'static str, T)>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    let (names, values): (Vec<&str>, Vec<T>) = all.into_iter().unzip();
+    move |text| {
+        let found = names.iter().position(|name| name.eq_ignore_ascii_case(text.trim()));
+        let last = names.len() - 1;
+        found
+            .map(|k| values[k].clone())
+            .ok_or_else(|| format!("choose {} or {}", names[..last].join(", "), names[last]))
+    }
 }
 
 impl SceneArguments {
     /// Builds the scene, with another object where one is named.
     pub(super) fn scene(&self, object: Option<&str>) -> Result<Scene, Failure> {
         self.with_file(self.scene.as_deref(), object)
-    }
-
-    /// True where any argument is given.
-    pub(super) fn any_given(&self) -> bool {
-        let Self { scene, accuracy, engine, fixed, preset, settings } = self;
-        let named = scene.is_some() || accuracy.is_some() || engine.is_some() || preset.is_some();
-        named || *fixed || !settings.is_empty()
     }
 
     /// Builds the scene on top of another file.

@@ -41,16 +41,16 @@ pub(super) struct SnapshotArguments {
     #[arg(long, conflicts_with_all = ["view", "ghost", "no_forces", "bare"])]
     panels: bool,
     /// Mode of the window: demo, inspect, label or study (default: inspect with --trial, else demo).
-    #[arg(long, value_name = "NAME", requires = "panels", value_parser = parse_mode)]
+    #[arg(long, value_name = "NAME", requires = "panels", value_parser = one_of(MODES))]
     mode: Option<Mode>,
     /// View: hand, front, back, left, right, top or bottom; or touch, from nearby through the finger in front.
-    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = parse_shown)]
+    #[arg(long, value_name = "NAME", default_value = "hand", value_parser = one_of(ShownPart::named()))]
     view: ShownPart,
     /// Width and height in pixels (default: 1280x800; a window 1280x820).
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = sides_from(16))]
     size: Option<[u32; 2]>,
     /// Theme: dark or light.
-    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = parse_theme)]
+    #[arg(long, value_name = "NAME", default_value = "dark", value_parser = one_of(Theme::ALL.map(|theme| (theme.name(), theme))))]
     theme: Theme,
     /// Overlay fingers and object as the other engine computes them, translucent.
     #[arg(long, conflicts_with = "trial")]
@@ -80,15 +80,8 @@ const USUAL_S: f64 = 2.9;
 /// Size of a window where none is asked for (pixels).
 const WINDOW: [u32; 2] = [1280, 820];
 
-fn parse_mode(text: &str) -> Result<Mode, String> {
-    match text {
-        "demo" => Ok(Mode::Demo),
-        "inspect" => Ok(Mode::Inspect),
-        "label" => Ok(Mode::Label),
-        "study" => Ok(Mode::Study),
-        _ => Err("choose demo, inspect, label or study".to_owned()),
-    }
-}
+const MODES: [(&str, Mode); 4] =
+    [("demo", Mode::Demo), ("inspect", Mode::Inspect), ("label", Mode::Label), ("study", Mode::Study)];
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug)]
@@ -97,30 +90,18 @@ enum ShownPart {
     Touch,
 }
 
-fn parse_shown(text: &str) -> Result<ShownPart, String> {
-    match text {
-        "touch" => Ok(ShownPart::Touch),
-        _ => parse_view(text).map(ShownPart::Hand).map_err(|choose| format!("{choose}; or touch")),
+impl ShownPart {
+    fn named() -> impl Iterator<Item = (&'static str, Self)> {
+        StandardView::ALL.into_iter().map(|view| (view.name(), Self::Hand(view))).chain([("touch", Self::Touch)])
     }
 }
 
-pub(super) fn parse_view(text: &str) -> Result<StandardView, String> {
-    let found = StandardView::ALL.into_iter().find(|view| view.name() == text);
-    found.ok_or_else(|| "choose hand, front, back, left, right, top or bottom".to_owned())
-}
-
-pub(super) fn parse_theme(text: &str) -> Result<Theme, String> {
-    Theme::ALL.into_iter().find(|theme| theme.name() == text).ok_or_else(|| "choose dark or light".to_owned())
-}
-
-pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
-    let parsed = || {
-        let (width, height) = text.split_once('x')?;
-        Some([width.parse::<u32>().ok()?, height.parse::<u32>().ok()?])
-    };
-    match parsed() {
-        Some(size) if size.iter().all(|s| (16..=4096).contains(s)) => Ok(size),
-        _ => Err("write WIDTHxHEIGHT, each from 16 to 4096, as in 1280x800".to_owned()),
+/// Parser of width and height, of at least so many pixels or points.
+pub(super) fn sides_from(least: u32) -> impl Fn(&str) -> Result<[u32; 2], String> + Clone {
+    move |text| {
+        let side = |text: &str| text.parse().ok().filter(|side| (least..=4096).contains(side));
+        let sides = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+        sides.ok_or_else(|| format!("write WIDTHxHEIGHT, each from {least} to 4096, as in 1280x800"))
     }
 }
 

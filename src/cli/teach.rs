@@ -45,7 +45,7 @@ pub(super) struct TeachArguments {
     #[arg(long = "class", value_name = "A,B,..", value_delimiter = ',')]
     classes: Vec<String>,
     /// Simulated grasps of each object.
-    #[arg(long, value_name = "N", default_value_t = LESSON_GRASPS, value_parser = within_grasps)]
+    #[arg(long, value_name = "N", default_value_t = LESSON_GRASPS, value_parser = within(10..=1000_usize))]
     grasps: usize,
     /// Random seed of poses and of the fit.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -56,11 +56,6 @@ pub(super) struct TeachArguments {
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
-}
-
-fn within_grasps(text: &str) -> Result<usize, String> {
-    let number = text.parse().ok().filter(|number| (10..=1000).contains(number));
-    number.ok_or_else(|| "write a number from 10 to 1000".to_owned())
 }
 
 /// Output of `--json`.

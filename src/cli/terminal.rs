@@ -43,6 +43,9 @@ pub(super) trait Report: Serialize + Sized {
 #[derive(Default)]
 pub(super) struct Page(Vec<Part>);
 
+/// Heading of a column and its cell in a row.
+pub(super) type Column<R> = (&'static str, fn(&R) -> String);
+
 enum Part {
     Line(String),
     Fact(String, String),
@@ -70,6 +73,13 @@ impl Page {
         let rows: Vec<R> = rows.into_iter().collect();
         let rows: Vec<&[String]> = rows.iter().map(AsRef::as_ref).collect();
         self.0.extend(aligned(header, &rows).map(Part::Line));
+    }
+
+    /// Adds a table of which each column says its heading and its cell in a row.
+    pub(super) fn columns<R>(&mut self, columns: &[Column<R>], rows: &[R]) {
+        let header: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
+        let cells = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect::<Vec<_>>();
+        self.table(&header, rows.iter().map(cells));
     }
 
     /// Prints the text.

@@ -12,7 +12,7 @@ use palpate_lab::inspection::OpenOptions;
 use palpate_learn::{Model, Models};
 use palpate_store::labels::shown_title;
 use palpate_store::{Library, Shown, StoreError, TrialColumn, TrialOrder, TrialPlace, TrialQuery, TrialRow};
-use selection::{Filters, Numbers, chosen};
+use selection::{ChosenTrials, Filters, Numbers, chosen};
 use std::io::IsTerminal as _;
 use std::sync::Arc;
 
@@ -113,21 +113,9 @@ enum TrialsCommand {
     },
     /// Mark trials as deleted: lists and data sets exclude them; `restore` or `undo` brings them back.
     #[command(visible_alias = "discard")]
-    Delete {
-        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
-        #[arg(required = true, value_name = "TRIALS")]
-        ids: Vec<Numbers>,
-        #[command(flatten)]
-        filters: Filters,
-    },
+    Delete(ChosenTrials),
     /// Restore deleted trials.
-    Restore {
-        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
-        #[arg(required = true, value_name = "TRIALS")]
-        ids: Vec<Numbers>,
-        #[command(flatten)]
-        filters: Filters,
-    },
+    Restore(ChosenTrials),
     /// Remove all deleted trials permanently.
     Purge,
 }
@@ -194,13 +182,13 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             }
             Ok(())
         }
-        TrialsCommand::Delete { ids, filters } => {
-            let ids = chosen(&store, ids, filters, Shown::Kept)?;
+        TrialsCommand::Delete(trials) => {
+            let ids = trials.of(&store, Shown::Kept)?;
             store.delete(&ids)?;
             say(format!("deleted {} trial(s); `palpate trials restore` brings them back", ids.len()))
         }
-        TrialsCommand::Restore { ids, filters } => {
-            let ids = chosen(&store, ids, filters, Shown::Discarded)?;
+        TrialsCommand::Restore(trials) => {
+            let ids = trials.of(&store, Shown::Discarded)?;
             store.restore(&ids)?;
             say(format!("restored {} trial(s)", ids.len()))
         }

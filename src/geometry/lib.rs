@@ -63,7 +63,7 @@ pub use grid_file::bake_once;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
-pub use mesh_files::{ColouredPart, MeshFileError, read_mesh, write_obj};
+pub use mesh_files::{ColouredPart, MeshFileError, read_mesh};
 pub use modelling::{cube_sphere, rounded_box};
 pub use pose::Pose;
 pub use primitive::{Primitive, lathe};

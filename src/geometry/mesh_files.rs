@@ -154,39 +154,6 @@ fn as_one_solid(text: &str) -> Vec<u8> {
     one.into_bytes()
 }
 
-/// Writes parts as OBJ text and its material text, with enough digits for a micrometre in a metre.
-///
-/// Equal input gives equal text. `materials_file` is the name by which the OBJ refers to the material text.
-pub fn write_obj(title: &str, materials_file: &str, parts: &[(&str, ColouredPart)]) -> (String, String) {
-    use std::fmt::Write as _;
-    let mut obj = format!("# {title}\nmtllib {materials_file}\n");
-    let mut mtl = format!("# {title}\n");
-    let mut offset = 1;
-    for (name, part) in parts {
-        let [r, g, b] = part.colour.unwrap_or(Rgb(200, 200, 200)).to_unit();
-        // Writing to a String cannot fail.
-        let _infallible = write!(mtl, "newmtl {name}\nKd {r:.3} {g:.3} {b:.3}\n");
-        let _infallible = write!(obj, "o {name}\nusemtl {name}\n");
-        for p in &part.mesh.points {
-            let [x, y, z] = p.to_array().map(plain_number);
-            let _infallible = writeln!(obj, "v {x} {y} {z}");
-        }
-        for t in &part.mesh.triangles {
-            let [a, b, c] = t.map(|i| i + offset);
-            let _infallible = writeln!(obj, "f {a} {b} {c}");
-        }
-        offset += part.mesh.points.len() as u32;
-    }
-    (obj, mtl)
-}
-
-/// Micrometres as text, without trailing zeros or a negative zero.
-fn plain_number(x: f64) -> String {
-    let text = format!("{x:.6}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,12 +167,13 @@ mod tests {
     }
 
     #[test]
-    fn obj_and_materials_survive_a_round_trip() {
+    fn an_obj_is_read_with_its_material() {
         let mesh = Primitive::Cuboid { half: DVec3::new(0.01, 0.02, 0.03) }.tessellate();
-        let part = ColouredPart { mesh: mesh.clone(), colour: Some(Rgb(255, 51, 0)), finish: Finish::default() };
-        let (obj, mtl) = write_obj("cube", "cube.mtl", &[("red", part)]);
-        let read = in_memory(vec![("d/cube.obj", obj.into_bytes()), ("d/cube.mtl", mtl.into_bytes())]);
-        let parts = read_mesh("d/cube.obj", &read).expect("what we wrote");
+        let points = mesh.points.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+        let faces = mesh.triangles.iter().map(|t| t.map(|i| i + 1)).map(|[a, b, c]| format!("f {a} {b} {c}\n"));
+        let obj: String = ["mtllib cube.mtl\nusemtl red\n".to_owned()].into_iter().chain(points).chain(faces).collect();
+        let read = in_memory(vec![("d/cube.obj", obj.into()), ("d/cube.mtl", "newmtl red\nKd 1 0.2 0\n".into())]);
+        let parts = read_mesh("d/cube.obj", &read).expect("readable");
         assert_eq!(parts.len(), 1);
         assert_eq!(parts[0].colour, Some(Rgb(255, 51, 0)));
         let corners = |m: &TriMesh| m.triangles.iter().map(|t| m.corners(*t)).collect::<Vec<_>>();

@@ -6,7 +6,7 @@ use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_lab::grasping::{CollectionPlan, KnownTouches, Stance, collect, random_shapes};
 use palpate_learn::comparison::Comparison;
 use palpate_learn::evaluation::prefix_calibration;
-use palpate_learn::{Dataset, Fitting, Model, Shipped, Signatures, StopRule, method};
+use palpate_learn::{Dataset, Fitting, Shipped, StopRule, method};
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
 use palpate_tactile::model::SensorModel;
@@ -100,32 +100,6 @@ impl Recipe {
         }
         Ok(grasps)
     }
-}
-
-/// Stores the class signatures of the training grasps in the shipped model, whose weights stay.
-pub(crate) fn add_signatures(out: &Path, store: &mut Store) -> Result<(), Failure> {
-    let recipe = Recipe::of(Shipped::PerfectSensors);
-    let path = out.join(recipe.which.model_file());
-    let model = Model::load(&path)?;
-    let before = model.recogniser.arrays();
-    let grasps = recipe.collected(0, store)?;
-    model.check_channels(&grasps.channels)?;
-    let signatures = grasps.relabelled(&model.card.labels).as_ref().and_then(Signatures::of);
-    let model = model.with_signatures(Some(signatures.ok_or("the model lacks a class of the training grasps")?));
-    palpate_lab::datasets::save_model(&model, &path)?;
-    if Model::load(&path)?.recogniser.arrays() != before {
-        return Err("the weights of the saved model differ".into());
-    }
-    let (now, then) = (&grasps.about, &model.card.data);
-    report(format_args!(
-        "{} grasps of collection {}; trained on {} of {}",
-        now.grasps,
-        now.collections.join(", "),
-        then.grasps,
-        then.collections.join(", ")
-    ));
-    report(format_args!("saved as {}, {} bytes", path.display(), std::fs::metadata(&path)?.len()));
-    Ok(())
 }
 
 /// Collects and writes the grasps in known poses that guide the next grasp.

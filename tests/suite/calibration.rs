@@ -76,7 +76,8 @@ pub(crate) fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor,
         board = own;
         for side in Side::BOTH {
             let sensor = kind.on(side);
-            let mut procedure = Procedure::new(&board, sensor, sensor.channel(), None).unwrap();
+            let mut procedure = Procedure::new(sensor, sensor.channel(), None);
+            assert!(procedure.see(&board));
             for reading in &stream {
                 procedure.feed(reading);
                 if let Some(next) = procedure.next().filter(|_| procedure.has_changed() && procedure.settled().is_ok())
@@ -152,7 +153,8 @@ fn a_resistor_that_is_not_what_the_board_says_is_told() {
     let (mut board, stream) = readings(&wrong, &Scene::default(), &holds(&[], &loads), 16.0, 1);
     // The hello line says what the maker believed.
     board.divider_ohm = vec![47e3, 47e3, 4.7e3, 47e3];
-    let mut procedure = Procedure::new(&board, Sensor::PadRight, "P2", None).unwrap();
+    let mut procedure = Procedure::new(Sensor::PadRight, "P2", None);
+    assert!(procedure.see(&board));
     for reading in &stream {
         procedure.feed(reading);
         if let Some(next) = procedure.next().filter(|_| procedure.has_changed() && procedure.settled().is_ok()) {

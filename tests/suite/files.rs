@@ -3,3 +3,10 @@
 
 mod foreign;
 mod malformed;
+
+/// A mesh as OBJ text.
+fn obj_text(mesh: &palpate_geometry::TriMesh) -> String {
+    let points = mesh.points.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+    let faces = mesh.triangles.iter().map(|t| t.map(|i| i + 1)).map(|[a, b, c]| format!("f {a} {b} {c}\n"));
+    points.chain(faces).collect()
+}

@@ -10,7 +10,7 @@ use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{
     CalibrationCommand, CalibrationPlan, Examine, ExamineRequest, GripperCommand, GripperSetup, GripperView,
-    GripperWorker, Notice, SensorJobError, TraceRow,
+    GripperWorker, Notice, TraceRow,
 };
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
@@ -341,26 +341,20 @@ fn a_calibration_shares_the_port_or_brings_its_own() {
         let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A7".to_owned(), port };
         GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
-    let running = |view: &GripperView| view.calibration.as_ref().is_some_and(|c| c.running.is_some());
+    let running = |view: &GripperView| view.calibration.running.is_some();
     desk.command(begin(Some("nowhere")));
-    let failed = desk.until(|view| view.calibration.as_ref().is_some_and(|c| c.ended.is_some()));
-    let ended = failed.calibration.as_ref().unwrap().ended.clone();
-    assert!(
-        matches!(&ended, Some(Err(SensorJobError::Port(cause))) if cause.text == "there is no nowhere"),
-        "{ended:?}"
-    );
+    let failed = desk.until(|view| view.calibration.ended.is_some());
+    let ended = failed.calibration.ended.clone();
+    assert!(matches!(&ended, Some(Err(cause)) if cause.to_string() == "there is no nowhere"), "{ended:?}");
     desk.command(begin(None));
     // Twice at once: the second reading has not settled, and that is said.
-    desk.until(|view| {
-        let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
-        calibration.and_then(|c| c.procedure.as_ref()).is_some_and(|procedure| procedure.settled().is_ok())
-    });
+    desk.until(|view| view.calibration.running.as_ref().is_some_and(|session| session.procedure().settled().is_ok()));
     for _ in 0..2 {
         desk.command(GripperCommand::Calibrate(CalibrationCommand::Take(0.0)));
     }
     desk.until(|view| {
-        let calibration = view.calibration.as_ref().and_then(|c| c.running.as_ref());
-        calibration.is_some_and(|c| c.not_taken.as_ref().is_some_and(|text| text.starts_with("not taken: ")))
+        let not_taken = view.calibration.running.as_ref().and_then(|session| session.not_taken());
+        not_taken.is_some_and(|text| text.starts_with("not taken: "))
     });
     desk.command(GripperCommand::Calibrate(CalibrationCommand::Stop));
     desk.until(|view| !running(view) && !view.is_connected());

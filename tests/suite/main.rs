@@ -6,6 +6,7 @@
 //! - `determinism`: the same seed gives the same bytes.
 //! - `files`: objects and scenes from elsewhere, sound and malformed.
 //! - `frozen`: JSON, help pages, studies, answers of the shipped models, frames and columns of exports, as texts.
+//! - `decoder_fuzz`: random bytes through the protocol decoder.
 //! - `fuzz`: random scenes through the scene file.
 //! - `trust`: trials that did not converge stay out of data sets.
 //! - `adapting`: a gripper recognises without labels, after one close of its empty hand.
@@ -49,6 +50,7 @@ mod calibration;
 mod command_line;
 mod cpu_renderer;
 mod datasets;
+mod decoder_fuzz;
 mod desk;
 mod determinism;
 mod emulator;

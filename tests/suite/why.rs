@@ -64,7 +64,7 @@ fn the_command_says_why_and_names_the_nearest_trials() {
 #[test]
 fn the_shipped_model_has_signatures_of_all_its_classes() {
     let model = Shipped::PerfectSensors.model().unwrap();
-    let signatures = model.signatures.clone().expect("made by `palpate-workshop signatures`");
+    let signatures = model.signatures.clone().expect("stored by training");
     assert_eq!(signatures.channels(), model.card.channels);
     assert!(signatures.grasps().iter().all(|grasps| *grasps >= 290), "{:?}", signatures.grasps());
     let without = Model { signatures: None, ..model.clone() }.with_signatures(None);

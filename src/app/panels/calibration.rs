@@ -8,20 +8,16 @@ use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
-use palpate_lab::workers::{
-    CalibrationCommand, CalibrationPlan, CalibrationView, GripperCommand, GripperView, RunningCalibration,
-    SensorJobError,
-};
+use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, GripperCommand, GripperView};
 use palpate_tactile::board::Sensor;
-use palpate_tactile::calibration::{Calibration, Curve, Procedure, Record, SensorKind};
+use palpate_tactile::calibration::{Calibration, Curve, Record, SensorKind};
 use std::path::PathBuf;
 
 pub(super) fn ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
-    let view = gripper.and_then(|gripper| gripper.calibration.as_deref());
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match view {
-        Some(CalibrationView { running: Some(running), .. }) => running_ui(ui, running, actions),
-        Some(CalibrationView { running: None, ended }) => begin_ui(ui, gripper, ended.as_ref(), actions),
-        None => begin_ui(ui, gripper, None, actions),
+    let running = gripper.and_then(|gripper| Some((gripper, gripper.calibration.running.as_ref()?)));
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match running {
+        Some((gripper, session)) => running_ui(ui, gripper, session, actions),
+        None => begin_ui(ui, gripper, actions),
     });
 }
 
@@ -39,15 +35,10 @@ impl Default for Form {
     }
 }
 
-fn begin_ui(
-    ui: &mut Ui,
-    gripper: Option<&GripperView>,
-    ended: Option<&Result<String, SensorJobError>>,
-    actions: &mut Actions,
-) {
+fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     let id = egui::Id::unique("calibration form");
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
-    match ended {
+    match gripper.and_then(|gripper| gripper.calibration.ended.as_ref()) {
         Some(Ok(text)) => wrapped(ui, RichText::new(text).strong()),
         Some(Err(cause)) => failure_ui(ui, cause),
         None => {}
@@ -91,57 +82,50 @@ fn begin_ui(
     ui.data_mut(|data| data.insert_temp(id, form));
 }
 
-fn running_ui(ui: &mut Ui, running: &RunningCalibration, actions: &mut Actions) {
-    let RunningCalibration { plan, procedure, fit, closing, .. } = running;
-    let procedure = procedure.as_ref();
-    remark_ui(ui, format!("\"{}\", {}", plan.part, plan.sensor.label()));
-    wrapped(ui, RichText::new(&running.instruction).strong());
-    let counts = procedure.and_then(Procedure::latest).map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
-    let state = match procedure.map(Procedure::settled) {
-        _ if *closing => "watching the empty close".to_owned(),
-        Some(Ok(_)) => "settled".to_owned(),
-        Some(Err(why)) => why.to_string(),
-        None => "no readings yet".to_owned(),
-    };
-    wrapped(ui, RichText::new(format!("{counts} counts, {state}")));
-    let calibration = fit.as_ref().and_then(|fit| fit.as_deref().ok());
-    ui.horizontal_wrapped(|ui| buttons_ui(ui, running, calibration.is_some(), actions));
-    if let Some(why) = &running.not_taken {
+fn running_ui(ui: &mut Ui, gripper: &GripperView, session: &CalibrationSession, actions: &mut Actions) {
+    let CalibrationPlan { sensor, part, .. } = session.plan();
+    remark_ui(ui, format!("\"{part}\", {}", sensor.label()));
+    let instruction = if session.is_begun() { session.instruction() } else { gripper.link_state() };
+    wrapped(ui, RichText::new(instruction).strong());
+    wrapped(ui, RichText::new(session.state()));
+    let fit = session.procedure().fit();
+    let calibration = fit.as_ref().ok();
+    ui.horizontal_wrapped(|ui| buttons_ui(ui, session, calibration.is_some(), actions));
+    if let Some(why) = session.not_taken() {
         warning_ui(ui, why);
     }
-    match fit {
-        Some(Ok(calibration)) => {
+    match &fit {
+        Ok(calibration) => {
             wrapped(ui, RichText::new(calibration.summary()));
             for warning in &calibration.warnings {
                 warning_ui(ui, warning);
             }
         }
-        Some(Err(why)) => remark_ui(ui, why.to_string()),
-        None => remark_ui(ui, "no points yet"),
+        Err(why) => remark_ui(ui, why.to_string()),
     }
     if let Some(calibration) = calibration {
-        let (kind, theme) = (SensorKind::of(plan.sensor), theme::of(ui));
+        let (kind, theme) = (SensorKind::of(*sensor), theme::of(ui));
         curve_plot(ui, kind, calibration, theme);
         residual_plot(ui, kind, calibration, theme);
         bending_plot(ui, calibration, theme);
     }
 }
 
-fn buttons_ui(ui: &mut Ui, running: &RunningCalibration, fits: bool, actions: &mut Actions) {
+fn buttons_ui(ui: &mut Ui, session: &CalibrationSession, fits: bool, actions: &mut Actions) {
     let mut button = |ready: bool, text: &str, about: &str, command: CalibrationCommand| {
         actions.on(&ui.add_enabled(ready, Button::new(text)).on_hover_text(about), |app| {
             _ = app.gripper.send(GripperCommand::Calibrate(command));
         });
     };
-    let (free, procedure) = (!running.closing, running.procedure.as_ref());
-    let next = procedure.and_then(Procedure::next);
-    let ready = free && next.is_some() && procedure.is_some_and(|procedure| procedure.settled().is_ok());
+    let (free, procedure) = (session.closing().is_none(), session.procedure());
+    let next = procedure.next();
+    let ready = free && next.is_some() && procedure.settled().is_ok();
     let take = CalibrationCommand::Take(next.unwrap_or_default());
     button(ready, "Take point", "Take the settled reading", take);
     button(free && next.is_some(), "Skip", "Leave this point out", CalibrationCommand::Skip);
-    let has_points = procedure.is_some_and(|procedure| !procedure.record().points.is_empty());
-    button(running.closing || has_points, "Undo", "Measure the last point again", CalibrationCommand::Undo);
-    if SensorKind::of(running.plan.sensor) == SensorKind::Pad {
+    let has_points = !procedure.record().points.is_empty();
+    button(!free || has_points, "Undo", "Measure the last point again", CalibrationCommand::Undo);
+    if SensorKind::of(session.plan().sensor) == SensorKind::Pad {
         let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
         button(free && fits, "Empty close", about, CalibrationCommand::EmptyClose);
     }

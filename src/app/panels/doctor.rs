@@ -9,13 +9,12 @@ use crate::app::widgets::{capital, command_ui, failure_ui, job_ui, port_field, r
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
-    Bleed, CHECKS, CheckFinding, CheckStatus, SKETCH, USUAL_LISTEN_S, WIRING_RULES, is_sound, summary, wires,
+    Bleed, CHECKS, CheckFinding, CheckStatus, CrosstalkTest, SKETCH, USUAL_LISTEN_S, WIRING_RULES, is_sound, summary,
+    wires,
 };
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{
-    CrosstalkCommand, CrosstalkView, DiagnosticsReport, ExamineRequest, GripperCommand, GripperView, Job,
-    RunningCrosstalk, SensorJobError,
-};
+use palpate_lab::workers::{CrosstalkCommand, DiagnosticsReport, ExamineRequest, GripperCommand, GripperView, Job};
+use std::cmp::Reverse;
 
 pub(super) fn ui(
     ui: &mut Ui,
@@ -23,16 +22,18 @@ pub(super) fn ui(
     gripper: Option<&GripperView>,
     actions: &mut Actions,
 ) {
-    let crosstalk = gripper.and_then(|gripper| gripper.crosstalk.as_deref());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        if let Some((crosstalk, running)) = crosstalk.and_then(|view| Some((view, view.running.as_ref()?))) {
-            return crosstalk_running_ui(ui, crosstalk, running, actions);
+        if let Some((gripper, test)) = gripper.and_then(|gripper| Some((gripper, gripper.crosstalk.running.as_ref()?)))
+        {
+            return crosstalk_running_ui(ui, gripper, test, actions);
         }
         let remark = Some("Now bend each finger and press each pad.");
         let stop = (remark, "End and report so far", (|app| app.tools.doctor.stop()) as fn(&mut App));
         let last = job_ui(ui, doctor, stop, actions, begin_ui);
-        if let Some((crosstalk, ended)) = crosstalk.and_then(|view| Some((view, view.ended.as_ref()?))) {
-            crosstalk_ended_ui(ui, crosstalk, ended);
+        match gripper.and_then(|gripper| gripper.crosstalk.ended.as_ref()) {
+            Some(Ok(test)) => crosstalk_ended_ui(ui, test),
+            Some(Err(cause)) => failure_ui(ui, cause),
+            None => {}
         }
         match last {
             Some(Ok(report)) => examination_ui(ui, theme::of(ui), &report),
@@ -92,11 +93,13 @@ fn wiring_ui(ui: &mut Ui) {
     }
 }
 
-fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCrosstalk, actions: &mut Actions) {
-    if let Some([step, of]) = running.step {
+fn crosstalk_running_ui(ui: &mut Ui, gripper: &GripperView, test: &CrosstalkTest, actions: &mut Actions) {
+    if test.is_begun() {
+        let [step, of] = test.step();
         remark_ui(ui, format!("Crosstalk test, sensor {step} of {of}"));
     }
-    wrapped(ui, RichText::new(format!("{}.", capital(&running.instruction))).strong());
+    let instruction = test.instruction().unwrap_or_else(|| gripper.link_state());
+    wrapped(ui, RichText::new(format!("{}.", capital(&instruction))).strong());
     ui.horizontal_wrapped(|ui| {
         for (text, about, command) in [
             ("Skip", "Continue with the next sensor", CrosstalkCommand::Skip),
@@ -107,22 +110,17 @@ fn crosstalk_running_ui(ui: &mut Ui, view: &CrosstalkView, running: &RunningCros
             });
         }
     });
-    bleeds_ui(ui, &view.found);
+    bleeds_ui(ui, test.found());
 }
 
-fn crosstalk_ended_ui(ui: &mut Ui, view: &CrosstalkView, ended: &Result<Vec<String>, SensorJobError>) {
+fn crosstalk_ended_ui(ui: &mut Ui, test: &CrosstalkTest) {
     ui.add_space(6.0);
-    let bleeds = view.found.iter().any(|bleed| bleed.bleeds);
-    match ended {
-        Err(cause) => failure_ui(ui, cause),
-        Ok(report) => {
-            for (k, text) in report.iter().enumerate() {
-                let text = RichText::new(format!("{text}."));
-                wrapped(ui, if k == 0 && !bleeds { text.strong() } else { text });
-            }
-        }
+    let bleeds = test.found().iter().any(|bleed| bleed.bleeds);
+    for (k, text) in test.summary().iter().enumerate() {
+        let text = RichText::new(format!("{text}."));
+        wrapped(ui, if k == 0 && !bleeds { text.strong() } else { text });
     }
-    bleeds_ui(ui, &view.found);
+    bleeds_ui(ui, test.found());
 }
 
 /// Influence of each moved sensor on the watched ones.
@@ -160,13 +158,7 @@ fn examination_ui(ui: &mut Ui, theme: Theme, examination: &DiagnosticsReport) {
     ui.add_space(2.0);
     // Problems first; among equals, the order of the checks.
     let mut findings: Vec<&CheckFinding> = examination.findings.iter().collect();
-    findings.sort_by_key(|finding| match finding.verdict {
-        CheckStatus::Failed => 0,
-        CheckStatus::Note => 1,
-        CheckStatus::NotChecked => 2,
-        CheckStatus::Passed => 3,
-        CheckStatus::Skipped => 4,
-    });
+    findings.sort_by_key(|finding| Reverse(finding.verdict));
     for finding in findings {
         finding_ui(ui, theme, finding);
     }
@@ -193,13 +185,13 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
 /// Check and observation, in one line where there is room.
 fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let colours = theme.colours();
-    let (name, seen) = match finding.verdict {
-        CheckStatus::Failed => (colours.error, colours.text),
-        CheckStatus::Note => (colours.warning, colours.text),
-        CheckStatus::NotChecked => (colours.text, colours.text),
-        CheckStatus::Passed => (colours.text, colours.quiet_text),
-        CheckStatus::Skipped => (colours.quiet_text, colours.quiet_text),
+    let name = match finding.verdict {
+        CheckStatus::Failed => colours.error,
+        CheckStatus::Note => colours.warning,
+        CheckStatus::NotChecked | CheckStatus::Passed => colours.text,
+        CheckStatus::Skipped => colours.quiet_text,
     };
+    let seen = if finding.verdict >= CheckStatus::NotChecked { colours.text } else { colours.quiet_text };
     let font = egui::TextStyle::Body.resolve(ui.style());
     let mut line = LayoutJob::default();
     line.append(&finding.check.replace('-', " "), 0.0, TextFormat::simple(font.clone(), colour(name)));

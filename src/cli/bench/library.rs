@@ -2,16 +2,16 @@
 
 use super::super::Failure;
 use super::super::output::TemporaryFolder;
-use super::super::terminal::note;
-use super::{Column, Costs};
+use super::super::terminal::{Column, note};
+use super::Costs;
+use palpate_lab::grasping::grasp;
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
-use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_sim::run::SimRun;
+use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{PRESETS, Scene};
 use palpate_store::labels::{Flag, TrialEdit};
 use palpate_store::{BoardInfo, Day, ImportedTrial, Shown, Store, TrialColumn, TrialOrder, TrialQuality, TrialQuery};
 use palpate_tactile::Signals;
-use palpate_tactile::trial::{SimulatedData, SimulatedTrial, Trial, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::trial::{SimulatedTrial, TrialHeader, TrialId, TrialSource};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -288,10 +288,5 @@ fn fill(path: &Path, trials: u32) -> Result<(), Failure> {
 fn grasped() -> Result<SimulatedTrial, Failure> {
     let mut scene = Scene::default();
     "lemon".clone_into(&mut scene.object.source);
-    let object = scene.load_object()?;
-    let (mut run, placement) = SimRun::new(&scene, object.as_ref());
-    let frames = run.run_programme(&scene.programme)?;
-    let (plan, quality) = (run.plan().clone(), run.quality());
-    let data = SimulatedData { world_from_gripper: placement.world_from_gripper, plan, quality, frames };
-    Ok(Trial { header: TrialHeader::new(object.map_or(EMPTY.to_owned(), |o| o.name).as_str(), scene), data })
+    Ok(grasp(&scene, scene.load_object()?.as_ref(), 0))
 }

@@ -1,16 +1,15 @@
 //! Guided calibration with the board connected: asks for the next angle or weight, waits until the reading has settled, and
 //! records the point on Enter or automatically.
 
-use super::super::link;
+use super::super::link::{self, Listener};
 use super::super::prelude::*;
 use super::CalibrateArguments;
-use palpate_device::serial::{LinkOptions, LinkState, SerialLink};
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
 use palpate_tactile::board::{Board, KNOWN_AFTER_S, Reading, Sensor};
-use palpate_tactile::calibration::{Point, Procedure, Record, SensorKind};
+use palpate_tactile::calibration::{Point, Record, SensorKind};
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Source of the readings, and how points are recorded.
 #[derive(Debug, clap::Args)]
@@ -40,16 +39,15 @@ impl LiveArguments {
     }
 }
 
-/// How long to wait for the first readings (s).
-const PATIENCE_S: f64 = 8.0;
-
 /// How long an automatic procedure waits for a change (s).
 const AUTO_PATIENCE_S: f64 = 60.0;
 
-/// The board: its link, and the last state that was told.
-struct BoardInput {
-    link: SerialLink,
-    state: LinkState,
+/// What a stream says that ended too early.
+const ENDED: &str = "the stream ended before all points were recorded";
+
+/// Opens a port or a file. Where nobody presses a key, captured bytes come without a pause.
+fn listen(port: Option<&Path>, hands_free: bool) -> Result<Listener, Failure> {
+    Listener::open(&link::options(port, hands_free), &AtomicBool::new(false))
 }
 
 /// Calibrates a part; `points` were measured before, and only the empty close is missing.
@@ -71,7 +69,7 @@ pub(super) fn record(
         close_s,
         serving: serving.transpose()?.map(|serving| serving.calibrations).unwrap_or_default(),
     };
-    let input = BoardInput::open(live.port.as_deref(), live.auto)?;
+    let board = listen(live.port.as_deref(), live.auto)?;
     if setup.record.is_none() {
         let place = sensor.label();
         note(&format!(
@@ -79,23 +77,23 @@ pub(super) fn record(
         ));
         note("s skips it, u undoes the last one, q quits.");
     }
-    guide(input, sensor, part, setup)
+    guide(board, sensor, part, setup)
 }
 
 /// Reads a pad under a known weight (kg): on Enter, or as soon as it has settled.
 pub(in crate::cli) fn weigh(port: Option<&Path>, sensor: Sensor, kg: f64, auto: bool) -> Result<Point, Failure> {
-    let input = BoardInput::open(port, auto)?;
+    let board = listen(port, auto)?;
     if !auto {
         note(&format!("Press Enter once the weight lies on the {}.", sensor.label()));
     }
     let stimuli = vec![SensorKind::Pad.stimulus(kg)];
     let setup = CalibrationSetup { stimuli, automatic: auto, ..CalibrationSetup::default() };
-    let record = guide(input, sensor, "weighed", setup)?;
+    let record = guide(board, sensor, "weighed", setup)?;
     Ok(*record.points.last().ok_or("no weight was measured")?)
 }
 
 /// Runs a calibration to its end.
-fn guide(mut input: BoardInput, sensor: Sensor, part: &str, setup: CalibrationSetup) -> Result<Record, Failure> {
+fn guide(mut board: Listener, sensor: Sensor, part: &str, setup: CalibrationSetup) -> Result<Record, Failure> {
     let auto = setup.automatic;
     let points = setup.record.as_ref().map_or(0, |record| record.points.len());
     let keys = if auto { channel().1 } else { typed_lines()? };
@@ -103,34 +101,29 @@ fn guide(mut input: BoardInput, sensor: Sensor, part: &str, setup: CalibrationSe
     let mut session = CalibrationSession::new(plan, setup);
     let mut screen = Screen::new(SensorKind::of(sensor), points, auto);
     while !session.is_complete() {
-        let mut readings = input.listen()?.into_iter();
-        let board = input.link.status().board;
-        while let Some(reading) = readings.next().filter(|_| !session.is_complete()) {
-            session.feed(&reading, &board)?;
-            screen.tell(&session);
-            if let Some(why) = session.take_refusal() {
-                if auto {
-                    return Err(why.into());
-                }
-                screen.warn(&why);
+        let readings = board.next()?.ok_or_else(|| format!("{ENDED}. {}", board.sentence()))?;
+        let known = board.board();
+        for reading in readings {
+            if !session.is_complete() {
+                session.feed(&reading, &known)?;
+                screen.tell(&mut session)?;
             }
         }
         screen.show_reading(&session);
-        screen.check_patience(&session, &input.state)?;
+        screen.check_patience(&session)?;
         if !auto
-            && session.procedure().is_some()
+            && session.is_begun()
             && let Some(command) = typed(&keys, &session, screen.kind)?
         {
-            let before = session.procedure().map_or(0, |procedure| procedure.record().points.len());
+            let before = screen.points;
             session.handle(&command);
             if command == CalibrationCommand::Undo && before == 0 {
                 note("no point to undo");
             }
-            session.take_refusal().iter().for_each(|why| screen.warn(why));
-            screen.tell(&session);
+            screen.tell(&mut session)?;
         }
     }
-    Ok(session.procedure().ok_or("nothing was measured")?.record().clone())
+    Ok(session.procedure().record().clone())
 }
 
 /// The command that was typed, if any.
@@ -148,7 +141,7 @@ fn typed(
     };
     Ok(match line.trim() {
         "" if session.awaits_close() => Some(CalibrationCommand::EmptyClose),
-        "" => session.procedure().and_then(Procedure::next).map(CalibrationCommand::Take),
+        "" => session.procedure().next().map(CalibrationCommand::Take),
         "s" => Some(CalibrationCommand::Skip),
         "u" => Some(CalibrationCommand::Undo),
         "q" => return Err("cancelled; nothing was stored".into()),
@@ -164,43 +157,22 @@ fn typed(
 
 /// Listens for some seconds; returns the board and its readings.
 pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Reading>), Failure> {
-    let mut input = BoardInput::open(port, true)?;
+    let mut board = listen(port, true)?;
     let (mut readings, start): (Vec<Reading>, _) = (Vec::new(), Instant::now());
     let mut span_s = -1.0;
     // Within the first, a board tells what it is.
-    while span_s < seconds || (span_s < KNOWN_AFTER_S && !input.link.is_over()) {
-        if start.elapsed().as_secs_f64() > seconds + PATIENCE_S {
-            return Err(format!("no readings from the board for {seconds} s. {}", input.state.sentence()).into());
+    while span_s < KNOWN_AFTER_S.max(seconds) {
+        if start.elapsed().as_secs_f64() > seconds + link::PATIENCE_S {
+            return Err(format!("no readings from the board for {seconds} s. {}", board.sentence()).into());
         }
-        readings.extend(input.listen()?);
+        match board.next()? {
+            Some(more) => readings.extend(more),
+            None if span_s < seconds => return Err(format!("{ENDED}. {}", board.sentence()).into()),
+            None => break,
+        }
         span_s = readings.last().zip(readings.first()).map_or(-1.0, |(last, first)| last.t_s - first.t_s);
     }
-    Ok((input.link.status().board, readings))
-}
-
-impl BoardInput {
-    fn open(port: Option<&Path>, hands_free: bool) -> Result<Self, Failure> {
-        let captured = port.is_some_and(Path::is_file);
-        let replay_speed = if captured && hands_free { f64::INFINITY } else { 1.0 };
-        let options = LinkOptions { path: port.map(Path::to_owned), replay_speed, ..LinkOptions::default() };
-        Ok(Self { link: link::open(&options, link::USUAL_WAIT_S, || false)?, state: LinkState::Waiting })
-    }
-
-    /// Receives readings; tells changes of the link.
-    fn listen(&mut self) -> Result<Vec<Reading>, Failure> {
-        let readings: Vec<Reading> = link::readings(&self.link, Duration::from_millis(100)).collect();
-        let state = self.link.status().state;
-        if state != self.state {
-            if !matches!(state, LinkState::Listening | LinkState::Ended { .. }) {
-                note(&state.sentence());
-            }
-            self.state = state;
-        }
-        if readings.is_empty() && self.link.is_over() {
-            return Err(format!("the stream ended before all points were recorded. {}", self.state.sentence()).into());
-        }
-        Ok(readings)
-    }
+    Ok((board.board(), readings))
 }
 
 /// What the terminal has told of a calibration.
@@ -210,6 +182,8 @@ struct Screen {
     /// A line that is overwritten shows the present reading, on a terminal only.
     shows_reading: bool,
     instruction: String,
+    /// The hand closes.
+    closes: bool,
     points: usize,
     /// When the last point was taken.
     since: Instant,
@@ -218,12 +192,22 @@ struct Screen {
 impl Screen {
     fn new(kind: SensorKind, points: usize, auto: bool) -> Self {
         let shows_reading = std::io::stderr().is_terminal();
-        Self { kind, auto, shows_reading, instruction: String::new(), points, since: Instant::now() }
+        Self { kind, auto, shows_reading, instruction: String::new(), closes: false, points, since: Instant::now() }
     }
 
-    /// Tells what has changed: the last point, and what to do next.
-    fn tell(&mut self, session: &CalibrationSession) {
-        let Some(procedure) = session.procedure() else { return };
+    /// Tells what has changed: the last point, what was not taken, and what to do next.
+    fn tell(&mut self, session: &mut CalibrationSession) -> Result<(), Failure> {
+        if let Some(why) = session.take_refusal() {
+            if self.auto {
+                return Err(why.into());
+            }
+            self.clear_line();
+            warn(&why);
+        }
+        if !session.is_begun() {
+            return Ok(());
+        }
+        let (procedure, instruction) = (session.procedure(), session.instruction());
         let points = &procedure.record().points;
         if points.len() != self.points {
             self.clear_line();
@@ -240,56 +224,43 @@ impl Screen {
             (self.points, self.since) = (points.len(), Instant::now());
         }
         let instruction = match session.closing() {
-            // Counts down.
-            Some(_) if self.instruction.starts_with("take everything") => return,
-            Some(closing) => closing.instruction(),
-            None if procedure.next().is_some() => format!("{} ({} left)", procedure.instruction(), procedure.left()),
+            // It counts down.
+            Some(_) if !self.closes => instruction,
+            None if procedure.left() > 0 => format!("{instruction} ({} left)", procedure.left()),
             None if session.awaits_close() && !self.auto => "Press Enter, then close the empty hand".to_owned(),
-            None => return,
+            _ => return Ok(()),
         };
+        self.closes = session.closing().is_some();
         if instruction != self.instruction {
             note(&instruction);
             self.instruction = instruction;
         }
+        Ok(())
     }
 
-    /// Ends a calibration without readings, or an automatic one that waits for a change.
-    fn check_patience(&self, session: &CalibrationSession, state: &LinkState) -> Result<(), Failure> {
-        let waited_s = self.since.elapsed().as_secs_f64();
-        match session.procedure() {
-            None if waited_s > PATIENCE_S => {
-                Err(format!("no readings from the board within {PATIENCE_S:.0} s. {}", state.sentence()).into())
-            }
-            Some(procedure) if self.auto && waited_s > AUTO_PATIENCE_S && session.closing().is_none() => {
-                let why =
-                    procedure.settled().map_or_else(|why| why.to_string(), |_| "the reading did not change".into());
-                let at = procedure.next().map(|next| self.kind.with_unit(next)).unwrap_or_default();
-                Err(format!("no point at {at}: {why}").into())
-            }
-            _ => Ok(()),
+    /// Ends an automatic calibration that waits for a change.
+    fn check_patience(&self, session: &CalibrationSession) -> Result<(), Failure> {
+        let waits = self.auto && self.since.elapsed().as_secs_f64() > AUTO_PATIENCE_S && session.closing().is_none();
+        if !waits {
+            return Ok(());
         }
+        let procedure = session.procedure();
+        let why = procedure.settled().map_or_else(|why| why.to_string(), |_| "the reading did not change".into());
+        let at = procedure.next().map(|next| self.kind.with_unit(next)).unwrap_or_default();
+        Err(format!("no point at {at}: {why}").into())
     }
 
     fn show_reading(&self, session: &CalibrationSession) {
-        let Some(procedure) = session.procedure().filter(|_| self.shows_reading && session.closing().is_none()) else {
+        if !self.shows_reading {
             return;
-        };
-        let counts = procedure.latest().map_or_else(|| "–".to_owned(), |counts| format!("{counts:.0}"));
-        let state = match procedure.settled() {
-            Ok(point) => format!("settled at {:.1}: press Enter", point.counts),
-            Err(why) => why.to_string(),
-        };
-        let _unseen = write!(std::io::stderr(), "\r\x1b[K  {counts} counts, {state}");
+        }
+        let hint = if session.procedure().settled().is_ok() && !self.auto { ": press Enter" } else { "" };
+        let _unseen = write!(std::io::stderr(), "\r\x1b[K  {}{hint}", session.state());
     }
 
     fn clear_line(&self) {
         if self.shows_reading {
             let _unseen = write!(std::io::stderr(), "\r\x1b[K");
         }
-    }
-
-    fn warn(&self, text: &str) {
-        self.clear_line();
-        warn(text);
     }
 }

@@ -1,7 +1,7 @@
 //! Manages calibrations: list, show, export, import, mount, withdraw.
 
 use super::super::prelude::*;
-use super::{parse_sensor, points_text, zero};
+use super::{points_text, zero};
 use palpate_store::{CalibrationId, StoredCalibration};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::Calibration;
@@ -42,7 +42,7 @@ pub(super) enum CalibrateCommand {
     /// Set which part is mounted in a place, after parts were swapped.
     Mount {
         /// Place: flexL, flexR, fsrL or fsrR.
-        #[arg(value_parser = parse_sensor)]
+        #[arg(value_parser = one_of(Sensor::ALL.map(|sensor| (sensor.channel(), sensor))))]
         sensor: Sensor,
         /// Name of the part.
         part: String,

@@ -4,7 +4,6 @@ use super::super::link;
 use super::super::prelude::*;
 use super::super::recognise::{load_model, warn_of_perfect_sensors};
 use super::{DemoArguments, GraspReport, Hand, grasp_until_recognised};
-use palpate_device::serial::LinkOptions;
 use palpate_lab::datasets::{SensorView, trial_signals};
 use palpate_lab::grasping::{Advisor, Identification, Row};
 use palpate_lab::gripper::SerialGripper;
@@ -46,8 +45,7 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let store = open_store(store)?;
     refuse_uncalibrated(&store, port)?;
     let stop = stop_flag()?;
-    let options = LinkOptions { path: Some(port.to_owned()), ..LinkOptions::default() };
-    let link = link::open(&options, link::USUAL_WAIT_S, || stop.load(Ordering::Relaxed))?;
+    let link = link::open(&link::options(Some(port), false), link::USUAL_WAIT_S, &stop)?;
     let keys = std::io::stdin().is_terminal().then(typed_lines).transpose()?;
     let gripper = SerialGripper::new(Box::new(link));
     let mut hand = RealHand { gripper, scene, truth: truth.clone(), store, stop, keys, advisor: Advisor::default() };

@@ -1,6 +1,6 @@
 //! The paper's studies: one subcommand for each, from the table of studies, and `all`.
 
-use super::super::learning::{QueryArguments, parse_sensors};
+use super::super::learning::QueryArguments;
 use super::super::prelude::*;
 use super::output::{BAR, StudyOutput, whole};
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
@@ -17,7 +17,7 @@ pub(super) struct PaperArguments {
     #[arg(long)]
     quick: bool,
     /// Sensor model of simulated grasps: virtual or physical-like (default: both; virtual for stored trials).
-    #[arg(long, value_name = "MODEL", value_parser = parse_sensors)]
+    #[arg(long, value_name = "MODEL", value_parser = one_of(SensorModel::ALL.map(|model| (model.name(), model))))]
     sensors: Option<SensorModel>,
     #[command(flatten)]
     trials: QueryArguments,

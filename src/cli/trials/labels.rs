@@ -2,7 +2,7 @@
 
 use super::super::output::names_folder;
 use super::super::prelude::*;
-use super::selection::{Filters, Numbers, chosen};
+use super::selection::{ChosenTrials, Filters, Numbers, chosen};
 use palpate_exchange::export_labelled;
 use palpate_sim::objects::{EMPTY, class_of, titled};
 use palpate_store::labels::{TrialEdit, class_name, compared};
@@ -52,13 +52,7 @@ pub(super) enum LabelCommand {
         filters: Filters,
     },
     /// Move trials from the demo log to the store, where newer grasps do not push them out.
-    Keep {
-        /// Trial numbers: 7, 3,7-9, or `matching` with filters.
-        #[arg(required = true, value_name = "TRIALS")]
-        ids: Vec<Numbers>,
-        #[command(flatten)]
-        filters: Filters,
-    },
+    Keep(ChosenTrials),
     /// Undo the last change of a label, note or tag, the last deletion, or the last `keep`; what was changed together is undone together.
     Undo,
     /// Redo the last undone change.
@@ -84,22 +78,15 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
         }
         LabelCommand::Tag { ids, tags, add, remove, filters } => {
             let list = tags.clone();
-            let change = match (add, remove) {
-                (true, _) => TrialEdit::Tag(list),
-                (_, true) => TrialEdit::Untag(list),
-                _ => TrialEdit::Tags(list),
-            };
-            let what = if *add {
-                "added tags"
-            } else if *remove {
-                "removed tags"
-            } else {
-                "tags"
+            let (change, what) = match (add, remove) {
+                (true, _) => (TrialEdit::Tag(list), "added tags"),
+                (_, true) => (TrialEdit::Untag(list), "removed tags"),
+                _ => (TrialEdit::Tags(list), "tags"),
             };
             edit(store, &of(store, ids, filters)?, &change, &format!("{what} [{}]", tags.join(", ")))
         }
-        LabelCommand::Keep { ids, filters } => {
-            let ids = chosen(store, ids, filters, Shown::Kept)?;
+        LabelCommand::Keep(trials) => {
+            let ids = trials.of(store, Shown::Kept)?;
             say(store.labels().edit(&ids, &TrialEdit::Keep)?.sentence(&TrialEdit::Keep))
         }
         LabelCommand::Undo => match store.journal().undo()? {

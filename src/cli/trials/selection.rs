@@ -61,6 +61,22 @@ impl Filters {
     }
 }
 
+/// Trials that a command is about.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct ChosenTrials {
+    /// Trial numbers: 7, 3,7-9, or `matching` with filters.
+    #[arg(required = true, value_name = "TRIALS")]
+    ids: Vec<Numbers>,
+    #[command(flatten)]
+    filters: Filters,
+}
+
+impl ChosenTrials {
+    pub(super) fn of(&self, store: &Store, shown: Shown) -> Result<Vec<TrialId>, Failure> {
+        chosen(store, &self.ids, &self.filters, shown)
+    }
+}
+
 /// Numbers of trials as they are written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Numbers {

@@ -1,9 +1,12 @@
-//! The list of the checks: each is a function from observations to an outcome, which states what was seen.
+//! The list of the checks: what each needs, and how it judges.
 
-use super::connection::{baud, busy, clock, firmware, lines, modem_manager, permission, port, rate, restarts, silence};
-use super::outcome::Outcome;
+use super::connection::{
+    RATE_S, baud, busy, clock, firmware, lines, modem_manager, permission, port, rate, restarts, silence,
+};
+use super::evidence::Needs;
 use super::sensors::{bits, crosstalk, movement, open_circuit, saturation, sensors};
 use super::{CheckFinding, CheckStatus, Observations, SKETCH};
+use Needs::{Counts, Nothing, Port, Readings};
 
 /// One check.
 #[derive(Clone, Copy, Debug)]
@@ -11,8 +14,36 @@ pub struct Check {
     pub name: &'static str,
     /// What holds when it passes.
     pub about: &'static str,
-    look: fn(&Observations) -> Outcome,
+    needs: Needs,
     next: Next,
+}
+
+/// A channel counts as saturated after half a second (s).
+const ENDS_S: f64 = 1.0;
+
+/// All checks, in the order in which they are shown.
+pub const CHECKS: &[Check] = &[
+    check("port", "a board is connected", Nothing(port), Next::Ports),
+    check("permission", "you may open the port", Nothing(permission), Next::Nothing),
+    check("busy", "no other program has the port", Nothing(busy), Next::Ports),
+    check("modem-manager", "ModemManager leaves the port alone", Nothing(modem_manager), Next::Nothing),
+    check("silence", "the board sends data", Port(silence), Next::Upload),
+    check("restarts", "the board does not restart", Readings(0.0, restarts), Next::Again),
+    check("baud", "the baud rate is right", Port(baud), Next::Again),
+    check("lines", "lines are readable", Port(lines), Next::Again),
+    check("sensors", "the channels are those of the four sensors", Readings(0.0, sensors), Next::Upload),
+    check("firmware", "the board identifies itself", Readings(0.0, firmware), Next::Upload),
+    check("bits", "the converter has 12 bits", Readings(0.0, bits), Next::Upload),
+    check("saturation", "no channel is saturated", Counts(ENDS_S, saturation), Next::Again),
+    check("open-circuit", "every sensor is connected", Counts(ENDS_S, open_circuit), Next::Again),
+    check("movement", "every strip moves with its finger", Counts(ENDS_S, movement), Next::Again),
+    check("crosstalk", "no channel bleeds into the next", Counts(ENDS_S, crosstalk), Next::Crosstalk),
+    check("rate", "samples arrive at the stated rate", Readings(RATE_S, rate), Next::Again),
+    check("clock", "the board's clock is accurate", Readings(0.0, clock), Next::Upload),
+];
+
+const fn check(name: &'static str, about: &'static str, needs: Needs, next: Next) -> Check {
+    Check { name, about, needs, next }
 }
 
 /// Command to run next when a check finds something.
@@ -69,35 +100,10 @@ fn quoted(path: &str) -> String {
 impl Check {
     /// Runs the check.
     pub fn look(&self, seen: &Observations) -> CheckFinding {
-        let Outcome { verdict, seen: found, cause, fix, command } = (self.look)(seen);
-        let worth_it = verdict >= CheckStatus::Note || (verdict == CheckStatus::NotChecked && cause.is_some());
-        let command = command.or_else(|| self.next.command(seen).filter(|_| worth_it));
-        CheckFinding { check: self.name, verdict, seen: found, cause, fix, command }
+        let found = self.needs.judged(seen);
+        let worth_it =
+            found.verdict >= CheckStatus::Note || (found.verdict == CheckStatus::NotChecked && found.cause.is_some());
+        let next = || self.next.command(seen).filter(|_| worth_it);
+        CheckFinding { check: self.name, command: found.command.clone().or_else(next), ..found }
     }
 }
-
-/// All checks, in the order in which they are shown.
-pub const CHECKS: &[Check] = &[
-    Check { name: "port", about: "a board is connected", look: port, next: Next::Ports },
-    Check { name: "permission", about: "you may open the port", look: permission, next: Next::Nothing },
-    Check { name: "busy", about: "no other program has the port", look: busy, next: Next::Ports },
-    Check {
-        name: "modem-manager",
-        about: "ModemManager leaves the port alone",
-        look: modem_manager,
-        next: Next::Nothing,
-    },
-    Check { name: "silence", about: "the board sends data", look: silence, next: Next::Upload },
-    Check { name: "restarts", about: "the board does not restart", look: restarts, next: Next::Again },
-    Check { name: "baud", about: "the baud rate is right", look: baud, next: Next::Again },
-    Check { name: "lines", about: "lines are readable", look: lines, next: Next::Again },
-    Check { name: "sensors", about: "the channels are those of the four sensors", look: sensors, next: Next::Upload },
-    Check { name: "firmware", about: "the board identifies itself", look: firmware, next: Next::Upload },
-    Check { name: "bits", about: "the converter has 12 bits", look: bits, next: Next::Upload },
-    Check { name: "saturation", about: "no channel is saturated", look: saturation, next: Next::Again },
-    Check { name: "open-circuit", about: "every sensor is connected", look: open_circuit, next: Next::Again },
-    Check { name: "movement", about: "every strip moves with its finger", look: movement, next: Next::Again },
-    Check { name: "crosstalk", about: "no channel bleeds into the next", look: crosstalk, next: Next::Crosstalk },
-    Check { name: "rate", about: "samples arrive at the stated rate", look: rate, next: Next::Again },
-    Check { name: "clock", about: "the board's clock is accurate", look: clock, next: Next::Upload },
-];

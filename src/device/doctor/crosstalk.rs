@@ -10,6 +10,7 @@
 //! With crosstalk of a converter's multiplexer, the reading of one sensor follows the other at once and in proportion.
 //! A sensor whose reading changes at other times was touched.
 
+use super::DoctorError;
 use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
 use serde::Serialize;
 use std::collections::VecDeque;
@@ -53,15 +54,12 @@ pub struct Bleed {
     pub bleeds: bool,
 }
 
-/// Why a board cannot be tested, as a sentence.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct CrosstalkError(String);
-
-/// Guided crosstalk test, independent of any port: readings in, instructions out.
-#[derive(Clone, Debug)]
+/// Guided crosstalk test, independent of any port: readings in, instructions out. Terminal and window show it.
+#[derive(Clone, Debug, Default)]
 pub struct CrosstalkTest {
-    /// Sensors of the board and their channels, in the order in which they are moved.
+    /// Readings before the channels of the board are known.
+    early: u32,
+    /// Sensors of the board and their channels, in the order in which they are moved; none before they are known.
     sensors: Vec<(Sensor, usize)>,
     /// Counts of this converter for one of 4095.
     scale: f64,
@@ -94,38 +92,29 @@ struct Moving {
     back: Option<f64>,
 }
 
+/// The sensors of a board with their channels, where there are some on both fingers.
+fn sensors_of(board: &Board) -> Result<Vec<(Sensor, usize)>, DoctorError> {
+    let channel = |sensor: Sensor| Some((sensor, board.channel_of(sensor)?));
+    let sensors: Vec<(Sensor, usize)> = Sensor::ALL.into_iter().filter_map(channel).collect();
+    if [0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
+        return Ok(sensors);
+    }
+    let channels = board.channels.join(", ");
+    Err(DoctorError(format!("the crosstalk test needs sensors on both fingers; the board has {channels}")))
+}
+
 impl CrosstalkTest {
-    /// Begins a test of a board with sensors on both fingers.
-    pub fn new(board: &Board) -> Result<Self, CrosstalkError> {
-        let sensors: Vec<(Sensor, usize)> =
-            Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, board.channel_of(sensor)?))).collect();
-        if ![0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
-            let channels = board.channels.join(", ");
-            return Err(CrosstalkError(format!(
-                "the crosstalk test needs sensors on both fingers; the board has {channels}"
-            )));
-        }
-        Ok(Self {
-            sensors,
-            scale: f64::from(board.full_scale) / 4095.0,
-            at: 0,
-            window: VecDeque::new(),
-            resting: None,
-            restless: None,
-            flickers: [false; 4],
-            moving: None,
-            found: Vec::new(),
-            unwatched: Vec::new(),
-            left_out: Vec::new(),
-        })
+    /// True once the channels of the board are known.
+    pub fn is_begun(&self) -> bool {
+        !self.sensors.is_empty()
     }
 
-    /// Updates the description of the board.
-    pub fn see(&mut self, board: &Board) {
-        self.scale = f64::from(board.full_scale) / 4095.0;
+    /// True when every sensor was moved or skipped.
+    pub fn is_over(&self) -> bool {
+        self.is_begun() && self.source().is_none()
     }
 
-    /// Sensor to move; none when all have been.
+    /// Sensor to move; none before the board is known, and when all have been.
     pub fn source(&self) -> Option<Sensor> {
         self.sensors.get(self.at).map(|(sensor, _)| *sensor)
     }
@@ -135,25 +124,36 @@ impl CrosstalkTest {
         [(self.at + 1).min(self.sensors.len()), self.sensors.len()]
     }
 
-    /// Instruction for the user.
-    pub fn instruction(&self) -> String {
-        let Some(sensor) = self.source() else { return "test complete".to_owned() };
+    /// Instruction for the user, while there is a sensor to move.
+    pub fn instruction(&self) -> Option<String> {
+        let sensor = self.source()?;
         let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
-        match &self.moving {
-            None => match self.restless {
-                None => "do not touch the fingers".to_owned(),
-                Some(restless) => format!("do not touch the fingers: the {} is not at rest", restless.label()),
-            },
-            Some(moving) if moving.most.abs() >= MOVES * self.scale => format!("release the {side} finger"),
-            Some(_) if sensor.is_flex() => {
+        Some(match (&self.moving, self.restless) {
+            (None, None) => "do not touch the fingers".to_owned(),
+            (None, Some(restless)) => format!("do not touch the fingers: the {} is not at rest", restless.label()),
+            (Some(moving), _) if moving.most.abs() >= MOVES * self.scale => format!("release the {side} finger"),
+            (Some(_), _) if sensor.is_flex() => {
                 format!("bend the {side} finger by hand and release it; do not touch the {other} one")
             }
-            Some(_) => format!("press the {side} pad firmly and release it; do not touch the {other} finger"),
-        }
+            (Some(_), _) => format!("press the {side} pad firmly and release it; do not touch the {other} finger"),
+        })
     }
 
-    /// Takes in a reading.
-    pub fn feed(&mut self, reading: &Reading) {
+    /// Takes in a reading of a board. Fails where the board has too few sensors.
+    pub fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), DoctorError> {
+        self.scale = f64::from(board.full_scale) / 4095.0;
+        if !self.is_begun() {
+            self.early += 1;
+            if self.early < KNOWN_AFTER {
+                return Ok(());
+            }
+            self.sensors = sensors_of(board)?;
+        }
+        self.take(reading);
+        Ok(())
+    }
+
+    fn take(&mut self, reading: &Reading) {
         let Some(source) = self.source() else { return };
         let mut counts = [None; 4];
         for (sensor, channel) in &self.sensors {
@@ -178,8 +178,10 @@ impl CrosstalkTest {
 
     /// Skips the sensor to move.
     pub fn skip(&mut self) {
-        self.left_out.extend(self.source());
-        self.next();
+        if let Some(source) = self.source() {
+            self.left_out.push(source);
+            self.next();
+        }
     }
 
     /// Results so far.
@@ -341,45 +343,6 @@ fn side_of(sensor: Sensor) -> usize {
     sensor as usize % 2
 }
 
-/// Crosstalk test of a board whose channels are known only after its first readings. Terminal and window show it.
-#[derive(Clone, Debug, Default)]
-pub struct CrosstalkSession {
-    test: Option<CrosstalkTest>,
-    readings: u32,
-}
-
-impl CrosstalkSession {
-    /// Takes in a reading. Fails where the board has too few sensors.
-    pub fn feed(&mut self, reading: &Reading, board: &Board) -> Result<(), CrosstalkError> {
-        self.readings = self.readings.saturating_add(1);
-        if self.readings < KNOWN_AFTER {
-            return Ok(());
-        }
-        let test = match &mut self.test {
-            Some(test) => test,
-            empty @ None => empty.insert(CrosstalkTest::new(board)?),
-        };
-        test.see(board);
-        test.feed(reading);
-        Ok(())
-    }
-
-    /// The test; none before the board is known.
-    pub fn test(&self) -> Option<&CrosstalkTest> {
-        self.test.as_ref()
-    }
-
-    /// Skips the sensor to move.
-    pub fn skip(&mut self) {
-        self.test.iter_mut().for_each(CrosstalkTest::skip);
-    }
-
-    /// True when every sensor was moved or skipped.
-    pub fn is_over(&self) -> bool {
-        self.test.as_ref().is_some_and(|test| test.source().is_none())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -393,10 +356,14 @@ mod tests {
         clumsy: bool,
     }
 
+    /// A test of a board that is known.
+    fn begun() -> CrosstalkTest {
+        CrosstalkTest { sensors: sensors_of(&Board::default()).expect("has both fingers"), ..CrosstalkTest::default() }
+    }
+
     impl Hand {
         fn new(share: f64) -> Self {
-            let test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
-            Self { test, t_s: 0.0, share, clumsy: false }
+            Self { test: begun(), t_s: 0.0, share, clumsy: false }
         }
 
         fn feed(&mut self, mut counts: [f64; 4]) {
@@ -406,7 +373,12 @@ mod tests {
             self.t_s += 0.02;
             let noise = f64::from((self.t_s * 50.0).round() as i32 % 3 - 1);
             let counts = counts.iter().map(|count| Some((count + noise) as f32)).collect();
-            self.test.feed(&Reading { t_s: self.t_s, arrived_s: self.t_s, seq: None, counts, line_bar: None });
+            let reading = Reading { t_s: self.t_s, arrived_s: self.t_s, seq: None, counts, line_bar: None };
+            self.test.feed(&reading, &Board::default()).expect("has both fingers");
+        }
+
+        fn asks(&self) -> String {
+            self.test.instruction().unwrap_or_default()
         }
 
         fn rest(&mut self, seconds: f64) {
@@ -418,9 +390,9 @@ mod tests {
         /// Follows the instructions to the end.
         fn follow(&mut self) {
             while let Some(sensor) = self.test.source() {
-                assert_eq!(self.test.instruction(), "do not touch the fingers");
+                assert_eq!(self.asks(), "do not touch the fingers");
                 self.rest(1.1);
-                assert!(self.test.instruction().contains("release it; do not touch"), "{}", self.test.instruction());
+                assert!(self.asks().contains("release it; do not touch"), "{}", self.asks());
                 for k in 0..100u32 {
                     let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
                     let mut counts = [1420.0, 1400.0, 0.0, 0.0];
@@ -493,13 +465,15 @@ mod tests {
 
     #[test]
     fn one_that_flickers_or_says_nothing_does_not_hold_up_the_others() {
-        let mut test = CrosstalkTest::new(&Board::default()).expect("has both fingers");
+        let mut test = CrosstalkTest::default();
         for k in 0..500u32 {
+            assert_eq!(test.is_begun(), k >= KNOWN_AFTER);
             let (t_s, flickers) = (0.02 * f64::from(k), if k % 2 == 0 { 300.0 } else { 0.0 });
             let counts = vec![None, Some(1400.0), Some(0.0), Some(flickers)];
-            test.feed(&Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None });
+            let reading = Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None };
+            test.feed(&reading, &Board::default()).expect("has both fingers");
         }
-        assert!(test.instruction().starts_with("bend the right finger"), "{}", test.instruction());
+        assert!(test.instruction().is_some_and(|text| text.starts_with("bend the right finger")), "{test:?}");
         assert_eq!(test.summary().last().map(|line| line.starts_with("Skipped: left flex strip")), Some(true));
     }
 
@@ -509,14 +483,14 @@ mod tests {
         for k in 0..200 {
             hand.feed([1420.0 + f64::from(k % 10) * 20.0, 1400.0, 0.0, 0.0]);
         }
-        assert_eq!(hand.test.instruction(), "do not touch the fingers: the left flex strip is not at rest");
+        assert_eq!(hand.asks(), "do not touch the fingers: the left flex strip is not at rest");
         hand.test.skip();
         hand.rest(3.0);
-        assert!(hand.test.instruction().starts_with("bend the right finger"), "{}", hand.test.instruction());
+        assert!(hand.asks().starts_with("bend the right finger"), "{}", hand.asks());
         assert_eq!((hand.test.step(), hand.test.found()), ([2, 4], &[][..]));
         assert_eq!(hand.test.summary(), ["Skipped: left flex strip, right flex strip, left pad, right pad"]);
         assert!(!hand.test.is_sound());
         let one = Board { channels: vec!["flexL".into(), "fsrL".into()], ..Board::default() };
-        assert!(CrosstalkTest::new(&one).is_err(), "nothing could be watched");
+        assert!(sensors_of(&one).is_err(), "nothing could be watched");
     }
 }

@@ -7,8 +7,8 @@
 mod checks;
 mod connection;
 mod crosstalk;
+mod evidence;
 mod examine;
-mod outcome;
 mod sensors;
 #[cfg(test)]
 mod tests;
@@ -16,14 +16,19 @@ mod traces;
 mod wiring;
 
 pub use checks::{CHECKS, Check};
-pub use crosstalk::{Bleed, CrosstalkError, CrosstalkSession, CrosstalkTest};
-pub use examine::{examine, example_of, is_enough};
+pub use crosstalk::{Bleed, CrosstalkTest};
+pub use examine::{Examination, examine};
 pub use traces::{ChannelTrace, ChannelTraces};
-pub use wiring::{SKETCH, SketchError, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};
+pub use wiring::{SKETCH, WIRING_PAGE, WIRING_RULES, Wire, wires, write_sketch};
 
 use crate::protocol::ConsoleLine;
 use crate::serial::{LinkStatus, PortError, PortInfo};
 use serde::Serialize;
+
+/// Why a board cannot be tested, or the sketch was not written, as a sentence.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct DoctorError(String);
 
 /// Outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -1,6 +1,7 @@
 //! Wiring of the gripper's board, and the sketch that runs on it. The files of `assets/firmware/due_gripper` are part of the
 //! program.
 
+use super::DoctorError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::{PadPart, StripPart};
 use std::fs;
@@ -50,21 +51,14 @@ pub fn wires() -> [Wire; 4] {
     })
 }
 
-/// Reason why the sketch was not written, as a sentence.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct SketchError(String);
-
-impl SketchError {
-    fn cannot_write(path: &Path, cause: &std::io::Error) -> Self {
-        Self(format!("cannot write \"{}\": {cause}. Choose a folder that you may write to", path.display()))
-    }
+fn cannot_write(path: &Path, cause: &std::io::Error) -> DoctorError {
+    DoctorError(format!("cannot write \"{}\": {cause}. Choose a folder that you may write to", path.display()))
 }
 
 /// Writes the sketch into a folder, which is created where it is missing, and returns its files. Writes nothing where a
 /// different file exists.
-pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, SketchError> {
-    fs::create_dir_all(folder).map_err(|cause| SketchError::cannot_write(folder, &cause))?;
+pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, DoctorError> {
+    fs::create_dir_all(folder).map_err(|cause| cannot_write(folder, &cause))?;
     let files = SKETCH_FILES.map(|(name, text)| (folder.join(name), text));
     let mut missing = Vec::new();
     for (path, text) in &files {
@@ -72,17 +66,17 @@ pub fn write_sketch(folder: &Path) -> Result<Vec<PathBuf>, SketchError> {
             Ok(there) if there == text.as_bytes() => {}
             Ok(_) => {
                 let path = path.display();
-                return Err(SketchError(format!(
+                return Err(DoctorError(format!(
                     "\"{path}\" exists and differs: nothing was written. Choose another folder"
                 )));
             }
             Err(error) if error.kind() == ErrorKind::NotFound => missing.push((path, text)),
-            Err(cause) => return Err(SketchError::cannot_write(path, &cause)),
+            Err(cause) => return Err(cannot_write(path, &cause)),
         }
     }
     for (path, text) in missing {
         let written = fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
-        written.map_err(|cause| SketchError::cannot_write(path, &cause))?;
+        written.map_err(|cause| cannot_write(path, &cause))?;
     }
     Ok(files.map(|(path, _)| path).to_vec())
 }

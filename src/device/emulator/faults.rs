@@ -1,6 +1,7 @@
 //! Faults of the emulator, on request: `NAME[=VALUE]@SECONDS[/DURATION]`, separated by commas, as in
 //! `vanish@5,garbage@7/2,stuck=2@10`.
 
+use super::event::EmulatorError;
 use std::fmt;
 
 /// Kinds of fault, from the sensor to the host.
@@ -129,18 +130,13 @@ pub fn fault_help() -> String {
     TABLE.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// An error in a list of faults.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the fault \"{text}\" {problem}; write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2")]
-pub struct FaultError {
-    /// The fault.
-    pub text: String,
-    pub problem: String,
-}
-
 /// Parses a list of faults.
-pub fn parse_faults(text: &str) -> Result<Vec<EmulatedFault>, FaultError> {
-    let parse = |text| parse_fault(text).map_err(|problem| FaultError { text: String::from(text), problem });
+pub fn parse_faults(text: &str) -> Result<Vec<EmulatedFault>, EmulatorError> {
+    let wrong = |text: &str, problem| {
+        let form = "write NAME[=VALUE]@SECONDS[/DURATION], as in garbage@7/2";
+        EmulatorError(format!("the fault \"{text}\" {problem}; {form}"))
+    };
+    let parse = |text| parse_fault(text).map_err(|problem: String| wrong(text, problem));
     text.split(',').map(str::trim).filter(|part| !part.is_empty()).map(parse).collect()
 }
 

@@ -1,9 +1,10 @@
 //! The emulated gripper: fingers, sensors, board and connection, with its faults. It has no port and no clock of its own: time
 //! and the host's bytes go in, the board's bytes come out. The same seed, times and input give the same bytes.
 
+use super::event::{EmulatorEvent, EmulatorEventKind};
 use super::faults::{EmulatedFault, FaultKind};
 use super::firmware::{BoardSetup, FirmwareBoard};
-use super::hand::{Hand, HandEvent, HandPlan};
+use super::hand::{Hand, HandPlan};
 use super::parts::{HiddenParts, Sensors, Stimulus};
 use super::script::Step;
 use super::uart::misread;
@@ -12,7 +13,6 @@ use palpate_sim::objects::ObjectError;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::Converter;
 use palpate_tactile::model::Stream;
-use serde::Serialize;
 
 /// Stated resistor of the inputs beyond the four sensors (ohm).
 const SPARE_OHM: u32 = 4700;
@@ -38,64 +38,6 @@ pub struct EmulatorSetup {
     pub faults: Vec<EmulatedFault>,
     /// Random seed of noise and faults.
     pub seed: u64,
-}
-
-/// Kind of an event.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "event", rename_all = "kebab-case")]
-pub enum EmulatorEventKind {
-    /// The fingers close.
-    Grasp {
-        /// Number of the grasp, from 1.
-        number: u32,
-        object: String,
-    },
-    /// A bend and a load are held on the bench.
-    Hold {
-        /// Bend of the strips (degrees).
-        bend_deg: [f64; 2],
-        /// Load on the pads (N).
-        load_n: [f64; 2],
-        /// Duration (s).
-        seconds: f64,
-    },
-    /// The script ended.
-    ScriptDone,
-    /// A fault begins.
-    Fault {
-        /// The fault, as on the command line.
-        fault: String,
-    },
-    /// The board vented because the host was silent.
-    Watchdog,
-    /// The simulation stopped.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-    /// A host opened the port.
-    HostCame,
-    /// It closed the port.
-    HostLeft,
-    /// The port is open under this name.
-    Port {
-        /// Path of the terminal.
-        path: String,
-    },
-    /// Bytes were dropped because the host does not read.
-    Overrun {
-        /// Number of bytes.
-        bytes: u64,
-    },
-}
-
-/// Event of the emulator, and its time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EmulatorEvent {
-    /// Time since the first host (s).
-    pub t_s: f64,
-    #[serde(flatten)]
-    pub what: EmulatorEventKind,
 }
 
 /// Emulated gripper.
@@ -267,7 +209,7 @@ impl EmulatedGripper {
         let clock_us = anchor_us + u64::from(due.wrapping_sub(anchor_us as u32));
         self.anchor = (self.now_s, clock_us);
         let stimulus = self.hand.at(self.now_s, self.board.line_bar());
-        self.tell_hand();
+        self.hand.take_began().into_iter().for_each(|began| self.tell(began));
         if let Some(bar) = self.hand.own_bar() {
             self.board.set_by_hand((bar * 20.0).round() as u8, due);
         }
@@ -316,17 +258,6 @@ impl EmulatedGripper {
                 self.struck[k] = true;
                 self.tell(EmulatorEventKind::Fault { fault: self.faults[k].to_string() });
             }
-        }
-    }
-
-    fn tell_hand(&mut self) {
-        for began in self.hand.take_began() {
-            self.tell(match began {
-                HandEvent::Grasp { number, object } => EmulatorEventKind::Grasp { number, object },
-                HandEvent::Hold { bend_deg, load_n, seconds } => EmulatorEventKind::Hold { bend_deg, load_n, seconds },
-                HandEvent::Done => EmulatorEventKind::ScriptDone,
-                HandEvent::Failed(reason) => EmulatorEventKind::Failed { reason },
-            });
         }
     }
 

@@ -1,6 +1,7 @@
 //! Fingers of the emulated gripper: they grasp by a programme of their own, as a host drives them, or are bent and loaded by a
 //! bench script. Grasps are simulated.
 
+use super::event::EmulatorEventKind;
 use super::parts::Stimulus;
 use super::script::Step;
 use palpate_sim::frame::Frame;
@@ -61,19 +62,6 @@ enum HandActivity {
     Grasp(Box<LiveGrasp>),
 }
 
-/// Start of an activity.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum HandEvent {
-    /// The fingers close on something.
-    Grasp { number: u32, object: String },
-    /// A bend and a load are held.
-    Hold { bend_deg: [f64; 2], load_n: [f64; 2], seconds: f64 },
-    /// The script is at its end.
-    Done,
-    /// The simulation failed; the fingers stop.
-    Failed(String),
-}
-
 /// The hand.
 #[derive(Debug)]
 pub(super) struct Hand {
@@ -89,7 +77,7 @@ pub(super) struct Hand {
     /// A host drives.
     driven: bool,
     vented_since_s: Option<f64>,
-    began: Vec<HandEvent>,
+    began: Vec<EmulatorEventKind>,
     last: Stimulus,
 }
 
@@ -149,7 +137,7 @@ impl Hand {
     }
 
     /// Takes the starts since the last call.
-    pub(super) fn take_began(&mut self) -> Vec<HandEvent> {
+    pub(super) fn take_began(&mut self) -> Vec<EmulatorEventKind> {
         std::mem::take(&mut self.began)
     }
 
@@ -187,7 +175,7 @@ impl Hand {
             }
             HandActivity::Grasp(grasp) => {
                 let stimulus = grasp.at(t, host_bar);
-                self.began.extend(grasp.failed.take().map(HandEvent::Failed));
+                self.began.extend(grasp.failed.take().map(|reason| EmulatorEventKind::Failed { reason }));
                 stimulus
             }
         };
@@ -219,7 +207,7 @@ impl Hand {
             self.take_step(&step, t);
         } else if self.scripted {
             if !matches!(self.doing, HandActivity::Rest) {
-                self.began.push(HandEvent::Done);
+                self.began.push(EmulatorEventKind::ScriptDone);
                 self.doing = HandActivity::Rest;
             }
         } else if let Some(every) = self.plan.grasp_every_s.filter(|_| t >= self.next_s) {
@@ -235,7 +223,7 @@ impl Hand {
                 let to = Stimulus { kappa: bend.map(|angle| angle / StripPart::ACTIVE_LENGTH), force: *load };
                 self.doing = HandActivity::Held { from: self.last, to, since_s: t, until_s: t + seconds };
                 let bend_deg = bend.map(f64::to_degrees);
-                self.began.push(HandEvent::Hold { bend_deg, load_n: *load, seconds: *seconds });
+                self.began.push(EmulatorEventKind::Hold { bend_deg, load_n: *load, seconds: *seconds });
             }
             Step::Grasp { object, bar } => {
                 let mut programme = self.plan.scene.programme.clone();
@@ -271,7 +259,7 @@ impl Hand {
         self.grasps += 1;
         let Graspable { name, model, poses } = &self.things[thing];
         let (scene, _) = poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps)));
-        self.began.push(HandEvent::Grasp { number: self.grasps, object: name.clone() });
+        self.began.push(EmulatorEventKind::Grasp { number: self.grasps, object: name.clone() });
         self.doing = HandActivity::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
     }
 }
@@ -379,7 +367,13 @@ mod tests {
         assert_eq!(loaded, Stimulus { kappa: [0.0; 2], force: [1.0; 2] });
         assert_eq!(run(&mut hand, 1.9, 3.0, 0.0), Stimulus::default());
         let began = hand.take_began();
-        assert!(matches!(began[..], [HandEvent::Hold { .. }, HandEvent::Hold { .. }, HandEvent::Done]), "{began:?}");
+        assert!(
+            matches!(
+                began[..],
+                [EmulatorEventKind::Hold { .. }, EmulatorEventKind::Hold { .. }, EmulatorEventKind::ScriptDone]
+            ),
+            "{began:?}"
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! | `gripper` | all of them, and the line with its faults; no port, no clock of its own |
 //! | `port` | the pseudo-terminal and its link (Unix) |
 
+mod event;
 mod faults;
 mod firmware;
 #[cfg(test)]
@@ -23,11 +24,12 @@ mod script;
 mod tests;
 mod uart;
 
-pub use faults::{EmulatedFault, FaultError, FaultKind, fault_help, parse_faults};
-pub use gripper::{EmulatedGripper, EmulatorEvent, EmulatorEventKind, EmulatorSetup};
+pub use event::{EmulatorError, EmulatorEvent, EmulatorEventKind};
+pub use faults::{EmulatedFault, FaultKind, fault_help, parse_faults};
+pub use gripper::{EmulatedGripper, EmulatorSetup};
 pub use hand::HandPlan;
-pub use parts::{HiddenParts, PadSetup, PartsError, Stimulus, StripSetup};
+pub use parts::{HiddenParts, PadSetup, Stimulus, StripSetup};
 #[cfg(unix)]
-pub use port::{PortSetup, ServeError, serve};
-pub use script::{ScriptError, Step, parse_script};
+pub use port::{PortSetup, serve};
+pub use script::{Step, parse_script};
 pub use uart::misread;

@@ -1,5 +1,6 @@
 //! Parts of the emulated gripper: hidden values that a calibration estimates.
 
+use super::event::EmulatorError;
 use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::model::Stream;
 use serde::{Deserialize, Serialize};
@@ -76,9 +77,9 @@ impl HiddenParts {
     }
 
     /// Refuses values that no part has.
-    pub fn check(&self) -> Result<(), PartsError> {
+    pub fn check(&self) -> Result<(), EmulatorError> {
         let refuse = |is_fine: bool, name: &str, value: f64, wanted: &str| {
-            if is_fine { Ok(()) } else { Err(PartsError(format!("{name} is {value}; it must {wanted}"))) }
+            if is_fine { Ok(()) } else { Err(EmulatorError(format!("{name} is {value}; it must {wanted}"))) }
         };
         let positive =
             |name: &str, value: f64| refuse(value.is_finite() && value > 0.0, name, value, "be a positive number");
@@ -113,11 +114,6 @@ impl HiddenParts {
         Sensors { strips, pads }
     }
 }
-
-/// A value that no part has, as a sentence.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct PartsError(String);
 
 /// Load that bending puts on a pad, least and most (N m). Assumed: 0.07 to 0.3 N when the finger is closed on nothing
 /// at 1 bar (14 1/m), so that it shows above the threshold of some pads and not of others.

@@ -3,8 +3,9 @@
 //! The terminal's other end is not kept open, so that hosts are noticed when they connect and disconnect. Each host gets a
 //! fresh terminal, without old bytes and locks.
 
+use super::event::{EmulatorError, EmulatorEventKind};
 use super::faults::FaultKind;
-use super::gripper::{EmulatedGripper, EmulatorEventKind};
+use super::gripper::EmulatedGripper;
 use super::uart::misread;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -38,12 +39,7 @@ pub struct PortSetup {
     pub boot_s: f64,
 }
 
-/// Reason why the emulator cannot be served, as a sentence.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct ServeError(String);
-
-impl From<serialport::Error> for ServeError {
+impl From<serialport::Error> for EmulatorError {
     fn from(cause: serialport::Error) -> Self {
         Self(format!("cannot open a pseudo-terminal: {cause}"))
     }
@@ -55,7 +51,7 @@ pub fn serve(
     served: &PortSetup,
     stop: &AtomicBool,
     turn: &mut dyn FnMut(&mut EmulatedGripper),
-) -> Result<(), ServeError> {
+) -> Result<(), EmulatorError> {
     let mut port = Port::new(served, gripper)?;
     while !stop.load(Ordering::Relaxed) {
         port.turn(gripper)?;
@@ -77,7 +73,7 @@ struct Port<'a> {
 }
 
 impl<'a> Port<'a> {
-    fn new(served: &'a PortSetup, gripper: &mut EmulatedGripper) -> Result<Self, ServeError> {
+    fn new(served: &'a PortSetup, gripper: &mut EmulatedGripper) -> Result<Self, EmulatorError> {
         let link = Link::new(&served.link)?;
         let mut port = Self { served, terminal: None, link, since: None, host: None };
         port.appear(gripper)?;
@@ -85,7 +81,7 @@ impl<'a> Port<'a> {
     }
 
     /// Opens a terminal, beside the old one if its writer still holds it.
-    fn appear(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
+    fn appear(&mut self, gripper: &mut EmulatedGripper) -> Result<(), EmulatorError> {
         let (terminal, path) = Terminal::open(&self.link)?;
         gripper.tell(EmulatorEventKind::Port { path });
         self.terminal = Some(terminal);
@@ -93,7 +89,7 @@ impl<'a> Port<'a> {
     }
 
     /// Reads from the host, advances the gripper, and sends its output.
-    fn turn(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
+    fn turn(&mut self, gripper: &mut EmulatedGripper) -> Result<(), EmulatorError> {
         if let Some(since) = self.since {
             gripper.advance(since.elapsed().as_secs_f64() * self.served.speed);
         }
@@ -130,7 +126,7 @@ impl<'a> Port<'a> {
         }
     }
 
-    fn nobody_is_there(&mut self, gripper: &mut EmulatedGripper) -> Result<(), ServeError> {
+    fn nobody_is_there(&mut self, gripper: &mut EmulatedGripper) -> Result<(), EmulatorError> {
         if self.host.take().is_some() {
             gripper.tell(EmulatorEventKind::HostLeft);
             self.terminal = None;
@@ -177,13 +173,13 @@ struct Link {
 
 impl Link {
     /// Refuses a path that is taken.
-    fn new(path: &Path) -> Result<Self, ServeError> {
+    fn new(path: &Path) -> Result<Self, EmulatorError> {
         match std::fs::symlink_metadata(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => {}
             Ok(_) if leads_to_a_terminal(path) => {}
             _ => {
                 let path = path.display();
-                return Err(ServeError(format!(
+                return Err(EmulatorError(format!(
                     "{path} exists and is not a link to a terminal. Choose another name, or remove it"
                 )));
             }
@@ -192,13 +188,13 @@ impl Link {
     }
 
     /// Points it to a terminal, atomically.
-    fn lead_to(&self, terminal: &str) -> Result<(), ServeError> {
+    fn lead_to(&self, terminal: &str) -> Result<(), EmulatorError> {
         let mut beside = self.path.clone().into_os_string();
         beside.push(format!(".{}", std::process::id()));
         let made = symlink(terminal, &beside).and_then(|()| std::fs::rename(&beside, &self.path));
         made.map_err(|cause| {
             let path = self.path.display();
-            ServeError(format!("cannot create the link {path}: {cause}. Choose an existing, writable folder"))
+            EmulatorError(format!("cannot create the link {path}: {cause}. Choose an existing, writable folder"))
         })
     }
 
@@ -233,7 +229,7 @@ struct Terminal {
 }
 
 impl Terminal {
-    fn open(link: &Link) -> Result<(Self, String), ServeError> {
+    fn open(link: &Link) -> Result<(Self, String), EmulatorError> {
         let (mut near, far) = TTYPort::pair()?;
         near.set_timeout(GRAIN)?;
         let name = far.name().unwrap_or_default();
@@ -249,7 +245,7 @@ impl Terminal {
                     left.fetch_sub(piece.len(), Ordering::Relaxed);
                 }
             })
-            .map_err(|cause| ServeError(format!("cannot start a thread: {cause}")))?;
+            .map_err(|cause| EmulatorError(format!("cannot start a thread: {cause}")))?;
         link.lead_to(&name)?;
         Ok((Self { near, output, waiting, dropped: 0, reported: Instant::now() }, name))
     }

@@ -13,6 +13,7 @@
 //!
 //! A step without `hold` takes 2 s; a grasp takes what its programme takes.
 
+use super::event::EmulatorError;
 use palpate_geometry::units::STANDARD_GRAVITY;
 
 /// Default duration of a step (s).
@@ -39,27 +40,17 @@ pub enum Step {
     },
 }
 
-/// An error in a script.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("step {number} of the script, \"{step}\": {problem}")]
-pub struct ScriptError {
-    /// Which step, from 1.
-    pub number: usize,
-    /// Its text.
-    pub step: String,
-    pub problem: String,
-}
-
 fn unknown(word: &str, instead: &str) -> String {
     format!("\"{word}\" is not known; write {instead}")
 }
 
 /// Parses a script.
-pub fn parse_script(text: &str) -> Result<Vec<Step>, ScriptError> {
+pub fn parse_script(text: &str) -> Result<Vec<Step>, EmulatorError> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default());
     let steps = lines.flat_map(|line| line.split(';')).map(str::trim).filter(|step| !step.is_empty());
     let step = |(index, text): (usize, &str)| {
-        parse_step(text).map_err(|problem| ScriptError { number: index + 1, step: text.to_owned(), problem })
+        let wrong = |problem: String| format!("step {} of the script, \"{text}\": {problem}", index + 1);
+        parse_step(text).map_err(|problem| EmulatorError(wrong(problem)))
     };
     steps.enumerate().map(step).collect()
 }

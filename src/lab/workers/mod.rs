@@ -64,8 +64,8 @@ pub use class_training::{TeachRequest, class_training_job};
 pub use doctor::{DiagnosticsReport, Examine, ExamineRequest, doctor_job, examine_port};
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,
-    CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, LatestReading, ObserveRequest,
-    RunningCalibration, RunningCrosstalk, SensorJobError, TrialView,
+    CrosstalkView, EndedTrial, GripperCommand, GripperSetup, GripperView, GripperWorker, Guided, LatestReading,
+    ObserveRequest, TrialView, keep_calibration,
 };
 pub use job::{EndedJob, Job, JobError, JobFailure, JobProgress, JobRun, Newer, RunningJob, spare_threads};
 pub use label_worker::{LabelCommand, LabelView, LabelWorker};

@@ -1,4 +1,7 @@
 //! The built-in objects: every folder of `assets/objects`, embedded. Adding one is adding a folder.
+//!
+//! Dimensions are real-world ones, chosen to match the names of the paper's objects, whose sizes it does not publish.
+//! Objects lie as placed: z up, long side along y, so that the fingers close across it along x.
 
 use super::files::inside;
 use super::{ObjectClass, ShapeClass, SizeClass};

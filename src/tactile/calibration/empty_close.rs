@@ -18,9 +18,10 @@ pub struct EmptyClose {
     readout: Readout,
     side: Side,
     seconds: f64,
-    readings: Vec<Reading>,
-    /// Time of the last reading less that of the first (s).
-    watched_s: f64,
+    /// Curvature (1/m) and conductance of the pad (S) in the readings so far.
+    readings: Vec<(f64, f64)>,
+    /// Times of the first and the last of them (s).
+    span_s: Option<[f64; 2]>,
 }
 
 impl EmptyClose {
@@ -49,25 +50,25 @@ impl EmptyClose {
             serving.iter().filter(|(own, _)| *own != sensor).cloned().collect();
         calibrations.push(pad);
         let readout = Readout::new(board, &calibrations)?;
-        Ok(Self { readout, side, seconds, readings: Vec::new(), watched_s: 0.0 })
+        Ok(Self { readout, side, seconds, readings: Vec::new(), span_s: None })
     }
 
     /// Takes in a reading; true once it has watched for long enough.
     pub fn feed(&mut self, reading: &Reading) -> bool {
         // A clock that was set back begins anew.
-        if self.readings.last().is_some_and(|last| reading.t_s < last.t_s) {
-            self.readings.clear();
+        if self.span_s.is_some_and(|[_, last]| reading.t_s < last) {
+            (self.readings, self.span_s) = (Vec::new(), None);
         }
         if self.readings.len() < MOST_READINGS {
-            self.readings.push(reading.clone());
+            self.readings.extend(self.readout.bending(self.side, std::slice::from_ref(reading)));
         }
-        self.watched_s = self.readings.first().map_or(0.0, |first| reading.t_s - first.t_s);
+        self.span_s.get_or_insert([reading.t_s; 2])[1] = reading.t_s;
         self.left_s() <= 0.0
     }
 
     /// Time left (s).
     pub fn left_s(&self) -> f64 {
-        (self.seconds - self.watched_s).max(0.0)
+        (self.seconds - self.span_s.map_or(0.0, |[first, last]| last - first)).max(0.0)
     }
 
     /// Instruction to the user.
@@ -81,7 +82,7 @@ impl EmptyClose {
 
     /// Bending zero from the recorded readings.
     pub fn bending(&self) -> Result<BendingZero, CalibrationFault> {
-        BendingZero::from_empty_close(&self.readout.bending(self.side, &self.readings))
+        BendingZero::from_empty_close(&self.readings)
     }
 }
 

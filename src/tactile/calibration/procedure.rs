@@ -78,51 +78,42 @@ pub struct Procedure {
 }
 
 impl Procedure {
-    /// Begins a calibration of a mounted part. `resistor_ohm` overrides the resistor that the board reports. Refuses a
-    /// board that has no such channel.
-    pub fn new(board: &Board, sensor: Sensor, part: &str, resistor_ohm: Option<f64>) -> Option<Self> {
-        let mut input = Input::on(board, sensor);
-        if let Some(ohm) = resistor_ohm {
-            input.divider.fixed_ohm = ohm;
-        }
-        let kind = SensorKind::of(sensor);
-        let part = part.trim().to_owned();
-        Some(Self {
+    /// Begins a calibration of a mounted part, on a board as our firmware describes it. `resistor_ohm` overrides the
+    /// resistor that the board reports.
+    pub fn new(sensor: Sensor, part: &str, resistor_ohm: Option<f64>) -> Self {
+        let (kind, mut input) = (SensorKind::of(sensor), Input::on(&Board::default(), sensor));
+        input.divider.fixed_ohm = resistor_ohm.unwrap_or(input.divider.fixed_ohm);
+        let (part, note) = (part.trim().to_owned(), String::new());
+        Self {
             sensor,
-            column: board.channel_of(sensor)?,
-            record: Record {
-                part,
-                kind,
-                input,
-                points: Vec::new(),
-                bending: None,
-                assumed: false,
-                note: String::new(),
-            },
+            column: sensor as usize,
+            record: Record { part, kind, input, points: Vec::new(), bending: None, assumed: false, note },
             left: plan(kind).into(),
             window: VecDeque::new(),
             silent: 0,
             resistor_is_given: resistor_ohm.is_some(),
             is_measured: false,
-        })
-    }
-
-    /// Continues after points that were measured elsewhere. Refuses a board that has no such channel.
-    pub fn after(board: &Board, sensor: Sensor, record: Record) -> Option<Self> {
-        let begun = Self::new(board, sensor, &record.part, None)?;
-        Some(Self { record, left: VecDeque::new(), is_measured: true, ..begun })
-    }
-
-    /// Updates the board's properties, which apply to all points, as points are stored as counts.
-    pub fn see(&mut self, board: &Board) {
-        self.column = board.channel_of(self.sensor).unwrap_or(self.column);
-        if self.is_measured {
-            return;
         }
-        let input = &mut self.record.input;
-        let seen = input.seen_by(board, self.sensor);
-        let fixed_ohm = if self.resistor_is_given { input.divider.fixed_ohm } else { seen.divider.fixed_ohm };
-        *input = Input { divider: Divider { fixed_ohm, ..seen.divider }, ..seen };
+    }
+
+    /// Continues after points that were measured elsewhere.
+    pub fn after(sensor: Sensor, record: Record) -> Self {
+        let begun = Self::new(sensor, &record.part, None);
+        Self { record, left: VecDeque::new(), is_measured: true, ..begun }
+    }
+
+    /// Updates the board's properties, which apply to all points, as points are stored as counts. False for a board that has
+    /// no such channel.
+    pub fn see(&mut self, board: &Board) -> bool {
+        let Some(column) = board.channel_of(self.sensor) else { return false };
+        self.column = column;
+        if !self.is_measured {
+            let input = &mut self.record.input;
+            let seen = input.seen_by(board, self.sensor);
+            let fixed_ohm = if self.resistor_is_given { input.divider.fixed_ohm } else { seen.divider.fixed_ohm };
+            *input = Input { divider: Divider { fixed_ohm, ..seen.divider }, ..seen };
+        }
+        true
     }
 
     /// With other angles (rad) or forces (N) to be set.
@@ -288,7 +279,7 @@ mod tests {
     }
 
     fn procedure() -> Procedure {
-        Procedure::new(&Board::default(), Sensor::PadRight, " P7 ", None).expect("has the channel")
+        Procedure::new(Sensor::PadRight, " P7 ", None)
     }
 
     /// Feeds readings at 50 Hz from a time on.
@@ -356,13 +347,13 @@ mod tests {
         procedure.take(1.0)?;
         assert!((procedure.record().input.ohm(600.0) - 4.7e3 * (4096.0 / 600.0 - 1.0)).abs() < 1e-6);
         let channels = vec!["fsrR".into(), "flexL".into()];
-        procedure.see(&Board { full_scale: 1023, divider_ohm: vec![3.3e3, 33e3], channels, ..Board::default() });
+        let ten_bits = Board { full_scale: 1023, divider_ohm: vec![3.3e3, 33e3], channels, ..Board::default() };
+        assert!(procedure.see(&ten_bits));
         assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
         assert_eq!(procedure.column, 0);
         // The user's resistor takes precedence over the board's.
-        let mut procedure =
-            Procedure::new(&Board::default(), Sensor::PadRight, "x", Some(1e3)).ok_or(Unsettled::Silent)?;
-        procedure.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() });
+        let mut procedure = Procedure::new(Sensor::PadRight, "x", Some(1e3));
+        assert!(procedure.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() }));
         assert_eq!(procedure.record().input.divider.fixed_ohm, 1e3);
         Ok(())
     }
@@ -377,7 +368,7 @@ mod tests {
         feed(&mut procedure, 5.0, 2.0, |_| 4095.0);
         assert!(matches!(procedure.settled(), Err(Unsettled::RangeEnd { .. })));
         let no_channel = Board { channels: vec!["flexL".into()], ..Board::default() };
-        assert!(Procedure::new(&no_channel, Sensor::PadRight, "x", None).is_none());
+        assert!(!procedure.see(&no_channel));
     }
 
     #[test]

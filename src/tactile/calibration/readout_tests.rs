@@ -58,7 +58,7 @@ impl Parts {
 
     /// Goes through the usual procedure.
     fn calibrate(&mut self, sensor: Sensor) -> Calibration {
-        let mut procedure = Procedure::new(&Board::default(), sensor, sensor.channel(), None).unwrap();
+        let mut procedure = Procedure::new(sensor, sensor.channel(), None);
         let mut now = 0.0;
         while let Some(stimulus) = procedure.next() {
             while procedure.settled().is_err() {

@@ -1,8 +1,9 @@
 //! Files as other people write them: several links, scaled meshes, primitives, package paths, sloppy XML, non-convex
 //! shapes of thousands of triangles.
 
+use super::obj_text;
 use glam::{DQuat, DVec2, DVec3};
-use palpate_geometry::{ColouredPart, Finish, Pose, Primitive, TriMesh, lathe, write_obj};
+use palpate_geometry::{Pose, Primitive, TriMesh, lathe};
 use palpate_lab::grasping::{GraspSummary, grasp};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
@@ -24,15 +25,6 @@ fn grasped(path: &Path) -> ObjectModel {
         assert!(hold.force_n.iter().all(|f| *f > 0.02), "{what}, fixed {fixed}: {:?}", hold.force_n);
     }
     object.expect("not an empty hand")
-}
-
-fn obj_text(mesh: &TriMesh) -> String {
-    write_obj(
-        "test",
-        "test.mtl",
-        &[("body", ColouredPart { mesh: mesh.clone(), colour: None, finish: Finish::default() })],
-    )
-    .0
 }
 
 /// A ring lying flat (m).

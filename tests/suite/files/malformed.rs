@@ -1,8 +1,9 @@
 //! Malformed files of every kind: whatever comes in, a typed error or an object with finite numbers comes out, in good
 //! time and without a panic.
 
+use super::obj_text;
 use glam::DVec3;
-use palpate_geometry::{ColouredPart, Finish, Primitive, TriMesh, write_obj};
+use palpate_geometry::{Primitive, TriMesh};
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::{LoadOptions, ObjectModel, load};
 use palpate_sim::scene::Scene;
@@ -80,10 +81,6 @@ const URDF: &str = r#"<robot name="thing">
 
 fn cube() -> TriMesh {
     Primitive::Cuboid { half: DVec3::new(0.015, 0.02, 0.018) }.tessellate()
-}
-
-fn obj() -> String {
-    write_obj("cube", "cube.mtl", &[("body", ColouredPart { mesh: cube(), colour: None, finish: Finish::default() })]).0
 }
 
 fn binary_stl() -> Vec<u8> {
@@ -189,7 +186,7 @@ proptest! {
 
     #[test]
     fn beaten_obj_survives(blows in blows()) {
-        survives("thing.obj", &beaten(obj().as_bytes(), &blows));
+        survives("thing.obj", &beaten(obj_text(&cube()).as_bytes(), &blows));
     }
 
     #[test]
@@ -252,13 +249,16 @@ proptest! {
 #[test]
 fn sound_files_pass_the_same_gate() {
     assert!(
-        survives("a.urdf", URDF.as_bytes()) && survives("a.obj", obj().as_bytes()) && survives("a.stl", &binary_stl())
+        survives("a.urdf", URDF.as_bytes())
+            && survives("a.obj", obj_text(&cube()).as_bytes())
+            && survives("a.stl", &binary_stl())
     );
 }
 
 #[test]
 fn every_cut_of_every_kind_survives() {
-    for (name, bytes) in [("a.urdf", URDF.as_bytes().to_vec()), ("a.obj", obj().into_bytes()), ("a.stl", binary_stl())]
+    for (name, bytes) in
+        [("a.urdf", URDF.as_bytes().to_vec()), ("a.obj", obj_text(&cube()).into_bytes()), ("a.stl", binary_stl())]
     {
         for length in (0..bytes.len()).step_by(23) {
             survives(name, &bytes[..length]);

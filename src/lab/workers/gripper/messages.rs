@@ -1,7 +1,7 @@
 //! Messages of the gripper thread: commands in, views out.
 
-use super::calibrating::{CalibrationCommand, CalibrationView};
-use super::crosstalk::{CrosstalkCommand, CrosstalkView};
+use super::calibrating::CalibrationCommand;
+use super::guided::{CalibrationView, CrosstalkCommand, CrosstalkView};
 use super::observing::ObserveRequest;
 use crate::grasping::{GraspStage, IdentificationView};
 use crate::gripper::{Listen, NotOpened};
@@ -166,14 +166,19 @@ pub struct GripperView {
     /// Name of the recognition model.
     pub model: Option<String>,
     /// A calibration.
-    pub calibration: Option<Arc<CalibrationView>>,
+    pub calibration: CalibrationView,
     /// The doctor's crosstalk test.
-    pub crosstalk: Option<Arc<CrosstalkView>>,
+    pub crosstalk: CrosstalkView,
     /// The newest lines of the board.
     pub console: Arc<[ConsoleLine]>,
 }
 
 impl GripperView {
+    /// State of the link, in a sentence; empty while disconnected.
+    pub fn link_state(&self) -> String {
+        self.link.as_ref().map(|link| link.state.sentence()).unwrap_or_default()
+    }
+
     /// True while a board is connected.
     pub fn is_connected(&self) -> bool {
         self.link.is_some()

@@ -10,18 +10,15 @@
 //! ```
 
 mod calibrating;
-mod crosstalk;
+mod guided;
 mod messages;
 mod observing;
 mod plotted;
 mod session;
 mod worker;
 
-pub use calibrating::{
-    CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, RunningCalibration,
-    SensorJobError,
-};
-pub use crosstalk::{CrosstalkCommand, CrosstalkView, RunningCrosstalk};
+pub use calibrating::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, keep_calibration};
+pub use guided::{CalibrationView, CrosstalkCommand, CrosstalkView, Guided};
 pub use messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading, TrialView};
 pub use observing::ObserveRequest;
 pub use worker::GripperWorker;

@@ -2,13 +2,12 @@
 //! opened twice.
 
 use crate::gripper::BoardStream;
-use palpate_device::doctor::{ChannelTraces, Observations, example_of, is_enough};
-use palpate_device::serial::{LinkStatus, is_running, list_ports};
+use palpate_device::doctor::{Examination, Observations};
+use palpate_device::serial::LinkStatus;
 use palpate_tactile::board::Reading;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::Instant;
 
 /// Request to observe the board for some time.
 #[derive(Clone, Debug)]
@@ -29,42 +28,27 @@ impl ObserveRequest {
 /// Observation in progress.
 pub(super) struct Observing {
     request: ObserveRequest,
-    began: Instant,
-    /// The link by then: what came before is not part of it.
-    before: LinkStatus,
-    traces: ChannelTraces,
+    look: Examination,
 }
 
 impl Observing {
+    /// Begins to observe a link that stands like this.
     pub(super) fn new(request: ObserveRequest, before: LinkStatus) -> Self {
-        Self { request, began: Instant::now(), before, traces: ChannelTraces::default() }
+        Self { request, look: Examination::begin(Some(before)) }
     }
 
     pub(super) fn add(&mut self, reading: &Reading) {
-        self.traces.add(reading);
+        self.look.add(reading);
     }
 
     /// True when the time is over or the requester stopped it.
     pub(super) fn is_over(&self) -> bool {
-        let waited_s = self.began.elapsed().as_secs_f64();
-        self.request.stop.load(Ordering::Relaxed) || is_enough(&self.traces, waited_s, self.request.seconds)
+        self.request.stop.load(Ordering::Relaxed) || self.look.is_enough(self.request.seconds)
     }
 
     /// Sends the result to the requester.
     pub(super) fn finish(self, stream: &dyn BoardStream) {
-        let mut link = stream.status();
-        link.cadence = link.cadence.since(&self.before.cadence);
-        link.reconnects = link.reconnects.saturating_sub(self.before.reconnects);
-        let observations = Observations {
-            ports: list_ports(),
-            refused: None,
-            modem_manager: is_running("ModemManager"),
-            link: Some(link),
-            listened_s: self.began.elapsed().as_secs_f64(),
-            traces: self.traces,
-            example: example_of(&stream.console()),
-        };
         // The requester may have ended.
-        let _sent = self.request.observed.send(observations);
+        let _sent = self.request.observed.send(self.look.observed(stream.status(), &stream.console()));
     }
 }

@@ -5,8 +5,7 @@ mod recognising;
 mod sensors;
 mod trials;
 
-use super::calibrating::{CalibrationSession, CalibrationView, SensorJobError};
-use super::crosstalk::CrosstalkView;
+use super::guided::{CalibrationView, CrosstalkView};
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
@@ -14,11 +13,11 @@ use crate::grasping::Row;
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
+use crate::workers::job::JobError;
 use crate::workers::live_recognition::LiveRecognition;
 use crate::workers::own_store::OwnStore;
 use crate::workers::worker::{Inbox, Publisher};
 use crate::workers::{Notice, TraceRow};
-use palpate_device::doctor::CrosstalkSession;
 use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::{PortInfo, list_ports};
 use palpate_sim::scene::Scene;
@@ -85,11 +84,9 @@ pub(super) struct GripperSession {
     begun: u64,
     watching: Option<TrialRequest>,
     ended: Option<Arc<EndedTrial>>,
-    calibrating: Option<CalibrationSession>,
+    calibration: CalibrationView,
+    crosstalk: CrosstalkView,
     observing: Vec<Observing>,
-    calibrated: Option<Result<String, SensorJobError>>,
-    crossing: Option<CrosstalkSession>,
-    crossed: CrosstalkView,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
     channels: Arc<[Channel]>,
@@ -128,11 +125,9 @@ impl GripperSession {
             begun: 0,
             watching: None,
             ended: None,
-            calibrating: None,
+            calibration: CalibrationView::default(),
+            crosstalk: CrosstalkView::default(),
             observing: Vec::new(),
-            calibrated: None,
-            crossing: None,
-            crossed: CrosstalkView::default(),
             stretch: (0, 0.0),
             channels: whole_fingers(SignalDefinition::Parts).into(),
             revision: 0,
@@ -259,12 +254,10 @@ impl GripperSession {
 
     fn disconnect(&mut self, why: &str) {
         self.end(false, Some(format!("ended early: {why}")));
-        if self.calibrating.take().is_some() {
-            self.calibrated = Some(Err(SensorJobError::Failed(format!("nothing was stored: {why}"))));
+        if self.calibration.running.take().is_some() {
+            self.calibration.ended = Some(Err(JobError::from(format!("nothing was stored: {why}")).into()));
         }
-        if let Some(crossing) = self.crossing.take() {
-            self.crossed = CrosstalkView::ended(&crossing);
-        }
+        self.end_crosstalk(Ok(()));
         self.observing.clear();
         self.connection = None;
         self.retried = None;
@@ -352,10 +345,10 @@ impl GripperSession {
         self.plot(rows);
         self.watch(reading);
         self.recognise(&row);
-        if let (Some(calibrating), Some(connection)) = (&mut self.calibrating, &self.connection)
+        if let (Some(calibrating), Some(connection)) = (&mut self.calibration.running, &self.connection)
             && let Err(cause) = calibrating.feed(reading, &connection.board)
         {
-            self.end_calibration(Some(Err(cause)));
+            self.end_calibration(Some(Err(cause.into())));
         }
         self.cross(reading);
     }
@@ -383,13 +376,6 @@ impl GripperSession {
         self.revision += 1;
         let connection = self.connection.as_ref();
         let link = connection.map(|connection| connection.gripper.stream().status());
-        let state = || link.as_ref().map(|link| link.state.sentence()).unwrap_or_default();
-        let calibration = self.calibrating.as_ref().map(|calibrating| calibrating.view(state()));
-        let calibration = CalibrationView { running: calibration, ended: self.calibrated.clone() };
-        let crosstalk = match &self.crossing {
-            Some(crossing) => CrosstalkView::running(crossing, state()),
-            None => self.crossed.clone(),
-        };
         let trial =
             self.recording.as_ref().zip(connection).map(|(recording, c)| self.trial_view(recording, c.gripper.now_s()));
         self.publisher.publish(GripperView {
@@ -409,8 +395,8 @@ impl GripperSession {
             identification: self.recognition.as_ref().and_then(LiveRecognition::view),
             recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
             model: self.model.clone(),
-            calibration: Some(Arc::new(calibration)),
-            crosstalk: Some(Arc::new(crosstalk)),
+            calibration: self.calibration.clone(),
+            crosstalk: self.crosstalk.clone(),
             console: connection.map(|c| c.gripper.stream().console()).unwrap_or_default().into(),
         });
     }

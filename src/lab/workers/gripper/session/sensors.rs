@@ -4,16 +4,14 @@ use super::{Connection, GripperSession};
 use crate::gripper::Gripper;
 use crate::recording::REST_S;
 use crate::workers::Notice;
-use crate::workers::gripper::calibrating::{
-    CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, SensorJobError,
-};
-use crate::workers::gripper::crosstalk::{CrosstalkCommand, CrosstalkView};
+use crate::workers::gripper::calibrating::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
+use crate::workers::gripper::guided::{CrosstalkCommand, Guided};
 use crate::workers::gripper::plotted::Plotted;
-use palpate_device::doctor::CrosstalkSession;
+use crate::workers::job::JobError;
+use palpate_device::doctor::{CrosstalkTest, DoctorError};
 use palpate_tactile::board::Reading;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Readings older than this are stale (s).
 const STALE_S: f64 = 2.0;
@@ -109,13 +107,16 @@ impl GripperSession {
 
     pub(super) fn calibrate(&mut self, command: &CalibrationCommand) {
         match command {
-            CalibrationCommand::Begin(plan) => self.begin_calibration(plan),
-            CalibrationCommand::Stop => self.end_calibration(None),
+            CalibrationCommand::Begin(plan) => return self.begin_calibration(plan),
+            CalibrationCommand::Stop => return self.end_calibration(None),
+            _ => {}
+        }
+        let Some(calibrating) = &mut self.calibration.running else { return };
+        match command {
             CalibrationCommand::Keep => {
-                let kept = match (&self.calibrating, self.store.open()) {
-                    (None, _) => return,
-                    (Some(calibrating), Ok(store)) => calibrating.keep(store),
-                    (Some(_), Err(cause)) => Some(Err(Arc::new(cause).into())),
+                let kept = match self.store.open() {
+                    Ok(store) => calibrating.keep(store),
+                    Err(cause) => Some(Err(cause.into())),
                 };
                 if let Some(kept) = kept {
                     self.end_calibration(Some(kept));
@@ -123,7 +124,6 @@ impl GripperSession {
                 }
             }
             CalibrationCommand::EmptyClose => {
-                let Some(calibrating) = &mut self.calibrating else { return };
                 match self.store.open().and_then(|store| store.calibrations().serving(None, &[])) {
                     Ok(serving) => {
                         calibrating.set_serving(serving.calibrations);
@@ -132,24 +132,22 @@ impl GripperSession {
                     Err(cause) => self.publisher.notify(Notice::Warning(cause.to_string())),
                 }
             }
-            CalibrationCommand::Take(_) | CalibrationCommand::Skip | CalibrationCommand::Undo => {
-                if let Some(calibrating) = &mut self.calibrating {
-                    calibrating.handle(command);
-                }
-            }
+            _ => calibrating.handle(command),
         }
     }
 
     fn begin_calibration(&mut self, plan: &CalibrationPlan) {
         match self.borrow_port(plan.port.as_deref()) {
-            Err(cause) => self.calibrated = Some(Err(cause)),
-            Ok(()) => self.calibrating = Some(CalibrationSession::new(plan.clone(), CalibrationSetup::default())),
+            Err(cause) => self.calibration.ended = Some(Err(cause.into())),
+            Ok(()) => {
+                self.calibration.running = Some(CalibrationSession::new(plan.clone(), CalibrationSetup::default()));
+            }
         }
     }
 
     /// Job that uses the fingers now, in a sentence.
     pub(super) fn occupied(&self) -> Option<&'static str> {
-        match (&self.recording, &self.calibrating, &self.crossing) {
+        match (&self.recording, &self.calibration.running, &self.crosstalk.running) {
             (Some(_), _, _) => Some("a trial is running: end it first"),
             (None, Some(_), _) => Some("a calibration is running: end it first, in the panel Calibration"),
             (None, None, Some(_)) => Some("a crosstalk test is running: end it first, in the panel Doctor"),
@@ -158,9 +156,9 @@ impl GripperSession {
     }
 
     /// Takes the fingers for a calibration or test; opens a port where none is open.
-    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), SensorJobError> {
+    fn borrow_port(&mut self, port: Option<&Path>) -> Result<(), JobError> {
         if let Some(occupied) = self.occupied() {
-            return Err(SensorJobError::Failed(occupied.to_owned()));
+            return Err(occupied.into());
         }
         if self.connection.is_some() {
             return Ok(());
@@ -185,9 +183,8 @@ impl GripperSession {
         }
     }
 
-    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, SensorJobError>>) {
-        self.calibrating = None;
-        self.calibrated = ended;
+    pub(super) fn end_calibration(&mut self, ended: Option<Result<String, JobError>>) {
+        self.calibration = Guided { running: None, ended: ended.map(|ended| ended.map_err(Into::into)) };
         self.return_port("the calibration has ended");
     }
 
@@ -196,38 +193,39 @@ impl GripperSession {
     pub(super) fn look_for_crosstalk(&mut self, command: CrosstalkCommand) {
         match command {
             CrosstalkCommand::Begin(port) => match self.borrow_port(port.as_deref()) {
-                Err(cause) => self.crossed = CrosstalkView { ended: Some(Err(cause)), ..CrosstalkView::default() },
-                Ok(()) => self.crossing = Some(CrosstalkSession::default()),
+                Err(cause) => self.crosstalk.ended = Some(Err(cause.into())),
+                Ok(()) => self.crosstalk.running = Some(CrosstalkTest::default()),
             },
             CrosstalkCommand::Skip => {
-                self.crossing.iter_mut().for_each(CrosstalkSession::skip);
+                self.crosstalk.running.iter_mut().for_each(CrosstalkTest::skip);
                 self.end_complete_crosstalk();
             }
-            CrosstalkCommand::Stop => self.end_crosstalk(None),
+            CrosstalkCommand::Stop => self.end_crosstalk(Ok(())),
         }
     }
 
     /// Passes a reading to the running test; ends the test when it is complete.
     pub(super) fn cross(&mut self, reading: &Reading) {
-        let (Some(crossing), Some(connection)) = (&mut self.crossing, &self.connection) else { return };
-        match crossing.feed(reading, &connection.board) {
+        let (Some(test), Some(connection)) = (&mut self.crosstalk.running, &self.connection) else { return };
+        match test.feed(reading, &connection.board) {
             Ok(()) => self.end_complete_crosstalk(),
-            Err(cause) => self.end_crosstalk(Some(cause.into())),
+            failed => self.end_crosstalk(failed),
         }
     }
 
     fn end_complete_crosstalk(&mut self) {
-        if self.crossing.as_ref().is_some_and(CrosstalkSession::is_over) {
-            self.end_crosstalk(None);
+        if self.crosstalk.running.as_ref().is_some_and(CrosstalkTest::is_over) {
+            self.end_crosstalk(Ok(()));
         }
     }
 
-    fn end_crosstalk(&mut self, cause: Option<SensorJobError>) {
-        let Some(crossing) = self.crossing.take() else { return };
-        self.crossed = CrosstalkView::ended(&crossing);
-        if let Some(cause) = cause {
-            self.crossed.ended = Some(Err(cause));
-        }
+    pub(super) fn end_crosstalk(&mut self, outcome: Result<(), DoctorError>) {
+        let Some(test) = self.crosstalk.running.take() else { return };
+        self.crosstalk.ended = Some(match outcome {
+            Err(cause) => Err(JobError::from(cause).into()),
+            Ok(()) if test.is_begun() => Ok(test),
+            Ok(()) => Err(JobError::from("no readings from the board").into()),
+        });
         self.return_port("the crosstalk test has ended");
     }
 }

@@ -19,7 +19,7 @@ impl GripperSession {
         let Some(connection) = &mut self.connection else { return };
         let events = connection.segmenter.push(reading);
         // Movements for a calibration or a test are no grasps.
-        let free = self.calibrating.is_none() && self.crossing.is_none();
+        let free = self.calibration.running.is_none() && self.crosstalk.running.is_none();
         let Some(request) = self.watching.clone().filter(|_| free) else { return };
         // A trial begun by command is not ended automatically.
         if self.recording.as_ref().is_some_and(|recording| !recording.automatic) {

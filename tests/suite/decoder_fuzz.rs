@@ -1,37 +1,26 @@
-//! Random streams for the protocol decoder, and what must hold for its events whatever the stream. The same seed gives the
-//! same stream.
+//! Random bytes through the protocol decoder, and what must hold for its events whatever the stream. The same seed gives
+//! the same stream.
+//!
+//! A few seeds run with every test. `PALPATE_FUZZ_S=60 cargo test --release --test suite decoder_fuzz` runs for a minute.
 
 use palpate_device::protocol::{BoardEvent, Decoder, checksum};
+use std::time::{Duration, Instant};
 
 /// Largest number of channels of a board.
 const MOST_CHANNELS: usize = 64;
 
 /// Random stream.
 #[derive(Clone, Debug)]
-pub(crate) struct FuzzStream {
+struct FuzzStream {
     state: u64,
     now_s: f64,
     sample: u64,
     format: u64,
 }
 
-/// Rule that the decoder broke.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum BrokenRule {
-    #[error("{rule}: {event:?}")]
-    Event { rule: &'static str, event: BoardEvent },
-    #[error("cadence counts {counted} readings, {decoded} were decoded")]
-    Count {
-        /// Readings by the cadence.
-        counted: u64,
-        /// Decoded readings.
-        decoded: u64,
-    },
-}
-
 /// Decoder of a stream that checks its events.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct FuzzListener {
+struct FuzzListener {
     decoder: Decoder,
     events: Vec<BoardEvent>,
     last_s: Option<f64>,
@@ -41,7 +30,7 @@ pub(crate) struct FuzzListener {
 
 impl FuzzStream {
     /// Begins a stream.
-    pub(crate) fn new(seed: u64) -> Self {
+    fn new(seed: u64) -> Self {
         Self { state: seed, now_s: 0.0, sample: 0, format: 0 }
     }
 
@@ -58,7 +47,7 @@ impl FuzzStream {
     }
 
     /// Puts the next bytes into `out` and returns their time of arrival (s).
-    pub(crate) fn next(&mut self, out: &mut Vec<u8>) -> f64 {
+    fn next(&mut self, out: &mut Vec<u8>) -> f64 {
         out.clear();
         self.now_s += match self.below(50) {
             0 => 3.0,
@@ -133,14 +122,14 @@ impl FuzzStream {
 }
 
 impl FuzzListener {
-    /// Takes in bytes.
-    pub(crate) fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), BrokenRule> {
+    /// Takes in bytes; a rule that the decoder breaks is an error.
+    fn push(&mut self, bytes: &[u8], arrived_s: f64) -> Result<(), String> {
         self.decoder.push(bytes, arrived_s, &mut self.events);
         for event in std::mem::take(&mut self.events) {
-            self.check(&event).map_err(|rule| BrokenRule::Event { rule, event })?;
+            self.check(&event).map_err(|rule| format!("{rule}: {event:?}"))?;
         }
-        let counted = self.decoder.cadence().samples;
-        if counted == self.readings { Ok(()) } else { Err(BrokenRule::Count { counted, decoded: self.readings }) }
+        let (counted, decoded) = (self.decoder.cadence().samples, self.readings);
+        if counted == decoded { Ok(()) } else { Err(format!("cadence counts {counted} readings, not {decoded}")) }
     }
 
     fn check(&mut self, event: &BoardEvent) -> Result<(), &'static str> {
@@ -173,28 +162,33 @@ impl FuzzListener {
         }
         Ok(())
     }
-
-    /// Readings so far.
-    pub(crate) fn readings(&self) -> u64 {
-        self.readings
-    }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Resident memory of this process (kB), on Linux.
+fn resident_kb() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.split_whitespace().next()?.parse().ok()
+}
 
-    #[test]
-    fn whatever_comes_nothing_breaks() -> Result<(), BrokenRule> {
-        let mut bytes = Vec::new();
-        for seed in 0..20 {
-            let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());
-            for _ in 0..1000 {
-                let arrived_s = stream.next(&mut bytes);
-                listener.push(&bytes, arrived_s)?;
-            }
-            assert!(listener.readings() > 50, "seed {seed}: {} readings", listener.readings());
+#[test]
+fn whatever_comes_nothing_breaks() {
+    let seconds = std::env::var("PALPATE_FUZZ_S").ok().and_then(|text| text.parse::<u64>().ok());
+    let (least, chunks) = if seconds.is_some() { (1, 200_000) } else { (20, 1000) };
+    let start = Instant::now();
+    let (mut seed, mut first_kb, mut bytes) = (0, None, Vec::new());
+    while seed < least || start.elapsed() < Duration::from_secs(seconds.unwrap_or(0)) {
+        let (mut stream, mut listener) = (FuzzStream::new(seed), FuzzListener::default());
+        for chunk in 0..chunks {
+            let arrived_s = stream.next(&mut bytes);
+            let kept = listener.push(&bytes, arrived_s);
+            assert!(kept.is_ok(), "seed {seed}, chunk {chunk}: {kept:?}");
         }
-        Ok(())
+        assert!(listener.readings > 50, "seed {seed}: {} readings", listener.readings);
+        // Alone, the decoder takes no more memory with time than the allocator does.
+        if let Some(now_kb) = resident_kb().filter(|_| seconds.is_some()) {
+            let first = *first_kb.get_or_insert(now_kb);
+            assert!(now_kb <= first + 16_384, "memory grew from {first} kB to {now_kb} kB by seed {seed}");
+        }
+        seed += 1;
     }
 }
