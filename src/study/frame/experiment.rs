@@ -148,3 +148,13 @@ pub enum StudyError {
     #[error("stopped")]
     Stopped,
 }
+
+impl StudyError {
+    /// Error of a fit of a method.
+    pub(crate) fn of_fit(method: &str, cause: LearnError) -> Self {
+        match cause {
+            LearnError::Stopped => Self::Stopped,
+            cause @ LearnError::Refused(_) => Self::Fit { method: method.to_owned(), cause },
+        }
+    }
+}

@@ -302,7 +302,7 @@ fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
             let (is_last, (other, from)) = (grasps == at.min(most(kind)), other(way));
             let is_wanted = is_last && way.combined == FEEDBACK && (other, from) != (way, grasps);
             let found = || (named(kind), name(grasps), kind.with((other, if from == 0 { grasps } else { from })));
-            is_wanted.then(found).into_iter().collect()
+            is_wanted.then(found)
         })
     };
     let rising = gains(STEADY, &|to| format!("from one to {to} grasps"), &|way| (way, 1));

@@ -30,9 +30,8 @@ mod training_size;
 pub(crate) use answers::Pool;
 pub use bench::StudyData;
 pub(crate) use in_short::sections_in_short;
-pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
+pub use plan::{DataWanted, STUDY_PRESET, StudyPlan};
 pub(crate) use stored::sections;
-pub use stored::stored_report;
 pub use study::{PaperStudy, is_current, study_fingerprint};
 
 /// All studies of the paper, in the order of its figures.
@@ -53,33 +52,3 @@ pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
 pub fn paper_study(key: &str) -> Option<&'static dyn PaperStudy> {
     PAPER_STUDIES.iter().copied().find(|study| study.card().key == key)
 }
-
-/// Name and purpose of a study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StudyCard {
-    /// Key on the command line and in files.
-    pub key: &'static str,
-    /// Display name.
-    pub title: &'static str,
-    /// What it shows, in a sentence without full stop.
-    pub about: &'static str,
-    /// Figure or section of the paper.
-    pub paper: &'static str,
-    /// CPU time of the full form, without collecting grasps.
-    pub budget: &'static str,
-}
-
-impl StudyCard {
-    /// True for a study that the paper has, or calls future work.
-    pub fn is_of_the_paper(&self) -> bool {
-        self.paper != OWN
-    }
-
-    /// Where it comes from: `Fig. 7 of the paper`.
-    pub fn origin(&self) -> String {
-        if self.is_of_the_paper() { format!("{} of the paper", self.paper) } else { "our own methods".to_owned() }
-    }
-}
-
-/// Section of the paper of a study of our own methods.
-const OWN: &str = "none: our own methods";

@@ -6,7 +6,7 @@ mod new_objects;
 mod novelty;
 mod questions;
 
-use super::answers::judge_answers;
+use super::answers::{judge_answers, mean};
 use super::emulated_grasps::EmulatedGrippers;
 use super::prelude::*;
 use guided::{GuidedCase, GuidedRounds, guided};
@@ -167,7 +167,7 @@ impl Study for Recognition {
         key: "recognition",
         title: "Recognition beyond the paper",
         about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
-        paper: OWN,
+        paper: OWN_METHODS,
         budget: "about 120 CPU minutes",
     };
 
@@ -348,9 +348,7 @@ impl Reached {
 /// What the models of the rows cost, means over draws.
 fn costs(all: &[Draws]) -> StudyTable {
     let mean = |(_, parts): &Draws, of: fn(&ModelAnswers) -> Option<f64>| -> Cell {
-        let all: Option<Vec<f64>> = parts.iter().map(|part| of(&part.one)).collect();
-        let all = all.filter(|all| !all.is_empty());
-        all.map(|all| all.iter().sum::<f64>() / all.len() as f64).into()
+        mean(parts.iter().map(|part| &part.one), of).into()
     };
     TableRows::new("costs", "Cost of the models", all).columns(&[
         Column("grasps", "", &|row| row.0.0.name.into()),
