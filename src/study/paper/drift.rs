@@ -111,8 +111,7 @@ fn zeroed(data: &Dataset) -> Dataset {
 fn read_again(bench: &StudyData<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Dataset, StudyError> {
     let mut read = data.clone();
     for example in &mut read.examples {
-        let missing = || StudyError::Missing("simulated grasps".to_owned());
-        let trial = bench.simulated(example.id)?.ok_or_else(missing)?;
+        let trial = bench.simulated(example.id)?.ok_or_else(|| StudyError::missing("simulated grasps"))?;
         let clean = SensorView::default().signals(&trial).map_err(DatasetError::Layout)?;
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         example.grasp = Arc::new(sequence_of(&settings.apply(&clean, noise_seed(&trial.header)).until(end)));

@@ -145,7 +145,7 @@ impl Study for Grasps {
         released_rounds.retain(|round| round.iter().all(|k| !learned.contains(&released.examples[*k].content)));
         let anew_rounds = placed_anew(&test);
         let Some(in_order) = released.relabelled(&test.labels) else {
-            return Err(StudyError::Missing("the same objects in both ways to place them".to_owned()));
+            return Err(StudyError::missing("the same objects in both ways to place them"));
         };
         let mut courses = Vec::new();
         for (placed, data, rounds) in [(ANEW, &test, &anew_rounds), (LEFT, &in_order, &released_rounds)] {

@@ -17,7 +17,8 @@ const MINIMAL: f64 = 0.02;
 /// Layout and signals of perfect sensors.
 impl Factor for SensorView {
     fn name(&self) -> String {
-        if are_of_parts(self) { self.layout.clone() } else { format!("{} {}", self.layout, self.signals.name()) }
+        let Self { layout, signals, .. } = self;
+        if *signals == SignalDefinition::Parts { layout.clone() } else { format!("{layout} {}", signals.name()) }
     }
 }
 
@@ -34,8 +35,8 @@ fn views() -> Vec<SensorView> {
 }
 
 /// True for what can be built.
-fn are_of_parts(view: &SensorView) -> bool {
-    view.signals == SignalDefinition::Parts
+fn is_of_parts(row: &&Row<SensorView>) -> bool {
+    row.kind.factor.signals == SignalDefinition::Parts
 }
 
 /// Number of channels on both fingers.
@@ -57,10 +58,10 @@ impl Crossing for Layouts {
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<SensorView>> {
         crossed(plan, &views(), &MODELS, |Kind { sensors, method, factor }| {
-            let (of_parts, simple) = (are_of_parts(factor), [SIMPLEST, "C1+F"].contains(&factor.layout.as_str()));
+            let of_parts = factor.signals == SignalDefinition::Parts;
+            let simple = [SIMPLEST, "C1+F"].contains(&factor.layout.as_str());
             if method.recipe.is_none() {
-                let is_wanted = of_parts || *sensors != SensorModel::PhysicalLike;
-                return if is_wanted { plan.pick(PARTS, 1, 1) } else { 0 };
+                return if of_parts || *sensors != SensorModel::PhysicalLike { plan.pick(PARTS, 1, 1) } else { 0 };
             }
             // A network takes minutes to train: perfect sensors only, and of the simulation's own signals only C1.
             let in_full = of_parts || (simple && method.key == MODELS[0]);
@@ -70,11 +71,11 @@ impl Crossing for Layouts {
     }
 
     fn sets(fit: &Fit<SensorView>, bench: &StudyData<'_>) -> Result<[Dataset; 2], StudyError> {
-        let SensorView { layout, signals, .. } = fit.kind.factor.clone();
-        let sets = fit.sets(bench, |view| (view.layout, view.signals) = (layout, signals))?;
+        let sets = fit.sets(bench, |view| *view = SensorView { sensors: view.sensors, ..fit.kind.factor.clone() })?;
         if sets[0].about.object == "recorded" {
-            let what = "simulated trials: the channels of recorded and imported trials are fixed";
-            return Err(StudyError::Missing(what.to_owned()));
+            return Err(StudyError::missing(
+                "simulated trials: the channels of recorded and imported trials are fixed",
+            ));
         }
         Ok(sets)
     }
@@ -99,15 +100,10 @@ impl Crossing for Layouts {
     }
 }
 
-/// Rows of layouts of parts, of each model.
-fn of_parts(rows: &[Row<SensorView>]) -> Vec<Vec<&Row<SensorView>>> {
-    by_model(rows.iter().filter(|row| are_of_parts(&row.kind.factor)))
-}
-
 /// The best layout of parts, and the one with the fewest channels whose F1 lies inside the interval of the best.
 fn recommended(rows: &[Row<SensorView>]) -> StudyTable {
     let f1 = |row: &Row<SensorView>| row.f1.map_or(f64::NEG_INFINITY, |f1| f1.estimate);
-    let of_model = of_parts(rows).into_iter().filter_map(|own| {
+    let of_model = by_model(rows.iter().filter(is_of_parts)).into_iter().filter_map(|own| {
         let best = own.iter().copied().max_by(|a, b| f1(a).total_cmp(&f1(b)))?;
         let low = best.f1?.low;
         let inside = own.into_iter().filter(|row| f1(row) >= low);
@@ -127,7 +123,7 @@ fn recommended(rows: &[Row<SensorView>]) -> StudyTable {
 }
 
 fn simplest_is_enough(rows: &[Row<SensorView>]) -> Finding {
-    let most = of_parts(rows).into_iter().filter_map(|own| {
+    let most = by_model(rows.iter().filter(is_of_parts)).into_iter().filter_map(|own| {
         let gains = own.into_iter().filter_map(|row| Some((row, row.gain?)));
         let (row, gain) = gains.max_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))?;
         Some((format!("{}: {} over {SIMPLEST}", row.kind.model(), row.kind.factor.name()), gain))

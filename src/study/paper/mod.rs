@@ -2,10 +2,12 @@
 //! recognition reaches beyond the paper.
 //!
 //! A `Study` is a grid of cells. A cell takes a data set from the [`StudyData`]; what is found is kept, so that a
-//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a [`StudyReport`]: tables, and
-//! a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
+//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a
+//! [`StudyReport`](crate::StudyReport): tables, and a [`Finding`](crate::Finding) for each claim of the paper. Figures
+//! are drawn from the tables.
 //!
-//! To add a study, write its file and add it to [`PAPER_STUDIES`]. Those that cross factors take their parts from `rows`.
+//! To add a study, write its file and add it to [`PAPER_STUDIES`]. One that crosses sensors, methods and another factor
+//! is a `Crossing` (in `rows`), which has the rest.
 
 mod answers;
 mod bench;

@@ -100,10 +100,8 @@ impl Crossing for Modality {
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
-        let along = Along::Columns("curvature alone (κ), pressure alone (p), both (C1 to C8)", &|line| match (
-            line.text("modality"),
-            line.text("pattern"),
-        ) {
+        let columns = "curvature alone (κ), pressure alone (p), both (C1 to C8)";
+        let along = Along::Columns(columns, &|line| match (line.text("modality"), line.text("pattern")) {
             (BOTH, pattern) => pattern.to_owned(),
             (CURVATURE, pattern) => format!("κ {pattern}"),
             (_, pattern) => format!("p {pattern}"),

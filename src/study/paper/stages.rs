@@ -121,9 +121,10 @@ impl Study for Stages {
         let [train, test] = fit.sets(bench, |_| ())?;
         let [first, second] = TestPart { of: 2, part: 0, train: usize::MAX }.split(&train, plan.seed)?;
         let first_stage = |property: usize| {
-            let pair = of_property(&first, property).zip(of_property(&test, property));
-            let no_properties = || StudyError::Missing("a size and a shape of every object".to_owned());
-            pair.ok_or_else(no_properties).and_then(|(train, test)| bench.judged_model(method, &[train, test]))
+            let (train, test) = of_property(&first, property)
+                .zip(of_property(&test, property))
+                .ok_or_else(|| StudyError::missing("a size and a shape of every object"))?;
+            bench.judged_model(method, &[train, test])
         };
         let ((sizes, of_size), (shapes, of_shape)) = (first_stage(0)?, first_stage(1)?);
         let (stage_one, mut stage_two) = ([of_size, of_shape], Vec::new());
