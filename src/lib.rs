@@ -126,9 +126,9 @@
 //! | a table of the store | `TABLES` in `src/store/schema.rs`, another `SCHEMA_VERSION`, and a repository beside it |
 //! | another file format for exported trials (MCAP, NPZ, ..) | a file in `src/exchange/` and a line in [`palpate_exchange::FORMATS`] |
 //! | a background task of the window | a function in `src/lab/workers/` or `src/study/jobs/` that returns a `Job`, and the feature that owns it |
-//! | a study | an `Experiment` in a file of `src/study/`, and its arguments in `src/cli/study/` |
+//! | a study | an `Experiment` in a file of `src/study/`, a line in `src/study/all.rs` for the window, and its arguments in `src/cli/study/` |
 //! | a study of the paper | a file in `src/study/paper/` and a line in `PAPER_STUDIES`; command line and window show it |
-//! | tables of a study in the manual | its result in `assets/studies/`, a line in `src/study/generated.rs` |
+//! | full results of a study, and its tables in the manual | its file in `assets/studies/`, a line in `src/study/frame/shipped.rs` and in `src/study/generated.rs` |
 //! | a surface finish (metal, rubber, ..) | a variant in `src/geometry/finish.rs`, and its shading in `src/render/passes/solid.rs` |
 //! | a kind of thing to draw | a file in `src/render/passes/`, the shader of the same name, a line in `passes::ALL` |
 //!

@@ -163,16 +163,9 @@ fn fitted(
     settings: serde_json::Map<String, serde_json::Value>,
 ) -> Result<Model, LearnError> {
     let bar = Progress::of("training");
-    let stop = AtomicBool::new(false);
-    let fitting = Fitting {
-        seed: arguments.data.seed,
-        quick: arguments.data.quick,
-        settings,
-        second: None,
-        progress: &|share| bar.share(share),
-        stop: &stop,
-    };
-    method.train(data, &fitting)
+    let (stop, progress) = (AtomicBool::new(false), |share| bar.share(share));
+    let usual = Fitting::new(arguments.data.seed, arguments.data.quick, &stop);
+    method.train(data, &Fitting { settings, progress: &progress, ..usual })
 }
 
 /// Judges the method on splits of the data; also says on what.

@@ -222,14 +222,7 @@ impl Comparison<'_> {
 
     /// Settings of the method, without progress reports.
     fn fitting(&self) -> Fitting<'_> {
-        Fitting {
-            seed: self.seed,
-            quick: self.quick,
-            settings: serde_json::Map::new(),
-            second: self.second,
-            progress: &|_| (),
-            stop: self.interrupted,
-        }
+        Fitting { second: self.second, ..Fitting::new(self.seed, self.quick, self.interrupted) }
     }
 
     fn of_method(&self, method: &'static Method) -> Result<TestRun, ComparisonError> {

@@ -16,7 +16,7 @@ use std::sync::atomic::AtomicBool;
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 pub(crate) fn quick(seed: u64) -> Fitting<'static> {
-    Fitting { seed, quick: true, settings: serde_json::Map::new(), second: None, progress: &|_| (), stop: &NEVER }
+    Fitting::new(seed, true, &NEVER)
 }
 
 /// Synthetic grasps of four objects: contact is earlier with large ones, force rises faster with cubic ones, with noise.

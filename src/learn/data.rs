@@ -258,6 +258,16 @@ impl Dataset {
         }
     }
 
+    /// The same grasps with other channels: values from the number of a grasp and each of its rows of readings.
+    pub fn with_channels(&self, channels: Vec<String>, values: impl Fn(usize, &[f32]) -> Vec<f32>) -> Self {
+        let example = |(k, example): (usize, &Example)| {
+            let values = example.grasp.rows().flat_map(|(_, row)| values(k, row)).collect();
+            Example { grasp: Arc::new(Sequence { t_s: example.grasp.t_s.clone(), values }), ..example.clone() }
+        };
+        let examples = self.examples.iter().enumerate().map(example).collect();
+        Self { channels, examples, labels: self.labels.clone(), about: self.about.clone() }
+    }
+
     /// Renumbers classes by another list of labels; `None` if that lacks one of the classes.
     pub fn relabelled(&self, labels: &Labels) -> Option<Self> {
         let known: Option<Vec<usize>> =

@@ -22,7 +22,12 @@ pub struct Fitting<'a> {
     pub stop: &'a AtomicBool,
 }
 
-impl Fitting<'_> {
+impl<'a> Fitting<'a> {
+    /// A fit of one set with the defaults of its method, whose progress nobody sees.
+    pub fn new(seed: u64, quick: bool, stop: &'a AtomicBool) -> Self {
+        Self { seed, quick, settings: serde_json::Map::new(), second: None, progress: &|_| (), stop }
+    }
+
     /// Returns an error once the stop flag is set.
     pub fn check(&self) -> Result<(), LearnError> {
         if self.stop.load(Ordering::Relaxed) { Err(LearnError::Stopped) } else { Ok(()) }

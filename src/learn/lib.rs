@@ -51,10 +51,8 @@
 //!         .collect(),
 //!     ..Dataset::default()
 //! };
-//! let (progress, stop) = (|_| {}, AtomicBool::new(false));
-//! let settings = Default::default();
-//! let fitting = Fitting { seed: 1, quick: true, settings, second: None, progress: &progress, stop: &stop };
-//! let model = method("decision-tree").expect("in METHODS").train(&data, &fitting)?;
+//! let stop = AtomicBool::new(false);
+//! let model = method("decision-tree").expect("in METHODS").train(&data, &Fitting::new(1, true, &stop))?;
 //! let verdict = model.recogniser.recognise(&grasp(1.0), None);
 //! assert_eq!(verdict.pmf.top().0, 1);
 //! # Ok::<(), palpate_learn::LearnError>(())

@@ -27,6 +27,18 @@ pub enum MethodKind {
     Further,
 }
 
+impl MethodKind {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Network => "network",
+            Self::Single => "single model",
+            Self::Ensemble => "ensemble",
+            Self::Further => "further",
+        }
+    }
+}
+
 type Fit = fn(&Dataset, &Fitting<'_>) -> Result<Box<dyn Recogniser>, LearnError>;
 type Load = fn(&ModelCard, &Arrays) -> Result<Box<dyn Recogniser>, ModelError>;
 

@@ -66,8 +66,7 @@ pub fn search(
         for (fold, split) in splits.iter().enumerate() {
             progress(n * FOLDS + fold, points.len() * FOLDS);
             let (train, left_out) = (data.part(&split.train), data.part(&split.test));
-            let fitting =
-                Fitting { seed, quick, settings: settings.clone(), second: None, progress: &|_| (), stop: &stop };
+            let fitting = Fitting { settings: settings.clone(), ..Fitting::new(seed, quick, &stop) };
             let recogniser = (method.fit)(&train, &fitting)?;
             let answers = answer(recogniser.as_ref(), &left_out);
             pairs.extend(answers.truth.iter().zip(&answers.verdicts).map(|(t, v)| (*t, Some(v.pmf.top().0))));

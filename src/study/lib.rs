@@ -18,9 +18,11 @@
 //! | 1 | [`paper`] | the studies of the paper |
 //! | 2 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
 //! | 3 | `generated` | sections of manual and README, written from stored results |
-//! | 3 | [`jobs`] | background tasks of the window |
+//! | 3 | `all` | the list of all studies |
+//! | 4 | [`jobs`] | background tasks of the window |
 
 pub mod accuracy;
+mod all;
 mod effects;
 mod finger_fit;
 mod frame;
@@ -32,19 +34,20 @@ mod physics_cost;
 mod shipped;
 pub mod stability;
 
+pub use all::{all_studies, listed_study};
 pub use effects::{
     AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectChange, EffectSize, ExplainedEffect,
-    Explanation, SEEN, SceneNumber, explain_effects, stored_effects,
+    Explanation, SEEN, SceneNumber, explain_effects,
 };
 pub use finger_fit::{
     Certainty, Estimate, FingerFit, FingerFitError, FingerMotion, FitWatch, MOST_STEPS, Observation,
     RecordedGraspError, RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
 };
 pub use frame::{
-    Agreement, Cell, ClaimNumber, Experiment, FigureLink, FigureMark, Finding, GeneratedSection, IntervalStrip,
-    LinkedFigure, Measuring, PERCENT, POINTS, ResultFile, ResultFileError, StoredStudy, StudyCell, StudyColumn,
-    StudyCommand, StudyError, StudyFolder, StudyOutcome, StudyProgress, StudyReport, StudyRow, StudyStep, StudyTable,
-    TrialNumbers, markdown_table, merged_units, program, run_experiment,
+    Agreement, Cell, ClaimNumber, Draw, Experiment, FigureLink, FigureMark, Finding, GeneratedSection, IntervalStrip,
+    LinkedFigure, ListedStudy, Measuring, PERCENT, POINTS, ResultFile, ResultFileError, ShownStudy, StoredStudy,
+    StudyCard, StudyCell, StudyColumn, StudyCommand, StudyError, StudyFolder, StudyOutcome, StudyProgress, StudyReport,
+    StudyRow, StudySize, StudyStep, StudyTable, TrialNumbers, markdown_table, merged_units, program, run_experiment,
 };
 pub use generated::generated_sections;
 pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};

@@ -40,9 +40,7 @@ pub(crate) fn make(which: Shipped, out: &Path, shapes: u64, poses: u64) -> Resul
     let (channels, touches) = (plan.channels()?, plan.simulate(&stop)?);
     report(format_args!("{} readings of grasps of {shapes} shapes, free and fixed", touches.len()));
     let names = SHAPES.map(|shape| shape.name().to_owned());
-    let settings = serde_json::Map::new();
-    let progress = |_share: f64| ();
-    let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &progress, stop: &stop };
+    let fitting = Fitting::new(1, false, &stop);
     let encoder = GeometryEncoder::fit(&channels, &names, &touches, &fitting)?;
     let bytes = encoder.to_bytes()?;
     let path = out.join(which.encoder_file());

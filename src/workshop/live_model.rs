@@ -132,8 +132,7 @@ pub(crate) fn make(which: Shipped, out: &Path, store: &mut Store) -> Result<(), 
     let method = method(recipe.method).ok_or("the method is gone")?;
     let settings = [("epochs".to_owned(), recipe.epochs.into())].into_iter().collect();
     let interrupted = AtomicBool::new(false);
-    let progress = |_share: f64| ();
-    let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &progress, stop: &interrupted };
+    let fitting = Fitting { settings, ..Fitting::new(1, false, &interrupted) };
     let mut model = method.train(&train, &fitting)?;
     let objects: Vec<usize> =
         (0..test.examples.len()).filter(|k| test.labels.classes[test.examples[*k].class].size.is_some()).collect();

@@ -6,12 +6,11 @@ use palpate_render::figure_svg;
 use palpate_store::Store;
 use palpate_study::accuracy::stored_accuracy;
 use palpate_study::paper::{
-    PAPER_STUDIES, PaperStudy, StudyData, StudyPlan, StudySize, is_current, paper_study, stored_report,
-    study_fingerprint,
+    PAPER_STUDIES, PaperStudy, StudyData, StudyPlan, is_current, paper_study, study_fingerprint,
 };
 use palpate_study::{
-    Cell, FigureMark, Measuring, StoredStudy, StudyError, StudyOutcome, StudyProgress, StudyReport, StudyRow,
-    StudyStep, generated_sections, merged_units, program,
+    Cell, FigureMark, Measuring, ShownStudy, StoredStudy, StudyError, StudyOutcome, StudyProgress, StudyReport,
+    StudyRow, StudySize, StudyStep, generated_sections, merged_units, program,
 };
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,7 +30,7 @@ fn tables_in_manual_and_readme_are_those_of_the_stored_results() -> TestResult {
 #[test]
 fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult {
     for study in PAPER_STUDIES {
-        let Some(stored) = stored_report(*study)? else { continue };
+        let Some(ShownStudy { stored, .. }) = study.shipped()? else { continue };
         let key = study.card().key;
         assert_eq!(stored.program, program(), "{key}: other physics; run the study again");
         let plan = StudyPlan::of_size(StudySize::Full);
@@ -44,7 +43,7 @@ fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult 
 #[test]
 fn the_stored_picture_is_that_of_the_stored_result() -> TestResult {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/studies/accuracy.svg");
-    let stored = stored_accuracy()?;
+    let stored = stored_accuracy().expect("stored");
     let linked = stored.result.figure().with_note(&stored.plain_origin());
     let drawn = figure_svg(&linked.figure, Theme::Light, linked.size)?;
     assert!(std::fs::read_to_string(path)? == drawn, "run `palpate study accuracy --out assets/studies` again");

@@ -10,8 +10,10 @@ use palpate_geometry::palette::Theme;
 use palpate_learn::metrics::Interval;
 use palpate_store::Store;
 use palpate_study::jobs::StudyRequest;
-use palpate_study::paper::{StudyPlan, StudySize, paper_study, study_fingerprint};
-use palpate_study::{Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StoredStudy, StudyReport, StudyTable};
+use palpate_study::paper::{StudyPlan, paper_study, study_fingerprint};
+use palpate_study::{
+    Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StoredStudy, StudyReport, StudySize, StudyTable,
+};
 
 const SAMPLE: StudySize = StudySize::Sample { objects: 4, trials: 6 };
 
@@ -131,7 +133,7 @@ fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     bench.until_shown(true, "A short form: do not quote its numbers.");
     // The same files as those of the command line.
     let folder = SAMPLE.folder(bench.store().path());
-    let stored = folder.read("models").unwrap().expect("a result");
+    let stored = folder.read::<StudyReport>("models").unwrap().expect("a result");
     assert!(stored.result.tables.iter().any(|table| table.rows.iter().any(|row| !row.trials.is_empty())));
     assert!(folder.has_begun("models") && folder.path().join("models.svg").is_file());
     let at = point_at(&mut bench, "Cost: ", "Click to open trial");

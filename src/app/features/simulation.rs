@@ -60,7 +60,7 @@ impl SimulationFeature {
             snapshot: None,
             accuracy: None,
             effects,
-            stored_accuracy: stored_accuracy().ok().map(|stored| stored.result),
+            stored_accuracy: stored_accuracy().map(|stored| stored.result),
             scene,
             traces: TraceHistory::default(),
             seen: None,

@@ -1,14 +1,14 @@
-//! Studies of the paper in the window: which is chosen, what of its results is shown, and which run.
+//! Studies in the window: which is chosen, what of its results is shown, and which run.
 
 use super::App;
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
 use palpate_render::figure_svg;
-use palpate_study::LinkedFigure;
 use palpate_study::jobs::{
     StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner, study_files_job, study_runner,
 };
-use palpate_study::paper::{PAPER_STUDIES, PaperStudy, StudySize, paper_study};
+use palpate_study::paper::PAPER_STUDIES;
+use palpate_study::{LinkedFigure, ListedStudy, StudySize, all_studies, listed_study};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub struct Studies {
     /// Studies whose last run has failed.
     failed: BTreeMap<String, (StudySize, JobFailure)>,
     store: PathBuf,
-    chosen: &'static dyn PaperStudy,
+    chosen: &'static dyn ListedStudy,
     /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
@@ -63,7 +63,7 @@ impl Studies {
     }
 
     /// The chosen study.
-    pub fn chosen(&self) -> &'static dyn PaperStudy {
+    pub fn chosen(&self) -> &'static dyn ListedStudy {
         self.chosen
     }
 
@@ -106,18 +106,18 @@ impl Studies {
 
     /// Chooses a study by its key.
     pub fn choose(&mut self, key: &str) {
-        if let Some(study) = paper_study(key) {
+        if let Some(study) = listed_study(key) {
             (self.chosen, self.figure) = (study, 0);
         }
     }
 
     /// Chooses the study this many places further.
     pub(in crate::app) fn step(&mut self, by: isize) {
-        let key = self.chosen.card().key;
-        let now = PAPER_STUDIES.iter().position(|study| study.card().key == key).unwrap_or(0);
-        let next = now.saturating_add_signed(by).min(PAPER_STUDIES.len() - 1);
+        let keys: Vec<&str> = all_studies().map(|study| study.card().key).collect();
+        let now = keys.iter().position(|key| *key == self.chosen.card().key).unwrap_or(0);
+        let next = now.saturating_add_signed(by).min(keys.len() - 1);
         if next != now {
-            self.choose(PAPER_STUDIES[next].card().key);
+            self.choose(keys[next]);
         }
     }
 
@@ -146,7 +146,7 @@ impl App {
         }
         for ended in studies.runner.take() {
             let StudyRequest { key, size, .. } = &*ended.command;
-            let title = paper_study(key).map_or(key.as_str(), |study| study.card().title);
+            let title = listed_study(key).map_or(key.as_str(), |study| study.card().title);
             studies.failed.remove(key);
             match ended.outcome {
                 Ok(end) => {

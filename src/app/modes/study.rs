@@ -1,4 +1,4 @@
-//! Study mode: run the studies of the paper, look at their figures, and open the trials behind them.
+//! Study mode: run studies, look at their figures, and open the trials behind them.
 
 use super::{ModeKind, split, tabs};
 use crate::app::actions::{Act, key, key_where};
@@ -6,8 +6,8 @@ use crate::app::features::App;
 use crate::app::features::view::Mode;
 use egui::{Key, Modifiers};
 use egui_tiles::{LinearDir, TileId, Tiles};
+use palpate_study::StudySize;
 use palpate_study::jobs::StudyRequest;
-use palpate_study::paper::StudySize;
 
 pub(super) const KIND: ModeKind = ModeKind {
     mode: Mode::Study,

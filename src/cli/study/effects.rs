@@ -26,11 +26,9 @@ pub(super) struct EffectsArguments {
     output: StudyOutput,
 }
 
-const QUICK_SCENES: u32 = 40;
-
 pub(super) fn run(arguments: &EffectsArguments) -> Result<(), Failure> {
     let EffectsArguments { quick, scenes, seed, output } = arguments;
-    let scenes = scenes.unwrap_or(if *quick { QUICK_SCENES } else { EffectAudit::SCENES });
+    let scenes = scenes.unwrap_or(if *quick { EffectAudit::QUICK_SCENES } else { EffectAudit::SCENES });
     let stored = output.run(&EffectAudit::new(scenes, *seed), "What auto leaves out", *quick)?;
     stored.filter(|_| output.json).map_or(Ok(()), |stored| say_json(&stored))
 }

@@ -5,8 +5,8 @@ use super::super::prelude::*;
 use super::output::{BAR, StudyOutput, whole};
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use palpate_lab::datasets::DatasetQuery;
-use palpate_study::paper::{PAPER_STUDIES, STUDY_PRESET, StudyCard, StudyData, StudyPlan, StudySize, paper_study};
-use palpate_study::{Measuring, StudyProgress, StudyStep};
+use palpate_study::paper::{PAPER_STUDIES, STUDY_PRESET, StudyData, StudyPlan, paper_study};
+use palpate_study::{Measuring, StudyCard, StudyProgress, StudySize, StudyStep};
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
 

@@ -157,14 +157,8 @@ impl LabelledTraining<'_> {
     }
 
     fn fitted(&self, data: &Dataset) -> Result<Model, LearnError> {
-        let fitting = Fitting {
-            seed: self.seed,
-            quick: self.quick,
-            settings: serde_json::Map::new(),
-            second: None,
-            progress: &|share| (self.progress)(TrainingStage::Fitting(share)),
-            stop: self.stop,
-        };
+        let progress = |share| (self.progress)(TrainingStage::Fitting(share));
+        let fitting = Fitting { progress: &progress, ..Fitting::new(self.seed, self.quick, self.stop) };
         fitting.check()?;
         self.method.train(data, &fitting)
     }

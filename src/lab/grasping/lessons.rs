@@ -138,9 +138,7 @@ impl Lessons<'_> {
             return Err(other_channels());
         }
         let progress = |share: f64| (self.progress)(LessonStage::Fitting(share));
-        let settings = serde_json::Map::new();
-        let fitting =
-            Fitting { seed: self.seed, quick: false, settings, second: None, progress: &progress, stop: self.stop };
+        let fitting = Fitting { progress: &progress, ..Fitting::new(self.seed, false, self.stop) };
         fitting.check()?;
         let mut taught = model.taught(&lessons, &fitting)?;
         taught.card.taught_from = taught_from;

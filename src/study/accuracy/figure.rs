@@ -137,8 +137,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_figure_shows_every_setting_the_default_and_the_knee() -> Result<(), serde_json::Error> {
-        let stored = stored_accuracy()?;
+    fn the_figure_shows_every_setting_the_default_and_the_knee() {
+        let stored = stored_accuracy().expect("stored");
         let figure = stored.result.figure().with_note(&stored.plain_origin()).figure;
         assert_eq!(figure.plots.len(), 4);
         let free = &figure.plots[0];
@@ -150,6 +150,5 @@ mod tests {
         assert_eq!(free.references.len(), 1);
         assert_eq!(figure.plots[3].references.len(), usize::from(stored.result.knee().is_some()));
         assert!(figure.note.contains("palpate study accuracy"));
-        Ok(())
     }
 }

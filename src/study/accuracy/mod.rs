@@ -21,7 +21,10 @@ pub use report::{
     AccuracyRow, AccuracyStudy, FAILED_SHARE, GroupCost, MethodScore, RecognitionRow, SceneGroup, Spread,
 };
 
-use super::frame::{Experiment, LinkedFigure, StoredStudy, StudyCell, StudyCommand, StudyError, StudyReport};
+use super::frame::{
+    Experiment, LinkedFigure, OWN_PHYSICS, PlainStudy, StoredStudy, StudyCard, StudyCell, StudyCommand, StudyError,
+    StudyReport, StudySize,
+};
 use measure::measure_scene;
 use palpate_geometry::DistanceField;
 use palpate_lab::grasping::posed_object;
@@ -71,9 +74,27 @@ impl StudyCell for AccuracyCell {
     }
 }
 
-/// The stored result of the full study, which manual, README and window show.
-pub fn stored_accuracy() -> Result<StoredStudy<AccuracyStudy>, serde_json::Error> {
-    StoredStudy::parse(include_str!("../../../assets/studies/accuracy.json"))
+/// The study in the list.
+pub(crate) const LISTED: PlainStudy<AccuracyExperiment> = PlainStudy {
+    card: StudyCard {
+        key: "accuracy",
+        title: "Cost and worth of accuracy",
+        about: "CPU time and error of each setting of the simulation, and what it is worth for recognition",
+        paper: OWN_PHYSICS,
+        budget: "about 17 CPU minutes",
+    },
+    of_size: |size| {
+        let plan = match size {
+            StudySize::Full => AccuracyPlan::full(),
+            StudySize::Quick | StudySize::Sample { .. } => AccuracyPlan::quick(),
+        };
+        Ok(AccuracyExperiment::new(plan)?)
+    },
+};
+
+/// The result of the full study that comes with the program, which window and manual show.
+pub fn stored_accuracy() -> Option<StoredStudy<AccuracyStudy>> {
+    StoredStudy::shipped(LISTED.card.key).ok().flatten()
 }
 
 /// The study with its objects.
@@ -111,7 +132,7 @@ impl Experiment for AccuracyExperiment {
     type Report = AccuracyStudy;
 
     fn key(&self) -> &'static str {
-        "accuracy"
+        LISTED.card.key
     }
 
     fn header(&self) -> serde_json::Value {

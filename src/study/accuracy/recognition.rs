@@ -13,7 +13,7 @@ use palpate_lab::datasets::{DatasetError, SensorView, labels_of_catalogue, seque
 use palpate_lab::grasping::{posed_object, timed_grasp};
 use palpate_learn::evaluation::answer;
 use palpate_learn::metrics::Interval;
-use palpate_learn::{Dataset, Example, Fitting, Labels, LearnError, method};
+use palpate_learn::{Dataset, Example, Fitting, Labels, method};
 use palpate_sim::objects::{BuiltIn, EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{PosePreset, Scene};
@@ -77,11 +77,8 @@ impl RecognitionData {
             if method.recipe.is_some() {
                 settings.insert("epochs".to_owned(), self.plan.epochs.into());
             }
-            let fitting = Fitting { seed: 1, quick: false, settings, second: None, progress: &|_| (), stop };
-            let recogniser = (method.fit)(&train, &fitting).map_err(|cause| match cause {
-                LearnError::Stopped => StudyError::Stopped,
-                cause @ LearnError::Refused(_) => StudyError::Fit { method: key.clone(), cause },
-            })?;
+            let fitting = Fitting { settings, ..Fitting::new(1, false, stop) };
+            let recogniser = (method.fit)(&train, &fitting).map_err(|cause| StudyError::of_fit(key, cause))?;
             let answers = answer(recogniser.as_ref(), &self.test);
             decided.insert(key.clone(), answers.verdicts.iter().map(|verdict| verdict.pmf.top().0).collect());
         }

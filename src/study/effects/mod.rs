@@ -3,7 +3,6 @@
 mod audit;
 mod explanation;
 
-pub use audit::{
-    AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectSize, SEEN, SceneNumber, stored_effects,
-};
+pub(crate) use audit::LISTED;
+pub use audit::{AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectSize, SEEN, SceneNumber};
 pub use explanation::{EffectChange, ExplainedEffect, Explanation, explain_effects};

@@ -125,6 +125,11 @@ impl Claim<'_> {
         self.on_groups(unit, all.into_iter().map(|one| (rule, vec![one])))
     }
 
+    /// Finding on gains of macro F1, all judged together by a rule.
+    pub(crate) fn on_all_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
+        self.on_groups(POINTS, [(rule, groups.into_iter().flat_map(named_gains).collect())])
+    }
+
     /// Finding on gains of macro F1, each group judged by a rule.
     pub(crate) fn on_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
         self.on_groups(POINTS, groups.into_iter().map(|group| (rule, named_gains(group))))
@@ -132,7 +137,7 @@ impl Claim<'_> {
 }
 
 /// Gains of a group, each named with it.
-pub(crate) fn named_gains((group, gains): (String, Gains)) -> Gains {
+fn named_gains((group, gains): (String, Gains)) -> Gains {
     gains.into_iter().map(|(name, gain)| (format!("{group}: {name}"), gain)).collect()
 }
 

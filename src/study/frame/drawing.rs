@@ -3,7 +3,7 @@
 use super::groups::{grouped, unique};
 use super::report::{FigureLink, FigureMark, LinkedFigure, StudyReport, StudyTable};
 use palpate_geometry::drawing::{
-    CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis,
+    CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis, ReferenceLine,
 };
 
 /// Heading of columns of shares in plots.
@@ -94,6 +94,8 @@ pub(crate) struct Facets<'a> {
     /// Width and height of files (points).
     pub(crate) size: [u32; 2],
     pub(crate) note: &'a str,
+    /// Line across the plot with a title.
+    pub(crate) reference: &'a dyn Fn(&str) -> Option<ReferenceLine>,
 }
 
 impl Facets<'_> {
@@ -108,6 +110,7 @@ impl Facets<'_> {
         columns: 2,
         size: [1080, 720],
         note: "Macro F1 after one grasp with 95 % intervals, by bootstrap over test grasps.",
+        reference: &|_| None,
     };
 
     /// The figure of a table, by the same name; none where the report lacks it.
@@ -201,7 +204,8 @@ impl<'a> LinkedPlots<'a> {
                 Along::Columns(title, _) => (named_columns(title, &names), share, false),
                 Along::Axis(axis, _) => (axis(&lines), share, false),
             };
-            self.plots.push(Plot { title, x, y, sideways, ..Plot::default() });
+            let references = (facets.reference)(&title).into_iter().collect();
+            self.plots.push(Plot { title, x, y, sideways, references, ..Plot::default() });
             let place = |name: String| names.iter().position(|own| *own == name).unwrap_or(0) as f64;
             for (number, name) in all.iter().enumerate() {
                 let shift = facets.shift[0] + facets.shift[1] * number as f64;
@@ -250,13 +254,8 @@ fn confusion_plot(
     title: &str,
     plot: usize,
 ) -> (Plot, Vec<FigureLink>) {
-    let mut classes: Vec<&str> = Vec::new();
     let names = |column: &'static str| rows.iter().map(move |row| table.text(*row, column));
-    for name in names("true").chain(names("predicted")) {
-        if !classes.contains(&name) {
-            classes.push(name);
-        }
-    }
+    let classes: Vec<&str> = unique(names("true").chain(names("predicted")));
     // Zero where nothing was confused.
     let mut values = vec![0.0; classes.len() * classes.len()];
     let mut links = Vec::new();

@@ -13,6 +13,7 @@ use palpate_sim::objects::ObjectError;
 use palpate_sim::scene::SceneError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -147,4 +148,19 @@ pub enum StudyError {
     Missing(String),
     #[error("stopped")]
     Stopped,
+}
+
+impl StudyError {
+    /// Error of something that the study needs.
+    pub(crate) fn missing(what: impl Display) -> Self {
+        Self::Missing(what.to_string())
+    }
+
+    /// Error of a fit of a method.
+    pub(crate) fn of_fit(method: &str, cause: LearnError) -> Self {
+        match cause {
+            LearnError::Stopped => Self::Stopped,
+            cause @ LearnError::Refused(_) => Self::Fit { method: method.to_owned(), cause },
+        }
+    }
 }

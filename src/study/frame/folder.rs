@@ -1,6 +1,6 @@
 //! Files of studies in a folder: finished units, results, tables and figures.
 
-use super::report::{LinkedFigure, StudyReport, StudyTable};
+use super::report::{LinkedFigure, StudyTable};
 use super::result_file::ResultFileError;
 use super::stored_study::StoredStudy;
 use palpate_lab::grasping::Shard;
@@ -59,7 +59,7 @@ impl StudyFolder {
     }
 
     /// Result of a study; none where it is not finished.
-    pub fn read(&self, key: &str) -> Result<Option<StoredStudy<StudyReport>>, ResultFileError> {
+    pub fn read<R: Serialize + DeserializeOwned>(&self, key: &str) -> Result<Option<StoredStudy<R>>, ResultFileError> {
         let path = self.result(key);
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,

@@ -1,5 +1,6 @@
 //! What a study reports: tables, findings beside the paper's claims, and figures whose points lead to trials.
 
+use super::groups::unique;
 use super::stored_study::markdown_table;
 use palpate_geometry::drawing::Figure;
 use palpate_learn::metrics::Interval;
@@ -325,6 +326,14 @@ impl From<Option<Interval>> for Cell {
 /// A column of rows of a study: heading, unit, and value of a row.
 pub(crate) struct Column<'a, R>(pub(crate) &'static str, pub(crate) &'static str, pub(crate) &'a dyn Fn(&R) -> Cell);
 
+impl<R> Clone for Column<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R> Copy for Column<'_, R> {}
+
 /// Typed rows of a table: its name, its title, and the trials behind a row.
 pub(crate) struct TableRows<'a, R> {
     name: &'a str,
@@ -414,14 +423,7 @@ impl StudyTable {
 
     /// Different texts of a column, in the order of the rows.
     pub fn texts(&self, column: &str) -> Vec<&str> {
-        let mut texts: Vec<&str> = Vec::new();
-        for row in 0..self.rows.len() {
-            let text = self.text(row, column);
-            if !texts.contains(&text) {
-                texts.push(text);
-            }
-        }
-        texts
+        unique((0..self.rows.len()).map(|row| self.text(row, column)))
     }
 
     /// Numbers of the rows with certain texts in some columns.

@@ -2,6 +2,7 @@
 //! numbers.
 
 use super::result_file::{ResultFileError, program};
+use super::shipped::shipped_json;
 use palpate_learn::REMOVED_METHODS;
 use palpate_store::{FileKind, write_whole};
 use serde::de::DeserializeOwned;
@@ -31,6 +32,11 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
     pub fn parse(json: &str) -> Result<Self, serde_json::Error> {
         let mark = |json: String, key: &&str| json.replace(key, &format!("{key} (0.1.0)"));
         serde_json::from_str(&REMOVED_METHODS.iter().fold(json.to_owned(), mark))
+    }
+
+    /// The result of the full run of a study that comes with the program; none where it has not been run in full.
+    pub fn shipped(key: &str) -> Result<Option<Self>, serde_json::Error> {
+        shipped_json(key).map(Self::parse).transpose()
     }
 
     /// Writes it, an element of a list per line.

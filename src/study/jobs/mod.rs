@@ -5,7 +5,7 @@
 //! | [`fit_job`] | recorded trials | a fitted finger | replaces |
 //! | [`recorded_trials_job`] [`study_files_job`] | | what the store and its folders hold | replaces |
 //! | [`effects_job`] | a scene | cost and change of each effect | replaces |
-//! | [`study_runner`] | a study of the paper | its result | waits |
+//! | [`study_runner`] | a study | its result | waits |
 
 mod effects;
 mod fit;

@@ -1,15 +1,12 @@
-//! Studies of the paper beside the window, on its store. Their files lie in folders beside the store; the command line
+//! Studies beside the window, on its store. Their files lie in folders beside the store; the command line
 //! continues them there, and is continued.
 
+use crate::all::{all_studies, listed_study};
 use crate::frame::{
-    LinkedFigure, Measuring, ResultFileError, StoredStudy, StudyError, StudyProgress, StudyReport, StudyStep, program,
+    LinkedFigure, ListedStudy, Measuring, ResultFileError, ShownStudy, StoredStudy, StudyError, StudyProgress,
+    StudyReport, StudySize, StudyStep, program,
 };
-use crate::paper::{
-    PAPER_STUDIES, PaperStudy, StudyData, StudyPlan, StudySize, is_current, paper_study, stored_report,
-};
-use palpate_lab::grasping::Shard;
 use palpate_lab::workers::{Job, JobError, JobFailure, JobRun, Newer, Wake, spare_threads};
-use palpate_store::Store;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -91,12 +88,10 @@ pub fn study_files_job(store: PathBuf, wake: Wake) -> Job<(), StudyFilesByKey> {
 
 /// Runs a study to its end; false where it was stopped.
 fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<'_>) -> Result<bool, JobError> {
-    let study = paper_study(&request.key).ok_or_else(|| format!("there is no study \"{}\"", request.key))?;
-    let (folder, key) = (request.size.folder(store), study.card().key);
+    let study = listed_study(&request.key).ok_or_else(|| format!("there is no study \"{}\"", request.key))?;
     if request.anew {
-        folder.forget_units(key)?;
+        request.size.folder(store).forget_units(study.card().key)?;
     }
-    let plan = StudyPlan::of_size(request.size);
     let progress = |StudyProgress { step, done, of }: StudyProgress| {
         let words = match step {
             StudyStep::Collecting => format!("simulating grasps, {done} of {of}"),
@@ -105,11 +100,7 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
         run.count(done, of, words);
     };
     let work = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
-    let bench = StudyData::new(Store::open(store)?, &plan, work);
-    let outcome = study.run(&bench, Some(&folder.units(key)), Shard::WHOLE)?;
-    let Some(stored) = outcome.whole() else { return Ok(false) };
-    folder.write(key, &stored, &stored.result.tables, study.figures(&stored.result), draw.as_ref())?;
-    Ok(true)
+    Ok(study.finish(store, request.size, work, draw.as_ref())?)
 }
 
 /// True where the finished units of a study are of another version or plan: it has to begin anew.
@@ -123,22 +114,22 @@ pub fn has_other_units(failure: &JobFailure) -> bool {
 
 fn study_files(store: &Path) -> StudyFilesByKey {
     let program = program();
-    PAPER_STUDIES.iter().map(|study| (study.card().key, files_of(store, *study, &program))).collect()
+    all_studies().map(|study| (study.card().key, files_of(store, study, &program))).collect()
 }
 
-fn files_of(store: &Path, study: &dyn PaperStudy, program: &str) -> StudyFiles {
+fn files_of(store: &Path, study: &dyn ListedStudy, program: &str) -> StudyFiles {
     let key = study.card().key;
     let mut files = StudyFiles::default();
     for size in [StudySize::Full, StudySize::Quick, StudySize::Sample { objects: 0, trials: 0 }] {
         let folder = size.folder(store);
-        match folder.read(key) {
+        match study.read(&folder) {
             Ok(Some(stored)) => files.results.push(shown(study, StudyOrigin::Run(size), stored, program)),
             Ok(None) if folder.has_begun(key) => files.begun.push(size),
             Ok(None) => {}
             Err(cause) => files.unreadable.push(cause.to_string()),
         }
     }
-    match stored_report(study) {
+    match study.shipped() {
         Ok(Some(stored)) => files.results.push(shown(study, StudyOrigin::Shipped, stored, program)),
         Ok(None) => {}
         Err(cause) => files.unreadable.push(format!("the result that comes with the program: {cause}")),
@@ -146,21 +137,20 @@ fn files_of(store: &Path, study: &dyn PaperStudy, program: &str) -> StudyFiles {
     files
 }
 
-/// A result with its figures.
+/// A result with what is known of it.
 fn shown(
-    study: &dyn PaperStudy,
+    study: &dyn ListedStudy,
     origin: StudyOrigin,
-    stored: StoredStudy<StudyReport>,
+    ShownStudy { stored, figures }: ShownStudy,
     program: &str,
 ) -> Arc<StudyResult> {
-    let is_current = |size| is_current(&stored.result, study, &StudyPlan::of_size(size));
-    let current = match origin {
-        // Samples are of many sizes.
-        StudyOrigin::Run(StudySize::Sample { .. }) => true,
-        StudyOrigin::Run(size) => is_current(size),
-        StudyOrigin::Shipped => is_current(StudySize::Full),
-    };
-    let (current, figures) = (current && stored.program == program, study.figures(&stored.result));
+    let current = stored.program == program
+        && match origin {
+            // Samples are of many sizes.
+            StudyOrigin::Run(StudySize::Sample { .. }) => true,
+            StudyOrigin::Run(size) => study.is_current(&stored.result, size),
+            StudyOrigin::Shipped => study.is_current(&stored.result, StudySize::Full),
+        };
     Arc::new(StudyResult { origin, stored, figures, current })
 }
 
@@ -194,7 +184,7 @@ mod tests {
         let draw: DrawFigure = Arc::new(|linked| Ok(linked.figure.title.clone()));
         let looks = study_files_job(store.clone(), Arc::clone(&wake));
         looks.start(());
-        assert_eq!(settled(&looks, &woken).expect("looked").expect("read").len(), PAPER_STUDIES.len());
+        assert_eq!(settled(&looks, &woken).expect("looked").expect("read").len(), all_studies().count());
         let runner = study_runner(store.clone(), draw, wake);
         let size = StudySize::Sample { objects: 4, trials: 6 };
         let request = |anew| StudyRequest { key: "models".to_owned(), size, anew };
@@ -213,6 +203,16 @@ mod tests {
         for name in ["models.json", "models.jsonl", "models.csv", "models.svg"] {
             assert!(files.path().join(name).is_file(), "{name}");
         }
+        // One that is not of the paper, and takes no grasps of the store.
+        runner.start(StudyRequest {
+            key: "effects".to_owned(),
+            size: StudySize::Sample { objects: 1, trials: 2 },
+            anew: false,
+        });
+        let end = settled(&runner, &woken).expect("ended").expect("runs");
+        let result = &end.files["effects"].results[0];
+        assert!(end.finished && result.current && !result.stored.result.tables.is_empty());
+        assert!(files.path().join("effects.svg").is_file());
         // Units of another plan are not continued, but can be forgotten.
         let other = StudySize::Sample { objects: 3, trials: 6 };
         runner.start(StudyRequest { size: other, ..request(false) });

@@ -133,6 +133,15 @@ impl StudyData<'_> {
     }
 }
 
+/// Mean over models; none where one of them has none.
+pub(super) fn mean<'a>(
+    all: impl IntoIterator<Item = &'a ModelAnswers>,
+    pick: impl Fn(&ModelAnswers) -> Option<f64>,
+) -> Option<f64> {
+    let values = all.into_iter().map(pick).collect::<Option<Vec<f64>>>().filter(|values| !values.is_empty())?;
+    Some(values.iter().sum::<f64>() / values.len() as f64)
+}
+
 /// Size of the model's file (bytes), without the digits of the time that its training took.
 fn file_size(model: &Model) -> usize {
     let mut timeless = model.clone();
@@ -290,6 +299,21 @@ impl Pool {
         }
         found.truncate(SHOWN);
         found
+    }
+
+    /// Share of the trials of two classes that were taken for the other of them; and the share of a pair of classes on average.
+    pub(super) fn taken_for_each_other(&self, names: [&str; 2]) -> Option<(Interval, f64)> {
+        let [Some(a), Some(b)] = names.map(|name| self.classes.iter().position(|class| class == name)) else {
+            return None;
+        };
+        let cells = self.confusions();
+        let count = |is: &dyn Fn(usize, usize) -> bool| -> usize {
+            cells.iter().filter(|((truth, decided), _)| is(*truth, *decided)).map(|(_, (count, _))| count).sum()
+        };
+        let taken = count(&|truth, decided| truth != decided && [a, b].contains(&truth) && [a, b].contains(&decided));
+        let wrong = count(&|truth, decided| truth != decided) as f64 / count(&|_, _| true).max(1) as f64;
+        let share = Interval::of_share(taken, count(&|truth, _| [a, b].contains(&truth)));
+        Some((share, wrong / (self.classes.len() as f64 - 1.0).max(1.0)))
     }
 
     /// Counts of decisions with some of their trials, by true and decided class.

@@ -138,17 +138,7 @@ impl<'a> StudyData<'a> {
         method: &str,
         fit: impl FnOnce(&Fitting<'_>) -> Result<Model, LearnError>,
     ) -> Result<Model, StudyError> {
-        let fitting = Fitting {
-            seed: self.plan.seed,
-            quick: self.plan.has_quick_fits(),
-            settings: serde_json::Map::new(),
-            progress: &|_| (),
-            stop: self.work.cancelled,
-            second: None,
-        };
-        fit(&fitting).map_err(|cause| match cause {
-            LearnError::Stopped => StudyError::Stopped,
-            cause @ LearnError::Refused(_) => StudyError::Fit { method: method.to_owned(), cause },
-        })
+        let fitting = Fitting::new(self.plan.seed, self.plan.has_quick_fits(), self.work.cancelled);
+        fit(&fitting).map_err(|cause| StudyError::of_fit(method, cause))
     }
 }

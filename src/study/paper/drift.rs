@@ -2,7 +2,7 @@
 //! contact, and hysteresis that the training has not seen.
 
 use super::prelude::*;
-use palpate_lab::datasets::{SensorView, noise_seed, sequence_of};
+use palpate_lab::datasets::{DatasetError, noise_seed, sequence_of};
 use palpate_sim::gripper::Phase;
 use palpate_tactile::model::PhysicalLike;
 use rand::{RngExt, SeedableRng};
@@ -47,16 +47,13 @@ pub(super) enum Reading {
 
 impl Reading {
     const DRIFTED: [Self; 2] = [Self::AsRead, Self::Zeroed];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::AsRead | Self::Hysteresis => "as read",
-            Self::Zeroed => "re-zeroed",
-        }
-    }
 }
 
 impl Factor for Reading {
+    fn name(&self) -> String {
+        if *self == Self::Zeroed { "re-zeroed" } else { "as read" }.to_owned()
+    }
+
     fn named(&self, sensors: &str, method: &str) -> String {
         match self {
             Self::AsRead | Self::Zeroed => format!("{sensors}, {}, {method}", self.name()),
@@ -67,15 +64,6 @@ impl Factor for Reading {
 
 /// Beginning of a grasp over which zeros are taken (s): fingers have hardly begun to bend.
 const ZERO_S: f32 = 0.1;
-
-/// A copy of the grasps with other readings.
-fn with_readings(data: &Dataset, read: impl Fn(usize, &Example) -> Sequence) -> Dataset {
-    let example = |(k, example): (usize, &Example)| {
-        let grasp = read(k, example);
-        Example { content: grasp.content(), grasp: Arc::new(grasp), ..example.clone() }
-    };
-    Dataset { examples: data.examples.iter().enumerate().map(example).collect(), ..data.part(&[]) }
-}
 
 /// Range of each channel: the value that one reading in a hundred exceeds.
 fn ranges(data: &Dataset) -> Vec<f32> {
@@ -91,53 +79,44 @@ fn ranges(data: &Dataset) -> Vec<f32> {
 
 /// Grasps whose channels each have a gain and a zero of their own, drawn evenly up to a level.
 fn drifted(data: &Dataset, ranges: &[f32], kind: DriftOf, level: f64, seed: u64) -> Dataset {
-    with_readings(data, |k, example| {
+    let drawn = |k: usize| -> Vec<[f32; 2]> {
         let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ k as u64);
         let mut within = || (level * (2.0 * random.random::<f64>() - 1.0)) as f32;
-        let drawn: Vec<[f32; 2]> = ranges.iter().map(|range| [within(), within() * range]).collect();
-        let mut grasp = (*example.grasp).clone();
-        for row in grasp.values.chunks_exact_mut(ranges.len().max(1)) {
-            for (value, [gain, zero]) in row.iter_mut().zip(&drawn) {
-                *value = match kind {
-                    DriftOf::Gain => *value * (1.0 + gain),
-                    DriftOf::Zero => *value + zero,
-                    DriftOf::Both => *value * (1.0 + gain) + zero,
-                };
-            }
-        }
-        grasp
-    })
+        ranges.iter().map(|range| [within(), within() * range]).collect()
+    };
+    let drawn: Vec<Vec<[f32; 2]>> = (0..data.examples.len()).map(drawn).collect();
+    let moved = |(value, [gain, zero]): (&f32, &[f32; 2])| match kind {
+        DriftOf::Gain => value * (1.0 + gain),
+        DriftOf::Zero => value + zero,
+        DriftOf::Both => value * (1.0 + gain) + zero,
+    };
+    data.with_channels(data.channels.clone(), |k, row| row.iter().zip(&drawn[k]).map(moved).collect())
 }
 
 /// Grasps less the mean of each channel at the beginning.
 fn zeroed(data: &Dataset) -> Dataset {
-    let width = data.channels.len().max(1);
-    with_readings(data, |_, example| {
-        let mut grasp = (*example.grasp).clone();
+    let zeros = |example: &Example| -> Vec<f32> {
+        let grasp = &example.grasp;
         let from = grasp.t_s.first().copied().unwrap_or_default();
         let count = grasp.t_s.iter().take_while(|t| **t <= from + ZERO_S).count().max(1);
-        let zeros: Vec<f32> = (0..width)
-            .map(|channel| grasp.values.iter().skip(channel).step_by(width).take(count).sum::<f32>() / count as f32)
-            .collect();
-        for row in grasp.values.chunks_exact_mut(width) {
-            row.iter_mut().zip(&zeros).for_each(|(value, zero)| *value -= zero);
-        }
-        grasp
-    })
+        let mean = |channel: usize| grasp.rows().take(count).map(|(_, row)| row[channel]).sum::<f32>() / count as f32;
+        (0..data.channels.len()).map(mean).collect()
+    };
+    let zeros: Vec<Vec<f32>> = data.examples.iter().map(zeros).collect();
+    let less = |k: usize, row: &[f32]| row.iter().zip(&zeros[k]).map(|(value, zero)| value - zero).collect();
+    data.with_channels(data.channels.clone(), less)
 }
 
 /// Readings of the same simulated grasps by real sensors with these faults.
 fn read_again(bench: &StudyData<'_>, data: &Dataset, settings: &PhysicalLike) -> Result<Dataset, StudyError> {
-    let mut read = Vec::new();
-    for example in &data.examples {
-        let missing = || StudyError::Missing("simulated grasps".to_owned());
-        let trial = bench.simulated(example.id)?.ok_or_else(missing)?;
-        let clean = SensorView::default().signals(&trial);
-        let clean = clean.map_err(palpate_lab::datasets::DatasetError::Layout)?;
+    let mut read = data.clone();
+    for example in &mut read.examples {
+        let trial = bench.simulated(example.id)?.ok_or_else(|| StudyError::missing("simulated grasps"))?;
+        let clean = SensorView::default().signals(&trial).map_err(DatasetError::Layout)?;
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
-        read.push(sequence_of(&settings.apply(&clean, noise_seed(&trial.header)).until(end)));
+        example.grasp = Arc::new(sequence_of(&settings.apply(&clean, noise_seed(&trial.header)).until(end)));
     }
-    Ok(with_readings(data, |k, _| read[k].clone()))
+    Ok(read)
 }
 
 /// The grasps that another data set has, with the readings of this one.
@@ -266,8 +245,11 @@ impl Study for Drift {
             });
             for (colour, model) in models.iter().enumerate() {
                 for reading in Reading::DRIFTED {
-                    let lines =
-                        figure.lines_with(&[("sensors", sensors), ("reading", reading.name()), ("model", model)]);
+                    let lines = figure.lines_with(&[
+                        ("sensors", sensors),
+                        ("reading", reading.name().as_str()),
+                        ("model", model),
+                    ]);
                     let points = LEVELS.into_iter().filter_map(|level| {
                         let condition = condition(kind, level);
                         let line = lines.iter().find(|line| line.text("drift up to") == condition)?;

@@ -55,10 +55,11 @@ impl EmulatedGrippers<'_> {
                 for number in 0..self.each {
                     let pose = seed * 1000 + number;
                     let (board, readings) = self.readings(&parts, object, pose)?;
-                    let readout = Readout::new(&board, &calibrations).map_err(missing)?;
+                    let readout = Readout::new(&board, &calibrations).map_err(StudyError::missing)?;
                     let signals = readout.derive(&readings, Some(REST_S)).signals;
-                    let signals =
-                        signals.chosen(channels).ok_or_else(|| missing("channels of the emulated gripper"))?;
+                    let signals = signals
+                        .chosen(channels)
+                        .ok_or_else(|| StudyError::missing("channels of the emulated gripper"))?;
                     let grasp = sequence_of(&self.until_release(signals));
                     let id = data.examples.len() as i64;
                     data.examples.push(Example {
@@ -92,7 +93,7 @@ impl EmulatedGrippers<'_> {
         let all = Sensor::ALL.into_iter().zip(&adaptation.sensors);
         all.map(|(sensor, adapted)| Some((sensor, adapted.calibration()?.clone())))
             .collect::<Option<_>>()
-            .ok_or_else(|| missing("an emulated gripper that can be adapted to"))
+            .ok_or_else(|| StudyError::missing("an emulated gripper that can be adapted to"))
     }
 
     /// What the board prints of one grasp.
@@ -115,7 +116,7 @@ impl EmulatedGrippers<'_> {
             faults: Vec::new(),
             seed,
         };
-        let mut gripper = EmulatedGripper::new(setup).map_err(missing)?;
+        let mut gripper = EmulatedGripper::new(setup).map_err(StudyError::missing)?;
         let (mut decoder, mut events) = (Decoder::default(), Vec::new());
         let seconds =
             REST_S + f64::from(self.scene.programme.total_ticks()) / f64::from(self.scene.timing.actuation_hz.max(1));
@@ -126,8 +127,4 @@ impl EmulatedGrippers<'_> {
         }
         Ok((decoder.board().clone(), events.into_iter().filter_map(BoardEvent::into_reading).collect()))
     }
-}
-
-fn missing(cause: impl std::fmt::Display) -> StudyError {
-    StudyError::Missing(cause.to_string())
 }

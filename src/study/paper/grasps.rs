@@ -145,7 +145,7 @@ impl Study for Grasps {
         released_rounds.retain(|round| round.iter().all(|k| !learned.contains(&released.examples[*k].content)));
         let anew_rounds = placed_anew(&test);
         let Some(in_order) = released.relabelled(&test.labels) else {
-            return Err(StudyError::Missing("the same objects in both ways to place them".to_owned()));
+            return Err(StudyError::missing("the same objects in both ways to place them"));
         };
         let mut courses = Vec::new();
         for (placed, data, rounds) in [(ANEW, &test, &anew_rounds), (LEFT, &in_order, &released_rounds)] {
@@ -302,7 +302,7 @@ fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
             let (is_last, (other, from)) = (grasps == at.min(most(kind)), other(way));
             let is_wanted = is_last && way.combined == FEEDBACK && (other, from) != (way, grasps);
             let found = || (named(kind), name(grasps), kind.with((other, if from == 0 { grasps } else { from })));
-            is_wanted.then(found).into_iter().collect()
+            is_wanted.then(found)
         })
     };
     let rising = gains(STEADY, &|to| format!("from one to {to} grasps"), &|way| (way, 1));

@@ -1,8 +1,7 @@
 //! Sections of the manual and the README on recognition in short, from the stored results of the studies.
 
-use super::stored::stored_report;
-use super::{PaperStudy, grasps, models, recognition};
-use crate::frame::{GeneratedSection, StudyReport, StudyTable, markdown_table};
+use super::{grasps, models, recognition};
+use crate::frame::{GeneratedSection, ListedStudy, ShownStudy, StudyReport, StudyTable, markdown_table};
 use crate::shipped::shipped_text;
 use palpate_learn::METHODS;
 
@@ -13,8 +12,8 @@ const NOISY: &str = "physical-like, balanced";
 const SUCCESSIVE: [f64; 2] = [3.0, 5.0];
 
 /// A table of the stored report of a study with the line on its origin; none where it has not been run in full.
-fn stored_table(study: &dyn PaperStudy) -> Result<Option<(StudyTable, String)>, serde_json::Error> {
-    let Some(stored) = stored_report(study)? else { return Ok(None) };
+fn stored_table(study: &dyn ListedStudy) -> Result<Option<(StudyTable, String)>, serde_json::Error> {
+    let Some(ShownStudy { stored, .. }) = study.shipped()? else { return Ok(None) };
     let table = stored.result.table(study.card().key).map(|(_, table)| table.clone());
     Ok(table.map(|table| (table, stored.origin())))
 }
@@ -22,7 +21,7 @@ fn stored_table(study: &dyn PaperStudy) -> Result<Option<(StudyTable, String)>, 
 /// The sections.
 pub(crate) fn sections_in_short() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let none = "Not measured in full with this version.".to_owned();
-    let beyond = stored_report(&recognition::Recognition)?;
+    let beyond = recognition::Recognition.shipped()?.map(|shown| shown.stored);
     let (methods, grasps) = (stored_table(&models::Models)?, stored_table(&grasps::Grasps)?);
     let (text, short) = match (&methods, &grasps) {
         (Some(methods), Some(grasps)) => (scores(methods, grasps), best_in_short(&methods.0, &grasps.0)),

@@ -14,56 +14,39 @@ const SIMPLEST: &str = "C1";
 /// Gain below which two layouts are as good as each other.
 const MINIMAL: f64 = 0.02;
 
-/// Signals of a layout: its name, and what they are.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Signals {
-    layout: String,
-    definition: SignalDefinition,
-}
-
-impl Signals {
-    fn of(layout: impl Into<String>, definition: SignalDefinition) -> Self {
-        Self { layout: layout.into(), definition }
-    }
-
-    /// All layouts as real sensors measure them; all with the contact pressure that only a simulation knows, without and with
-    /// force; and C1 with pressure over the hull of the contacts, as in the paper.
-    fn all() -> Vec<Self> {
-        let of = |definition, force: &'static str| {
-            CATALOGUE.iter().map(move |layout| Self::of(format!("{}{force}", layout.name), definition))
-        };
-        of(SignalDefinition::Parts, "")
-            .chain(of(SignalDefinition::Contact, ""))
-            .chain(of(SignalDefinition::Contact, "+F"))
-            .chain([Self::of(SIMPLEST, SignalDefinition::Hull)])
-            .collect()
-    }
-
-    /// True for what can be built.
-    fn are_of_parts(&self) -> bool {
-        self.definition == SignalDefinition::Parts
-    }
-
+/// Layout and signals of perfect sensors.
+impl Factor for SensorView {
     fn name(&self) -> String {
-        if self.are_of_parts() { self.layout.clone() } else { format!("{} {}", self.layout, self.definition.name()) }
-    }
-
-    /// Number of channels on both fingers.
-    fn channels(&self) -> Option<usize> {
-        let layout = SensorLayout::named(&self.layout).ok()?;
-        Some(layout.channels(&GripperModel::default(), self.definition).ok()?.len())
+        let Self { layout, signals, .. } = self;
+        if *signals == SignalDefinition::Parts { layout.clone() } else { format!("{layout} {}", signals.name()) }
     }
 }
 
-impl Factor for Signals {
-    fn named(&self, sensors: &str, method: &str) -> String {
-        format!("{sensors}, {}, {method}", self.name())
-    }
+/// All layouts as real sensors measure them; all with the contact pressure that only a simulation knows, without and with
+/// force; and C1 with pressure over the hull of the contacts, as in the paper.
+fn views() -> Vec<SensorView> {
+    let view = |layout, signals| SensorView { layout, signals, ..SensorView::default() };
+    let all = |signals, force| CATALOGUE.iter().map(move |layout| view(format!("{}{force}", layout.name), signals));
+    all(SignalDefinition::Parts, "")
+        .chain(all(SignalDefinition::Contact, ""))
+        .chain(all(SignalDefinition::Contact, "+F"))
+        .chain([view(SIMPLEST.to_owned(), SignalDefinition::Hull)])
+        .collect()
 }
 
-impl Study for Layouts {
-    type Cell = Fit<Signals>;
-    type Found = TestAnswers;
+/// True for what can be built.
+fn is_of_parts(row: &&Row<SensorView>) -> bool {
+    row.kind.factor.signals == SignalDefinition::Parts
+}
+
+/// Number of channels on both fingers.
+fn channels(row: &Row<SensorView>) -> Option<usize> {
+    let SensorView { layout, signals, .. } = &row.kind.factor;
+    Some(SensorLayout::named(layout).ok()?.channels(&GripperModel::default(), *signals).ok()?.len())
+}
+
+impl Crossing for Layouts {
+    type Factor = SensorView;
 
     const CARD: StudyCard = StudyCard {
         key: "layouts",
@@ -73,52 +56,42 @@ impl Study for Layouts {
         budget: "about 40 CPU minutes",
     };
 
-    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
-        crossed(plan, &Signals::all(), &MODELS, |Kind { sensors, method, factor }| {
-            let (of_parts, simple) = (factor.are_of_parts(), [SIMPLEST, "C1+F"].contains(&factor.layout.as_str()));
-            let is_wanted = if method.recipe.is_none() {
-                of_parts || *sensors != SensorModel::PhysicalLike
-            } else {
-                // A network takes minutes to train: perfect sensors only, and of the simulation's own signals only C1.
-                let in_full = of_parts || (simple && method.key == MODELS[0]);
-                let wanted = if plan.size == StudySize::Full { in_full } else { of_parts && simple };
-                wanted && *sensors == SensorModel::Virtual
-            };
-            if is_wanted { plan.pick(if method.recipe.is_some() { 1 } else { PARTS }, 1, 1) } else { 0 }
+    fn grid(plan: &StudyPlan) -> Vec<Fit<SensorView>> {
+        crossed(plan, &views(), &MODELS, |Kind { sensors, method, factor }| {
+            let of_parts = factor.signals == SignalDefinition::Parts;
+            let simple = [SIMPLEST, "C1+F"].contains(&factor.layout.as_str());
+            if method.recipe.is_none() {
+                return if of_parts || *sensors != SensorModel::PhysicalLike { plan.pick(PARTS, 1, 1) } else { 0 };
+            }
+            // A network takes minutes to train: perfect sensors only, and of the simulation's own signals only C1.
+            let in_full = of_parts || (simple && method.key == MODELS[0]);
+            let is_wanted = if plan.size == StudySize::Full { in_full } else { of_parts && simple };
+            usize::from(is_wanted && *sensors == SensorModel::Virtual)
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
-        let mut wanted = usual_grasps(bench.plan(), kind.sensors);
-        (wanted.view.layout, wanted.view.signals) = (kind.factor.layout.clone(), kind.factor.definition);
-        let sets = bench.split(wanted, kind.method, TestPart::usual(bench.plan(), *part))?;
+    fn sets(fit: &Fit<SensorView>, bench: &StudyData<'_>) -> Result<[Dataset; 2], StudyError> {
+        let sets = fit.sets(bench, |view| *view = SensorView { sensors: view.sensors, ..fit.kind.factor.clone() })?;
         if sets[0].about.object == "recorded" {
-            let what = "simulated trials: the channels of recorded and imported trials are fixed";
-            return Err(StudyError::Missing(what.to_owned()));
+            return Err(StudyError::missing(
+                "simulated trials: the channels of recorded and imported trials are fixed",
+            ));
         }
-        bench.judge(kind.method, &sets)
+        Ok(sets)
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
-        let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
-        compare(&mut rows, |kind| Some(kind.with(Signals::of(SIMPLEST, SignalDefinition::Parts))));
+    fn compared(rows: &mut [Row<SensorView>]) {
+        compare(rows, |kind| Some(kind.with(SensorView::default())));
+    }
+
+    fn report(plan: &StudyPlan, rows: &[Row<SensorView>]) -> (Vec<StudyTable>, Vec<Finding>) {
         let title = format!("Sensor layouts, {}; differences to {SIMPLEST}", plan.described());
-        let chosen = recommended(&rows);
-        let tables = vec![
-            Row::table("layouts", title, &rows).columns(&[
-                Row::SENSORS,
-                Row::MODEL,
-                Column("layout", "", &|row| row.kind.factor.name().into()),
-                Column("channels", "", &|row| row.kind.factor.channels().into()),
-                Row::F1,
-                Row::ACCURACY,
-                Row::gain("F1 against C1"),
-                Row::HOLM,
-                Row::TESTED,
-            ]),
-            recommended_table(&chosen),
+        let own = [
+            Column("layout", "", &|row: &Row<SensorView>| row.kind.factor.name().into()),
+            Column("channels", "", &|row| channels(row).into()),
         ];
-        StudyReport::new(described(&rows), tables, vec![simplest_is_enough(&rows), better_than_zuo(&rows)])
+        let tables = vec![Row::scores("layouts", title, rows, &own, Some("F1 against C1")), recommended(rows)];
+        (tables, vec![simplest_is_enough(rows), better_than_zuo(rows)])
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
@@ -128,42 +101,30 @@ impl Study for Layouts {
 }
 
 /// The best layout of parts, and the one with the fewest channels whose F1 lies inside the interval of the best.
-type Recommended<'a> = [&'a Row<Signals>; 2];
-
-fn f1(row: &Row<Signals>) -> f64 {
-    row.f1.map_or(f64::NEG_INFINITY, |f1| f1.estimate)
-}
-
-fn recommended(rows: &[Row<Signals>]) -> Vec<Recommended<'_>> {
-    let channels = |row: &Row<Signals>| row.kind.factor.channels().unwrap_or(usize::MAX);
-    let of_model = by_model(rows).into_iter().filter_map(|own| {
-        let own = own.into_iter().filter(|row| row.kind.factor.are_of_parts());
-        let best = own.clone().max_by(|a, b| f1(a).total_cmp(&f1(b)))?;
+fn recommended(rows: &[Row<SensorView>]) -> StudyTable {
+    let f1 = |row: &Row<SensorView>| row.f1.map_or(f64::NEG_INFINITY, |f1| f1.estimate);
+    let of_model = by_model(rows.iter().filter(is_of_parts)).into_iter().filter_map(|own| {
+        let best = own.iter().copied().max_by(|a, b| f1(a).total_cmp(&f1(b)))?;
         let low = best.f1?.low;
-        let inside = own.filter(|row| f1(row) >= low);
+        let inside = own.into_iter().filter(|row| f1(row) >= low);
         let fewest = inside.min_by(|a, b| channels(a).cmp(&channels(b)).then(f1(b).total_cmp(&f1(a))))?;
         Some([best, fewest])
     });
-    of_model.collect()
-}
-
-fn recommended_table(all: &[Recommended<'_>]) -> StudyTable {
     let title = "Fewest channels whose F1 is inside the best layout's 95 % interval";
-    TableRows::new("layouts-recommended", title, all).columns(&[
+    TableRows::new("layouts-recommended", title, &of_model.collect::<Vec<_>>()).columns(&[
         Column("sensors", "", &|[best, _]| best.kind.sensors.name().into()),
         Column("model", "", &|[best, _]| best.kind.method.key.into()),
         Column("best", "", &|[best, _]| best.kind.factor.name().into()),
         Column("F1 of the best", PERCENT, &|[best, _]| best.f1.into()),
         Column("recommended", "", &|[_, fewest]| fewest.kind.factor.name().into()),
-        Column("channels", "", &|[_, fewest]| fewest.kind.factor.channels().into()),
+        Column("channels", "", &|[_, fewest]| channels(fewest).into()),
         Column("F1", PERCENT, &|[_, fewest]| fewest.f1.into()),
     ])
 }
 
-fn simplest_is_enough(rows: &[Row<Signals>]) -> Finding {
-    let most = by_model(rows).into_iter().filter_map(|own| {
-        let gains = own.into_iter().filter(|row| row.kind.factor.are_of_parts());
-        let gains = gains.filter_map(|row| Some((row, row.gain?)));
+fn simplest_is_enough(rows: &[Row<SensorView>]) -> Finding {
+    let most = by_model(rows.iter().filter(is_of_parts)).into_iter().filter_map(|own| {
+        let gains = own.into_iter().filter_map(|row| Some((row, row.gain?)));
         let (row, gain) = gains.max_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate))?;
         Some((format!("{}: {} over {SIMPLEST}", row.kind.model(), row.kind.factor.name()), gain))
     });
@@ -176,14 +137,11 @@ fn simplest_is_enough(rows: &[Row<Signals>]) -> Finding {
     claim.on_each(POINTS, Rule::AllBelow(MINIMAL), most)
 }
 
-fn better_than_zuo(rows: &[Row<Signals>]) -> Finding {
+fn better_than_zuo(rows: &[Row<SensorView>]) -> Finding {
     let gains = gains_over(rows, |kind| {
-        let other = method(MODELS[1]).filter(|_| kind.method.key == MODELS[0]);
-        let over = |method| {
-            let name = format!("{} over {}", kind.factor.name(), MODELS[1]);
-            (kind.sensors.name().to_owned(), name, Kind { method, ..kind.clone() })
-        };
-        other.map(over).into_iter().collect()
+        let method = method(MODELS[1]).filter(|_| kind.method.key == MODELS[0])?;
+        let name = format!("{} over {}", kind.factor.name(), method.key);
+        Some((kind.sensors.name().to_owned(), name, Kind { method, ..kind.clone() }))
     });
     let claim = "The macro-layer is more accurate than the network of Zuo et al.";
     let rule = "Agrees where the paired 95 % interval is above zero for every layout, disagrees where one is below";

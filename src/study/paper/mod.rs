@@ -2,10 +2,12 @@
 //! recognition reaches beyond the paper.
 //!
 //! A `Study` is a grid of cells. A cell takes a data set from the [`StudyData`]; what is found is kept, so that a
-//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a [`StudyReport`]: tables, and
-//! a [`Finding`] for each claim of the paper. Figures are drawn from the tables.
+//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a
+//! [`StudyReport`](crate::StudyReport): tables, and a [`Finding`](crate::Finding) for each claim of the paper. Figures
+//! are drawn from the tables.
 //!
-//! To add a study, write its file and add it to [`PAPER_STUDIES`]. Those that cross factors take their parts from `rows`.
+//! To add a study, write its file and add it to [`PAPER_STUDIES`]. One that crosses sensors, methods and another factor
+//! is a `Crossing` (in `rows`), which has the rest.
 
 mod answers;
 mod bench;
@@ -30,9 +32,8 @@ mod training_size;
 pub(crate) use answers::Pool;
 pub use bench::StudyData;
 pub(crate) use in_short::sections_in_short;
-pub use plan::{DataWanted, STUDY_PRESET, StudyPlan, StudySize};
+pub use plan::{DataWanted, STUDY_PRESET, StudyPlan};
 pub(crate) use stored::sections;
-pub use stored::stored_report;
 pub use study::{PaperStudy, is_current, study_fingerprint};
 
 /// All studies of the paper, in the order of its figures.
@@ -53,33 +54,3 @@ pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
 pub fn paper_study(key: &str) -> Option<&'static dyn PaperStudy> {
     PAPER_STUDIES.iter().copied().find(|study| study.card().key == key)
 }
-
-/// Name and purpose of a study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StudyCard {
-    /// Key on the command line and in files.
-    pub key: &'static str,
-    /// Display name.
-    pub title: &'static str,
-    /// What it shows, in a sentence without full stop.
-    pub about: &'static str,
-    /// Figure or section of the paper.
-    pub paper: &'static str,
-    /// CPU time of the full form, without collecting grasps.
-    pub budget: &'static str,
-}
-
-impl StudyCard {
-    /// True for a study that the paper has, or calls future work.
-    pub fn is_of_the_paper(&self) -> bool {
-        self.paper != OWN
-    }
-
-    /// Where it comes from: `Fig. 7 of the paper`.
-    pub fn origin(&self) -> String {
-        if self.is_of_the_paper() { format!("{} of the paper", self.paper) } else { "our own methods".to_owned() }
-    }
-}
-
-/// Section of the paper of a study of our own methods.
-const OWN: &str = "none: our own methods";

@@ -1,13 +1,13 @@
 //! All methods side by side (Fig. 7): scores, paired differences, and what a model costs.
 
-use super::answers::ModelCost;
 use super::prelude::*;
 use palpate_learn::comparison::in_table_order;
 
 pub(super) struct Models;
 
-/// The paper's model: its strict recipe where there is one.
-const PAPERS_MODEL: [&str; 2] = ["paper-ds-lstm", "ds-lstm"];
+/// The paper's model, strict and tuned.
+const PAPERS_MODEL: &str = "paper-ds-lstm";
+const TUNED: &str = "ds-lstm";
 
 /// Numbers of training grasps of the objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,23 +17,10 @@ pub(super) enum Balance {
     Imbalanced,
 }
 
-impl Balance {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Balanced => "balanced",
-            Self::Imbalanced => "imbalanced",
-        }
-    }
-}
-
 impl Factor for Balance {
-    fn named(&self, sensors: &str, method: &str) -> String {
-        format!("{sensors}, {}, {method}", self.name())
+    fn name(&self) -> String {
+        if *self == Self::Balanced { "balanced" } else { "imbalanced" }.to_owned()
     }
-}
-
-fn papers_model() -> Option<&'static Method> {
-    PAPERS_MODEL.into_iter().find_map(method)
 }
 
 /// True for networks that are trained many times.
@@ -43,7 +30,7 @@ fn is_costly(method: &Method) -> bool {
 
 /// True for the paper's model and what it is compared with.
 fn is_of_papers_table(method: &Method) -> bool {
-    matches!(method.kind, MethodKind::Single | MethodKind::Ensemble) || PAPERS_MODEL.contains(&method.key)
+    matches!(method.kind, MethodKind::Single | MethodKind::Ensemble) || [PAPERS_MODEL, TUNED].contains(&method.key)
 }
 
 /// Name of a kind of data in tables.
@@ -51,9 +38,8 @@ fn grasps(kind: &Kind<Balance>) -> String {
     format!("{}, {}", kind.sensors.name(), kind.factor.name())
 }
 
-impl Study for Models {
-    type Cell = Fit<Balance>;
-    type Found = TestAnswers;
+impl Crossing for Models {
+    type Factor = Balance;
 
     const CARD: StudyCard = StudyCard {
         key: "models",
@@ -63,7 +49,7 @@ impl Study for Models {
         budget: "about 100 CPU minutes",
     };
 
-    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
+    fn grid(plan: &StudyPlan) -> Vec<Fit<Balance>> {
         let methods: Vec<&str> = in_table_order().into_iter().map(|method| method.key).collect();
         crossed(plan, &[Balance::Balanced, Balance::Imbalanced], &methods, |kind| match kind.factor {
             Balance::Balanced if is_costly(kind.method) => 1,
@@ -75,7 +61,7 @@ impl Study for Models {
         })
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
+    fn sets(Fit { kind, part }: &Fit<Balance>, bench: &StudyData<'_>) -> Result<[Dataset; 2], StudyError> {
         let (plan, is_imbalanced) = (bench.plan(), kind.factor == Balance::Imbalanced);
         let train = if is_imbalanced { TRAIN * 55 / 50 } else { TRAIN };
         let part = TestPart { train, ..TestPart::usual(plan, *part) };
@@ -84,38 +70,36 @@ impl Study for Models {
             let most = train.by_class().iter().map(Vec::len).max().unwrap_or(0);
             train = train.imbalanced((40 * most).div_ceil(55)..=most, plan.seed);
         }
-        bench.judge(kind.method, &[train, test])
+        Ok([train, test])
     }
 
-    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
-        let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
-        let papers = papers_model();
+    fn compared(rows: &mut [Row<Balance>]) {
         for rows in rows.chunk_by_mut(|a, b| grasps(&a.kind) == grasps(&b.kind)) {
-            compare(rows, |kind| Some(Kind { method: papers?, ..*kind }));
+            compare(rows, |kind| Some(Kind { method: method(PAPERS_MODEL)?, ..*kind }));
         }
-        let papers = papers.map_or("", |method| method.key);
-        let title = format!("Methods on grasps that none has seen, {}; differences to {papers}", plan.described());
-        StudyReport::new(
-            described(&rows),
-            vec![Row::table("models", title, &rows).columns(&[
-                Column("grasps", "", &|row: &Row<Balance>| grasps(&row.kind).into()),
-                Row::MODEL,
-                Column("kind", "", &|row| kind_name(row.kind.method.kind).into()),
-                Row::F1,
-                Row::ACCURACY,
-                Row::gain("F1 against the paper's model"),
-                Row::HOLM,
-                Column("ECE", "", &|row| mean(row, |answers| Some(answers.ece)).into()),
-                Column("training", "CPU s", &|row| mean(row, |answers| Some(answers.cost.train_cpu_s)).into()),
-                Column("live step", "µs", &|row| mean(row, |answers| answers.cost.step_us).into()),
-                Column("whole grasp", "ms", &|row| mean(row, |answers| Some(answers.cost.answer_ms)).into()),
-                Column("model file", "kB", &|row| first(row).map(|cost| cost.bytes as f64 / 1e3).into()),
-                Column("parameters", "", &|row| first(row).map(|cost| cost.parameters as f64).into()),
-                Row::TESTED,
-                Column("remark", "", &|row| remark(row).into()),
-            ])],
-            findings(&rows),
-        )
+    }
+
+    fn report(plan: &StudyPlan, rows: &[Row<Balance>]) -> (Vec<StudyTable>, Vec<Finding>) {
+        let title =
+            format!("Methods on grasps that none has seen, {}; differences to {PAPERS_MODEL}", plan.described());
+        let table = Row::table("models", title, rows).columns(&[
+            Column("grasps", "", &|row: &Row<Balance>| grasps(&row.kind).into()),
+            Row::MODEL,
+            Column("kind", "", &|row| row.kind.method.kind.name().into()),
+            Row::F1,
+            Row::ACCURACY,
+            Row::gain("F1 against the paper's model"),
+            Row::HOLM,
+            Column("ECE", "", &|row| row.mean(|answers| Some(answers.ece)).into()),
+            Column("training", "CPU s", &|row| row.mean(|answers| Some(answers.cost.train_cpu_s)).into()),
+            Column("live step", "µs", &|row| row.mean(|answers| answers.cost.step_us).into()),
+            Column("whole grasp", "ms", &|row| row.mean(|answers| Some(answers.cost.answer_ms)).into()),
+            Column("model file", "kB", &|row| row.cost().map(|cost| cost.bytes as f64 / 1e3).into()),
+            Column("parameters", "", &|row| row.cost().map(|cost| cost.parameters as f64).into()),
+            Row::TESTED,
+            Column("remark", "", &|row| row.remark().into()),
+        ]);
+        (vec![table], findings(rows))
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
@@ -141,43 +125,14 @@ impl Study for Models {
     }
 }
 
-fn kind_name(kind: MethodKind) -> &'static str {
-    match kind {
-        MethodKind::Network => "network",
-        MethodKind::Single => "single model",
-        MethodKind::Ensemble => "ensemble",
-        MethodKind::Further => "further",
-    }
-}
-
-/// Mean over the parts; none where a part has none.
-fn mean(row: &Row<Balance>, pick: impl Fn(&ModelAnswers) -> Option<f64>) -> Option<f64> {
-    let values: Option<Vec<f64>> = row.parts.iter().filter_map(TestAnswers::answers).map(pick).collect();
-    let values = values.filter(|values| !values.is_empty())?;
-    Some(values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Cost of the model of the first part, whose size stands for all.
-fn first(row: &Row<Balance>) -> Option<&ModelCost> {
-    Some(&row.parts.iter().find_map(TestAnswers::answers)?.cost)
-}
-
-/// Reason why it could not be fitted, where it could not.
-fn remark(row: &Row<Balance>) -> &str {
-    let mut reasons = row.parts.iter().filter_map(|part| match part {
-        TestAnswers::NotFitted(reason) => Some(reason.as_str()),
-        TestAnswers::Answers(_) => None,
-    });
-    reasons.next().unwrap_or_default()
-}
-
 fn findings(rows: &[Row<Balance>]) -> Vec<Finding> {
     // Gains of the paper's model over others of each kind of data, worst first.
     let gains = |claim: &str, why: &str, factor: Balance, group: MethodKind, rule: Rule| {
         let own = rows.iter().filter(|row| row.kind.factor == factor && row.kind.method.kind == group);
-        let gains = own
-            .filter_map(|row| Some((grasps(&row.kind), (format!("over {}", row.kind.method.key), negated(row.gain?)))));
-        let mut gains: Vec<(String, Gains)> = grouped(gains);
+        let named = |row: &Row<Balance>| {
+            Some((grasps(&row.kind), (format!("over {}", row.kind.method.key), negated(row.gain?))))
+        };
+        let mut gains = grouped(own.filter_map(named));
         gains.iter_mut().for_each(|(_, gains)| gains.sort_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate)));
         Claim("V-D", claim, why).on_gains(rule, gains)
     };
@@ -209,35 +164,27 @@ fn costs(rows: &[Row<Balance>]) -> Finding {
         "Agrees where both its training and its answer to a grasp take less CPU time than those of every ensemble, disagrees where \
          both take more. The lines are the times of the dual-stage LSTM",
     );
+    let cost = |row: &Row<Balance>| -> Option<[f64; 2]> {
+        let answer_ms = row.mean(|answers| Some(answers.cost.answer_ms))?;
+        Some([row.mean(|answers| Some(answers.cost.train_cpu_s))?, answer_ms])
+    };
     let costs = |is_wanted: &dyn Fn(&Method) -> bool| -> Vec<(&str, [f64; 2])> {
         let own = rows.iter().filter(|row| grasps(&row.kind) == grasps(&rows[0].kind) && is_wanted(row.kind.method));
-        let cost = |row: &Row<Balance>| {
-            let answer_ms = mean(row, |answers| Some(answers.cost.answer_ms))?;
-            Some((row.kind.method.key, [mean(row, |answers| Some(answers.cost.train_cpu_s))?, answer_ms]))
-        };
-        own.filter_map(cost).collect()
+        own.filter_map(|row| Some((row.kind.method.key, cost(row)?))).collect()
     };
-    let own = costs(&|method| papers_model().is_some_and(|papers| papers.key == method.key));
-    let ensembles = costs(&|method| method.kind == MethodKind::Ensemble);
+    let papers = costs(&|method| method.key == PAPERS_MODEL);
+    let (mut measured, mut verdicts) = (Vec::new(), Vec::new());
+    for (at, what, unit) in [(0, "training", "CPU s"), (1, "answer to a grasp", "ms")] {
+        for (key, cost) in costs(&|method| method.kind == MethodKind::Ensemble) {
+            let Some((_, papers)) = papers.first() else { continue };
+            measured.push(ClaimNumber::new(format!("{key}: {what}"), Some(cost[at]), unit, papers[at]));
+            verdicts.push(if papers[at] < cost[at] { Agreement::Agrees } else { Agreement::Disagrees });
+        }
+    }
     let sentences = [
         "Every ensemble takes more CPU time than the paper's model, for both.",
         "Some ensembles take more CPU time than the paper's model, others less.",
         "Every ensemble takes less CPU time than the paper's model, for both.",
     ];
-    let ([(_, papers)], false) = (own.as_slice(), ensembles.is_empty()) else {
-        return claim.finding(Vec::new(), Agreement::NotMeasured, sentences);
-    };
-    let measured =
-        [("training", "CPU s"), ("answer to a grasp", "ms")].into_iter().enumerate().flat_map(|(at, (what, unit))| {
-            ensembles
-                .iter()
-                .map(move |(key, cost)| ClaimNumber::new(format!("{key}: {what}"), Some(cost[at]), unit, papers[at]))
-        });
-    let cheaper = ensembles.iter().flat_map(|(_, cost)| [papers[0] < cost[0], papers[1] < cost[1]]);
-    let verdict = match unique(cheaper).as_slice() {
-        [true] => Agreement::Agrees,
-        [false] => Agreement::Disagrees,
-        _ => Agreement::Partly,
-    };
-    claim.finding(measured.collect(), verdict, sentences)
+    claim.finding(measured, Agreement::of_all(verdicts), sentences)
 }

@@ -1,41 +1,11 @@
 //! What a study is to run on: its size, grasps, sensors and seed.
 
-use crate::frame::{StudyCommand, StudyFolder};
+use crate::frame::{StudyCommand, StudySize};
 use palpate_lab::datasets::{Cut, DatasetQuery, PhysicsVersion, SensorView};
 use palpate_learn::Method;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::model::SensorModel;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
-
-/// Amount of work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StudySize {
-    /// The full form, whose results are quoted.
-    Full,
-    /// Less than a minute: fewer grasps, small networks, few epochs.
-    Quick,
-    /// A few objects and grasps, to test the program.
-    Sample {
-        /// Number of objects.
-        objects: usize,
-        /// Grasps of each.
-        trials: usize,
-    },
-}
-
-impl StudySize {
-    /// Folder beside a store for studies of this size.
-    pub fn folder(self, store: &Path) -> StudyFolder {
-        StudyFolder::new(store.with_file_name(match self {
-            Self::Full => "studies",
-            Self::Quick => "studies-quick",
-            Self::Sample { .. } => "studies-sample",
-        }))
-    }
-}
 
 /// Grasps that a study wants, and the sensors that it reads them through.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,16 +1,79 @@
 //! Studies that cross factors: fits of methods to grasps read by sensors, pooled over parts into rows, and compared in pairs.
 
-use super::StudyPlan;
-use super::answers::{PARTS, Pool, TestAnswers};
-use crate::frame::{Column, Gains, PERCENT, StudyCell, TableRows, grouped, unique};
+use super::answers::{ModelAnswers, ModelCost, PARTS, Pool, TestAnswers, TestPart, mean, usual_grasps};
+use super::bench::StudyData;
+use super::plan::StudyPlan;
+use super::study::Study;
+use crate::frame::{
+    Column, Finding, Gains, LinkedFigure, PERCENT, StudyCard, StudyCell, StudyError, StudyReport, StudyTable,
+    TableRows, grouped, unique,
+};
+use palpate_lab::datasets::SensorView;
 use palpate_learn::metrics::{Interval, holm};
-use palpate_learn::{Method, method};
+use palpate_learn::{Dataset, Method, method};
 use palpate_tactile::model::SensorModel;
 
+/// A study that crosses sensors, methods and a factor: every fit is judged, and compared with a reference.
+pub(super) trait Crossing: Sync {
+    /// What it varies beside sensors and methods.
+    type Factor: Factor;
+
+    /// Name and purpose.
+    const CARD: StudyCard;
+
+    /// Fits, in the order of work.
+    fn grid(plan: &StudyPlan) -> Vec<Fit<Self::Factor>>;
+
+    /// Training and test grasps of a fit.
+    fn sets(fit: &Fit<Self::Factor>, bench: &StudyData<'_>) -> Result<[Dataset; 2], StudyError>;
+
+    /// Compares each row with its reference.
+    fn compared(rows: &mut [Row<Self::Factor>]);
+
+    /// Tables and findings.
+    fn report(plan: &StudyPlan, rows: &[Row<Self::Factor>]) -> (Vec<StudyTable>, Vec<Finding>);
+
+    /// Figures, drawn from the tables.
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>>;
+}
+
+impl<S: Crossing> Study for S {
+    type Cell = Fit<S::Factor>;
+    type Found = TestAnswers;
+
+    const CARD: StudyCard = S::CARD;
+
+    fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {
+        S::grid(plan)
+    }
+
+    fn measure(fit: &Self::Cell, bench: &StudyData<'_>) -> Result<TestAnswers, StudyError> {
+        bench.judge(fit.kind.method, &S::sets(fit, bench)?)
+    }
+
+    fn report(plan: &StudyPlan, found: Vec<(Self::Cell, TestAnswers)>) -> StudyReport {
+        let mut rows = pooled(found.into_iter().map(|(fit, judged)| (fit.kind, judged)));
+        S::compared(&mut rows);
+        let (tables, findings) = S::report(plan, &rows);
+        StudyReport::new(described(&rows), tables, findings)
+    }
+
+    fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
+        S::figures(report)
+    }
+}
+
 /// What a study varies beside sensors and methods.
-pub(super) trait Factor: Clone + PartialEq + Sync {
+pub(super) trait Factor: Clone + PartialEq + Sync + 'static {
+    /// Its name; empty where [`Self::named`] needs none.
+    fn name(&self) -> String {
+        String::new()
+    }
+
     /// Name of a fit, for the names of results.
-    fn named(&self, sensors: &str, method: &str) -> String;
+    fn named(&self, sensors: &str, method: &str) -> String {
+        format!("{sensors}, {}, {method}", self.name())
+    }
 }
 
 impl Factor for () {
@@ -63,6 +126,19 @@ impl<F> Kind<F> {
 pub(super) struct Fit<F> {
     pub(super) kind: Kind<F>,
     pub(super) part: usize,
+}
+
+impl<F> Fit<F> {
+    /// Training and test set of the usual grasps, seen in a way that `view` sets.
+    pub(super) fn sets(
+        &self,
+        bench: &StudyData<'_>,
+        view: impl FnOnce(&mut SensorView),
+    ) -> Result<[Dataset; 2], StudyError> {
+        let mut wanted = usual_grasps(bench.plan(), self.kind.sensors);
+        view(&mut wanted.view);
+        bench.split(wanted, self.kind.method, TestPart::usual(bench.plan(), self.part))
+    }
 }
 
 impl<F: Factor> StudyCell for Fit<F> {
@@ -125,6 +201,21 @@ impl<F: 'static> Row<F> {
     pub(super) fn table<'a>(name: &'a str, title: impl Into<String>, rows: &'a [Self]) -> TableRows<'a, Self> {
         TableRows::new(name, title, rows).with_trials(&|row| row.pool.misjudged())
     }
+
+    /// The same with columns of the study's own between the model and its scores; `gain` names the difference to the
+    /// reference, where there is one.
+    pub(super) fn scores(
+        name: &str,
+        title: impl Into<String>,
+        rows: &[Self],
+        own: &[Column<'_, Self>],
+        gain: Option<&'static str>,
+    ) -> StudyTable {
+        let gain = gain.map_or(Vec::new(), |name| vec![Self::gain(name), Self::HOLM]);
+        let columns =
+            [&[Self::SENSORS, Self::MODEL][..], own, &[Self::F1, Self::ACCURACY], &gain, &[Self::TESTED]].concat();
+        Self::table(name, title, rows).columns(&columns)
+    }
 }
 
 impl<F> Row<F> {
@@ -132,6 +223,25 @@ impl<F> Row<F> {
     pub(super) fn of_pool(kind: Kind<F>, pool: Pool) -> Self {
         let (f1, accuracy) = (pool.f1(), pool.accuracy());
         Self { kind, parts: Vec::new(), pool, f1, accuracy, gain: None, p: None }
+    }
+
+    /// Mean over the parts; none where a part has none.
+    pub(super) fn mean(&self, pick: impl Fn(&ModelAnswers) -> Option<f64>) -> Option<f64> {
+        mean(self.parts.iter().filter_map(TestAnswers::answers), pick)
+    }
+
+    /// Cost of the model of the first part, whose size stands for all.
+    pub(super) fn cost(&self) -> Option<&ModelCost> {
+        Some(&self.parts.iter().find_map(TestAnswers::answers)?.cost)
+    }
+
+    /// Reason why it could not be fitted, where it could not.
+    pub(super) fn remark(&self) -> &str {
+        let mut reasons = self.parts.iter().filter_map(|part| match part {
+            TestAnswers::NotFitted(reason) => Some(reason.as_str()),
+            TestAnswers::Answers(_) => None,
+        });
+        reasons.next().unwrap_or_default()
     }
 }
 
@@ -151,8 +261,8 @@ pub(super) fn described<F>(rows: &[Row<F>]) -> Vec<String> {
 }
 
 /// Rows of the same sensors and method.
-pub(super) fn by_model<F>(rows: &[Row<F>]) -> Vec<Vec<&Row<F>>> {
-    let groups = grouped(rows.iter().map(|row| (row.kind.with(()), row)));
+pub(super) fn by_model<'a, F: 'a>(rows: impl IntoIterator<Item = &'a Row<F>>) -> Vec<Vec<&'a Row<F>>> {
+    let groups = grouped(rows.into_iter().map(|row| (row.kind.with(()), row)));
     groups.into_iter().map(|(_, rows)| rows).collect()
 }
 
@@ -176,16 +286,12 @@ pub(super) fn compare<F: PartialEq>(rows: &mut [Row<F>], reference: impl Fn(&Kin
 }
 
 /// Gains of macro F1 of rows over others that `others` names, each with its group and its name.
-pub(super) fn gains_over<F: PartialEq>(
-    rows: &[Row<F>],
-    others: impl Fn(&Kind<F>) -> Vec<(String, String, Kind<F>)>,
+pub(super) fn gains_over<'a, F: PartialEq, O: IntoIterator<Item = (String, String, Kind<F>)>>(
+    rows: &'a [Row<F>],
+    others: impl Fn(&'a Kind<F>) -> O,
 ) -> Vec<(String, Gains)> {
-    let of_row = |row| {
-        let gain = move |(group, name, other): (String, String, Kind<F>)| {
-            let row: &Row<F> = row;
-            Some((group, (name, row.pool.against(&find(rows, &other)?.pool)?.f1)))
-        };
-        others(&row.kind).into_iter().filter_map(gain).collect::<Vec<_>>()
-    };
-    grouped(rows.iter().flat_map(of_row))
+    let pairs = rows.iter().flat_map(|row| others(&row.kind).into_iter().map(move |other| (row, other)));
+    grouped(pairs.filter_map(|(row, (group, name, other))| {
+        Some((group, (name, row.pool.against(&find(rows, &other)?.pool)?.f1)))
+    }))
 }

@@ -94,7 +94,7 @@ fn grasps(bench: &StudyData<'_>, Case(kind): &Case) -> Result<Dataset, StudyErro
             into.about.grasps = into.examples.len();
         }
     }
-    merged.ok_or_else(|| StudyError::Missing("built-in objects".to_owned()))
+    merged.ok_or_else(|| StudyError::missing("built-in objects"))
 }
 
 impl Study for Shaken {

@@ -5,7 +5,6 @@
 //! them it gets nothing (uniform probabilities), one of both, or the true size and shape.
 
 use super::prelude::*;
-use palpate_learn::SplitPlan;
 
 pub(super) struct Stages;
 
@@ -82,35 +81,23 @@ type Estimates = [Pmf; 2];
 /// The data set with properties as further channels. Each stands on both fingers, so that grasps can still be mirrored.
 fn with_known(data: &Dataset, estimates: &[Estimates], known: ShownProperties) -> Dataset {
     let labels = &data.labels;
-    let mut channels = data.channels.clone();
-    for name in labels.sizes.iter().chain(&labels.shapes) {
-        channels.extend(["left", "right"].map(|side| format!("known_{name}_{side}")));
-    }
-    let widened = |(example, [size, shape]): (&Example, &Estimates)| {
-        let class = &labels.classes[example.class];
-        let of = |source: Source, estimate: &Pmf, truth: Option<usize>| -> Vec<f32> {
-            let count = estimate.classes();
-            match source {
-                Source::Uniform => vec![1.0 / count as f32; count],
-                Source::StageOne => estimate.probabilities().iter().map(|p| *p as f32).collect(),
-                Source::Truth => (0..count).map(|k| if truth == Some(k) { 1.0 } else { 0.0 }).collect(),
-            }
-        };
-        let properties = [of(known.size, size, class.size), of(known.shape, shape, class.shape)].concat();
-        let twice: Vec<f32> = properties.into_iter().flat_map(|p| [p, p]).collect();
-        let values = example.grasp.rows().flat_map(|(_, row)| row.iter().chain(&twice).copied().collect::<Vec<_>>());
-        let grasp = Sequence { t_s: example.grasp.t_s.clone(), values: values.collect() };
-        Example { grasp: Arc::new(grasp), ..example.clone() }
+    let both = |name: &String| ["left", "right"].map(|side| format!("known_{name}_{side}"));
+    let further = labels.sizes.iter().chain(&labels.shapes).flat_map(both);
+    let property = |source: Source, estimate: &Pmf, truth: Option<usize>| -> Vec<f32> {
+        let count = estimate.classes();
+        match source {
+            Source::Uniform => vec![1.0 / count as f32; count],
+            Source::StageOne => estimate.probabilities().iter().map(|p| *p as f32).collect(),
+            Source::Truth => (0..count).map(|k| if truth == Some(k) { 1.0 } else { 0.0 }).collect(),
+        }
     };
-    let examples = data.examples.iter().zip(estimates).map(widened).collect();
-    Dataset { channels, examples, labels: data.labels.clone(), about: data.about.clone() }
-}
-
-/// Both halves of the training grasps of each object.
-fn halves(train: &Dataset, seed: u64) -> Result<[Dataset; 2], StudyError> {
-    let splits = SplitPlan::Folds { folds: 2 }.splits(train, seed, 1)?;
-    let split = splits.first().cloned().unwrap_or_default();
-    Ok([train.part(&split.train), train.part(&split.test)])
+    let shown = |(example, [size, shape]): (&Example, &Estimates)| -> Vec<f32> {
+        let class = &labels.classes[example.class];
+        let properties = [property(known.size, size, class.size), property(known.shape, shape, class.shape)].concat();
+        properties.into_iter().flat_map(|p| [p, p]).collect()
+    };
+    let shown: Vec<Vec<f32>> = data.examples.iter().zip(estimates).map(shown).collect();
+    data.with_channels(data.channels.iter().cloned().chain(further).collect(), |k, row| [row, &shown[k]].concat())
 }
 
 impl Study for Stages {
@@ -129,15 +116,15 @@ impl Study for Stages {
         crossed(plan, &[()], &MODELS, |kind| kind.usual_parts(plan))
     }
 
-    fn measure(Fit { kind, part }: &Self::Cell, bench: &StudyData<'_>) -> Result<StagesResult, StudyError> {
-        let (plan, method) = (bench.plan(), kind.method);
-        let usual = usual_grasps(plan, kind.sensors);
-        let [train, test] = bench.split(usual, method, TestPart::usual(plan, *part))?;
-        let [first, second] = halves(&train, plan.seed)?;
+    fn measure(fit: &Self::Cell, bench: &StudyData<'_>) -> Result<StagesResult, StudyError> {
+        let (plan, method) = (bench.plan(), fit.kind.method);
+        let [train, test] = fit.sets(bench, |_| ())?;
+        let [first, second] = TestPart { of: 2, part: 0, train: usize::MAX }.split(&train, plan.seed)?;
         let first_stage = |property: usize| {
-            let pair = of_property(&first, property).zip(of_property(&test, property));
-            let no_properties = || StudyError::Missing("a size and a shape of every object".to_owned());
-            pair.ok_or_else(no_properties).and_then(|(train, test)| bench.judged_model(method, &[train, test]))
+            let (train, test) = of_property(&first, property)
+                .zip(of_property(&test, property))
+                .ok_or_else(|| StudyError::missing("a size and a shape of every object"))?;
+            bench.judged_model(method, &[train, test])
         };
         let ((sizes, of_size), (shapes, of_shape)) = (first_stage(0)?, first_stage(1)?);
         let (stage_one, mut stage_two) = ([of_size, of_shape], Vec::new());
@@ -164,34 +151,17 @@ impl Study for Stages {
         }
         let (first, mut second) = (pooled(ones), pooled(twos));
         compare(&mut second, |kind| Some(kind.with(NOTHING.to_owned())));
-        let factor = |name| Column(name, "", &|row: &Row<String>| row.kind.factor.as_str().into());
-        let properties = Row::table("stages-first", format!("Stage one, {}", plan.described()), &first).columns(&[
-            Row::SENSORS,
-            Row::MODEL,
-            factor("property"),
-            Row::F1,
-            Row::ACCURACY,
-            Row::TESTED,
-        ]);
-        let named: Vec<_> =
-            first.iter().map(|row| (format!("{}, {}", row.kind.model(), row.kind.factor), row)).collect();
-        let named: Vec<_> = named.iter().map(|(name, row)| (name.as_str(), &row.pool)).collect();
-        let confusions =
-            confusion_table("stages-confusion", &format!("Confusions of stage one, {}", plan.described()), &named);
-        let title = format!("Stage two by its extra input, {}; differences to none", plan.described());
+        let factor = |name| [Column(name, "", &|row: &Row<String>| row.kind.factor.as_str().into())];
+        let [one, confused] =
+            ["Stage one", "Confusions of stage one"].map(|what| format!("{what}, {}", plan.described()));
+        let two = format!("Stage two by its extra input, {}; differences to none", plan.described());
+        let names: Vec<String> = first.iter().map(|row| format!("{}, {}", row.kind.model(), row.kind.factor)).collect();
+        let pools: Vec<(&str, &Pool)> =
+            names.iter().map(String::as_str).zip(first.iter().map(|row| &row.pool)).collect();
         let tables = vec![
-            properties,
-            confusions,
-            Row::table("stages", title, &second).columns(&[
-                Row::SENSORS,
-                Row::MODEL,
-                factor("known"),
-                Row::F1,
-                Row::ACCURACY,
-                Row::gain("F1 against nothing"),
-                Row::HOLM,
-                Row::TESTED,
-            ]),
+            Row::scores("stages-first", one, &first, &factor("property"), None),
+            confusion_table("stages-confusion", &confused, &pools),
+            Row::scores("stages", two, &second, &factor("known"), Some("F1 against nothing")),
         ];
         StudyReport::new(described(&second), tables, findings(&first, &second))
     }
@@ -216,9 +186,10 @@ fn findings(first: &[Row<String>], second: &[Row<String>]) -> Vec<Finding> {
         Claim("V-C", &claim, rule).on_each(PERCENT, Rule::Within(papers - NEAR, papers + NEAR), found)
     });
     let gains = |claim: &str, name: &str, over: &[&str]| {
-        let gains = gains_over(second, |kind: &Kind<String>| {
+        let gains = gains_over(second, |kind| {
             let over = over.iter().filter(|_| kind.factor == name);
-            over.map(|other| (kind.model(), format!("over {other}"), kind.with((*other).to_owned()))).collect()
+            over.map(|other| (kind.model(), format!("over {other}"), kind.with((*other).to_owned())))
+                .collect::<Vec<_>>()
         });
         Claim("V-C", claim, ALL_GAIN).on_gains(Rule::AllAbove(0.0), gains)
     };

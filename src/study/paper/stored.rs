@@ -1,40 +1,18 @@
 //! The paper's claims beside our numbers, from the stored results of its studies.
 
-use super::{PAPER_STUDIES, PaperStudy};
-use crate::frame::{
-    Cell, ClaimNumber, Finding, GeneratedSection, IntervalStrip, StoredStudy, StudyReport, markdown_table,
-};
-
-/// Results of full runs by the key of their study: files of `assets/studies/paper`.
-const STORED: &[(&str, &str)] = &[
-    ("signatures", include_str!("../../../assets/studies/paper/signatures.json")),
-    ("layouts", include_str!("../../../assets/studies/paper/layouts.json")),
-    ("modality", include_str!("../../../assets/studies/paper/modality.json")),
-    ("stages", include_str!("../../../assets/studies/paper/stages.json")),
-    ("training-size", include_str!("../../../assets/studies/paper/training-size.json")),
-    ("models", include_str!("../../../assets/studies/paper/models.json")),
-    ("grasps", include_str!("../../../assets/studies/paper/grasps.json")),
-    ("drift", include_str!("../../../assets/studies/paper/drift.json")),
-    ("shaking", include_str!("../../../assets/studies/paper/shaking.json")),
-    ("recognition", include_str!("../../../assets/studies/paper/recognition.json")),
-];
+use super::PAPER_STUDIES;
+use crate::frame::{Cell, ClaimNumber, Finding, GeneratedSection, IntervalStrip, ShownStudy, markdown_table};
 
 /// Descriptions of grasps below the claims of a study: the others differ in layout or signals.
 const DATA_LINES: usize = 6;
-
-/// Stored report of a study; none where it has not been run in full.
-pub fn stored_report(study: &dyn PaperStudy) -> Result<Option<StoredStudy<StudyReport>>, serde_json::Error> {
-    let stored = STORED.iter().find(|(key, _)| *key == study.card().key);
-    stored.map(|(_, json)| StoredStudy::parse(json)).transpose()
-}
 
 /// Sections of the manual that are written from the stored reports.
 pub(crate) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     let (mut parts, mut missing) = (Vec::new(), Vec::new());
     for study in PAPER_STUDIES.iter().filter(|study| study.card().is_of_the_paper()) {
         let card = study.card();
-        match stored_report(*study)? {
-            Some(stored) => {
+        match study.shipped()? {
+            Some(ShownStudy { stored, .. }) => {
                 let lines = &stored.result.data;
                 let mut data = lines.iter().take(DATA_LINES).map(|line| format!("- {line}\n")).collect::<String>();
                 if let Some(more @ 1..) = lines.len().checked_sub(DATA_LINES) {

@@ -1,12 +1,15 @@
 //! A study of the paper: an experiment on grasps of a store.
 
 use super::bench::StudyData;
-use super::{StudyCard, StudyPlan};
+use super::plan::StudyPlan;
 use crate::frame::{
-    Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyOutcome, StudyReport, TrialNumbers,
+    Draw, Experiment, LinkedFigure, ListedStudy, Measuring, ResultFileError, ShownStudy, StoredStudy, StudyCard,
+    StudyCell, StudyCommand, StudyError, StudyFolder, StudyOutcome, StudyReport, StudySize, TrialNumbers, finish,
     run_experiment,
 };
+use palpate_lab::datasets::DatasetError;
 use palpate_lab::grasping::Shard;
+use palpate_store::Store;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -84,11 +87,8 @@ impl<S: Study> Experiment for OnBench<'_, S> {
     }
 }
 
-/// A study, whatever its cells are.
-pub trait PaperStudy: Sync {
-    /// Name and purpose.
-    fn card(&self) -> StudyCard;
-
+/// A study of the paper, whatever its cells are.
+pub trait PaperStudy: ListedStudy {
     /// Names of the results of all cells.
     fn units(&self, plan: &StudyPlan) -> Vec<String>;
 
@@ -104,11 +104,32 @@ pub trait PaperStudy: Sync {
     fn figures(&self, report: &StudyReport) -> Vec<LinkedFigure>;
 }
 
-impl<S: Study> PaperStudy for S {
+impl<S: Study> ListedStudy for S {
     fn card(&self) -> StudyCard {
         S::CARD
     }
 
+    fn shipped(&self) -> Result<Option<ShownStudy>, serde_json::Error> {
+        Ok(StoredStudy::shipped(S::CARD.key)?.map(ShownStudy::new::<OnBench<'_, S>>))
+    }
+
+    fn read(&self, folder: &StudyFolder) -> Result<Option<ShownStudy>, ResultFileError> {
+        Ok(folder.read(S::CARD.key)?.map(ShownStudy::new::<OnBench<'_, S>>))
+    }
+
+    fn is_current(&self, result: &StudyReport, size: StudySize) -> bool {
+        is_current(result, self, &StudyPlan::of_size(size))
+    }
+
+    fn finish(&self, store: &Path, size: StudySize, how: Measuring<'_>, draw: Draw<'_>) -> Result<bool, StudyError> {
+        let (store, folder, plan) =
+            (Store::open(store).map_err(DatasetError::Store)?, size.folder(store), StudyPlan::of_size(size));
+        let bench = StudyData::new(store, &plan, how);
+        finish(&OnBench { study: self, bench: &bench }, &folder, &how, draw)
+    }
+}
+
+impl<S: Study> PaperStudy for S {
     fn units(&self, plan: &StudyPlan) -> Vec<String> {
         S::grid(plan).iter().map(StudyCell::stored_name).collect()
     }

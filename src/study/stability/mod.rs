@@ -17,7 +17,8 @@ pub use random::{
 };
 
 pub(super) use report::sections;
-pub use report::{CaseSummary, StabilityReport, stored_stability};
+pub use report::{CaseSummary, StabilityReport};
+pub(crate) use study::LISTED;
 pub use study::{StabilityCell, StabilityPlan, StabilityUnit};
 
 use palpate_sim::physics::NotFinite;

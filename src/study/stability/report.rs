@@ -12,15 +12,8 @@ use palpate_learn::metrics::Interval;
 use palpate_sim::scene::Accuracy;
 use serde::{Deserialize, Serialize};
 
-/// The stored result of the full form.
-const STORED: &str = include_str!("../../../assets/studies/stability.json");
 /// Share of silently wrong results that is aimed at.
 const TARGET: f64 = 0.005;
-
-/// The stored result of the full form.
-pub fn stored_stability() -> Result<StoredStudy<StabilityReport>, serde_json::Error> {
-    StoredStudy::parse(STORED)
-}
 
 /// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -212,7 +205,7 @@ fn flags_table(rows: &[FlagRow]) -> StudyTable {
 
 /// Sections of manual and README that are written from the stored result.
 pub(crate) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
-    let stored = stored_stability()?;
+    let Some(stored) = StoredStudy::<StabilityReport>::shipped("stability")? else { return Ok(Vec::new()) };
     let shown = stored.result.shown();
     let in_manual = |name, table: &str, below: String| {
         let table = shown.table(table).map_or_else(String::new, |(_, table)| table.markdown());

@@ -4,7 +4,10 @@ use super::chatter::{ChatterRow, ChatterUnit, chatter_table};
 use super::random::{JudgedScene, RandomReport};
 use super::report::{CaseSummary, StabilityReport};
 use super::{ACCURACIES, CASES, Case, CaseAccuracy, CaseRow, QUICK_ACCURACIES};
-use crate::frame::{Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyReport};
+use crate::frame::{
+    Experiment, LinkedFigure, OWN_PHYSICS, PlainStudy, StudyCard, StudyCell, StudyCommand, StudyError, StudyReport,
+    StudySize,
+};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
@@ -27,6 +30,23 @@ impl StabilityPlan {
     /// The quick form: under a minute.
     pub const QUICK: Self = Self { thorough: false, grasps: 16, scenes: 5, seed: 1 };
 }
+
+/// The study in the list.
+pub(crate) const LISTED: PlainStudy<StabilityPlan> = PlainStudy {
+    card: StudyCard {
+        key: "stability",
+        title: "Stability",
+        about: "hard cases of the simulation with their limits, holds that chatter, and how many random scenes end wrongly without a flag",
+        paper: OWN_PHYSICS,
+        budget: "about 73 CPU minutes",
+    },
+    of_size: |size| {
+        Ok(match size {
+            StudySize::Full => StabilityPlan::FULL,
+            StudySize::Quick | StudySize::Sample { .. } => StabilityPlan::QUICK,
+        })
+    },
+};
 
 /// Random scenes in a unit of work.
 const SCENES_AT_ONCE: u64 = 5;
@@ -70,7 +90,7 @@ impl Experiment for StabilityPlan {
     type Report = StabilityReport;
 
     fn key(&self) -> &'static str {
-        "stability"
+        LISTED.card.key
     }
 
     fn header(&self) -> serde_json::Value {

@@ -11,8 +11,8 @@ use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
 use palpate_geometry::drawing::{Figure, LineStyle, Marker};
 use palpate_geometry::palette::{Theme, series_colour};
 use palpate_study::LinkedFigure;
+use palpate_study::StudySize;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
-use palpate_study::paper::StudySize;
 
 /// Least width of a plot (points).
 const LEAST_WIDTH: f32 = 300.0;

@@ -9,7 +9,8 @@ use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_lab::workers::JobProgress;
 use palpate_store::Store;
 use palpate_study::jobs::{StudyFiles, StudyOrigin, StudyRequest, has_other_units};
-use palpate_study::paper::{PAPER_STUDIES, StudyCard, StudySize};
+use palpate_study::paper::paper_study;
+use palpate_study::{StudyCard, StudySize, all_studies};
 
 /// Height of a row (points).
 const ROW: f32 = 40.0;
@@ -19,7 +20,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
         actions.push(|app| app.studies.look());
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for study in PAPER_STUDIES {
+        for study in all_studies() {
             let card = study.card();
             let chosen = card.key == studies.chosen().card().key;
             row_ui(ui, studies, &card, chosen, actions);
@@ -30,7 +31,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
         ui.add_space(6.0);
         let all = ui.button("Run all, quick").on_hover_text("Run the quick form of all studies, one after the other");
         if all.clicked() {
-            for study in PAPER_STUDIES {
+            for study in all_studies() {
                 run(study.card().key, StudySize::Quick, false, actions);
             }
         }
@@ -112,10 +113,12 @@ fn state(studies: &Studies, key: &str, colours: &ThemeColours) -> (String, Rgb) 
 fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Actions) {
     let key = card.key;
     wrapped(ui, RichText::new(format!("{}.", card.about)));
-    let cost = format!(
-        "In full: {}. Quick: less than a minute, not to be quoted. Grasps that the store lacks are simulated and kept there.",
-        card.budget
-    );
+    let kept = if paper_study(key).is_some() {
+        "Grasps that the store lacks are simulated and kept there."
+    } else {
+        "Its grasps are not kept."
+    };
+    let cost = format!("In full: {}. Quick: less than a minute, not to be quoted. {kept}", card.budget);
     wrapped(ui, RichText::new(cost).small().weak());
     let running = progress(studies, key);
     if let Some(JobProgress { share, words }) = &running {

@@ -1,4 +1,4 @@
-//! Study mode: the studies of the paper, the figures, tables and findings of the one that is chosen. A click on a point, cell
+//! Study mode: the studies, the figures, tables and findings of the one that is chosen. A click on a point, cell
 //! or row opens the trials behind it.
 
 pub(super) mod figure;
@@ -53,8 +53,8 @@ fn opening(result: &StudyResult, row: &StudyRow) -> Option<Vec<TrialId>> {
 /// What a click on a row does, or why it does nothing.
 fn hint(result: &StudyResult, row: &StudyRow) -> String {
     match (row.trials.as_slice(), result.origin) {
-        (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
         ([], _) => "No trials are kept for this row".to_owned(),
+        (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
         ([only], _) => format!("Click to open trial {only} in Inspect"),
         ([first, others @ ..], _) => {
             format!("Click to open trial {first} in Inspect, with {} others beside it", others.len())

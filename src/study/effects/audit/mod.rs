@@ -11,10 +11,13 @@
 mod report;
 mod scenes;
 
-pub use report::{AuditReport, AuditRow, stored_effects};
+pub use report::{AuditReport, AuditRow};
 
 use super::explanation::flipped;
-use crate::frame::{Experiment, LinkedFigure, StudyCell, StudyCommand, StudyError, StudyReport};
+use crate::frame::{
+    Experiment, LinkedFigure, OWN_PHYSICS, PlainStudy, StudyCard, StudyCell, StudyCommand, StudyError, StudyReport,
+    StudySize,
+};
 use palpate_lab::grasping::{ErrorNorms, timed_grasp};
 use palpate_sim::frame::Plan;
 use palpate_sim::objects::ObjectModel;
@@ -30,6 +33,25 @@ pub struct EffectAudit {
     scenes: u32,
     seed: u64,
 }
+
+/// The study in the list.
+pub(crate) const LISTED: PlainStudy<EffectAudit> = PlainStudy {
+    card: StudyCard {
+        key: "effects",
+        title: "What auto leaves out",
+        about: "random scenes with each physical effect flipped: what the rules that switch effects on miss, and what effects cost",
+        paper: OWN_PHYSICS,
+        budget: "about 7 CPU minutes",
+    },
+    of_size: |size| {
+        let scenes = match size {
+            StudySize::Full => EffectAudit::SCENES,
+            StudySize::Quick => EffectAudit::QUICK_SCENES,
+            StudySize::Sample { trials, .. } => trials as u32,
+        };
+        Ok(EffectAudit::new(scenes, 1))
+    },
+};
 
 /// Difference of two trials: root mean squares over all samples of both fingers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -113,6 +135,8 @@ impl StudyCell for SceneNumber {
 impl EffectAudit {
     /// Random scenes of the full form.
     pub const SCENES: u32 = 500;
+    /// Scenes of the quick form.
+    pub const QUICK_SCENES: u32 = 40;
 
     /// An audit of so many random scenes of a seed.
     pub fn new(scenes: u32, seed: u64) -> Self {
@@ -126,7 +150,7 @@ impl Experiment for EffectAudit {
     type Report = AuditReport;
 
     fn key(&self) -> &'static str {
-        "effects"
+        LISTED.card.key
     }
 
     /// More scenes of the same seed continue from fewer.

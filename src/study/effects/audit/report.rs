@@ -1,7 +1,7 @@
 //! An audit in numbers: a row per effect, its table and its figure.
 
 use super::{AuditedEffect, AuditedScene, EffectSize};
-use crate::frame::{Column, LinkedFigure, StoredStudy, StudyReport, TableRows, plots_of, rounded};
+use crate::frame::{Column, LinkedFigure, StudyReport, TableRows, plots_of, rounded};
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
 use palpate_sim::physics::effects::rule_of;
 use palpate_sim::scene::Effect;
@@ -186,11 +186,6 @@ impl AuditRow {
 fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(((values.len() as f64 - 1.0) * share).round().max(0.0) as usize).copied()
-}
-
-/// The stored result.
-pub fn stored_effects() -> Result<StoredStudy<AuditReport>, serde_json::Error> {
-    StoredStudy::parse(include_str!("../../../../assets/studies/effects.json"))
 }
 
 /// Effects of the two plots of the figure.

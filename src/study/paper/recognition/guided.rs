@@ -129,23 +129,22 @@ impl GuidedCase {
 
     /// A model, grasps that it has not learned from with its answers, and what it learned.
     fn model(self, bench: &StudyData<'_>) -> Result<(Model, TouchLibrary, String), StudyError> {
-        let missing = |what: &str| StudyError::Missing(what.to_owned());
         if self == Self::Unlabelled {
-            let failed = |cause: &dyn std::fmt::Display| StudyError::Missing(cause.to_string());
-            let model = Shipped::AnyGripper.model().map_err(|cause| failed(&cause))?;
-            let touches = KnownTouches::shipped(Shipped::AnyGripper).map_err(|cause| failed(&cause))?;
-            let library = touches.library(&model).ok_or_else(|| missing("channels of the shipped model"))?;
+            let model = Shipped::AnyGripper.model().map_err(StudyError::missing)?;
+            let touches = KnownTouches::shipped(Shipped::AnyGripper).map_err(StudyError::missing)?;
+            let library =
+                touches.library(&model).ok_or_else(|| StudyError::missing("channels of the shipped model"))?;
             let about = model.card.data.described();
             return Ok((model, library, about));
         }
         let (plan, question) = (bench.plan(), self.question());
         let wanted = |grasps: usize, quick: usize, poses: u64| question.wanted(plan, plan.grasps(grasps, quick), poses);
-        let method = method(GUIDED_METHOD).ok_or_else(|| missing(GUIDED_METHOD))?;
+        let method = method(GUIDED_METHOD).ok_or_else(|| StudyError::missing(GUIDED_METHOD))?;
         let train = bench.data(&wanted(LEARNED, 20, POSES))?;
         let known = bench.data(&wanted(KNOWN, 20, KNOWN_POSES))?;
         check_apart(&train.examples, &known.examples)?;
         let model = bench.fit(method, &train)?;
-        let known = known.relabelled(&model.card.labels).ok_or_else(|| missing("simulated grasps"))?;
+        let known = known.relabelled(&model.card.labels).ok_or_else(|| StudyError::missing("simulated grasps"))?;
         let library = library(&model, &known, bench)?;
         Ok((model, library, train.about.described()))
     }
@@ -154,7 +153,7 @@ impl GuidedCase {
 /// Runs all rounds.
 pub(super) fn guided(case: GuidedCase, bench: &StudyData<'_>) -> Result<GuidedRounds, StudyError> {
     let (plan, question) = (bench.plan(), case.question());
-    let missing = || StudyError::Missing("simulated grasps of the same objects".to_owned());
+    let missing = || StudyError::missing("simulated grasps of the same objects");
     let (model, library, data) = case.model(bench)?;
     let library = Arc::new(library);
     let wanted = question.wanted(plan, 1, 0);

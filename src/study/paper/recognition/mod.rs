@@ -6,7 +6,7 @@ mod new_objects;
 mod novelty;
 mod questions;
 
-use super::answers::judge_answers;
+use super::answers::{judge_answers, mean};
 use super::emulated_grasps::EmulatedGrippers;
 use super::prelude::*;
 use guided::{GuidedCase, GuidedRounds, guided};
@@ -87,7 +87,7 @@ impl Answered {
         let (of_each, _) = question.draws(plan);
         let test = tested(question, bench)?;
         let model = match question.learns {
-            Learns::Shipped(shipped) => shipped.model().map_err(|error| StudyError::Missing(error.to_string()))?,
+            Learns::Shipped(shipped) => shipped.model().map_err(StudyError::missing)?,
             Learns::Like { .. } | Learns::Drawn { .. } | Learns::Shuffled { .. } | Learns::Given { .. } => {
                 let all = bench.data(&question.learned(plan))?;
                 let own = all.by_class().into_iter().flat_map(|of| of.into_iter().skip(draw * of_each).take(of_each));
@@ -102,8 +102,7 @@ impl Answered {
         let unseen = |k: &usize| !model.card.learned.contains(&test.examples[*k]);
         let test = test.part(&(0..test.examples.len()).filter(unseen).collect::<Vec<_>>());
         let test = test.relabelled(&model.card.labels).filter(|_| model.card.method == method.key);
-        let test =
-            test.ok_or_else(|| StudyError::Missing("a model of this method that knows the objects".to_owned()))?;
+        let test = test.ok_or_else(|| StudyError::missing("a model of this method that knows the objects"))?;
         let answers = answer(model.recogniser.as_ref(), &test);
         let answers = match question.learns {
             Learns::Given { .. } => with_true_size_and_shape(&answers, &test),
@@ -133,7 +132,7 @@ fn emulated(preset: &'static str, objects: &[String], plan: &StudyPlan) -> Resul
     let scene = Scene { pose: poses, ..Scene::default() };
     let seeds = EMULATED.start..EMULATED.start + plan.pick(EMULATED.end - EMULATED.start, 1, 1);
     let each = plan.pick(EMULATED_EACH, 1, 1);
-    let shipped = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
+    let shipped = Shipped::AnyGripper.model().map_err(StudyError::missing)?;
     EmulatedGrippers { scene: &scene, preset, seeds, objects, each }.grasps(&shipped.card.channels)
 }
 
@@ -167,7 +166,7 @@ impl Study for Recognition {
         key: "recognition",
         title: "Recognition beyond the paper",
         about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
-        paper: OWN,
+        paper: OWN_METHODS,
         budget: "about 120 CPU minutes",
     };
 
@@ -196,7 +195,7 @@ impl Study for Recognition {
     fn measure(case: &Case, bench: &StudyData<'_>) -> Result<Found, StudyError> {
         if bench.plan().query.is_some() {
             let needs = "grasps of several presets that it simulates; leave out the options that choose trials";
-            return Err(StudyError::Missing(needs.to_owned()));
+            return Err(StudyError::missing(needs));
         }
         Ok(match case {
             Case::Answers { question, method, draw } => Found::Answered(Answered::new(question, method, *draw, bench)?),
@@ -348,9 +347,7 @@ impl Reached {
 /// What the models of the rows cost, means over draws.
 fn costs(all: &[Draws]) -> StudyTable {
     let mean = |(_, parts): &Draws, of: fn(&ModelAnswers) -> Option<f64>| -> Cell {
-        let all: Option<Vec<f64>> = parts.iter().map(|part| of(&part.one)).collect();
-        let all = all.filter(|all| !all.is_empty());
-        all.map(|all| all.iter().sum::<f64>() / all.len() as f64).into()
+        mean(parts.iter().map(|part| &part.one), of).into()
     };
     TableRows::new("costs", "Cost of the models", all).columns(&[
         Column("grasps", "", &|row| row.0.0.name.into()),

@@ -32,7 +32,7 @@ pub(super) fn new_object(
     let known = all.part(&of_class(true)).without_empty_classes();
     let lesson = all.part(&of_class(false)).without_empty_classes();
     let model = bench.teach(&bench.fit(method, &known)?, &lesson)?;
-    let missing = || StudyError::Missing(format!("grasps of {left_out}"));
+    let missing = || StudyError::missing(format_args!("grasps of {left_out}"));
     let new = model.card.labels.class(left_out).ok_or_else(missing)?;
     let test = test.relabelled(&model.card.labels).ok_or_else(missing)?;
     let says_new = |pmf: &Pmf| f64::from(u8::from(pmf.top().0 == new));

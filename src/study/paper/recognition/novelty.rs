@@ -44,11 +44,11 @@ pub(super) fn novelty(left_out: &str, method: &Method, bench: &StudyData<'_>) ->
     let others = bench.data(&wanted)?;
     let known: Vec<usize> =
         (0..all.examples.len()).filter(|k| all.labels.classes[all.examples[*k].class].name != left_out).collect();
-    let other_channels = || StudyError::Missing("random shapes with the channels of the objects".to_owned());
-    let train = all.part(&known).with(&others).ok_or_else(other_channels)?;
+    let train = all.part(&known).with(&others);
+    let train = train.ok_or_else(|| StudyError::missing("random shapes with the channels of the objects"))?;
     check_apart(&train.examples, &test.examples)?;
     let model = bench.fit(method, &train)?;
-    let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
+    let other = model.card.labels.other().ok_or_else(|| StudyError::missing("random shapes"))?;
     let score = |pmf: &Pmf| pmf.probabilities()[other].max(f64::MIN_POSITIVE).ln();
     Ok(Scored::of(&model, &test, |name| name == left_out, plan.seed, score))
 }
@@ -73,8 +73,8 @@ struct Decided {
 /// How surely grasps of emulated grippers are of a known object, for the shipped model, and what is decided.
 pub(super) fn emulated_novelty(bench: &StudyData<'_>) -> Result<EmulatedRounds, StudyError> {
     let plan = bench.plan();
-    let model = Shipped::AnyGripper.model().map_err(|error| StudyError::Missing(error.to_string()))?;
-    let other = model.card.labels.other().ok_or_else(|| StudyError::Missing("random shapes".to_owned()))?;
+    let model = Shipped::AnyGripper.model().map_err(StudyError::missing)?;
+    let other = model.card.labels.other().ok_or_else(|| StudyError::missing("random shapes"))?;
     let strangers = random_shapes(STRANGERS.start..STRANGERS.start + plan.pick(STRANGERS.end - STRANGERS.start, 4, 2));
     let objects = [plan.objects(), strangers.clone()].concat();
     let test = emulated(QUESTIONS[0].preset, &objects, plan)?;
