@@ -12,11 +12,12 @@ use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Mode, PanelKind};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
+use palpate_lab::grasping::grasp;
 use palpate_lab::workers::{Command, MeasuredAccuracy};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{Accuracy, Effect, PosePreset, Scene, Setting};
-use palpate_store::{Store, TrialQuery};
+use palpate_store::{Store, TrialPlace, TrialQuery};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -31,13 +32,20 @@ fn whole_window() -> Bench {
 /// Panels of one picture.
 const ON_A_SHEET: usize = 6;
 
+fn logged_trial(store: &mut Store) {
+    store.insert_in(TrialPlace::DemoLog, &grasp(&Scene::default(), None, 0)).unwrap();
+}
+
 #[test]
 fn every_panel_in_both_themes() {
     let picture = |panel: &'static PanelKind| {
         let [dark, light] = Theme::ALL.map(|theme| {
             let size = [300.0, 240.0];
-            let fill: fn(&mut Store) =
-                if panel.name.starts_with("study-") { scripted_result } else { |_: &mut Store| () };
+            let fill: fn(&mut Store) = match panel.name {
+                "library" => logged_trial,
+                name if name.starts_with("study-") => scripted_result,
+                _ => |_: &mut Store| (),
+            };
             let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), fill, ..BenchSetup::default() });
             bench.advance_to(2.6);
             match panel.name {
