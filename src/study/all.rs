@@ -25,7 +25,7 @@ mod tests {
         let keys: BTreeSet<&str> = all_studies().map(|study| study.card().key).collect();
         assert_eq!(keys.len(), all_studies().count());
         for study in all_studies() {
-            let shown = study.shipped()?.expect(study.card().key);
+            let shown = study.shipped()?.expect("ships a result");
             assert!(!shown.stored.result.tables.is_empty() && !shown.figures.is_empty(), "{}", study.card().key);
         }
         Ok(())
