@@ -61,13 +61,13 @@ impl StudyCard {
 
     /// Where it comes from: `Fig. 7 of the paper`.
     pub fn origin(&self) -> String {
-        if self.is_of_the_paper() { format!("{} of the paper", self.paper) } else { "our own methods".to_owned() }
+        if self.is_of_the_paper() { format!("{} of the paper", self.paper) } else { format!("our {}", self.paper) }
     }
 }
 
 /// In place of a section of the paper: studies of our own methods, and of the simulation.
-pub(crate) const OWN_METHODS: &str = "none: our own methods";
-pub(crate) const OWN_PHYSICS: &str = "none: our own simulation";
+pub(crate) const OWN_METHODS: &str = "own methods";
+pub(crate) const OWN_PHYSICS: &str = "own simulation";
 
 /// Result of a study as it is shown.
 #[derive(Clone, Debug)]

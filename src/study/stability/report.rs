@@ -111,7 +111,7 @@ impl StabilityReport {
         let mut marks = Vec::new();
         for (colour, accuracy) in [Accuracy::Draft, Accuracy::Standard].map(|own| own.to_string()).iter().enumerate() {
             let marker = if colour == 0 { Marker::Ring } else { Marker::Dot };
-            let plain = DataSeries { colour, line: LineStyle::Thin, marker, ..DataSeries::default() };
+            let plain = DataSeries { colour, line: LineStyle::None, marker, ..DataSeries::default() };
             let named = DataSeries { name: format!("asked for {accuracy}"), ..plain.clone() };
             for row in Policy::ALL.iter().filter_map(|policy| random.policy(accuracy, *policy)) {
                 let Interval { estimate, low, high } = percent(row.silent_share);

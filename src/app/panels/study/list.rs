@@ -4,6 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_lab::workers::JobProgress;
@@ -58,9 +59,10 @@ fn row_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, chosen: bool, action
     let small = FontId::proportional(11.5);
     let quiet = if chosen { colours.text } else { colours.quiet_text };
     let paper = painter.text(inner.right_top(), Align2::RIGHT_TOP, card.paper, small.clone(), colour(quiet));
-    let room = egui::Rect::from_min_max(inner.min, egui::pos2(paper.left() - 6.0, inner.bottom()));
-    let title = painter.with_clip_rect(room.intersect(ui.clip_rect()));
-    title.text(inner.left_top(), Align2::LEFT_TOP, card.title, FontId::proportional(13.5), colour(colours.text));
+    let mut title =
+        LayoutJob::simple_singleline(card.title.to_owned(), FontId::proportional(13.5), colour(colours.text));
+    title.wrap = TextWrapping::truncate_at_width(paper.left() - 6.0 - inner.left());
+    painter.galley(inner.left_top(), painter.layout_job(title), colour(colours.text));
     painter.text(
         inner.left_bottom(),
         Align2::LEFT_BOTTOM,

@@ -17,6 +17,9 @@ const AROUND: f32 = 64.0;
 /// Least and largest height of other plots (points).
 const HEIGHTS: [f32; 2] = [190.0, 380.0];
 
+/// Labelled points of a plot up to which the labels are shown.
+const MOST_LABELS: usize = 8;
+
 pub(super) fn plot_ui(
     ui: &mut Ui,
     result: &StudyResult,
@@ -36,7 +39,9 @@ pub(super) fn plot_ui(
         (0.7 * ui.available_width()).clamp(least, most).max(room.min(1.2 * most))
     };
     let id = format!("{} {number}", linked.name);
-    let shown = figure_plot::show(ui, theme::of(ui), (&id, plot), height, false, |_| false);
+    // More than these would cover each other.
+    let labels = plot.series.iter().flat_map(|series| &series.points).filter(|point| !point.label.is_empty()).count();
+    let shown = figure_plot::show(ui, theme::of(ui), (&id, plot), height, false, |_| labels <= MOST_LABELS);
     let points: usize = plot.series.iter().map(|series| series.points.len()).sum();
     let text = match &plot.heat {
         Some(heat) => {

@@ -38,7 +38,7 @@ pub struct EffectAudit {
 pub(crate) const LISTED: PlainStudy<EffectAudit> = PlainStudy {
     card: StudyCard {
         key: "effects",
-        title: "What auto leaves out",
+        title: "Effects that auto leaves off",
         about: "random scenes with each physical effect flipped: what the rules that switch effects on miss, and what effects cost",
         paper: OWN_PHYSICS,
         budget: "about 7 CPU minutes",

@@ -129,7 +129,7 @@ impl AuditReport {
             }
         }
         let figure = Figure {
-            title: format!("What auto leaves out: {} random scenes, each effect flipped", self.scenes),
+            title: format!("Effects that auto leaves off: {} random scenes, each effect flipped", self.scenes),
             columns: 1,
             plots: plots_of(&axes, marks),
             note: "90th percentile of the scenes; crosses: missed.".to_owned(),
