@@ -113,11 +113,8 @@ pub(super) fn show(
             for point in series.points.iter().filter(|point| labelled(&point.label)) {
                 let Some([x, y]) = plot.place(point.at) else { continue };
                 let beyond = x - x_bounds.start() > 0.8 * (x_bounds.end() - x_bounds.start());
-                let (side, word) = match beyond {
-                    true => (Align2::RIGHT_CENTER, format!("{}  ", point.label)),
-                    false => (Align2::LEFT_CENTER, format!("  {}", point.label)),
-                };
-                let word = RichText::new(word).small();
+                let side = if beyond { Align2::RIGHT_CENTER } else { Align2::LEFT_CENTER };
+                let word = RichText::new(format!("  {}  ", point.label)).small();
                 let text = Text::new("", PlotPoint::new(x, y), word).color(colour(theme.colours().text));
                 plot_ui.text(text.anchor(side));
             }

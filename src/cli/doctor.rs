@@ -152,10 +152,10 @@ fn crosstalk(options: &LinkOptions, stop: &AtomicBool, json: bool) -> Result<Exi
         for reading in readings {
             test.feed(&reading, &known)?;
             let [step, of] = test.step();
-            let told = test.instruction().map(|instruction| format!("{step} of {of}: {instruction}"));
-            if let Some(told) = told.filter(|told| *told != shown) {
-                note(&told);
-                shown = told;
+            let step_text = test.instruction().map(|instruction| format!("{step} of {of}: {instruction}"));
+            if let Some(text) = step_text.filter(|text| *text != shown) {
+                note(&text);
+                shown = text;
             }
         }
         if keys.try_recv().is_ok() {

@@ -50,10 +50,10 @@ pub(super) fn options(port: Option<&Path>, at_once: bool) -> LinkOptions {
     LinkOptions { path: port.map(Path::to_owned), replay_speed, ..LinkOptions::default() }
 }
 
-/// Readings of a board, for a command that guides the user. It tells how the link stands.
+/// Readings of a board, for a command that guides the user. It prints changes of the state of the link.
 pub(super) struct Listener {
     link: SerialLink,
-    /// State that was told last.
+    /// State that was printed last.
     state: LinkState,
     opened: Instant,
     has_heard: bool,

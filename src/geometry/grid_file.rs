@@ -2,7 +2,7 @@
 
 use super::{BakeError, Bounds, DistanceGrid, SolidPart, bake};
 use glam::DVec3;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher as _, DefaultHasher, Hash, Hasher, RandomState};
 use std::io;
 use std::path::Path;
 
@@ -77,10 +77,10 @@ pub fn bake_once(parts: &[SolidPart], cell: f64, folder: &Path) -> Result<Distan
     Ok(grid)
 }
 
-/// Writes a file that appears whole or not at all.
+/// Writes a file that appears whole or not at all, under a temporary name that no other thread or process has.
 fn keep(path: &Path, folder: &Path, bytes: &[u8]) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
-    let unfinished = path.with_extension(format!("{}.unfinished", std::process::id()));
+    let unfinished = path.with_extension(format!("{:016x}.unfinished", RandomState::new().hash_one(path)));
     let written = std::fs::write(&unfinished, bytes).and_then(|()| std::fs::rename(&unfinished, path));
     if written.is_err() {
         // Nothing more can be done about remains that cannot be removed.
@@ -120,13 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn a_grid_is_baked_once_and_a_damaged_file_is_not_believed() -> io::Result<()> {
+    fn a_grid_is_baked_once_and_a_damaged_file_is_not_used() -> io::Result<()> {
         let folder = tempfile::tempdir()?;
         let (parts, cell) = (two_balls(0.01), 2e-3);
         let once = || bake_once(&parts, cell, folder.path()).expect("bakes");
         let fresh = bake(&parts, cell).expect("bakes");
         assert_eq!(once(), fresh);
-        // What is read is the file: another sound grid under the name is believed, a damaged one is not.
+        // The file is read: another sound grid under its name is used, a damaged one is not.
         let path = folder.path().join(grid_name(&parts, cell));
         let other = bake(&two_balls(0.012), cell).expect("bakes");
         std::fs::write(&path, other.to_bytes())?;

@@ -42,7 +42,7 @@ impl LiveArguments {
 /// How long an automatic procedure waits for a change (s).
 const AUTO_PATIENCE_S: f64 = 60.0;
 
-/// What a stream says that ended too early.
+/// Error of a stream that ended too early.
 const ENDED: &str = "the stream ended before all points were recorded";
 
 /// Opens a port or a file. Where nobody presses a key, captured bytes come without a pause.
@@ -195,7 +195,7 @@ impl Screen {
         Self { kind, auto, shows_reading, instruction: String::new(), closes: false, points, since: Instant::now() }
     }
 
-    /// Tells what has changed: the last point, what was not taken, and what to do next.
+    /// Prints changes: the last point, what was not taken, and what to do next.
     fn tell(&mut self, session: &mut CalibrationSession) -> Result<(), Failure> {
         if let Some(why) = session.take_refusal() {
             if self.auto {

@@ -25,6 +25,6 @@ pub(super) fn run(arguments: &AccuracyArguments) -> Result<(), Failure> {
     let AccuracyArguments { quick, poses, output } = arguments;
     let usual = if *quick { AccuracyPlan::quick() } else { AccuracyPlan::full() };
     let plan = AccuracyPlan { poses: poses.unwrap_or(usual.poses), ..usual };
-    let stored = output.run(&AccuracyExperiment::new(plan)?, "Cost and worth of accuracy", *quick)?;
+    let stored = output.run(&AccuracyExperiment::new(plan)?, *quick)?;
     stored.filter(|_| output.json).map_or(Ok(()), |stored| say_json(&stored))
 }

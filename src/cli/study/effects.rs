@@ -29,6 +29,6 @@ pub(super) struct EffectsArguments {
 pub(super) fn run(arguments: &EffectsArguments) -> Result<(), Failure> {
     let EffectsArguments { quick, scenes, seed, output } = arguments;
     let scenes = scenes.unwrap_or(if *quick { EffectAudit::QUICK_SCENES } else { EffectAudit::SCENES });
-    let stored = output.run(&EffectAudit::new(scenes, *seed), "Effects that auto leaves off", *quick)?;
+    let stored = output.run(&EffectAudit::new(scenes, *seed), *quick)?;
     stored.filter(|_| output.json).map_or(Ok(()), |stored| say_json(&stored))
 }

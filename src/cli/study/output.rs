@@ -8,7 +8,7 @@ use palpate_lab::grasping::Shard;
 use palpate_render::figure_svg;
 use palpate_study::{
     Cell, Experiment, Finding, LinkedFigure, Measuring, StoredStudy, StudyFolder, StudyOutcome, StudyProgress,
-    StudyReport, StudyTable, run_experiment,
+    StudyReport, StudyTable, listed_study, run_experiment,
 };
 use serde::de::DeserializeOwned;
 
@@ -44,7 +44,6 @@ impl StudyOutput {
     pub(super) fn run<E: Experiment>(
         &self,
         experiment: &E,
-        title: &str,
         quick: bool,
     ) -> Result<Option<StoredStudy<E::Report>>, Failure> {
         let (stop, bar) = (stop_flag()?, Progress::new(BAR));
@@ -56,6 +55,7 @@ impl StudyOutput {
         drop(bar);
         let Some(stored) = whole(key, &part, outcome) else { return Ok(None) };
         let (shown, figures) = (E::shown(&stored.result), E::figures(&stored.result));
+        let title = listed_study(key).map_or(key, |study| study.card().title);
         self.show(&folder, (key, title, quick), &stored, &shown, figures)?;
         Ok(Some(stored))
     }

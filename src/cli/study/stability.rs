@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<(), Failure> {
     let usual = if *quick { StabilityPlan::QUICK } else { StabilityPlan::FULL };
     let grasps = grasps.map_or(usual.grasps, |grasps| grasps as usize);
     let plan = StabilityPlan { grasps, scenes: scenes.unwrap_or(usual.scenes), seed: *seed, ..usual };
-    let Some(stored) = output.run(&plan, "Stability", *quick)? else { return Ok(()) };
+    let Some(stored) = output.run(&plan, *quick)? else { return Ok(()) };
     let (report, cpu_hours) = (&stored.result, stored.cpu_hours);
     if output.json {
         say_json(&StabilityJson { table: &report.table, report, cpu_hours })?;

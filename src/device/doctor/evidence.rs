@@ -103,7 +103,7 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// What is missing where the values are not counts of the sensors they are said to be.
+    /// Reason why the values are not counts of the sensors.
     pub(super) fn no_counts(&self) -> Option<String> {
         let missing = [
             (self.sensors.is_empty(), "none of the channels is known to be a sensor"),

@@ -1,4 +1,4 @@
-//! Studies in one list, whatever they measure: what is said of each, and how it is read, shown and run.
+//! The list of studies: name and purpose of each, and how its result is read, shown and computed.
 
 use super::experiment::{Experiment, StudyError, run_experiment};
 use super::folder::StudyFolder;
@@ -69,7 +69,7 @@ impl StudyCard {
 pub(crate) const OWN_METHODS: &str = "own methods";
 pub(crate) const OWN_PHYSICS: &str = "own simulation";
 
-/// Result of a study as it is shown.
+/// Tables and figures of a study.
 #[derive(Clone, Debug)]
 pub struct ShownStudy {
     /// Tables and findings.

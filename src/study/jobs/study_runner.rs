@@ -137,7 +137,7 @@ fn files_of(store: &Path, study: &dyn ListedStudy, program: &str) -> StudyFiles 
     files
 }
 
-/// A result with what is known of it.
+/// Result of a study, its origin, and whether it is up to date.
 fn shown(
     study: &dyn ListedStudy,
     origin: StudyOrigin,

@@ -1,8 +1,8 @@
 //! The paper's studies: each figure of its section V, and two of its future work, from one command each; and what
 //! recognition reaches beyond the paper.
 //!
-//! A `Study` is a grid of cells. A cell takes a data set from the [`StudyData`]; what is found is kept, so that a
-//! study that was stopped goes on where it stopped. From all cells come typed rows, and from these a
+//! A `Study` is a grid of cells. A cell takes a data set from the [`StudyData`]; its result is kept, so that a
+//! study that was stopped resumes. From all cells come typed rows, and from these a
 //! [`StudyReport`](crate::StudyReport): tables, and a [`Finding`](crate::Finding) for each claim of the paper. Figures
 //! are drawn from the tables.
 //!

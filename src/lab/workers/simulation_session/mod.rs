@@ -221,7 +221,7 @@ impl Session {
             }
             Command::SetRecording(recording) => {
                 self.status.recording = recording;
-                // The grasp that goes on is stored where it was to be when it began, or not at all.
+                // The running grasp is stored in the place that was chosen when it began.
                 if let Some(current) = self.current.as_mut().filter(|_| recording.is_none()) {
                     current.recorded = None;
                 }
