@@ -7,6 +7,7 @@
 //!
 //! Beside it, recognition: models trained on grasps of each setting are tested on reference grasps.
 
+mod continuum;
 mod figure;
 mod measure;
 mod plan;
@@ -14,6 +15,7 @@ mod recognition;
 mod report;
 mod tables;
 
+pub use continuum::{Beside, Continuum, FingerRow, PadRow};
 pub use figure::accuracy_plot;
 pub use measure::GraspSample;
 pub use plan::{AccuracyPlan, AccuracySetting, RecognitionPlan, SettingFamily};
@@ -48,6 +50,7 @@ pub struct AccuracyUnit(UnitResult);
 enum UnitResult {
     Grasps(Vec<GraspSample>),
     Recognition(LevelAnswers),
+    Continuum(Continuum),
 }
 
 /// A unit of work.
@@ -63,6 +66,8 @@ pub enum AccuracyCell {
     },
     /// Models of one setting.
     Recognition(AccuracySetting),
+    /// Pad and finger beside finite elements.
+    Continuum,
 }
 
 impl StudyCell for AccuracyCell {
@@ -70,6 +75,7 @@ impl StudyCell for AccuracyCell {
         match self {
             Self::Pose { object, fixed, seed } => format!("{object} {} {seed}", SceneGroup::of(*fixed).title()),
             Self::Recognition(setting) => format!("recognition, {} {}", setting.family.title(), setting.name),
+            Self::Continuum => "pad and finger beside finite elements".to_owned(),
         }
     }
 }
@@ -154,7 +160,7 @@ impl Experiment for AccuracyExperiment {
                 (1..=*poses).map(move |seed| AccuracyCell::Pose { object: object.clone(), fixed, seed })
             })
         });
-        trained.chain(posed).collect()
+        trained.chain([AccuracyCell::Continuum]).chain(posed).collect()
     }
 
     fn measure(&self, cell: &AccuracyCell, stop: &AtomicBool) -> Result<AccuracyUnit, StudyError> {
@@ -168,6 +174,7 @@ impl Experiment for AccuracyExperiment {
                 UnitResult::Grasps(measure_scene(&scene, model, &self.plan.settings, &stopped)?)
             }
             AccuracyCell::Recognition(setting) => UnitResult::Recognition(self.bench(stop)?.level(setting, stop)?),
+            AccuracyCell::Continuum => UnitResult::Continuum(Continuum::measure()?),
         };
         Ok(AccuracyUnit(found))
     }
@@ -175,7 +182,7 @@ impl Experiment for AccuracyExperiment {
     fn report(&self, found: Vec<(AccuracyCell, AccuracyUnit)>) -> AccuracyStudy {
         let AccuracyPlan { settings, objects, poses, recognition } = &self.plan;
         let mut samples: Vec<Vec<(SceneKind, GraspSample)>> = vec![Vec::new(); settings.len()];
-        let mut levels = Vec::new();
+        let (mut levels, mut continuum) = (Vec::new(), None);
         for (cell, AccuracyUnit(found)) in found {
             match (cell, found) {
                 (AccuracyCell::Pose { object, fixed, .. }, UnitResult::Grasps(grasps)) => {
@@ -184,6 +191,7 @@ impl Experiment for AccuracyExperiment {
                     samples.iter_mut().zip(grasps).for_each(|(own, grasp)| own.push((kind, grasp)));
                 }
                 (AccuracyCell::Recognition(setting), UnitResult::Recognition(level)) => levels.push((setting, level)),
+                (AccuracyCell::Continuum, UnitResult::Continuum(found)) => continuum = Some(found),
                 _ => {}
             }
         }
@@ -197,6 +205,7 @@ impl Experiment for AccuracyExperiment {
             poses: *poses,
             rows: settings.iter().zip(&samples).map(row).collect(),
             recognition: reference.map(|reference| scores(&levels, reference)).unwrap_or_default(),
+            continuum,
         }
     }
 

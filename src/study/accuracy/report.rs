@@ -1,5 +1,6 @@
 //! Results of the study: medians over poses and shapes, the front, the floor and the knee.
 
+use super::continuum::Continuum;
 use super::measure::GraspSample;
 use super::plan::{AccuracySetting, SettingFamily};
 use crate::frame::rounded;
@@ -17,6 +18,9 @@ pub struct AccuracyStudy {
     pub rows: Vec<AccuracyRow>,
     /// Recognition by models trained on grasps of several settings; empty where it was not compared.
     pub recognition: Vec<RecognitionRow>,
+    /// Pad and finger beside finite elements; absent in results from before they were compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continuum: Option<Continuum>,
 }
 
 /// Cost and error of one setting.
@@ -278,7 +282,7 @@ mod tests {
             row(SettingFamily::Rapier, "1/150 s", 1.0, 0.0001, 3),
             row(SettingFamily::Joints, "N = 5", 1.0, 1e-6, 0),
         ];
-        AccuracyStudy { objects: vec!["ball".to_owned()], poses: 1, rows, recognition: Vec::new() }
+        AccuracyStudy { objects: vec!["ball".to_owned()], poses: 1, rows, recognition: Vec::new(), continuum: None }
     }
 
     #[test]

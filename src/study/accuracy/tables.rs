@@ -1,5 +1,6 @@
 //! The result in tables, for the terminal, the manual and other programs.
 
+use super::continuum::{Beside, Continuum};
 use super::plan::{AccuracySetting, SettingFamily};
 use super::report::{AccuracyStudy, GroupCost, MethodScore, RecognitionRow, SceneGroup};
 use crate::frame::{Cell, Column, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
@@ -42,6 +43,10 @@ impl AccuracyStudy {
             ));
             tables.push(self.recognition_table());
         }
+        if let Some(continuum) = &self.continuum {
+            data.push(continuum.about());
+            tables.extend([continuum.pad_table(), continuum.finger_table()]);
+        }
         StudyReport::new(data, tables, Vec::new())
     }
 
@@ -83,5 +88,50 @@ impl AccuracyStudy {
             Column("F1", PERCENT, &|(_, score)| Some(score.f1).into()),
             Column("difference", POINTS, &|(_, score)| Some(score.gain).into()),
         ])
+    }
+}
+
+impl Continuum {
+    fn about(&self) -> String {
+        let [(modulus, left), (along, left_along)] = self.best_factors();
+        let percent = |log: f64| 100.0 * log.exp_m1();
+        let within = self.pad.iter().filter(|row| (row.normal.continuum / row.normal.ours - 1.0).abs() <= 0.05).count();
+        format!(
+            "Springs beside a continuum: forces of a bonded layer of incompressible rubber of the pad's modulus, by finite \
+             elements (tests/peers/soft_pad.py), in N under the ball and N/m under the others. Of {} normal forces {within} are \
+             within 5 % of ours. A modulus {modulus:.2} times ours fits best and leaves {:.0} % (RMS); along the pad it is \
+             {along:.2} times ours and {:.0} %.",
+            self.pad.len(),
+            percent(left),
+            percent(left_along),
+        )
+    }
+
+    fn pad_table(&self) -> StudyTable {
+        let pair = |beside: Beside| Cell::from(format!("{} / {}", beside.continuum, beside.ours));
+        TableRows::new("accuracy-pad", "Springs beside a continuum: the pad (finite elements / ours)", &self.pad)
+            .columns(&[
+                Column("body", "", &|row| row.body.as_str().into()),
+                Column("way", "", &|row| if row.slant_deg > 0.0 { "30° slanted" } else { "normal" }.into()),
+                Column("friction", "", &|row| if row.sticks { "sticks" } else { "none" }.into()),
+                Column("depth", "mm", &|row| Some(row.depth_mm).into()),
+                Column("force", "N, N/m", &|row| pair(row.normal)),
+                Column("ratio", "", &|row| Some(row.normal.continuum / row.normal.ours).into()),
+                Column("along", "N, N/m", &|row| row.along.map_or(Cell::Missing, pair)),
+                Column("width", "mm", &|row| pair(row.width_mm)),
+                Column("peak", "kPa", &|row| pair(row.peak_kpa)),
+                Column("mesh", PERCENT, &|row| row.mesh_percent.map(|percent| 0.01 * percent).into()),
+            ])
+    }
+
+    fn finger_table(&self) -> StudyTable {
+        TableRows::new("accuracy-finger", "Joints beside a continuum: the finger under a load on its tip", &self.finger)
+            .columns(&[
+                Column("load F L² / E I", "", &|row| Some(row.load).into()),
+                Column("tip angle", "°", &|row| Some(row.tip_angle_deg).into()),
+                Column("solid", "of the length", &|row| Some(row.deflection.continuum).into()),
+                Column("ours", "of the length", &|row| Some(row.deflection.ours).into()),
+                Column("difference", PERCENT, &|row| Some(row.deflection.ours / row.deflection.continuum - 1.0).into()),
+            ])
     }
 }

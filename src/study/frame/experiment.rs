@@ -10,6 +10,7 @@ use palpate_lab::datasets::DatasetError;
 use palpate_lab::grasping::{CollectionError, Shard};
 use palpate_learn::{LearnError, Method, SplitError};
 use palpate_sim::objects::ObjectError;
+use palpate_sim::physics::SimulationError;
 use palpate_sim::scene::SceneError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -142,6 +143,8 @@ pub enum StudyError {
     },
     #[error(transparent)]
     Split(#[from] SplitError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     #[error("there is no {0}")]
     Unknown(String),
     #[error("the study needs {0}")]
