@@ -217,7 +217,7 @@ fn summary_text(summary: &GraspSummary, page: &mut Page) {
         let [left, right] = hold.force_n.map(three_digits);
         let [low, high] = hold.pressure_pa.map(|p| three_digits(p * 1e-3));
         page.line(format!("  force {left} and {right} N, pressure {low} and {high} kPa."));
-        if summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
+        if summary.object_moved_m.is_some() && summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
             page.line("  The object slipped out of the grasp.");
         }
     }

@@ -112,9 +112,57 @@ pub struct Quality {
     pub imbalance: Option<Imbalance>,
     /// Why the trial was computed more finely than its scene asked for; absent where it was not.
     pub recomputed: Option<Recomputed>,
-    /// Whether another run of the same scene at a tenth of the tolerance, or at ten times the tolerance, ends alike;
-    /// absent where there was none.
+    /// Whether other runs of the same grasp end alike; absent where there were none.
     pub agrees: Option<bool>,
+    /// Why the grasp itself failed, though its numbers may be right; absent where it did not.
+    pub mishap: Option<Mishap>,
+    /// Mean normal force of each finger on the object in the settled hold, left and right (N): contact between the fingers
+    /// is not part of it. Absent in trials from before it was recorded.
+    pub hold_force: Option<[f64; 2]>,
+}
+
+/// A grasp that holds nothing, or began where no grasp can.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mishap {
+    /// The open fingers stood this deep inside the object or its support (m).
+    StartedInside(f64),
+    /// No finger touched the object.
+    NeverTouched,
+    /// The object fell or rolled out of the hand before the release.
+    LostObject,
+    /// A push of a micrometre changes how the grasp ends: it has no single answer.
+    NoSingleAnswer,
+}
+
+impl std::fmt::Display for Mishap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::StartedInside(depth) => {
+                write!(
+                    f,
+                    "the open fingers start {:.1} mm inside something: move the gripper or the object",
+                    depth * 1e3
+                )
+            }
+            Self::NeverTouched => f.write_str("no finger touched the object"),
+            Self::NoSingleAnswer => f.write_str("a push of a micrometre decides how it ends"),
+            Self::LostObject => f.write_str("the object left the hand before the release"),
+        }
+    }
+}
+
+/// An object this far from its start, or this far below it, has left the hand (m).
+const GONE: f64 = 0.15;
+const FALLEN: f64 = 0.03;
+
+impl Frame {
+    /// True if the object has left the hand since `start`.
+    pub fn has_lost_object(&self, start: &Self) -> bool {
+        let moved =
+            start.world_from_object.zip(self.world_from_object).map(|(start, now)| now.position - start.position);
+        moved.is_some_and(|moved| moved.length() > GONE || moved.z < -FALLEN)
+    }
 }
 
 /// A trial that was computed again at a finer accuracy than its scene asked for. The scene of the trial has the
@@ -140,9 +188,9 @@ pub enum RecomputeCause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrustLevel {
-    /// A finer run ends alike, and nothing was flagged.
+    /// Another run ends alike, and nothing was flagged.
     Green,
-    /// Not compared with a finer run, or flagged.
+    /// Not compared with another run, or some steps missed the accuracy.
     Amber,
     /// Wrong by its own finer run, or unsound.
     Red,
@@ -183,10 +231,15 @@ pub struct Imbalance {
 }
 
 impl Quality {
-    /// True when the trial may be learned from: every number was finite, every step reached its tolerance, the hold came to
-    /// rest, and no finer run ends elsewhere.
+    /// True when the trial may be learned from: it was solved, no finer run ends elsewhere, and a finger touched the object.
+    /// One that lost the object may: a hand in use loses it too, and is judged by what it felt.
     pub fn is_sound(&self) -> bool {
-        self.finite && self.converged && !self.is_restless() && self.agrees != Some(false)
+        self.is_solved() && self.agrees != Some(false) && matches!(self.mishap, None | Some(Mishap::LostObject))
+    }
+
+    /// True when every number was finite, every step reached its tolerance, and the hold came to rest.
+    pub fn is_solved(&self) -> bool {
+        self.finite && self.converged && !self.is_restless()
     }
 
     /// True when the hold did not come to rest: forces kept changing, or do not balance at its end.
@@ -207,8 +260,8 @@ impl Quality {
         match (diverged.or_else(|| self.misses()), self.agrees) {
             (Some(cause), _) => (TrustLevel::Red, cause),
             (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
-            (None, None | Some(false)) => (TrustLevel::Amber, "not compared with a finer run".to_owned()),
-            (None, Some(true)) => (TrustLevel::Green, "a finer run of the same grasp ends alike".to_owned()),
+            (None, None | Some(false)) => (TrustLevel::Amber, "not compared with another run".to_owned()),
+            (None, Some(true)) => (TrustLevel::Green, "another run of the same grasp ends alike".to_owned()),
         }
     }
 
@@ -230,7 +283,8 @@ impl Quality {
                  unbalanced at its end"
             ));
         }
-        (self.agrees == Some(false)).then(|| "a finer run of the same grasp ends elsewhere".to_owned())
+        let elsewhere = (self.agrees == Some(false)).then(|| "a finer run of the same grasp ends elsewhere".to_owned());
+        self.mishap.map(|mishap| mishap.to_string()).or(elsewhere)
     }
 }
 
@@ -259,6 +313,8 @@ impl Default for Quality {
             imbalance: None,
             recomputed: None,
             agrees: None,
+            mishap: None,
+            hold_force: None,
         }
     }
 }
@@ -314,6 +370,7 @@ mod tests {
             |q| q.finite = false,
             |q| q.hold_changes = 5,
             |q| q.static_residual = 0.3,
+            |q| q.mishap = Some(Mishap::NeverTouched),
         ] {
             assert_eq!(light(&change).0, TrustLevel::Red);
         }

@@ -1,6 +1,6 @@
 //! A simulation on its clock: actuation ticks and samples in order. Identical scenes give identical frames.
 
-use crate::frame::{Frame, Plan, Quality};
+use crate::frame::{Frame, Mishap, Plan, Quality};
 use crate::gripper::{Phase, Programme, Side};
 use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
@@ -32,7 +32,13 @@ pub struct SimRun {
     phase: Phase,
     static_residual: Option<f64>,
     hold: HoldWatch,
+    /// The frame before the first step, and how deep the open fingers stand inside something there (m).
+    start: Frame,
+    overlap: f64,
 }
+
+/// A start this deep inside something is wrong (m).
+const DEEPEST_START: f64 = 5e-4;
 
 /// Counts changes of force while nothing is commanded.
 #[derive(Clone, Debug)]
@@ -48,6 +54,12 @@ struct HoldWatch {
     /// Changes in the whole hold, and those once it has settled.
     all: [u32; 2],
     settled: [u32; 2],
+    /// Sum over the samples of the settled hold of the force beside that of the other finger (N), their number, and whether
+    /// the fingers touched each other in any of them.
+    beside_finger: ([f64; 2], u32, bool),
+    /// The object is touched, or has left the hand, before the release.
+    touched: bool,
+    lost: bool,
 }
 
 /// After this much of the hold (s) what was pushed has settled.
@@ -57,10 +69,13 @@ const CHANGE: f64 = 0.05;
 
 impl HoldWatch {
     fn new(taxels: usize, still_until: f64) -> Self {
-        Self { taxels, still_until, since: None, force: [0.0; 2], all: [0; 2], settled: [0; 2] }
+        let (force, all, settled) = ([0.0; 2], [0; 2], [0; 2]);
+        let beside_finger = ([0.0; 2], 0, false);
+        Self { taxels, still_until, since: None, force, all, settled, beside_finger, touched: false, lost: false }
     }
 
-    fn note(&mut self, frame: &Frame) {
+    /// Notes a sample: the frame before the first step, and the force beside that of the other finger.
+    fn note(&mut self, frame: &Frame, start: &Frame, beside_finger: Option<[f64; 2]>) {
         let force = Side::BOTH.map(|side| frame.normal_force(side, self.taxels));
         let into_hold = match frame.phase {
             Phase::Hold if frame.t <= self.still_until => frame.t - *self.since.get_or_insert(frame.t),
@@ -75,6 +90,22 @@ impl HoldWatch {
             self.settled[side] += u32::from(changed && into_hold > SETTLED_AFTER);
         }
         self.force = force;
+        let held = beside_finger.unwrap_or(force);
+        if into_hold > SETTLED_AFTER {
+            let (sum, count, met) = &mut self.beside_finger;
+            (0..2).for_each(|side| sum[side] += held[side]);
+            (*count, *met) = (*count + 1, *met || beside_finger.is_some());
+        }
+        if frame.phase != Phase::Release && frame.t <= self.still_until {
+            self.touched |= held != [0.0; 2];
+            self.lost |= frame.has_lost_object(start);
+        }
+    }
+
+    /// Mean force on the object in the settled hold (N), where the fingers touched each other too.
+    fn hold_force(&self) -> Option<[f64; 2]> {
+        let (sum, count, met) = self.beside_finger;
+        met.then(|| sum.map(|sum| sum / f64::from(count)))
     }
 }
 
@@ -128,12 +159,14 @@ impl SimRun {
 
     /// Sets up a scene with a refinement.
     pub fn refined(scene: &Scene, object: Option<&ObjectModel>, refinement: Refinement) -> (Self, Placement) {
-        let (engine, placement) = EngineRun::new(scene, object, refinement);
+        let (mut engine, placement) = EngineRun::new(scene, object, refinement);
         let taxels = scene.gripper.taxels().count();
         let shaken = scene.hand_motion().filter(|_| engine.get().plan().is_on(Effect::Shaking.name()));
         let still_until = shaken.map_or(f64::INFINITY, |motion| motion.begins_s());
         let hold = HoldWatch::new(taxels, still_until);
-        let run = Self { engine, reported: None, phase: Phase::Close, static_residual: None, hold };
+        let start = engine.get().frame();
+        let overlap = engine.get_mut().starting_overlap();
+        let run = Self { engine, reported: None, phase: Phase::Close, static_residual: None, hold, start, overlap };
         (run, placement)
     }
 
@@ -158,8 +191,8 @@ impl SimRun {
     }
 
     /// Overlap of the open fingers with the object or its support before the first step (m).
-    pub fn starting_overlap(&mut self) -> f64 {
-        self.engine.get_mut().starting_overlap()
+    pub fn starting_overlap(&self) -> f64 {
+        self.overlap
     }
 
     /// Effects simulated, with the reason for each.
@@ -176,6 +209,7 @@ impl SimRun {
     /// angle, rad), world axes.
     pub fn move_object(&mut self, shift: DVec3, turn: DVec3) {
         self.engine.get_mut().move_object(shift, turn);
+        self.start.world_from_object = self.engine.get().frame().world_from_object;
     }
 
     /// Simulates up to the next event.
@@ -197,7 +231,7 @@ impl SimRun {
             self.engine.get_mut().advance_by(ticks)?;
             if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
                 let frame = self.engine.get().frame();
-                self.hold.note(&frame);
+                self.hold.note(&frame, &self.start, self.engine.get().force_beside_finger());
                 // A hand that moves leaves nothing at rest: the last sample before counts.
                 if self.phase == Phase::Hold && self.hold.still_until.is_finite() && frame.t <= self.hold.still_until {
                     self.static_residual = Some(self.engine.get().quality().static_residual);
@@ -226,7 +260,22 @@ impl SimRun {
         }
         quality.hold_changes = self.hold.settled[0].max(self.hold.settled[1]);
         quality.all_hold_changes = self.hold.all[0].max(self.hold.all[1]);
+        quality.mishap = self.mishap();
+        quality.hold_force = self.hold.hold_force();
         quality
+    }
+
+    /// What went wrong with the grasp, once it has come to the hold.
+    fn mishap(&self) -> Option<Mishap> {
+        if self.overlap > DEEPEST_START {
+            return Some(Mishap::StartedInside(self.overlap));
+        }
+        let missed = self.phase != Phase::Close && !self.hold.touched;
+        match self.start.world_from_object {
+            Some(_) if self.hold.lost => Some(Mishap::LostObject),
+            Some(_) if missed => Some(Mishap::NeverTouched),
+            _ => None,
+        }
     }
 
     /// Remarks on the frames so far.
@@ -303,7 +352,7 @@ mod tests {
                 world_from_object: None,
                 taxels,
             };
-            watch.note(&frame);
+            watch.note(&frame, &frame, None);
             (watch.settled, watch.all[0])
         };
         // 0.8 N on and off, in every phase.

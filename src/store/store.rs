@@ -246,6 +246,13 @@ impl Store {
         Ok(())
     }
 
+    /// Notes anew how far a simulated trial can be trusted, once other runs of it have ended.
+    pub fn note_quality(&mut self, id: TrialId, quality: &Quality) -> Result<(), StoreError> {
+        let sql = "UPDATE trials SET quality = ?2 WHERE id = ?1";
+        self.connection.execute(sql, params![id, json(quality)]).map_err(|e| self.fault(&e))?;
+        Ok(())
+    }
+
     /// Stores a whole simulated trial, all or nothing, unless another trial holds the same grasp.
     pub fn insert(&mut self, trial: &SimulatedTrial) -> Result<Stored, StoreError> {
         self.insert_in(TrialPlace::Store, trial)

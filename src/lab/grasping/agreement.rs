@@ -7,13 +7,17 @@
 //! asked for --> a tenth --> a hundredth --> ..  until three in a row end alike; the finest of them is reported
 //! ```
 //!
+//! [`compare`] asks less: whether a grasp can be trusted as it is. A run at ten times the tolerance, from a start ten
+//! micrometres away, costs half as much as the grasp. Where it ends alike, the grasp is taken as right; otherwise a run at a
+//! hundredth of the tolerance decides.
+//!
 //! Two in a row are not enough: one in a hundred extreme scenes ends in the same wrong place at two coarse levels. Levels
 //! end one below the accuracy `reference`, but up to three are always computed. `palpate study stability` measures how
 //! often the reported result is wrong, and what it costs.
 
 use super::run::{grasp, prepare};
 use glam::DVec3;
-use palpate_sim::frame::{Frame, RecomputeCause, Recomputed};
+use palpate_sim::frame::{Frame, Mishap, Quality, RecomputeCause, Recomputed};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Accuracy, Scene, Solver};
@@ -52,17 +56,13 @@ const SETTLED_S: f64 = 0.5;
 const SAME_ANGLE: f64 = 0.02;
 /// Largest distance of objects between ends that are alike (m).
 const SAME_PLACE: f64 = 2e-3;
-/// An object this far from its start, or this far below it, has left the hand (m).
-const GONE: f64 = 0.15;
-const FALLEN: f64 = 0.03;
-
 impl EndState {
     /// Reads the end of a grasp; `None` without samples.
     pub fn of(frames: &[Frame]) -> Option<Self> {
         let first = frames.first()?;
         let hold = |frame: &&Frame| frame.phase == Phase::Hold;
         let last = frames.iter().rfind(hold).or(frames.last())?;
-        if has_lost_object(first, last) {
+        if last.has_lost_object(first) {
             return Some(Self::Lost);
         }
         let since = frames.iter().find(hold).map_or(f64::INFINITY, |frame| frame.t + SETTLED_S);
@@ -85,12 +85,6 @@ impl EndState {
             _ => false,
         }
     }
-}
-
-/// True if the object of a grasp has left the hand.
-pub fn has_lost_object(start: &Frame, now: &Frame) -> bool {
-    let moved = start.world_from_object.zip(now.world_from_object).map(|(start, now)| now.position - start.position);
-    moved.is_some_and(|moved| moved.length() > GONE || moved.z < -FALLEN)
 }
 
 /// Number of levels in a row that must agree.
@@ -166,7 +160,7 @@ pub fn grasp_until_agreement(
     };
     // A run that was cancelled ends the search at once: those that follow are cancelled too.
     let agree = |coarse: &Option<SimulatedTrial>, fine: &Option<SimulatedTrial>| match (coarse, fine) {
-        (Some(coarse), Some(fine)) => fine.data.quality.is_sound() && ends_alike(coarse, fine),
+        (Some(coarse), Some(fine)) => fine.data.quality.is_solved() && ends_alike(coarse, fine),
         _ => true,
     };
     let Agreed { result, agree, .. } = until_agreement(&scene.solver, AGREEING, run, agree);
@@ -174,6 +168,69 @@ pub fn grasp_until_agreement(
     // An engine that controls no error has one level only.
     trial.data.quality.agrees = scene.solver.finer().map(|_| agree);
     Some(trial)
+}
+
+/// Shift of the object (m) and its turn (rad) in the coarser run of a comparison.
+const NUDGE: DVec3 = DVec3::new(1e-5, 0.0, 0.0);
+const TURN: DVec3 = DVec3::new(0.0, 0.0, 3e-4);
+/// A push that decides nothing in a grasp with a single answer (m).
+const PUSH: f64 = 1e-6;
+
+/// What other runs say about a grasp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GraspComparison {
+    /// Whether they end alike.
+    pub agrees: bool,
+    /// True where a push of a micrometre changes the end.
+    pub undecided: bool,
+}
+
+impl GraspComparison {
+    /// Notes it in the quality of the grasp.
+    pub fn note(self, quality: &mut Quality) {
+        quality.agrees = Some(self.agrees);
+        if self.undecided {
+            quality.mishap = Some(Mishap::NoSingleAnswer);
+        }
+    }
+}
+
+/// Compares where a grasp ends with a coarser run from a start nearby, and where they differ with a much finer one; see the
+/// top of this file. `None` where the engine controls no error, and if it was cancelled.
+pub fn compare(
+    scene: &Scene,
+    object: Option<&ObjectModel>,
+    seed: u64,
+    end: Option<&EndState>,
+    cancelled: &dyn Fn() -> bool,
+) -> Option<GraspComparison> {
+    let run = |solver: Solver, shift: DVec3, turn: DVec3| {
+        let scene = Scene { solver, ..scene.clone() };
+        let mut grasp = prepare(&scene, object, seed);
+        if object.is_some() {
+            grasp.simulation_mut().move_object(shift, turn);
+        }
+        grasp.run_to_end(&scene, cancelled)
+    };
+    let alike = |trial: &SimulatedTrial| {
+        end.zip(EndState::of(trial.frames()).as_ref()).is_some_and(|(grasp, other)| grasp.is_like(other))
+    };
+    if let Some(coarser) = scene.solver.coarser()
+        && alike(&run(coarser, NUDGE, TURN)?)
+    {
+        return Some(GraspComparison { agrees: true, undecided: false });
+    }
+    let finer = scene.solver.finer()?;
+    let finer = finer.finer().unwrap_or(finer);
+    let finest = run(finer.clone(), DVec3::ZERO, DVec3::ZERO)?;
+    let agrees = finest.data.quality.is_solved() && alike(&finest);
+    let mut undecided = false;
+    if !agrees && object.is_some() {
+        for push in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+            undecided |= !ends_alike(&finest, &run(finer.clone(), push * PUSH, DVec3::ZERO)?);
+        }
+    }
+    Some(GraspComparison { agrees, undecided })
 }
 
 /// True if two grasps end alike.
@@ -288,5 +345,26 @@ mod tests {
         let cause = RecomputeCause::UntilAgreement;
         assert_eq!(quality.recomputed, Some(Recomputed { asked: Accuracy::Draft, cause }));
         assert_eq!(grasp_until_agreement(&scene, Some(&ball), 0, &|| true), None);
+    }
+
+    #[test]
+    fn a_quiet_grasp_is_confirmed_by_a_cheaper_run_and_a_wrong_end_is_not() {
+        let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+        let scene = Scene::default();
+        let end = EndState::of(grasp(&scene, Some(&ball), 0).frames());
+        let checked = |end: &Option<EndState>| compare(&scene, Some(&ball), 0, end.as_ref(), &|| false);
+        assert_eq!(checked(&end), Some(GraspComparison { agrees: true, undecided: false }));
+        // All other runs hold the ball.
+        let lost = checked(&Some(EndState::Lost)).expect("is compared");
+        assert_eq!(lost, GraspComparison { agrees: false, undecided: false });
+        let mut quality = Quality::default();
+        lost.note(&mut quality);
+        assert_eq!((quality.agrees, quality.mishap), (Some(false), None));
+        GraspComparison { agrees: false, undecided: true }.note(&mut quality);
+        assert_eq!(quality.misses().as_deref(), Some("a push of a micrometre decides how it ends"));
+        assert_eq!(compare(&scene, Some(&ball), 0, end.as_ref(), &|| true), None);
+        let mut rapier = scene.clone();
+        rapier.solver.engine = EngineKind::Rapier;
+        assert_eq!(compare(&rapier, Some(&ball), 0, end.as_ref(), &|| false), None);
     }
 }

@@ -36,11 +36,11 @@ pub fn prepare_refined(scene: &Scene, object: Option<&ObjectModel>, seed: u64) -
 }
 
 fn prepare_with(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refinement: Refinement) -> GraspRun {
-    let (mut simulation, placement) = SimRun::refined(scene, object, refinement);
+    let (simulation, placement) = SimRun::refined(scene, object, refinement);
     let mut warnings = object.map(|o| o.warnings.clone()).unwrap_or_default();
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));
-    warnings.extend(overlap_warning(&mut simulation));
+    warnings.extend(simulation.quality().mishap.map(|mishap| mishap.to_string()));
     let origin = GraspOrigin {
         physics: PHYSICS_VERSION,
         object: object.map_or(0, |object| object.content),
@@ -188,7 +188,8 @@ impl GraspRun {
         let Trial { mut header, mut data } = self.begun();
         let warnings = &mut header.warnings;
         data.quality.finite &= !self.failed;
-        warnings.extend(data.quality.misses());
+        let misses = data.quality.misses().filter(|cause| !warnings.contains(cause));
+        warnings.extend(misses);
         if data.quality.missed_steps > 0 {
             let (missed, steps, least) =
                 (data.quality.missed_steps, data.quality.steps, data.quality.least_step_s * 1e6);
@@ -207,17 +208,6 @@ impl GraspRun {
         Trial { header, data }
     }
 }
-
-/// A warning where the open fingers already stand inside the object or its support.
-fn overlap_warning(simulation: &mut SimRun) -> Option<String> {
-    let depth = simulation.starting_overlap();
-    let mm = depth * 1e3;
-    (depth > DEEPEST_START)
-        .then(|| format!("the open fingers start {mm:.1} mm inside something: move the gripper or the object"))
-}
-
-/// A start this deep inside something is mentioned (m).
-const DEEPEST_START: f64 = 5e-4;
 
 /// When, if ever, the pads of the two fingers have changed sides.
 fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
@@ -242,7 +232,7 @@ fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
 mod tests {
     use super::*;
     use palpate_geometry::Primitive;
-    use palpate_sim::frame::Quality;
+    use palpate_sim::frame::{Mishap, Quality, TrustLevel};
 
     fn ball() -> ObjectModel {
         ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6)
@@ -288,6 +278,29 @@ mod tests {
         scene.gripper.mount.offset = [0.03, 0.0, 0.0];
         let run = prepare(&scene, Some(&ball()), 0);
         assert!(run.header().warnings.iter().any(|w| w.contains("start")), "{:?}", run.header().warnings);
+        let trial = grasp(&scene, Some(&ball()), 0);
+        assert!(matches!(trial.data.quality.mishap, Some(Mishap::StartedInside(depth)) if depth > 1e-3));
+        assert_eq!(trial.header.warnings.iter().filter(|w| w.contains("start")).count(), 1);
+    }
+
+    #[test]
+    fn a_grasp_that_holds_nothing_is_red_with_its_reason() {
+        let end = |scene: &Scene, pull: f64| {
+            let mut run = prepare(scene, Some(&ball()), 0);
+            run.pull_object(DVec3::X * pull);
+            while run.next_frame().is_some() {}
+            let quality = run.finish(scene).data.quality;
+            (quality.mishap, quality.is_sound(), quality.trust().0)
+        };
+        let held = end(&Scene::default(), 0.0);
+        assert_eq!(held, (None, true, TrustLevel::Amber));
+        let mut aside = Scene::default();
+        aside.gripper.mount.offset = [0.0, 0.08, 0.0];
+        assert_eq!(end(&aside, 0.0), (Some(Mishap::NeverTouched), false, TrustLevel::Red));
+        // Pulled off its pedestal, far beyond the fingers.
+        aside.gripper.mount.offset = [0.0, 0.0, 0.0];
+        let (mishap, sound, light) = end(&aside, 20.0);
+        assert_eq!((mishap, sound, light), (Some(Mishap::LostObject), true, TrustLevel::Red));
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub struct ShakenSummary {
 /// Means over the last quarter of the hold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HoldSummary {
-    /// Normal force on each pad (N).
+    /// Normal force on each pad (N), without that of the other finger.
     pub force_n: [f64; 2],
     /// Curvature that each strip measures (1/m).
     pub curvature_per_m: [f64; 2],
@@ -81,7 +81,7 @@ impl GraspSummary {
             converged: trial.data.quality.converged,
             warnings: trial.header.warnings.clone(),
             contact_onset_s: trial.frames().iter().find(touches).map(|frame| frame.t),
-            hold: HoldSummary::new(&held[held.len() - held.len().div_ceil(4)..], scene),
+            hold: HoldSummary::new(&held[held.len() - held.len().div_ceil(4)..], scene, trial.data.quality.hold_force),
             object_moved_m: moved(),
             shaken: ShakenSummary::new(trial, scene, &held),
             quality: trial.data.quality.clone(),
@@ -104,7 +104,7 @@ impl ShakenSummary {
 }
 
 impl HoldSummary {
-    fn new(frames: &[&Frame], scene: &Scene) -> Option<Self> {
+    fn new(frames: &[&Frame], scene: &Scene, on_object: Option<[f64; 2]>) -> Option<Self> {
         if frames.is_empty() {
             return None;
         }
@@ -128,7 +128,7 @@ impl HoldSummary {
                 tip_m: mean(&tip),
                 twist_rad: mean(&|frame, side| frame.sways[side.index()].twist * gripper.finger.length),
             }),
-            force_n: read(SignalDefinition::Parts, Quantity::Force),
+            force_n: on_object.unwrap_or_else(|| read(SignalDefinition::Parts, Quantity::Force)),
             curvature_per_m: read(SignalDefinition::Parts, Quantity::Curvature),
             pressure_pa: read(SignalDefinition::Parts, Quantity::Pressure),
             contact_pressure_pa: read(SignalDefinition::Contact, Quantity::ContactPressure),
@@ -196,8 +196,11 @@ mod tests {
     fn an_empty_hand_touches_nothing_but_itself() {
         let mut scene = Scene::default();
         let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);
-        let [left, right] = summary.hold.expect("held").force_n;
-        assert!(left > 0.05 && (left / right - 1.0).abs() < 1e-6, "{left} N and {right} N");
+        let hold = summary.hold.expect("held");
+        // The pads feel each other, but hold nothing.
+        let [left, right] = hold.pressure_pa;
+        assert!(left > 50.0 && (left / right - 1.0).abs() < 1e-6, "{left} Pa and {right} Pa");
+        assert_eq!(hold.force_n, [0.0, 0.0]);
         assert!(summary.contact_onset_s.is_some() && summary.object_moved_m.is_none());
         scene.effects.set(Effect::FingerContact, Setting::Off);
         let summary = GraspSummary::new(&grasp(&scene, None, 0), &scene);

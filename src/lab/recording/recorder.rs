@@ -5,6 +5,7 @@
 use super::board_writer::{BoardTrialPlan, BoardWriter, RecordedTrial};
 use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::LinkStatus;
+use palpate_sim::frame::Quality;
 use palpate_store::{Store, StoreError, Stored, TrialPlace};
 use palpate_tactile::trial::{PhaseMark, SimulatedTrial, TrialId};
 use std::path::PathBuf;
@@ -105,6 +106,14 @@ impl Recorder {
             let stored = writer.insert(place, &trial)?;
             last.map_or(Ok(()), |old| writer.with_store(|store| store.give_up(old)))?;
             writer.report(stored)
+        });
+    }
+
+    /// Notes what other runs of the last finished simulated trial say about it.
+    pub fn note_quality(&self, quality: Quality) {
+        self.send(move |writer| {
+            let last = writer.last;
+            last.map_or(Ok(()), |id| writer.with_store(|store| store.note_quality(id, &quality)))
         });
     }
 

@@ -183,7 +183,7 @@ pub struct Status {
 /// Check of how far a finished grasp can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Checking {
-    /// A finer run is computed to compare with.
+    /// Other runs are computed to compare with.
     Comparing,
     /// The grasp is computed again until three levels agree.
     ComputingAgain,

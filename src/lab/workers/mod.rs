@@ -26,7 +26,7 @@
 //! | [`advice_job`] | a grasp | the move before the next one | replaces |
 //! | [`Explainer`] | a grasp | why the model gave its answer; the nearest trials | replaces |
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
-//! | of the simulation | a grasp | its ghost by the other engine; a check by a finer run | replaces |
+//! | of the simulation | a grasp | its ghost by the other engine; a check by other runs | replaces |
 //!
 //! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows keep their order
 //! and none is lost.

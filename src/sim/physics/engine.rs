@@ -50,6 +50,12 @@ pub trait Engine {
     /// Sample of the present state.
     fn frame(&self) -> Frame;
 
+    /// Normal force of each pad on anything but the other finger in the last step, left and right (N); `None` where fingers
+    /// do not touch each other, so that it is all that the pads feel.
+    fn force_beside_finger(&self) -> Option<[f64; 2]> {
+        None
+    }
+
     /// Deepest compression of the pads before the first step (m).
     fn starting_overlap(&mut self) -> f64;
 

@@ -275,6 +275,24 @@ impl Simulation {
         loads
     }
 
+    /// Normal force of each pad on anything but the other finger (N); `None` where the fingers do not touch each other.
+    fn force_beside_finger(&self) -> Option<[f64; 2]> {
+        let springs = &self.model.springs;
+        let mut force = [0.0; 2];
+        for contact in self.workspace.contacts.iter().filter(|_| self.workspace.fingers_meet) {
+            let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
+            match (contact.acting, contact.against) {
+                (Acting::Segment(link), Against::Object | Against::World) if spring < springs.on_pad => {
+                    let (normal, tangential) = contact.force(self.workspace.step);
+                    let load = self.taxel_load(side, spring, link, contact.normal * normal + tangential);
+                    force[side] += f64::from(load.normal);
+                }
+                _ => {}
+            }
+        }
+        self.workspace.fingers_meet.then_some(force)
+    }
+
     fn taxel_load(&self, side: usize, taxel: usize, link: u32, force: DVec3) -> TaxelLoad {
         let [along, across, inward] =
             (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
@@ -376,6 +394,10 @@ impl Engine for Simulation {
 
     fn frame(&self) -> Frame {
         self.frame()
+    }
+
+    fn force_beside_finger(&self) -> Option<[f64; 2]> {
+        self.force_beside_finger()
     }
 
     fn starting_overlap(&mut self) -> f64 {

@@ -260,6 +260,14 @@ impl Solver {
         let possible = self.engine == EngineKind::Palpate && Accuracy::TOLERANCES.contains(&accuracy.step_tolerance());
         possible.then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
     }
+
+    /// The same at ten times the tolerance; `None` where the engine controls no error, and above the largest tolerance.
+    pub fn coarser(&self) -> Option<Self> {
+        let tolerance = 10.0 * self.accuracy.step_tolerance();
+        let possible = self.engine == EngineKind::Palpate && Accuracy::TOLERANCES.contains(&tolerance);
+        let accuracy = Accuracy::Tolerance(tolerance);
+        possible.then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
+    }
 }
 
 impl Default for Solver {

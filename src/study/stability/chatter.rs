@@ -4,7 +4,7 @@
 //! sample to the next while nothing is commanded, and it does not do so at the reference accuracy in the same pose: there
 //! the object really rolls or slips.
 
-use palpate_lab::grasping::{Recompute, grasp, grasp_soundly, has_lost_object};
+use palpate_lab::grasping::{Recompute, grasp, grasp_soundly};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Phase, Side};
 use palpate_sim::objects::{ObjectError, ObjectModel, catalogue};
@@ -149,7 +149,7 @@ fn changes_in_hold(trial: &SimulatedTrial) -> bool {
     let count = trial.header.scene.gripper.taxels().count();
     let held: Vec<&Frame> = trial.frames().iter().filter(|frame| frame.phase == Phase::Hold).collect();
     let Some(last) = held.last() else { return false };
-    let in_hand = trial.frames().first().is_some_and(|first| !has_lost_object(first, last));
+    let in_hand = trial.frames().first().is_some_and(|first| !last.has_lost_object(first));
     let squeezed = Side::BOTH.iter().all(|side| last.normal_force(*side, count) > HELD);
     let changes = |side: &Side| {
         let forces: Vec<f64> = held.iter().map(|frame| frame.normal_force(*side, count)).collect();

@@ -13,7 +13,8 @@ mod study;
 pub use cases::CASES;
 pub use chatter::{CHATTER_ACCURACIES, ChatterRow, ChatterUnit, chatter_table};
 pub use random::{
-    FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict, SilentShareRow,
+    ComparedResult, FlagRow, JudgedScene, LevelResult, Policy, PolicyRow, RandomReport, RandomScene, SceneVerdict,
+    SilentShareRow,
 };
 
 pub(super) use report::sections;

@@ -190,6 +190,7 @@ fn policies_table(rows: &[PolicyRow]) -> StudyTable {
         Column("policy", "", &|row| row.policy.about().into()),
         Column("wrong", "", &|row| row.wrong.into()),
         Column("silently wrong", "% of scenes", &|row| Some(percent(row.silent_share)).into()),
+        Column("or undecided", "% of scenes", &|row| row.silent_or_undecided.map(percent).into()),
         Column("false alarms", "% of right results", &|row| Some(100.0 * row.false_alarms).into()),
         Column("cost", "", &|row| Some(row.cost).into()),
     ])

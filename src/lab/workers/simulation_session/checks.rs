@@ -1,19 +1,21 @@
-//! Checks of the last finished grasp: a finer run to compare with, and the grasp computed again.
+//! Checks of the last finished grasp: other runs to compare with, and the grasp computed again.
 
 use super::super::messages::{Checking, FinishedGrasp, TraceRow};
 use super::Session;
 use super::jobs::{CheckRequest, CheckResult, Subject};
-use crate::grasping::{GraspSummary, Row};
+use crate::grasping::{GraspComparison, GraspSummary, Row};
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;
 
 impl Session {
-    /// Compares the grasp that has just ended with a finer run, where it can be computed again.
+    /// Compares the grasp that has just ended with other runs, where it can be computed again.
     pub(super) fn begin_check(&mut self, subject: Option<Subject>) {
         self.status.checking = None;
         self.subject = subject;
         self.checker.stop();
-        if let Some(subject) = &self.subject {
+        // What is red already needs no comparison.
+        let sound = self.last.as_ref().is_some_and(|last| last.summary.quality.is_sound());
+        if let Some(subject) = self.subject.as_ref().filter(|_| sound) {
             self.checker.start(CheckRequest::Compare(subject.clone()));
             self.status.checking = Some(Checking::Comparing);
         }
@@ -38,8 +40,8 @@ impl Session {
         // A check that failed leaves the grasp as it is.
         for result in self.checker.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
             let answered = match &*result {
-                CheckResult::Compared { grasp, agrees } => {
-                    self.take_comparison(*grasp, *agrees);
+                CheckResult::Compared { grasp, found } => {
+                    self.take_comparison(*grasp, *found);
                     Checking::Comparing
                 }
                 CheckResult::ComputedAgain { grasp, trial } => {
@@ -56,10 +58,13 @@ impl Session {
         }
     }
 
-    fn take_comparison(&mut self, grasp: u64, agrees: bool) {
+    fn take_comparison(&mut self, grasp: u64, found: GraspComparison) {
         let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
         let mut last = FinishedGrasp::clone(last);
-        last.summary.quality.agrees = Some(agrees);
+        found.note(&mut last.summary.quality);
+        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
+            recorder.note_quality(last.summary.quality.clone());
+        }
         self.last = Some(Arc::new(last));
     }
 

@@ -1,9 +1,9 @@
-//! Jobs of the simulation thread: the grasp by the other engine, the check of a finished grasp by finer runs, and the cost
+//! Jobs of the simulation thread: the grasp by the other engine, the check of a finished grasp by other runs, and the cost
 //! and error of a scene's accuracy.
 
 use super::super::job::{Job, Newer};
 use super::super::messages::{GhostGrasp, MeasuredAccuracy, Wake};
-use crate::grasping::{EndState, accuracy_cost, grasp_until_agreement, prepare};
+use crate::grasping::{EndState, GraspComparison, accuracy_cost, compare, grasp_until_agreement, prepare};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::SimulatedTrial;
@@ -49,7 +49,7 @@ pub(super) struct Subject {
 
 /// What is to be done with a grasp.
 pub(super) enum CheckRequest {
-    /// Compare its end with that of a finer run.
+    /// Compare its end with that of other runs.
     Compare(Subject),
     /// Compute it again until three levels agree.
     ComputeAgain(Subject),
@@ -57,8 +57,8 @@ pub(super) enum CheckRequest {
 
 /// Result of a check.
 pub(super) enum CheckResult {
-    /// Whether a finer run ends in the same state.
-    Compared { grasp: u64, agrees: bool },
+    /// What other runs of it say.
+    Compared { grasp: u64, found: GraspComparison },
     /// The grasp computed again.
     ComputedAgain { grasp: u64, trial: Box<SimulatedTrial> },
 }
@@ -68,22 +68,16 @@ pub(super) fn check_job(wake: Wake) -> Job<CheckRequest, CheckResult> {
     Job::new("check", Newer::Replaces, wake, |request: &CheckRequest, run| {
         let cancelled = || run.stopped();
         Ok(match request {
-            CheckRequest::Compare(subject) => compare(subject, &cancelled),
+            CheckRequest::Compare(Subject { grasp, scene, object, seed, end, .. }) => {
+                let found = compare(scene, object.as_deref(), *seed, end.as_ref(), &cancelled);
+                found.map(|found| CheckResult::Compared { grasp: *grasp, found })
+            }
             CheckRequest::ComputeAgain(subject) => {
                 let trial = grasp_until_agreement(&subject.scene, subject.object.as_deref(), subject.seed, &cancelled);
                 trial.map(|trial| CheckResult::ComputedAgain { grasp: subject.grasp, trial: Box::new(trial) })
             }
         })
     })
-}
-
-/// Compares a grasp with the next level of accuracy; `None` where there is none, and if it was cancelled.
-fn compare(subject: &Subject, cancelled: &dyn Fn() -> bool) -> Option<CheckResult> {
-    let solver = subject.scene.solver.finer()?;
-    let scene = Scene { solver, ..Scene::clone(&subject.scene) };
-    let trial = prepare(&scene, subject.object.as_deref(), subject.seed).run_to_end(&scene, cancelled)?;
-    let alike = subject.end.as_ref().zip(EndState::of(trial.frames())).is_some_and(|(a, b)| a.is_like(&b));
-    Some(CheckResult::Compared { grasp: subject.grasp, agrees: alike && trial.data.quality.is_sound() })
 }
 
 /// A scene to measure, and its object.

@@ -89,9 +89,31 @@ impl LevelResult {
     }
 }
 
+/// Runs that a trial at standard is compared with, beside the next level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ComparedResult {
+    /// A run at draft from a start ten micrometres away ends alike.
+    pub coarser: bool,
+    /// Its convex minimisations.
+    pub coarser_solves: u64,
+    /// A run at the reference accuracy is solved and ends alike.
+    pub reference: bool,
+}
+
+impl ComparedResult {
+    fn new(runs: &Runs<'_>, standard: &Ran, reference: &Ran) -> Self {
+        let coarser = runs.scene.run(&solver(LEVELS[0]), runs.scene.nudge());
+        Self {
+            coarser: coarser.ends_like(standard),
+            coarser_solves: coarser.quality.solves,
+            reference: agree(standard, reference),
+        }
+    }
+}
+
 /// True if a result can be reported by the rule of [`until_agreement`].
 fn agree(coarse: &Ran, fine: &Ran) -> bool {
-    fine.quality.is_sound() && coarse.ends_like(fine)
+    fine.quality.is_solved() && coarse.ends_like(fine)
 }
 
 /// A scene with its results.
@@ -102,6 +124,8 @@ pub struct JudgedScene {
     pub levels: Vec<LevelResult>,
     /// Results from the drawn tolerance on, until two levels agree.
     pub drawn: Vec<LevelResult>,
+    /// What a trial at standard is compared with.
+    pub compared: ComparedResult,
     /// Tolerance of the truth.
     pub truth: f64,
     /// What is known about it.
@@ -123,11 +147,12 @@ impl JudgedScene {
         let level = |k: usize| LevelResult::new(LEVELS[k], &ran[k], &truth.run, k.checked_sub(1).map(|k| &ran[k]));
         let levels: Vec<LevelResult> = (0..LEVELS.len()).map(level).collect();
         let drawn = from_drawn(&runs, &truth);
+        let compared = ComparedResult::new(&runs, &ran[1], &ran[3]);
         let disputed = truth.accuracy != LEVELS[4] || levels.iter().chain(&drawn).any(|level| !level.right);
         let verdict = if disputed { truth.pushed(&runs) } else { SceneVerdict::Single };
         let diverged = runs.any_diverged();
         let cpu_s = start.elapsed().as_secs_f64();
-        Self { number, levels, drawn, truth: truth.accuracy.step_tolerance(), verdict, diverged, cpu_s }
+        Self { number, levels, drawn, compared, truth: truth.accuracy.step_tolerance(), verdict, diverged, cpu_s }
     }
 
     /// Results from one of the levels on.

@@ -4,6 +4,6 @@ mod judged;
 mod report;
 mod scene;
 
-pub use judged::{JudgedScene, LevelResult, SceneVerdict};
+pub use judged::{ComparedResult, JudgedScene, LevelResult, SceneVerdict};
 pub use report::{FlagRow, Policy, PolicyRow, RandomReport, SilentShareRow};
 pub use scene::RandomScene;

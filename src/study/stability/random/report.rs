@@ -1,6 +1,6 @@
 //! Shares of silently wrong results among judged scenes, by accuracy and by policy.
 
-use super::judged::{JudgedScene, LEVELS, LevelResult, SceneVerdict};
+use super::judged::{ComparedResult, JudgedScene, LEVELS, LevelResult, SceneVerdict};
 use palpate_learn::metrics::Interval;
 use palpate_sim::scene::Accuracy;
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,12 @@ pub enum Policy {
     Flags,
     /// A restless trial is computed again at a tenth of the tolerance, down to the reference; the others are flagged.
     Restless,
+    /// A coarser run from a start ten micrometres away has to end alike, or else one at a hundredth of the tolerance.
+    Compared,
     /// A run at a tenth of the tolerance flags what it disagrees with.
     RefinedRun,
+    /// The coarser run and one at a tenth have to end alike, or else one at a hundredth.
+    ComparedTwice,
     /// Refined until two levels agree; what never agrees is flagged.
     TwoAgree,
     /// Refined until three levels in a row agree, as `--until-agreement` does.
@@ -25,8 +29,18 @@ pub enum Policy {
 
 impl Policy {
     /// All of them, the cheapest first.
-    pub const ALL: [Self; 6] =
-        [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::TwoAgree, Self::ThreeAgree];
+    pub const ALL: [Self; 8] = [
+        Self::None,
+        Self::Flags,
+        Self::Restless,
+        Self::Compared,
+        Self::RefinedRun,
+        Self::ComparedTwice,
+        Self::TwoAgree,
+        Self::ThreeAgree,
+    ];
+    /// Those of drawn tolerances, which are refined until two levels agree and no further.
+    const DRAWN: [Self; 5] = [Self::None, Self::Flags, Self::Restless, Self::RefinedRun, Self::TwoAgree];
 
     /// Name in the figure.
     pub fn name(self) -> &'static str {
@@ -34,7 +48,9 @@ impl Policy {
             Self::None => "nothing",
             Self::Flags => "flags",
             Self::Restless => "restless again",
+            Self::Compared => "compared",
             Self::RefinedRun => "refined run",
+            Self::ComparedTwice => "compared twice",
             Self::TwoAgree => "two agree",
             Self::ThreeAgree => "three agree",
         }
@@ -45,39 +61,75 @@ impl Policy {
         match self {
             Self::None => "nothing",
             Self::Flags => "flags of a trial",
-            Self::Restless => "flags; restless trials again (default)",
+            Self::Restless => "flags; restless trials again",
+            Self::Compared => "flags; a coarser run from 10 µm away, else a hundredth (trust light)",
             Self::RefinedRun => "flags and a refined run",
+            Self::ComparedTwice => "flags; that coarser run and a tenth, else a hundredth",
             Self::TwoAgree => "refine until two levels agree",
             Self::ThreeAgree => "refine until three levels agree (`--until-agreement`)",
         }
     }
 
-    /// Reported result, whether it is flagged, and how many levels were computed for it.
-    fn outcome(self, levels: &[LevelResult]) -> (&LevelResult, bool, usize) {
+    /// Reported result, whether it is flagged, and the convex minimisations that were spent on it.
+    fn outcome<'a>(self, ladder: &Ladder<'a>) -> (&'a LevelResult, bool, u64) {
+        let levels = ladder.levels;
         let first = &levels[0];
+        let spent = |count: usize| levels[..count.min(levels.len())].iter().map(|level| level.solves).sum::<u64>();
         match self {
-            Self::None => (first, false, 1),
-            Self::Flags => (first, first.is_flagged(), 1),
+            Self::None => (first, false, spent(1)),
+            Self::Flags => (first, first.is_flagged(), spent(1)),
             Self::Restless => {
                 let last = levels.iter().position(|level| !level.restless).unwrap_or(levels.len() - 1);
-                (&levels[last], levels[last].is_flagged(), last + 1)
+                (&levels[last], levels[last].is_flagged(), spent(last + 1))
             }
             Self::RefinedRun => {
                 let agrees = levels.get(1).and_then(|second| second.agrees).unwrap_or(true);
-                (first, first.is_flagged() || !agrees, levels.len().min(2))
+                (first, first.is_flagged() || !agrees, spent(2))
             }
-            Self::TwoAgree => agreed(levels, 1),
-            Self::ThreeAgree => agreed(levels, 2),
+            // What is flagged already is not compared.
+            Self::Compared | Self::ComparedTwice if first.is_flagged() => (first, true, spent(1)),
+            Self::Compared | Self::ComparedTwice => {
+                let Some(compared) = ladder.compared else { return (first, false, spent(1)) };
+                let twice = self == Self::ComparedTwice;
+                let tenth = levels.get(1).and_then(|second| second.agrees) != Some(false);
+                let settled = compared.coarser && (!twice || tenth);
+                let finest = if settled { 0 } else { levels.get(2).map_or(0, |level| level.solves) };
+                let solves = spent(if twice { 2 } else { 1 }) + compared.coarser_solves + finest;
+                (first, !settled && !compared.reference, solves)
+            }
+            Self::TwoAgree => agreed(levels, 1, spent),
+            Self::ThreeAgree => agreed(levels, 2, spent),
         }
     }
 }
 
+/// Results of a scene from an accuracy on.
+#[derive(Clone, Copy)]
+struct Ladder<'a> {
+    levels: &'a [LevelResult],
+    /// Runs that a trial at standard is compared with.
+    compared: Option<&'a ComparedResult>,
+}
+
+impl<'a> Ladder<'a> {
+    /// From a level on.
+    fn of(scene: &'a JudgedScene, first: usize) -> Self {
+        let compared = (LEVELS[first] == Accuracy::Standard).then_some(&scene.compared);
+        Self { levels: scene.ladder(first), compared }
+    }
+
+    /// From the drawn tolerance on.
+    fn drawn(scene: &'a JudgedScene) -> Self {
+        Self { levels: &scene.drawn, compared: None }
+    }
+}
+
 /// The first level that agrees with the one before, as do so many in a row; else the last, which is flagged.
-fn agreed(levels: &[LevelResult], in_a_row: usize) -> (&LevelResult, bool, usize) {
+fn agreed(levels: &[LevelResult], in_a_row: usize, spent: impl Fn(usize) -> u64) -> (&LevelResult, bool, u64) {
     let agree = |last: &usize| (last + 1 - in_a_row..=*last).all(|k| levels[k].agrees == Some(true));
     let found = (in_a_row..levels.len()).find(agree);
     let last = found.unwrap_or(levels.len() - 1);
-    (&levels[last], found.is_none() || levels[last].is_flagged(), last + 1)
+    (&levels[last], found.is_none() || levels[last].is_flagged(), spent(last + 1))
 }
 
 /// What a policy comes to, from one accuracy on.
@@ -93,6 +145,9 @@ pub struct PolicyRow {
     pub silent: usize,
     /// Their share, with its interval.
     pub silent_share: Interval,
+    /// The same where scenes without a known end count as wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub silent_or_undecided: Option<Interval>,
     /// Wrong results, flagged or not.
     pub wrong: usize,
     /// Share of right results that are flagged.
@@ -188,7 +243,7 @@ impl RandomReport {
         let mut friction: Vec<f64> = drawn.iter().map(|level| level.friction_residual).collect();
         friction.sort_by(f64::total_cmp);
         let silent = |scene: &&&JudgedScene| {
-            let (level, flagged, _) = Policy::ThreeAgree.outcome(scene.ladder(0));
+            let (level, flagged, _) = Policy::ThreeAgree.outcome(&Ladder::of(scene, 0));
             !level.right && !flagged
         };
         Self {
@@ -206,7 +261,7 @@ impl RandomReport {
             friction_residual_p99: friction.get(friction.len() * 99 / 100).copied().unwrap_or(0.0),
             friction_residual_max: friction.last().copied().unwrap_or(0.0),
             by_accuracy: accuracy_rows(&clear),
-            by_policy: policy_rows(&clear),
+            by_policy: policy_rows(&clear, &with(SceneVerdict::Undecided).collect::<Vec<_>>()),
             flags: flag_rows(&clear),
             examples: clear.iter().filter(silent).map(|scene| scene.number).take(10).collect(),
             cpu_s: scenes.iter().map(|scene| scene.cpu_s).sum(),
@@ -224,7 +279,7 @@ fn accuracy_rows(scenes: &[&JudgedScene]) -> Vec<SilentShareRow> {
         let those: Vec<&LevelResult> = ladders.iter().map(|levels| &levels[0]).collect();
         let silent = those.iter().filter(|level| !level.right && !level.is_flagged()).count();
         let after = |levels: &&&[LevelResult]| {
-            let (level, flagged, _) = Policy::ThreeAgree.outcome(levels);
+            let (level, flagged, _) = Policy::ThreeAgree.outcome(&Ladder { levels, compared: None });
             !level.right && !flagged
         };
         SilentShareRow {
@@ -247,41 +302,38 @@ fn accuracy_rows(scenes: &[&JudgedScene]) -> Vec<SilentShareRow> {
     rows
 }
 
-fn policy_rows(scenes: &[&JudgedScene]) -> Vec<PolicyRow> {
-    let rows_of = |accuracy: String, ladders: Vec<&[LevelResult]>, policies: &[Policy]| {
+fn policy_rows(scenes: &[&JudgedScene], undecided: &[&JudgedScene]) -> Vec<PolicyRow> {
+    let rows_of = |accuracy: &str, ladder: &dyn for<'a> Fn(&'a JudgedScene) -> Ladder<'a>, policies: &[Policy]| {
         let row = |policy: &Policy| {
-            let outcomes: Vec<_> = ladders.iter().map(|levels| policy.outcome(levels)).collect();
+            let outcomes: Vec<_> = scenes.iter().map(|scene| policy.outcome(&ladder(scene))).collect();
             let count = |is: &dyn Fn(bool, bool) -> bool| {
                 outcomes.iter().filter(|(level, flagged, _)| is(level.right, *flagged)).count()
             };
             let silent = count(&|right, flagged| !right && !flagged);
             let right = count(&|right, _| right);
-            let spent: u64 = ladders
-                .iter()
-                .zip(&outcomes)
-                .map(|(levels, (_, _, computed))| levels[..*computed].iter().map(|level| level.solves).sum::<u64>())
-                .sum();
-            let single: u64 = ladders.iter().map(|levels| levels[0].solves).sum();
+            let unflagged = undecided.iter().filter(|scene| !policy.outcome(&ladder(scene)).1).count();
+            let single: u64 = scenes.iter().map(|scene| ladder(scene).levels[0].solves).sum();
             PolicyRow {
-                accuracy: accuracy.clone(),
+                accuracy: accuracy.to_owned(),
                 policy: *policy,
-                scenes: ladders.len(),
+                scenes: scenes.len(),
                 silent,
-                silent_share: Interval::of_share(silent, ladders.len()),
-                wrong: ladders.len() - right,
+                silent_share: Interval::of_share(silent, scenes.len()),
+                silent_or_undecided: Some(Interval::of_share(silent + unflagged, scenes.len() + undecided.len())),
+                wrong: scenes.len() - right,
                 false_alarms: count(&|right, flagged| right && flagged) as f64 / right.max(1) as f64,
-                cost: spent as f64 / single.max(1) as f64,
+                cost: outcomes.iter().map(|(_, _, spent)| spent).sum::<u64>() as f64 / single.max(1) as f64,
             }
         };
         policies.iter().map(row).collect::<Vec<_>>()
     };
-    // Drawn tolerances are refined until two levels agree, and no further.
-    let drawn = scenes.iter().map(|scene| scene.drawn.as_slice()).collect();
-    let drawn = rows_of(DRAWN.to_owned(), drawn, &Policy::ALL[..5]);
-    let named = [Accuracy::Draft, Accuracy::Standard].into_iter().enumerate().flat_map(|(k, accuracy)| {
-        rows_of(accuracy.to_string(), scenes.iter().map(|scene| scene.ladder(k)).collect(), &Policy::ALL)
-    });
-    drawn.into_iter().chain(named).collect()
+    let mut rows = rows_of(DRAWN, &|scene| Ladder::drawn(scene), &Policy::DRAWN);
+    for (k, level) in LEVELS.iter().enumerate().take(2) {
+        let compared = |policy: &Policy| !matches!(policy, Policy::Compared | Policy::ComparedTwice);
+        let policies: Vec<Policy> = Policy::ALL.into_iter().filter(|p| k == 1 || compared(p)).collect();
+        rows.extend(rows_of(&level.to_string(), &|scene| Ladder::of(scene, k), &policies));
+    }
+    rows
 }
 
 fn flag_rows(scenes: &[&JudgedScene]) -> Vec<FlagRow> {

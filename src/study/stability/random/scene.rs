@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
-use palpate_lab::grasping::{EndState, has_lost_object};
+use palpate_lab::grasping::EndState;
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, TorquePoint};
 use palpate_sim::objects::ObjectModel;
@@ -107,6 +107,12 @@ impl RandomScene {
         })
     }
 
+    /// The start that a trial is compared from: ten micrometres away, along and about an axis.
+    pub(super) fn nudge(&self) -> Push {
+        let far = 1e-5;
+        Push { shift: DVec3::X * far, turn: DVec3::Z * (far / self.reach) }
+    }
+
     /// Computes the scene to the end of its hold.
     pub(super) fn run(&self, solver: &Solver, push: Push) -> Ran {
         let scene = Scene { solver: solver.clone(), ..self.scene.clone() };
@@ -123,7 +129,7 @@ impl RandomScene {
                     run.command(self.pressure(t), phase);
                 }
                 Ok(SimEvent::Sampled(frame)) => {
-                    let lost = has_lost_object(&start, &frame);
+                    let lost = frame.has_lost_object(&start);
                     frames.push(frame);
                     // Nothing that follows matters.
                     if lost {
