@@ -56,6 +56,7 @@ const SETTLED_S: f64 = 0.5;
 const SAME_ANGLE: f64 = 0.02;
 /// Largest distance of objects between ends that are alike (m).
 const SAME_PLACE: f64 = 2e-3;
+
 impl EndState {
     /// Reads the end of a grasp; `None` without samples.
     pub fn of(frames: &[Frame]) -> Option<Self> {
@@ -227,7 +228,7 @@ pub fn compare(
     let mut undecided = false;
     if !agrees && object.is_some() {
         for push in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
-            undecided |= !ends_alike(&finest, &run(finer.clone(), push * PUSH, DVec3::ZERO)?);
+            undecided = undecided || !ends_alike(&finest, &run(finer.clone(), push * PUSH, DVec3::ZERO)?);
         }
     }
     Some(GraspComparison { agrees, undecided })
