@@ -65,7 +65,7 @@ struct GraspReport {
     accuracy: String,
     /// CPU time of the simulation alone (ms).
     cpu_ms: f64,
-    /// CPU time of the runs that it was compared with (ms).
+    /// CPU time of the simulations it was compared with (ms).
     check_cpu_ms: f64,
     /// CPU time of loading the object (ms).
     load_cpu_ms: f64,
@@ -170,7 +170,7 @@ impl Report for GraspReport {
         page.fact(
             "cost",
             format!(
-                "{:.1} ms CPU for {duration} s at accuracy {accuracy}, {:.1} ms for the runs it was compared with",
+                "{:.1} ms CPU for {duration} s at accuracy {accuracy}, {:.1} ms for the comparison",
                 self.cpu_ms, self.check_cpu_ms
             ),
         );

@@ -112,19 +112,19 @@ pub struct Quality {
     pub imbalance: Option<Imbalance>,
     /// Why the trial was computed more finely than its scene asked for; absent where it was not.
     pub recomputed: Option<Recomputed>,
-    /// Whether other runs of the same grasp end alike; absent where there were none.
+    /// Whether other simulations of the grasp give the same result; absent where there were none.
     pub agrees: Option<bool>,
     /// Why the grasp itself failed, though its numbers may be right; absent where it did not.
-    pub mishap: Option<Mishap>,
+    pub failure: Option<GraspFailure>,
     /// Mean normal force of each finger on the object in the settled hold, left and right (N): contact between the fingers
-    /// is not part of it. Absent in trials from before it was recorded.
+    /// is not part of it. Absent where pads touch nothing but the object.
     pub hold_force: Option<[f64; 2]>,
 }
 
 /// A grasp that holds nothing, or began where no grasp can.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Mishap {
+pub enum GraspFailure {
     /// The open fingers stood this deep inside the object or its support (m).
     StartedInside(f64),
     /// No finger touched the object.
@@ -135,7 +135,7 @@ pub enum Mishap {
     NoSingleAnswer,
 }
 
-impl std::fmt::Display for Mishap {
+impl std::fmt::Display for GraspFailure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::StartedInside(depth) => {
@@ -188,11 +188,11 @@ pub enum RecomputeCause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrustLevel {
-    /// Another run ends alike, and nothing was flagged.
+    /// Another simulation gives the same result, and nothing was flagged.
     Green,
-    /// Not compared with another run, or some steps missed the accuracy.
+    /// Not compared with another simulation, or some steps missed the accuracy.
     Amber,
-    /// Wrong by its own finer run, or unsound.
+    /// A finer simulation gives another result, or the trial is unsound or failed.
     Red,
 }
 
@@ -231,10 +231,10 @@ pub struct Imbalance {
 }
 
 impl Quality {
-    /// True when the trial may be learned from: it was solved, no finer run ends elsewhere, and a finger touched the object.
-    /// One that lost the object may: a hand in use loses it too, and is judged by what it felt.
+    /// True when the trial may be learned from: it was solved, no finer simulation gives another result, and the fingers
+    /// started outside of everything. One that misses or loses the object may: a hand in use does so too.
     pub fn is_sound(&self) -> bool {
-        self.is_solved() && self.agrees != Some(false) && matches!(self.mishap, None | Some(Mishap::LostObject))
+        self.is_solved() && self.agrees != Some(false) && !matches!(self.failure, Some(GraspFailure::StartedInside(_)))
     }
 
     /// True when every number was finite, every step reached its tolerance, and the hold came to rest.
@@ -260,8 +260,8 @@ impl Quality {
         match (diverged.or_else(|| self.misses()), self.agrees) {
             (Some(cause), _) => (TrustLevel::Red, cause),
             (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
-            (None, None | Some(false)) => (TrustLevel::Amber, "not compared with another run".to_owned()),
-            (None, Some(true)) => (TrustLevel::Green, "another run of the same grasp ends alike".to_owned()),
+            (None, None | Some(false)) => (TrustLevel::Amber, "not compared with another simulation".to_owned()),
+            (None, Some(true)) => (TrustLevel::Green, "another simulation gives the same result".to_owned()),
         }
     }
 
@@ -283,8 +283,8 @@ impl Quality {
                  unbalanced at its end"
             ));
         }
-        let elsewhere = (self.agrees == Some(false)).then(|| "a finer run of the same grasp ends elsewhere".to_owned());
-        self.mishap.map(|mishap| mishap.to_string()).or(elsewhere)
+        let elsewhere = (self.agrees == Some(false)).then(|| "a finer simulation gives another result".to_owned());
+        self.failure.map(|failure| failure.to_string()).or(elsewhere)
     }
 }
 
@@ -313,7 +313,7 @@ impl Default for Quality {
             imbalance: None,
             recomputed: None,
             agrees: None,
-            mishap: None,
+            failure: None,
             hold_force: None,
         }
     }
@@ -370,7 +370,7 @@ mod tests {
             |q| q.finite = false,
             |q| q.hold_changes = 5,
             |q| q.static_residual = 0.3,
-            |q| q.mishap = Some(Mishap::NeverTouched),
+            |q| q.failure = Some(GraspFailure::NeverTouched),
         ] {
             assert_eq!(light(&change).0, TrustLevel::Red);
         }

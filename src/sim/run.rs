@@ -1,6 +1,6 @@
 //! A simulation on its clock: actuation ticks and samples in order. Identical scenes give identical frames.
 
-use crate::frame::{Frame, Mishap, Plan, Quality};
+use crate::frame::{Frame, GraspFailure, Plan, Quality};
 use crate::gripper::{Phase, Programme, Side};
 use crate::objects::ObjectModel;
 #[cfg(feature = "rapier")]
@@ -54,9 +54,9 @@ struct HoldWatch {
     /// Changes in the whole hold, and those once it has settled.
     all: [u32; 2],
     settled: [u32; 2],
-    /// Sum over the samples of the settled hold of the force beside that of the other finger (N), their number, and whether
-    /// the fingers touched each other in any of them.
-    beside_finger: ([f64; 2], u32, bool),
+    /// Sum over the samples of the settled hold of the force on the object (N), their number, and whether pads touched
+    /// anything else in any of them.
+    on_object: ([f64; 2], u32, bool),
     /// The object is touched, or has left the hand, before the release.
     touched: bool,
     lost: bool,
@@ -70,12 +70,12 @@ const CHANGE: f64 = 0.05;
 impl HoldWatch {
     fn new(taxels: usize, still_until: f64) -> Self {
         let (force, all, settled) = ([0.0; 2], [0; 2], [0; 2]);
-        let beside_finger = ([0.0; 2], 0, false);
-        Self { taxels, still_until, since: None, force, all, settled, beside_finger, touched: false, lost: false }
+        let on_object = ([0.0; 2], 0, false);
+        Self { taxels, still_until, since: None, force, all, settled, on_object, touched: false, lost: false }
     }
 
-    /// Notes a sample: the frame before the first step, and the force beside that of the other finger.
-    fn note(&mut self, frame: &Frame, start: &Frame, beside_finger: Option<[f64; 2]>) {
+    /// Notes a sample, given the frame before the first step and the force on the object where pads touch more.
+    fn note(&mut self, frame: &Frame, start: &Frame, on_object: Option<[f64; 2]>) {
         let force = Side::BOTH.map(|side| frame.normal_force(side, self.taxels));
         let into_hold = match frame.phase {
             Phase::Hold if frame.t <= self.still_until => frame.t - *self.since.get_or_insert(frame.t),
@@ -90,11 +90,11 @@ impl HoldWatch {
             self.settled[side] += u32::from(changed && into_hold > SETTLED_AFTER);
         }
         self.force = force;
-        let held = beside_finger.unwrap_or(force);
+        let held = on_object.unwrap_or(force);
         if into_hold > SETTLED_AFTER {
-            let (sum, count, met) = &mut self.beside_finger;
+            let (sum, count, met) = &mut self.on_object;
             (0..2).for_each(|side| sum[side] += held[side]);
-            (*count, *met) = (*count + 1, *met || beside_finger.is_some());
+            (*count, *met) = (*count + 1, *met || on_object.is_some());
         }
         if frame.phase != Phase::Release && frame.t <= self.still_until {
             self.touched |= held != [0.0; 2];
@@ -102,9 +102,9 @@ impl HoldWatch {
         }
     }
 
-    /// Mean force on the object in the settled hold (N), where the fingers touched each other too.
+    /// Mean force on the object in the settled hold (N), where pads touched anything else.
     fn hold_force(&self) -> Option<[f64; 2]> {
-        let (sum, count, met) = self.beside_finger;
+        let (sum, count, met) = self.on_object;
         met.then(|| sum.map(|sum| sum / f64::from(count)))
     }
 }
@@ -231,7 +231,7 @@ impl SimRun {
             self.engine.get_mut().advance_by(ticks)?;
             if self.engine.get().tick().is_multiple_of(u64::from(clock.ticks_per_sample)) {
                 let frame = self.engine.get().frame();
-                self.hold.note(&frame, &self.start, self.engine.get().force_beside_finger());
+                self.hold.note(&frame, &self.start, self.engine.get().force_on_object());
                 // A hand that moves leaves nothing at rest: the last sample before counts.
                 if self.phase == Phase::Hold && self.hold.still_until.is_finite() && frame.t <= self.hold.still_until {
                     self.static_residual = Some(self.engine.get().quality().static_residual);
@@ -260,20 +260,20 @@ impl SimRun {
         }
         quality.hold_changes = self.hold.settled[0].max(self.hold.settled[1]);
         quality.all_hold_changes = self.hold.all[0].max(self.hold.all[1]);
-        quality.mishap = self.mishap();
+        quality.failure = self.failure();
         quality.hold_force = self.hold.hold_force();
         quality
     }
 
-    /// What went wrong with the grasp, once it has come to the hold.
-    fn mishap(&self) -> Option<Mishap> {
+    /// Failure of the grasp: of its start at once, of the hold once there is one.
+    fn failure(&self) -> Option<GraspFailure> {
         if self.overlap > DEEPEST_START {
-            return Some(Mishap::StartedInside(self.overlap));
+            return Some(GraspFailure::StartedInside(self.overlap));
         }
         let missed = self.phase != Phase::Close && !self.hold.touched;
         match self.start.world_from_object {
-            Some(_) if self.hold.lost => Some(Mishap::LostObject),
-            Some(_) if missed => Some(Mishap::NeverTouched),
+            Some(_) if self.hold.lost => Some(GraspFailure::LostObject),
+            Some(_) if missed => Some(GraspFailure::NeverTouched),
             _ => None,
         }
     }

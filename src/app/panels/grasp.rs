@@ -91,7 +91,7 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
     let quality = &last.summary.quality;
     let (level, reason) = quality.trust();
     let reason = match checking {
-        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with other runs ..".to_owned(),
+        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with another simulation ..".to_owned(),
         Some(Checking::ComputingAgain) => "computing again at finer accuracy ..".to_owned(),
         _ => reason,
     };

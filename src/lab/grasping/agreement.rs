@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`compare`] asks less: whether a grasp can be trusted as it is. A run at ten times the tolerance, from a start ten
-//! micrometres away, costs half as much as the grasp. Where it ends alike, the grasp is taken as right; otherwise a run at a
+//! micrometres away, costs half as much as the grasp. Where it gives the same result, the grasp is taken as right; otherwise a run at a
 //! hundredth of the tolerance decides.
 //!
 //! Two in a row are not enough: one in a hundred extreme scenes ends in the same wrong place at two coarse levels. Levels
@@ -17,7 +17,7 @@
 
 use super::run::{grasp, prepare};
 use glam::DVec3;
-use palpate_sim::frame::{Frame, Mishap, Quality, RecomputeCause, Recomputed};
+use palpate_sim::frame::{Frame, GraspFailure, Quality, RecomputeCause, Recomputed};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Accuracy, Scene, Solver};
@@ -171,16 +171,17 @@ pub fn grasp_until_agreement(
     Some(trial)
 }
 
-/// Shift of the object (m) and its turn (rad) in the coarser run of a comparison.
-const NUDGE: DVec3 = DVec3::new(1e-5, 0.0, 0.0);
-const TURN: DVec3 = DVec3::new(0.0, 0.0, 3e-4);
-/// A push that decides nothing in a grasp with a single answer (m).
-const PUSH: f64 = 1e-6;
+/// Shift of the object in the coarser simulation of a comparison (m).
+pub const NUDGE: DVec3 = DVec3::new(1e-5, 0.0, 0.0);
+/// Its turn there (rad).
+pub const NUDGE_TURN: DVec3 = DVec3::new(0.0, 0.0, 3e-4);
+/// Push that changes nothing in a grasp with a single answer (m).
+pub const PUSH: f64 = 1e-6;
 
-/// What other runs say about a grasp.
+/// Result of comparing a grasp with other simulations of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraspComparison {
-    /// Whether they end alike.
+    /// Whether they give the same result.
     pub agrees: bool,
     /// True where a push of a micrometre changes the end.
     pub undecided: bool,
@@ -191,7 +192,7 @@ impl GraspComparison {
     pub fn note(self, quality: &mut Quality) {
         quality.agrees = Some(self.agrees);
         if self.undecided {
-            quality.mishap = Some(Mishap::NoSingleAnswer);
+            quality.failure = Some(GraspFailure::NoSingleAnswer);
         }
     }
 }
@@ -217,7 +218,7 @@ pub fn compare(
         end.zip(EndState::of(trial.frames()).as_ref()).is_some_and(|(grasp, other)| grasp.is_like(other))
     };
     if let Some(coarser) = scene.solver.coarser()
-        && alike(&run(coarser, NUDGE, TURN)?)
+        && alike(&run(coarser, NUDGE, NUDGE_TURN)?)
     {
         return Some(GraspComparison { agrees: true, undecided: false });
     }
@@ -360,7 +361,7 @@ mod tests {
         assert_eq!(lost, GraspComparison { agrees: false, undecided: false });
         let mut quality = Quality::default();
         lost.note(&mut quality);
-        assert_eq!((quality.agrees, quality.mishap), (Some(false), None));
+        assert_eq!((quality.agrees, quality.failure), (Some(false), None));
         GraspComparison { agrees: false, undecided: true }.note(&mut quality);
         assert_eq!(quality.misses().as_deref(), Some("a push of a micrometre decides how it ends"));
         assert_eq!(compare(&scene, Some(&ball), 0, end.as_ref(), &|| true), None);

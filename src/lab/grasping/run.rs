@@ -40,7 +40,7 @@ fn prepare_with(scene: &Scene, object: Option<&ObjectModel>, seed: u64, refineme
     let mut warnings = object.map(|o| o.warnings.clone()).unwrap_or_default();
     warnings.extend(placement.warnings);
     warnings.extend(programme_warnings(scene));
-    warnings.extend(simulation.quality().mishap.map(|mishap| mishap.to_string()));
+    warnings.extend(simulation.quality().failure.map(|failure| failure.to_string()));
     let origin = GraspOrigin {
         physics: PHYSICS_VERSION,
         object: object.map_or(0, |object| object.content),
@@ -232,7 +232,7 @@ fn fingers_cross(scene: &Scene, frames: &[Frame]) -> Option<f64> {
 mod tests {
     use super::*;
     use palpate_geometry::Primitive;
-    use palpate_sim::frame::{Mishap, Quality, TrustLevel};
+    use palpate_sim::frame::{GraspFailure, Quality, TrustLevel};
 
     fn ball() -> ObjectModel {
         ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6)
@@ -279,7 +279,7 @@ mod tests {
         let run = prepare(&scene, Some(&ball()), 0);
         assert!(run.header().warnings.iter().any(|w| w.contains("start")), "{:?}", run.header().warnings);
         let trial = grasp(&scene, Some(&ball()), 0);
-        assert!(matches!(trial.data.quality.mishap, Some(Mishap::StartedInside(depth)) if depth > 1e-3));
+        assert!(matches!(trial.data.quality.failure, Some(GraspFailure::StartedInside(depth)) if depth > 1e-3));
         assert_eq!(trial.header.warnings.iter().filter(|w| w.contains("start")).count(), 1);
     }
 
@@ -290,17 +290,17 @@ mod tests {
             run.pull_object(DVec3::X * pull);
             while run.next_frame().is_some() {}
             let quality = run.finish(scene).data.quality;
-            (quality.mishap, quality.is_sound(), quality.trust().0)
+            (quality.failure, quality.is_sound(), quality.trust().0)
         };
         let held = end(&Scene::default(), 0.0);
         assert_eq!(held, (None, true, TrustLevel::Amber));
         let mut aside = Scene::default();
         aside.gripper.mount.offset = [0.0, 0.08, 0.0];
-        assert_eq!(end(&aside, 0.0), (Some(Mishap::NeverTouched), false, TrustLevel::Red));
+        assert_eq!(end(&aside, 0.0), (Some(GraspFailure::NeverTouched), true, TrustLevel::Red));
         // Pulled off its pedestal, far beyond the fingers.
         aside.gripper.mount.offset = [0.0, 0.0, 0.0];
-        let (mishap, sound, light) = end(&aside, 20.0);
-        assert_eq!((mishap, sound, light), (Some(Mishap::LostObject), true, TrustLevel::Red));
+        let (failure, sound, light) = end(&aside, 20.0);
+        assert_eq!((failure, sound, light), (Some(GraspFailure::LostObject), true, TrustLevel::Red));
     }
 
     #[test]

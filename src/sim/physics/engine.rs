@@ -50,9 +50,9 @@ pub trait Engine {
     /// Sample of the present state.
     fn frame(&self) -> Frame;
 
-    /// Normal force of each pad on anything but the other finger in the last step, left and right (N); `None` where fingers
-    /// do not touch each other, so that it is all that the pads feel.
-    fn force_beside_finger(&self) -> Option<[f64; 2]> {
+    /// Normal force of each pad on the object in the last step, left and right (N); `None` where pads touch nothing else, so
+    /// that it is the whole load of their taxels.
+    fn force_on_object(&self) -> Option<[f64; 2]> {
         None
     }
 

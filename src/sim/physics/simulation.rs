@@ -275,22 +275,26 @@ impl Simulation {
         loads
     }
 
-    /// Normal force of each pad on anything but the other finger (N); `None` where the fingers do not touch each other.
-    fn force_beside_finger(&self) -> Option<[f64; 2]> {
+    /// Normal force of each pad on the object (N); `None` where pads touch nothing else.
+    fn force_on_object(&self) -> Option<[f64; 2]> {
         let springs = &self.model.springs;
-        let mut force = [0.0; 2];
-        for contact in self.workspace.contacts.iter().filter(|_| self.workspace.fingers_meet) {
+        let (mut force, mut touch_more) = ([0.0; 2], self.workspace.fingers_meet);
+        for contact in &self.workspace.contacts {
             let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
-            match (contact.acting, contact.against) {
-                (Acting::Segment(link), Against::Object | Against::World) if spring < springs.on_pad => {
-                    let (normal, tangential) = contact.force(self.workspace.step);
+            let Acting::Segment(link) = contact.acting else { continue };
+            let (normal, tangential) = contact.force(self.workspace.step);
+            if normal <= 0.0 || spring >= springs.on_pad {
+                continue;
+            }
+            match contact.against {
+                Against::Object => {
                     let load = self.taxel_load(side, spring, link, contact.normal * normal + tangential);
                     force[side] += f64::from(load.normal);
                 }
-                _ => {}
+                Against::World | Against::Finger(_) => touch_more = true,
             }
         }
-        self.workspace.fingers_meet.then_some(force)
+        touch_more.then_some(force)
     }
 
     fn taxel_load(&self, side: usize, taxel: usize, link: u32, force: DVec3) -> TaxelLoad {
@@ -396,8 +400,8 @@ impl Engine for Simulation {
         self.frame()
     }
 
-    fn force_beside_finger(&self) -> Option<[f64; 2]> {
-        self.force_beside_finger()
+    fn force_on_object(&self) -> Option<[f64; 2]> {
+        self.force_on_object()
     }
 
     fn starting_overlap(&mut self) -> f64 {

@@ -17,7 +17,7 @@ use palpate_sim::scene::{Auto, Effect, Scene, Setting, SupportKind};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, SQRT_2};
 
-/// What finite elements give; the scripts say in what units.
+/// Results of the finite elements; units as in the scripts.
 const PAD: &str = include_str!("../../../tests/peers/results/soft_pad.csv");
 const FINGER: &str = include_str!("../../../tests/peers/results/soft_finger.csv");
 
@@ -36,7 +36,7 @@ const HALF_BAR: f64 = 0.02;
 const PLATE: f64 = 0.04;
 
 /// A rigid body with its lowest point towards the left pad.
-struct Body {
+struct RigidBody {
     shape: Primitive,
     /// Its turn in the gripper's frame.
     turn: DQuat,
@@ -46,8 +46,8 @@ struct Body {
     length: f64,
 }
 
-impl Body {
-    fn of(name: &str, finger_width: f64) -> Option<Self> {
+impl RigidBody {
+    fn named(name: &str, finger_width: f64) -> Option<Self> {
         let bar = |tilt: f64| Self {
             shape: Primitive::Cuboid { half: DVec3::new(HALF_BAR, HALF_LENGTH, HALF_BAR) },
             turn: DQuat::from_rotation_y(FRAC_PI_4 + tilt),
@@ -78,16 +78,26 @@ impl Body {
     }
 }
 
-/// What the pad feels: force towards it and along it, footprint along the finger, peak pressure.
+/// Load of a pad: force towards it and along it (N), footprint along the finger, peak pressure.
 #[derive(Clone, Copy, Default)]
-struct Felt {
+struct PadLoad {
     normal: f64,
     along: f64,
     width_m: f64,
     peak_pa: f64,
 }
 
-impl Felt {
+impl PadLoad {
+    /// Weighted sum.
+    fn sum(loads: impl IntoIterator<Item = (f64, Self)>) -> Self {
+        loads.into_iter().fold(Self::default(), |sum, (weight, load)| Self {
+            normal: sum.normal + weight * load.normal,
+            along: sum.along + weight * load.along,
+            width_m: sum.width_m + weight * load.width_m,
+            peak_pa: sum.peak_pa + weight * load.peak_pa,
+        })
+    }
+
     fn new(scene: &Scene, frame: &Frame) -> Self {
         let grid = scene.gripper.taxels();
         let loads: Vec<_> = frame.loads(Side::Left, grid.count()).filter(|(_, load)| load.normal > 0.0).collect();
@@ -117,9 +127,9 @@ fn straight_finger(sticks: bool) -> Scene {
     scene
 }
 
-/// Presses a body in, slanted along the finger, from a place along a row of taxels on: what the pad feels at depths (m).
+/// Presses a body in, slanted along the finger, from a place along a row of taxels on: loads of the pad by depth (m).
 /// A very heavy body is pulled: the pad hardly slows it down, and skin that sticks to it is sheared.
-fn press(scene: &Scene, body: &Body, slant_deg: f64, place: f64) -> Result<Vec<(f64, Felt)>, StudyError> {
+fn press(scene: &Scene, body: &RigidBody, slant_deg: f64, place: f64) -> Result<Vec<(f64, PadLoad)>, StudyError> {
     let mut object = ObjectModel::from_primitive("body", body.shape, 500.0, 1.0);
     object.mass = object.mass.with_mass(MASS);
     let (mut run, placement) = SimRun::new(scene, Some(&object));
@@ -131,43 +141,37 @@ fn press(scene: &Scene, body: &Body, slant_deg: f64, place: f64) -> Result<Vec<(
     run.move_object(gripper.point(start) - now, turn.to_scaled_axis());
     let way = DVec3::new(-1.0, 0.0, -slant_deg.to_radians().tan());
     run.pull_object(gripper.direction(way) * (MASS * PULL));
-    let mut felt = vec![(0.0, Felt::default())];
-    while felt.last().is_some_and(|(depth, _)| *depth < WAY) {
+    let mut loads = vec![(0.0, PadLoad::default())];
+    while loads.last().is_some_and(|(depth, _)| *depth < WAY) {
         match run.next_event()? {
             SimEvent::Sampled(frame) => {
                 let at = frame.world_from_object.map_or(DVec3::ZERO, |pose| gripper.inverse().point(pose.position));
-                felt.push((start.x - at.x, Felt::new(scene, &frame)));
+                loads.push((start.x - at.x, PadLoad::new(scene, &frame)));
             }
             SimEvent::ActuationDue { .. } => {}
             SimEvent::Finished => break,
         }
     }
-    Ok(felt)
+    Ok(loads)
 }
 
-/// Between the samples around a depth (m).
-fn at_depth(felt: &[(f64, Felt)], depth: f64) -> Felt {
-    let after = felt.partition_point(|(reached, _)| *reached < depth).clamp(1, felt.len() - 1);
-    let ((from, low), (to, high)) = (felt[after - 1], felt[after]);
+/// Load between the samples around a depth (m).
+fn at_depth(loads: &[(f64, PadLoad)], depth: f64) -> PadLoad {
+    let after = loads.partition_point(|(reached, _)| *reached < depth).clamp(1, loads.len() - 1);
+    let ((from, low), (to, high)) = (loads[after - 1], loads[after]);
     let share = (depth - from) / (to - from);
-    let between = |value: fn(&Felt) -> f64| value(&low) + share * (value(&high) - value(&low));
-    Felt {
-        normal: between(|felt| felt.normal),
-        along: between(|felt| felt.along),
-        width_m: between(|felt| felt.width_m),
-        peak_pa: between(|felt| felt.peak_pa),
-    }
+    PadLoad::sum([(1.0 - share, low), (share, high)])
 }
 
-/// A body pressed in from several places along a row of taxels.
-struct Pressed {
-    places: Vec<Vec<(f64, Felt)>>,
+/// Loads of a body pressed in from several places along a row of taxels.
+struct PressedBody {
+    places: Vec<Vec<(f64, PadLoad)>>,
     /// Length that forces are divided by (m).
     length: f64,
 }
 
-impl Pressed {
-    fn new(body: &Body, slant_deg: f64, sticks: bool) -> Result<Self, StudyError> {
+impl PressedBody {
+    fn new(body: &RigidBody, slant_deg: f64, sticks: bool) -> Result<Self, StudyError> {
         let scene = straight_finger(sticks);
         let pitch = scene.gripper.taxels().row_pitch() / f64::from(PLACES);
         let places = (0..PLACES).map(|place| press(&scene, body, slant_deg, pitch * f64::from(place)));
@@ -175,32 +179,26 @@ impl Pressed {
     }
 
     /// Mean over the places, at a depth (m), with forces per length.
-    fn at(&self, depth: f64) -> Felt {
-        let felt: Vec<Felt> = self.places.iter().map(|felt| at_depth(felt, depth)).collect();
-        let mean = |value: fn(&Felt) -> f64| felt.iter().map(value).sum::<f64>() / f64::from(PLACES);
-        Felt {
-            normal: mean(|felt| felt.normal) / self.length,
-            along: mean(|felt| felt.along) / self.length,
-            width_m: mean(|felt| felt.width_m),
-            peak_pa: mean(|felt| felt.peak_pa),
-        }
+    fn at(&self, depth: f64) -> PadLoad {
+        let mean = PadLoad::sum(self.places.iter().map(|loads| (1.0 / f64::from(PLACES), at_depth(loads, depth))));
+        PadLoad { normal: mean.normal / self.length, along: mean.along / self.length, ..mean }
     }
 }
 
 /// A number of a continuum and that of our springs or joints.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Beside {
+pub struct ContinuumPair {
     pub continuum: f64,
     pub ours: f64,
 }
 
-impl Beside {
+impl ContinuumPair {
     fn new(continuum: f64, ours: f64) -> Self {
         Self { continuum: rounded(continuum), ours: rounded(ours) }
     }
 
     /// The continuum's over ours.
-    fn ratio(self) -> f64 {
+    pub(super) fn ratio(self) -> f64 {
         self.continuum / self.ours
     }
 }
@@ -216,13 +214,13 @@ pub struct PadRow {
     pub sticks: bool,
     pub depth_mm: f64,
     /// Force towards the pad (N for the ball, N/m for the others).
-    pub normal: Beside,
+    pub normal: ContinuumPair,
     /// Force along the pad, where the way is slanted (the same units).
-    pub along: Option<Beside>,
+    pub along: Option<ContinuumPair>,
     /// Extent of the contact along the finger (mm).
-    pub width_mm: Beside,
+    pub width_mm: ContinuumPair,
     /// Peak pressure (kPa): ours is that of a taxel.
-    pub peak_kpa: Beside,
+    pub peak_kpa: ContinuumPair,
     /// Change of the continuum's normal force between two meshes (%); absent where one of them did not get as deep.
     pub mesh_percent: Option<f64>,
 }
@@ -234,10 +232,10 @@ pub struct FingerRow {
     pub load: f64,
     pub tip_angle_deg: f64,
     /// Deflection of the tip over the finger's length.
-    pub deflection: Beside,
+    pub deflection: ContinuumPair,
 }
 
-/// The pad and the finger beside a continuum, and what constants of the pad would fit best.
+/// The pad and the finger beside a continuum.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Continuum {
     pub pad: Vec<PadRow>,
@@ -249,7 +247,7 @@ impl Continuum {
     pub(super) fn measure() -> Result<Self, StudyError> {
         let width = Scene::default().gripper.finger.width;
         let mut pad = Vec::new();
-        let mut pressed: Option<(Vec<String>, Pressed)> = None;
+        let mut pressed: Option<(Vec<String>, PressedBody)> = None;
         for line in PAD.lines().skip(1) {
             let field: Vec<&str> = line.split(',').collect();
             let number = |k: usize| field.get(k).and_then(|text| text.parse::<f64>().ok());
@@ -257,22 +255,22 @@ impl Continuum {
             let case: Vec<String> = field.iter().take(3).map(|text| (*text).to_owned()).collect();
             let (slant_deg, sticks) = (number(1).ok_or_else(wrong)?, number(2) == Some(1.0));
             if pressed.as_ref().is_none_or(|(known, _)| *known != case) {
-                let body = Body::of(field[0], width).ok_or_else(wrong)?;
-                pressed = Some((case, Pressed::new(&body, slant_deg, sticks)?));
+                let body = RigidBody::named(field[0], width).ok_or_else(wrong)?;
+                pressed = Some((case, PressedBody::new(&body, slant_deg, sticks)?));
             }
             let depth_mm = number(3).ok_or_else(wrong)?;
             let ours = pressed.as_ref().map(|(_, pressed)| pressed.at(1e-3 * depth_mm)).ok_or_else(wrong)?;
-            let beside = |k: usize, ours: f64| Some(Beside::new(number(k)?.abs(), ours));
+            let pair = |k: usize, ours: f64| Some(ContinuumPair::new(number(k)?.abs(), ours));
             pad.push(PadRow {
                 body: field[0].to_owned(),
                 slant_deg,
                 sticks,
                 depth_mm,
-                normal: beside(4, ours.normal).ok_or_else(wrong)?,
-                along: (slant_deg != 0.0).then(|| beside(5, ours.along)).flatten(),
+                normal: pair(4, ours.normal).ok_or_else(wrong)?,
+                along: (slant_deg != 0.0).then(|| pair(5, ours.along)).flatten(),
                 // The plate is seen across the finger, whose width it covers.
-                width_mm: beside(6, 1e3 * if field[0] == "plate" { width } else { ours.width_m }).ok_or_else(wrong)?,
-                peak_kpa: beside(7, 1e-3 * ours.peak_pa).ok_or_else(wrong)?,
+                width_mm: pair(6, 1e3 * if field[0] == "plate" { width } else { ours.width_m }).ok_or_else(wrong)?,
+                peak_kpa: pair(7, 1e-3 * ours.peak_pa).ok_or_else(wrong)?,
                 mesh_percent: number(8),
             });
         }
@@ -280,11 +278,11 @@ impl Continuum {
         Ok(Self { pad, finger })
     }
 
-    /// Factors on forces towards and along the pad with which ours fit best, and what is then left: root mean squares of
-    /// the logarithms.
+    /// Factors on our forces towards and along the pad that fit best, and the root mean squares of the logarithms that
+    /// then remain.
     pub(super) fn best_factors(&self) -> [(f64, f64); 2] {
         let normal: Vec<f64> = self.pad.iter().map(|row| row.normal.ratio()).collect();
-        let along: Vec<f64> = self.pad.iter().filter_map(|row| row.along).map(Beside::ratio).collect();
+        let along: Vec<f64> = self.pad.iter().filter_map(|row| row.along).map(ContinuumPair::ratio).collect();
         [normal, along].map(|ratios| {
             let count = ratios.len().max(1) as f64;
             let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / count;
@@ -308,7 +306,7 @@ fn finger_row(line: &str) -> Option<FingerRow> {
     let mut run = SteppedScene::new(&scene, None, 0.02);
     let drive = Drive { tip_force: [DVec3::X * force, DVec3::ZERO], ..Drive::default() };
     run.cover(10.0, |_| drive).ok()?;
-    let deflection = Beside::new(solid_across, run.tip().0 / scene.gripper.finger.length);
+    let deflection = ContinuumPair::new(solid_across, run.tip().0 / scene.gripper.finger.length);
     Some(FingerRow { load, tip_angle_deg, deflection })
 }
 
@@ -320,12 +318,12 @@ mod tests {
     fn springs_under_a_plate_press_with_their_own_law() {
         let scene = straight_finger(false);
         let (gripper, pad) = (&scene.gripper, &scene.gripper.pad);
-        let body = Body::of("plate", gripper.finger.width).expect("is known");
-        let felt = Pressed::new(&body, 0.0, false).expect("finite").at(1e-3);
+        let body = RigidBody::named("plate", gripper.finger.width).expect("is known");
+        let load = PressedBody::new(&body, 0.0, false).expect("finite").at(1e-3);
         let area = gripper.finger.width;
         let (want, _) = pad.law.force(pad.modulus * area / pad.thickness, pad.thickness, 1e-3);
         // Springs at both ends of the plate lean on its edges.
-        let got = felt.normal;
+        let got = load.normal;
         assert!((1.0..1.12).contains(&(got / want)), "{got} N/m instead of {want}");
     }
 

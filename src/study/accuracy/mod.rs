@@ -15,7 +15,7 @@ mod recognition;
 mod report;
 mod tables;
 
-pub use continuum::{Beside, Continuum, FingerRow, PadRow};
+pub use continuum::{Continuum, ContinuumPair, FingerRow, PadRow};
 pub use figure::accuracy_plot;
 pub use measure::GraspSample;
 pub use plan::{AccuracyPlan, AccuracySetting, RecognitionPlan, SettingFamily};

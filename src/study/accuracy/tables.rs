@@ -1,6 +1,6 @@
 //! The result in tables, for the terminal, the manual and other programs.
 
-use super::continuum::{Beside, Continuum};
+use super::continuum::{Continuum, ContinuumPair};
 use super::plan::{AccuracySetting, SettingFamily};
 use super::report::{AccuracyStudy, GroupCost, MethodScore, RecognitionRow, SceneGroup};
 use crate::frame::{Cell, Column, PERCENT, POINTS, StudyReport, StudyTable, TableRows};
@@ -95,7 +95,7 @@ impl Continuum {
     fn about(&self) -> String {
         let [(modulus, left), (along, left_along)] = self.best_factors();
         let percent = |log: f64| 100.0 * log.exp_m1();
-        let within = self.pad.iter().filter(|row| (row.normal.continuum / row.normal.ours - 1.0).abs() <= 0.05).count();
+        let within = self.pad.iter().filter(|row| (row.normal.ratio() - 1.0).abs() <= 0.05).count();
         format!(
             "Springs beside a continuum: forces of a bonded layer of incompressible rubber of the pad's modulus, by finite \
              elements (tests/peers/soft_pad.py), in N under the ball and N/m under the others. Of {} normal forces {within} are \
@@ -108,7 +108,7 @@ impl Continuum {
     }
 
     fn pad_table(&self) -> StudyTable {
-        let pair = |beside: Beside| Cell::from(format!("{} / {}", beside.continuum, beside.ours));
+        let pair = |pair: ContinuumPair| Cell::from(format!("{} / {}", pair.continuum, pair.ours));
         TableRows::new("accuracy-pad", "Springs beside a continuum: the pad (finite elements / ours)", &self.pad)
             .columns(&[
                 Column("body", "", &|row| row.body.as_str().into()),
@@ -116,7 +116,7 @@ impl Continuum {
                 Column("friction", "", &|row| if row.sticks { "sticks" } else { "none" }.into()),
                 Column("depth", "mm", &|row| Some(row.depth_mm).into()),
                 Column("force", "N, N/m", &|row| pair(row.normal)),
-                Column("ratio", "", &|row| Some(row.normal.continuum / row.normal.ours).into()),
+                Column("ratio", "", &|row| Some(row.normal.ratio()).into()),
                 Column("along", "N, N/m", &|row| row.along.map_or(Cell::Missing, pair)),
                 Column("width", "mm", &|row| pair(row.width_mm)),
                 Column("peak", "kPa", &|row| pair(row.peak_kpa)),
@@ -131,7 +131,7 @@ impl Continuum {
                 Column("tip angle", "°", &|row| Some(row.tip_angle_deg).into()),
                 Column("solid", "of the length", &|row| Some(row.deflection.continuum).into()),
                 Column("ours", "of the length", &|row| Some(row.deflection.ours).into()),
-                Column("difference", PERCENT, &|row| Some(row.deflection.ours / row.deflection.continuum - 1.0).into()),
+                Column("difference", PERCENT, &|row| Some(1.0 / row.deflection.ratio() - 1.0).into()),
             ])
     }
 }

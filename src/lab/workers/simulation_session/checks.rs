@@ -4,6 +4,7 @@ use super::super::messages::{Checking, FinishedGrasp, TraceRow};
 use super::Session;
 use super::jobs::{CheckRequest, CheckResult, Subject};
 use crate::grasping::{GraspComparison, GraspSummary, Row};
+use crate::recording::Recorder;
 use palpate_tactile::trial::SimulatedTrial;
 use std::sync::Arc;
 
@@ -58,11 +59,16 @@ impl Session {
         }
     }
 
+    /// The recorder, where it has the checked grasp.
+    fn recorder_of_subject(&self) -> Option<&Recorder> {
+        self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|subject| subject.recorded))
+    }
+
     fn take_comparison(&mut self, grasp: u64, found: GraspComparison) {
         let Some(last) = self.last.as_ref().filter(|last| last.grasp == grasp) else { return };
         let mut last = FinishedGrasp::clone(last);
         found.note(&mut last.summary.quality);
-        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
+        if let Some(recorder) = self.recorder_of_subject() {
             recorder.note_quality(last.summary.quality.clone());
         }
         self.last = Some(Arc::new(last));
@@ -75,7 +81,7 @@ impl Session {
         let (summary, repeatable) = (GraspSummary::new(trial, scene), last.repeatable);
         let accuracy = scene.solver.accuracy;
         self.last = Some(Arc::new(FinishedGrasp { grasp, summary, accuracy, repeatable }));
-        if let Some(recorder) = self.recorder.as_ref().filter(|_| self.subject.as_ref().is_some_and(|s| s.recorded)) {
+        if let Some(recorder) = self.recorder_of_subject() {
             let mut trial = trial.clone();
             trial.header.earlier = self.current.as_ref().and_then(|current| current.earlier.clone());
             recorder.replace(trial);

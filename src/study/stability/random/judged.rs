@@ -6,7 +6,7 @@
 //! them end apart. Where no two levels agree and the twelve do, or where runs had to be given up, it stays undecided.
 
 use super::scene::{Push, Ran, RandomScene};
-use palpate_lab::grasping::until_agreement;
+use palpate_lab::grasping::{NUDGE, NUDGE_TURN, until_agreement};
 use palpate_sim::scene::{Accuracy, Solver};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -89,20 +89,20 @@ impl LevelResult {
     }
 }
 
-/// Runs that a trial at standard is compared with, beside the next level.
+/// Results that decide the trust light of a trial at standard.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ComparedResult {
-    /// A run at draft from a start ten micrometres away ends alike.
+    /// A run at draft from a start ten micrometres away gives the same result.
     pub coarser: bool,
     /// Its convex minimisations.
     pub coarser_solves: u64,
-    /// A run at the reference accuracy is solved and ends alike.
+    /// A run at the reference accuracy is solved and gives the same result.
     pub reference: bool,
 }
 
 impl ComparedResult {
     fn new(runs: &Runs<'_>, standard: &Ran, reference: &Ran) -> Self {
-        let coarser = runs.scene.run(&solver(LEVELS[0]), runs.scene.nudge());
+        let coarser = runs.scene.run(&solver(LEVELS[0]), Push { shift: NUDGE, turn: NUDGE_TURN });
         Self {
             coarser: coarser.ends_like(standard),
             coarser_solves: coarser.quality.solves,
@@ -124,7 +124,7 @@ pub struct JudgedScene {
     pub levels: Vec<LevelResult>,
     /// Results from the drawn tolerance on, until two levels agree.
     pub drawn: Vec<LevelResult>,
-    /// What a trial at standard is compared with.
+    /// Comparison of a trial at standard.
     pub compared: ComparedResult,
     /// Tolerance of the truth.
     pub truth: f64,

@@ -15,11 +15,12 @@ pub enum Policy {
     Flags,
     /// A restless trial is computed again at a tenth of the tolerance, down to the reference; the others are flagged.
     Restless,
-    /// A coarser run from a start ten micrometres away has to end alike, or else one at a hundredth of the tolerance.
+    /// A coarser run from a start ten micrometres away has to give the same result, or else one at a hundredth of the
+    /// tolerance, as for the trust light.
     Compared,
     /// A run at a tenth of the tolerance flags what it disagrees with.
     RefinedRun,
-    /// The coarser run and one at a tenth have to end alike, or else one at a hundredth.
+    /// The coarser run and one at a tenth have to give the same result, or else one at a hundredth.
     ComparedTwice,
     /// Refined until two levels agree; what never agrees is flagged.
     TwoAgree,

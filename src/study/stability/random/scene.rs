@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
-use palpate_lab::grasping::EndState;
+use palpate_lab::grasping::{EndState, PUSH};
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, TorquePoint};
 use palpate_sim::objects::ObjectModel;
@@ -107,12 +107,6 @@ impl RandomScene {
         })
     }
 
-    /// The start that a trial is compared from: ten micrometres away, along and about an axis.
-    pub(super) fn nudge(&self) -> Push {
-        let far = 1e-5;
-        Push { shift: DVec3::X * far, turn: DVec3::Z * (far / self.reach) }
-    }
-
     /// Computes the scene to the end of its hold.
     pub(super) fn run(&self, solver: &Solver, push: Push) -> Ran {
         let scene = Scene { solver: solver.clone(), ..self.scene.clone() };
@@ -154,9 +148,6 @@ impl RandomScene {
         Ran { end, quality }
     }
 }
-
-/// Shift of the start that must not change the end (m); turns move the farthest point of the surface as far.
-const PUSH: f64 = 1e-6;
 
 /// Change of the object's start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
