@@ -51,7 +51,10 @@ const MOST_NODES: usize = 8_000_000;
 
 /// Distance from the solid (m) up to which the grid holds exact values: the ends of contact springs are at most this
 /// thick, so contact detection never reads values at the border of the grid.
-const REACH: f64 = 4e-3;
+const REACH: f64 = 8e-3;
+
+/// Hollows that a ball of this radius (m) cannot reach are filled.
+const HOLLOW: f64 = 8e-3;
 
 /// Cells beyond [`REACH`], for interpolation.
 const MARGIN: f64 = 2.0;
@@ -101,6 +104,7 @@ pub fn bake(parts: &[SolidPart], cell: f64) -> Result<DistanceGrid, BakeError> {
             *value = value.min(distance);
         }
     }
+    grid.fill_hollows(HOLLOW);
     Ok(grid)
 }
 

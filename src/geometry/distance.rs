@@ -91,7 +91,7 @@ impl DistanceGrid {
 
     /// Distance by trilinear interpolation, inside the grid (m).
     #[inline]
-    fn interpolated(&self, p: DVec3) -> Option<f64> {
+    pub(super) fn interpolated(&self, p: DVec3) -> Option<f64> {
         let (c, t) = self.corner_values(p)?;
         let near = lerp(lerp(c[0], c[1], t.z), lerp(c[2], c[3], t.z), t.y);
         let far = lerp(lerp(c[4], c[5], t.z), lerp(c[6], c[7], t.z), t.y);
@@ -144,7 +144,7 @@ impl DistanceGrid {
                 gradient += DVec3::new(dx[i] * wy[j] * value, wx[i] * dy[j] * value, wx[i] * wy[j] * slope);
             }
         }
-        (distance, gradient.normalize_or(DVec3::Z))
+        (distance, gradient / self.cell)
     }
 
     /// The eight values around a point (z fastest, then y, then x) and where in the cell it lies.

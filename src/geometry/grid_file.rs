@@ -7,7 +7,7 @@ use std::io;
 use std::path::Path;
 
 /// First bytes of a file. Another number marks grids of another layout or of another [`bake`].
-const BEGINNING: [u8; 16] = *b"palpate grid 1\r\n";
+const BEGINNING: [u8; 16] = *b"palpate grid 4\r\n";
 /// Bytes before the distances: the beginning, a checksum of all that follows, ten numbers and three counts.
 const HEADER: usize = BEGINNING.len() + 4 + 8 * 13;
 

@@ -41,6 +41,7 @@ mod distance;
 pub mod drawing;
 mod finish;
 mod grid_file;
+mod hollows;
 mod hull;
 mod mass;
 mod mesh;

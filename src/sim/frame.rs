@@ -247,10 +247,12 @@ impl Quality {
         self.hold_changes >= RESTLESS_CHANGES || self.static_residual > RESTLESS_RESIDUAL
     }
 
-    /// True when forces changed repeatedly anywhere in the hold, or it did not come to rest: a finer run tells whether the
-    /// object really moves.
+    /// True when forces changed repeatedly anywhere in the hold of an object, or it did not come to rest: a finer run tells
+    /// whether the object really moves.
     pub fn is_unsettled(&self) -> bool {
-        self.is_restless() || self.all_hold_changes >= RESTLESS_CHANGES
+        // Fingers that have lost the object swing against each other.
+        let held = self.failure != Some(GraspFailure::LostObject);
+        self.is_restless() || held && self.all_hold_changes >= RESTLESS_CHANGES
     }
 
     /// How far the trial can be trusted, and why, in a few words.

@@ -1,38 +1,20 @@
-//! Finding contacts: every contact spring of the pads casts a short ray from its foot along its axis.
+//! Finding contacts: each contact spring of the pads beside the object, its support and the other finger.
 //!
-//! The ray is thick: a ball of the contact spring's radius moves from the foot outwards by sphere tracing until it
-//! touches something. Point samples of a distance field tunnel, since a 1 mm plate or a needle passes between taxels;
-//! rays that are as thick as the gaps between contact springs do not.
-//!
-//! With the rest position of the ball's centre at s and the touch at t, the spring would have to give way by x = s - t
-//! along its axis u, or by c x along the surface normal n, c = -n . u; apart, it is the same number below zero. Rubber
-//! gives way along its axis with the stiffness k of its law, and sideways with G / E of that, k / 3. Of all ways that
-//! keep the ball outside, the one of least energy shares the load between both, which are springs in series along n:
-//!
-//! ```text
-//! 1 / k_n = c² / k + (1 - c²) / (k / 3)          force k_n c x along n
-//! ```
-//!
-//! Head-on this is the law itself; a spring that grazes an edge leans on it with its side, and slips off without a
-//! jump. A spring that could not give way sideways would press with k x / c, thrown off and springing back step by
-//! step, without end.
-//!
-//! The force acts where the axis touches. Energy would be conserved where the end sits in the way of least energy, beside
-//! that by 3 x sqrt(1 - c²) for small angles, with the surface's normal there: undamped fingers that bounce on a round
-//! object with the sides of their tips gain and lose energy, whatever the step (hard case "passive swing"). Finding that
-//! place by one to four rounds of projection onto the surface cures it, but at an edge the rounds jump from one side to
-//! the other, and more holds chatter.
+//! [`super::stretch`] says how far a spring has to give way. Most springs touch nothing: segments and springs are looked
+//! at again only after they have gone what they were clear of ([`super::clearances`]).
 //!
 //! Distances, normals and arms are those of the layout in the workspace, which is ahead of the state; see
 //! [`super::step`].
 
 use super::contact::{Acting, Against, Contact, SHEAR_SHARE};
+use super::contact_springs::ContactSpring;
 use super::effects::{FingerContact, Shell};
 use super::environment::Environment;
 use super::finger_pair::{Fronts, OtherFinger, in_series};
 use super::model::{Body, PhysicsModel};
 use super::spatial::Spatial;
 use super::state::State;
+use super::stretch::{Met, SpringAtRest, Touch};
 use super::workspace::Workspace;
 use crate::gripper::{FingerPlane, PadLaw, SegmentPose};
 use glam::{DMat3, DVec3};
@@ -44,34 +26,6 @@ const STILL_MARGIN: f64 = 2e-4;
 const SPEED_MARGIN: f64 = 0.1;
 /// Factor on the speed within one step up to which contacts are found in time.
 const SPEED_FACTOR: f64 = 1.5;
-
-/// A surface that a contact spring has met.
-struct Hit {
-    /// Compression along the surface normal (m), negative while apart.
-    compression: f64,
-    /// Outward normal of the surface, unit length.
-    normal: DVec3,
-    /// Counterpart that is met.
-    point: DVec3,
-    /// Cosine between the spring's axis and the surface normal, c: from zero to one.
-    cosine: f64,
-}
-
-/// Place where a ray meets a surface.
-struct Touch {
-    /// Way of the ball from the foot (m).
-    way: f64,
-    /// Centre of the ball there.
-    centre: DVec3,
-    /// Distance of the ball from the surface (m), about zero, or negative where the foot's own ball overlaps it.
-    gap: f64,
-    normal: DVec3,
-    /// Cosine between the spring's axis and the normal; negative where the surface looks the way that the spring does.
-    cosine: f64,
-}
-
-/// Cosine below which a spring is taken to meet a surface at this one: lengths along the normal stay finite.
-const LEAST_COSINE: f64 = 0.02;
 
 /// Fills `workspace.contacts` with everything that touches or may touch within the step.
 pub(super) fn detect(model: &PhysicsModel, state: &State, workspace: &mut Workspace) {
@@ -217,81 +171,90 @@ fn detect_segment(model: &PhysicsModel, state: &State, workspace: &mut Workspace
         let (foot, axis) = if in_space {
             spring.ray_in_space(&workspace.frames()[place.link])
         } else {
-            let (foot, axis) = spring.ray(&place.segment);
-            (plane.point(foot, spring.across), plane.direction(axis))
+            spring.ray(&plane, &place.segment)
         };
-        let ray = Ray { foot, axis, radius: model.springs.radius, rest: spring.height - model.springs.radius };
+        let at_rest = SpringAtRest { foot, axis, height: spring.height, end: model.springs.radius };
         let finger = near.finger.and_then(|(fronts, margin)| {
             let gap = fronts.least_distance(model, place.finger, foot) - spring.height;
             (in_space || gap <= margin).then_some(margin)
         });
-        let (to_object, clearance) = near.distances(ray.foot);
+        let (to_object, clearance) = near.distances(foot);
         if finger.is_none() {
             workspace.clearances.note_spring(site, place.link, clearance);
             if clearance > spring.height + near.farthest() {
                 continue;
             }
         }
-        let on_object = near.object.and_then(|(solid, margin)| ray.cast_solid(solid, to_object, margin));
-        let on_world = near.world.and_then(|margin| ray.cast_environment(near.environment, margin));
-        let (mut hit, mut against) = match (on_object, on_world) {
-            (Some(object), Some(world)) if world.compression > object.compression => (Some(world), Against::World),
-            (Some(object), _) => (Some(object), Against::Object),
-            (None, world) => (world, Against::World),
-        };
+        let pressed = PressedSpring { model, state, place, spring, site, local_axes };
+        let on_object = near.object.and_then(|(solid, margin)| meet_solid(&at_rest, solid, to_object, margin));
+        if let Some(touch) = on_object {
+            pressed.add(workspace, Against::Object, &touch);
+        }
+        let world = near.environment;
+        let surface = |p| (world.distance(p), world.normal(p));
+        let on_world = near.world.and_then(|margin| meet_thick(&at_rest, world.distance(foot), margin, surface));
+        if let Some(touch) = on_world {
+            pressed.add(workspace, Against::World, &touch);
+        }
         if let Some(margin) = finger {
             let other = OtherFinger::opposite(model, workspace, place.finger, spring.across);
-            if let Some(met) = ray.cast_finger(&other, margin) {
-                // A contact in waiting gives way to all others.
-                let deepest = hit.as_ref().map_or(f64::NEG_INFINITY, |hit| hit.compression.max(0.0));
-                if met.compression > deepest {
-                    let first_link = (1 - place.finger) * (model.chain.joints + 1);
-                    against = Against::Finger((first_link + other.segment(met.point)) as u32);
-                    hit = Some(met);
-                }
+            let touch = meet_thick(&at_rest, other.distance(foot), margin, |p| other.surface(p));
+            if let Some((touch, segment)) = touch.map(|touch| (touch, other.segment(touch.point))) {
+                let first_link = (1 - place.finger) * (model.chain.joints + 1);
+                workspace.fingers_meet = true;
+                pressed.add(workspace, Against::Finger((first_link + segment) as u32), &touch);
             }
         }
-        let Some(hit) = hit else { continue };
-        workspace.fingers_meet |= matches!(against, Against::Finger(_));
-        let mu = match against {
-            Against::Object => model.pad_friction.on_object,
-            Against::World => model.pad_friction.on_world,
-            Against::Finger(_) => model.pad_friction.on_pad,
+    }
+}
+
+/// A contact spring that is pressed.
+struct PressedSpring<'a> {
+    model: &'a PhysicsModel,
+    state: &'a State,
+    place: Place,
+    spring: &'a ContactSpring,
+    site: usize,
+    /// Axes of the segment, in the gripper frame.
+    local_axes: DMat3,
+}
+
+impl PressedSpring<'_> {
+    /// Adds the contact with one of the things that press it: each has its own energy.
+    fn add(&self, workspace: &mut Workspace, against: Against, touch: &Touch) {
+        let Self { model, state, spring, .. } = self;
+        let own = (spring.stiffness, spring.height);
+        let ((stiffness, height), shear_stiffness, mu, place) = match (against, &model.shell) {
+            (Against::Object, Some(shell)) => {
+                let under = shell.under(own.0, own.1);
+                let shear = Shell::shear_in_series(SHEAR_SHARE * own.0, under);
+                (shell.in_series(own, under), shear, model.pad_friction.on_object, 0)
+            }
+            (Against::Object, None) => (own, SHEAR_SHARE * own.0, model.pad_friction.on_object, 0),
+            (Against::World, _) => (own, SHEAR_SHARE * own.0, model.pad_friction.on_world, 1),
+            (Against::Finger(_), _) => {
+                let both = in_series(own.0, own.1);
+                (both, SHEAR_SHARE * both.0, model.pad_friction.on_pad, 2)
+            }
         };
-        let (stiffness, height) = match against {
-            Against::Finger(_) => in_series(spring.stiffness, spring.height),
-            _ => (spring.stiffness, spring.height),
-        };
-        let shear = local_axes * state.touched.shear[site];
-        let mut shear_stiffness = SHEAR_SHARE * stiffness;
-        // Axial and sideways compliance in series, along the normal.
-        let squared = hit.cosine * hit.cosine;
-        let compliance = squared + (1.0 - squared) / SHEAR_SHARE;
-        // Its bottom is its rest length whichever way it gives; two pads that shear past each other have none.
-        let height = match against {
-            Against::Finger(_) => height * compliance / hit.cosine.max(LEAST_COSINE),
-            Against::Object | Against::World => height,
-        };
-        let (mut stiffness, mut height) = (stiffness / compliance, height);
-        if let (Against::Object, Some(shell)) = (against, &model.shell) {
-            let under = shell.under(spring.stiffness, spring.height);
-            (stiffness, height) = shell.in_series((stiffness, height), under);
-            shear_stiffness = Shell::shear_in_series(shear_stiffness, under);
-        }
+        let site = place * 2 * model.springs.all.len() + self.site;
+        // The law along the axis, scaled to the normal.
+        let scale = touch.length / spring.height;
+        let shear = self.local_axes * state.touched.shear[site];
         workspace.contacts.push(Contact {
             site: site as u32,
-            acting: Acting::Segment(place.link as u32),
+            acting: Acting::Segment(self.place.link as u32),
             against,
-            arm: hit.point - workspace.reference,
-            normal: hit.normal,
-            compression: hit.compression,
+            arm: touch.point - workspace.reference,
+            normal: touch.normal,
+            compression: touch.compression,
             law: model.pad_law,
-            stiffness,
-            height,
+            stiffness: stiffness / (scale * scale),
+            height: height * scale,
             shear_stiffness,
             mu,
             limit: mu * state.expected_impulse(site, workspace.step.h),
-            shear: shear - hit.normal * hit.normal.dot(shear),
+            shear: shear - touch.normal * touch.normal.dot(shear),
             velocity: DVec3::ZERO,
             change: DVec3::ZERO,
         });
@@ -355,135 +318,38 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// The path of a contact spring's round end.
-struct Ray {
-    foot: DVec3,
-    axis: DVec3,
-    radius: f64,
-    /// Distance of the end's centre from the foot at rest (m).
-    rest: f64,
+/// The touch of a contact spring and the object; `distance` is that of the foot (m).
+fn meet_solid(spring: &SpringAtRest, solid: &Solid<'_>, distance: f64, margin: f64) -> Option<Touch> {
+    if distance > spring.height + margin {
+        return None;
+    }
+    let local =
+        SpringAtRest { foot: solid.local(spring.foot), axis: solid.object_from_gripper * spring.axis, ..*spring };
+    let surface = |p| solid.body.field.surface(p);
+    let touch = match local.meet(distance, margin, surface)? {
+        Met::Outside(touch) => touch,
+        Met::Inside => local.trace_back(distance, surface)?,
+        Met::InFrontOf(touch) => local.trace_back(distance, surface).unwrap_or(touch),
+    };
+    let to_gripper = solid.object_from_gripper.transpose();
+    Some(Touch {
+        normal: to_gripper * touch.normal,
+        point: to_gripper * (touch.point - solid.body.centre) + solid.centre,
+        ..touch
+    })
 }
 
-/// Below this gap the touch is computed from the slope of the distance instead of by more steps (m); the error is
-/// its square over the surface's radius, 1e-8 m on a 10 mm ball.
-const CLOSE: f64 = 1e-5;
-/// Steps of sphere tracing before a ray that grazes along a surface is taken to touch where it is.
-const MOST_STEPS: usize = 32;
-/// A surface whose normal points ahead along the contact spring by more than this was passed, not met sideways: things
-/// beside a finger have a normal across it.
-const FROM_BEHIND: f64 = -0.7;
-
-impl Ray {
-    /// `distance` is that of the foot from the object (m).
-    fn cast_solid(&self, solid: &Solid<'_>, distance: f64, margin: f64) -> Option<Hit> {
-        if distance - self.radius > self.rest + margin {
-            return None;
-        }
-        let foot = solid.local(self.foot);
-        let axis = solid.object_from_gripper * self.axis;
-        let field = &solid.body.field;
-        let gap = distance - self.radius;
-        let (distance, surface) = (|p| field.distance(p), |p| field.surface(p));
-        let touch = self.trace((foot, axis), gap, margin, distance, surface)?;
-        let passed = touch.cosine < FROM_BEHIND && touch.way == 0.0;
-        let hit = if passed {
-            self.trace_back((foot, axis), touch.gap, distance, surface)
-        } else {
-            self.pressed(&touch, touch.cosine, margin)?
-        };
-        let to_gripper = solid.object_from_gripper.transpose();
-        Some(Hit {
-            normal: to_gripper * hit.normal,
-            point: to_gripper * (hit.point - solid.body.centre) + solid.centre,
-            ..hit
-        })
-    }
-
-    fn cast_environment(&self, environment: &Environment, margin: f64) -> Option<Hit> {
-        let surface = |p| (environment.distance(p), environment.normal(p));
-        let gap = environment.distance(self.foot) - self.radius;
-        let touch = self.trace((self.foot, self.axis), gap, margin, |p| environment.distance(p), surface)?;
-        self.pressed(&touch, touch.cosine.max(0.0), margin)
-    }
-
-    #[inline(never)]
-    fn cast_finger(&self, other: &OtherFinger<'_>, margin: f64) -> Option<Hit> {
-        let gap = other.distance(self.foot) - self.radius;
-        let (distance, surface) = (|p| other.distance(p), |p| other.surface(p));
-        let touch = self.trace((self.foot, self.axis), gap, margin, distance, surface)?;
-        self.pressed(&touch, touch.cosine.max(0.0), margin)
-    }
-
-    /// A contact spring pressed by what it meets. A table, a pedestal or a finger is too thick to be passed: where one
-    /// looks the way that the spring does, the spring leans on it with its side, at a cosine of zero.
-    #[inline]
-    fn pressed(&self, touch: &Touch, cosine: f64, margin: f64) -> Option<Hit> {
-        // The surface is `gap` away along the normal, `gap / cosine` along the axis; a foot inside has gap < 0.
-        let compression = (self.rest - touch.way) * cosine - touch.gap;
-        (compression > -margin).then(|| Hit {
-            compression,
-            normal: touch.normal,
-            point: touch.centre - touch.normal * (self.radius + touch.gap),
-            cosine: cosine.max(0.0),
-        })
-    }
-
-    /// The foot has come through a thin body: the contact spring is compressed down to where it went in, and pushes
-    /// back the way it came.
-    #[cold]
-    fn trace_back(
-        &self,
-        (foot, axis): (DVec3, DVec3),
-        mut gap: f64,
-        distance: impl Fn(DVec3) -> f64,
-        surface: impl Fn(DVec3) -> (f64, DVec3),
-    ) -> Hit {
-        let mut back = 0.0;
-        for _ in 0..MOST_STEPS {
-            if gap > 0.0 {
-                break;
-            }
-            back += (-gap).max(CLOSE);
-            gap = distance(foot - axis * back) - self.radius;
-        }
-        let centre = foot - axis * back;
-        let (away, normal) = surface(centre);
-        let gap = away - self.radius;
-        let cosine = (-normal.dot(axis)).max(LEAST_COSINE);
-        let point = centre - normal * (self.radius + gap);
-        Hit { compression: (self.rest + back) * cosine - gap, normal, point, cosine }
-    }
-
-    /// Sphere tracing along a path given by its foot and axis, both in the frame of the distance. `gap` is that at the
-    /// foot, or a lower bound of it (m).
-    #[inline]
-    fn trace(
-        &self,
-        (foot, axis): (DVec3, DVec3),
-        mut gap: f64,
-        margin: f64,
-        distance: impl Fn(DVec3) -> f64,
-        surface: impl Fn(DVec3) -> (f64, DVec3),
-    ) -> Option<Touch> {
-        let limit = self.rest + margin;
-        let mut way = 0.0;
-        if gap > limit {
-            return None;
-        }
-        for _ in 0..MOST_STEPS {
-            if gap < CLOSE {
-                break;
-            }
-            way += gap;
-            if way > limit {
-                return None;
-            }
-            gap = distance(foot + axis * way) - self.radius;
-        }
-        let centre = foot + axis * way;
-        let (away, normal) = surface(centre);
-        Some(Touch { way, centre, gap: away - self.radius, normal, cosine: -normal.dot(axis) })
-    }
+/// The touch of a contact spring and something too thick to be passed: table, pedestal, the other finger.
+fn meet_thick(
+    spring: &SpringAtRest,
+    distance: f64,
+    margin: f64,
+    surface: impl Fn(DVec3) -> (f64, DVec3),
+) -> Option<Touch> {
+    Some(match spring.meet(distance, margin, &surface)? {
+        Met::Outside(touch) | Met::InFrontOf(touch) => touch,
+        Met::Inside => spring.push_out(&surface),
+    })
 }
 
 /// The object against its support: its resting points against table and pedestal, and the pedestal's rim against it.
@@ -500,7 +366,7 @@ fn detect_resting(
     }
     let gripper_from_object = pose.matrix();
     let place = |p: DVec3| gripper_from_object * (p - body.centre) + pose.position;
-    let first_site = 2 * model.springs.all.len();
+    let first_site = model.first_resting_site();
     let (contacts, reference) = (&mut workspace.contacts, workspace.reference);
     let mut touch = |site: usize, compression: f64, normal: DVec3, point: DVec3| {
         let shear = state.touched.shear[site];
@@ -545,8 +411,8 @@ fn detect_resting(
     for k in nearby.rim.iter().map(|k| *k as usize) {
         let p = environment.rim()[k];
         if body.field.distance(local(p)) < margin {
-            let (gap, normal) = body.field.surface(local(p));
-            let out_of_object = gripper_from_object * normal;
+            let (gap, slope) = body.field.surface(local(p));
+            let out_of_object = gripper_from_object * slope.normalize_or(DVec3::Z);
             touch(first_rim + k, -gap, -out_of_object, p);
         }
     }

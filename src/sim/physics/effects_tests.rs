@@ -332,7 +332,7 @@ fn a_push_from_one_side_is_passed_on() {
         let contacts = run.ws.contacts.iter().map(|c| {
             let (normal, tangential) = c.force(run.ws.step);
             let force = c.normal * normal + tangential;
-            let left_acts = c.site < run.model.springs.all.len() as u32;
+            let left_acts = run.model.spring_at(c.site).0 == 0;
             let force = if left_acts == (finger == 0) { force } else { -force };
             let arm =
                 run.ws.reference + c.arm - run.model.planes[finger].point(run.ws.segments[finger * 11 + 1].start, 0.0);

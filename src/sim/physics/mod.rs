@@ -11,7 +11,7 @@
 //!
 //! [`effects`] decides which parts of this a scene needs.
 //!
-//! Read in this order: `chain` (what a finger resists), `contact springs` and `detect` (where it touches), `contact`
+//! Read in this order: `chain` (what a finger resists), `contact springs`, `stretch` and `detect` (where it touches), `contact`
 //! (what a touch costs), `solve` (the minimisation), `step` (all of it in order), `integrator` and `stepper` (which
 //! steps, and how long), [`Simulation`] (a grasp in time). A second engine, `RapierSimulation` (feature `rapier`),
 //! computes the same scenes independently; both are an [`Engine`].
@@ -30,6 +30,8 @@ pub mod effects;
 #[cfg(test)]
 mod effects_tests;
 mod energy;
+#[cfg(test)]
+mod energy_tests;
 mod engine;
 mod environment;
 mod explicit;
@@ -60,6 +62,7 @@ mod stepped;
 mod stepper;
 #[cfg(test)]
 mod stepper_tests;
+mod stretch;
 mod workspace;
 
 pub use engine::{Engine, SimulationError};

@@ -217,7 +217,19 @@ impl PhysicsModel {
 
     /// Places where contact can be remembered: contact springs of both fingers, resting points, rim of the pedestal.
     pub(super) fn sites(&self) -> usize {
-        2 * self.springs.all.len() + self.resting_points() + self.environment.rim().len()
+        self.first_resting_site() + self.resting_points() + self.environment.rim().len()
+    }
+
+    /// The first place of contact between object and support; before it are those of the contact springs of both fingers
+    /// against the object, against the support and against the other finger.
+    pub(super) fn first_resting_site(&self) -> usize {
+        3 * 2 * self.springs.all.len()
+    }
+
+    /// Finger and contact spring of a place of contact.
+    pub(super) fn spring_at(&self, site: u32) -> (usize, usize) {
+        let all = self.springs.all.len();
+        (site as usize / all % 2, site as usize % all)
     }
 
     pub(super) fn resting_points(&self) -> usize {

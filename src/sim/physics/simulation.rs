@@ -236,76 +236,66 @@ impl Simulation {
         }
     }
 
+    /// Contacts that press on a taxel in the last step: side, spring, link and the force on it (N).
+    fn pressed(&self) -> impl Iterator<Item = (&Contact, usize, usize, u32, DVec3)> {
+        self.workspace.contacts.iter().filter_map(|contact| {
+            let Acting::Segment(link) = contact.acting else { return None };
+            let (side, spring) = self.model.spring_at(contact.site);
+            let (normal, tangential) = contact.force(self.workspace.step);
+            (normal > 0.0).then(|| (contact, side, spring, link, contact.normal * normal + tangential))
+        })
+    }
+
     /// Forces on the loaded taxels in the last step.
     fn taxel_loads(&self) -> Vec<TaxelLoad> {
         let springs = &self.model.springs;
         let mut loads: Vec<TaxelLoad> = Vec::new();
-        for contact in &self.workspace.contacts {
-            let Acting::Segment(link) = contact.acting else {
-                continue;
-            };
-            let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
-            let (normal, tangential) = contact.force(self.workspace.step);
-            if normal <= 0.0 {
-                continue;
-            }
-            let force = contact.normal * normal + tangential;
-            if spring < springs.on_pad {
-                loads.push(self.taxel_load(side, spring, link, force));
-            }
+        for (contact, side, spring, link, force) in self.pressed() {
+            loads.extend(self.taxel_load(side, spring, link, force));
             if let Against::Finger(other) = contact.against {
                 let met = OtherFinger::opposite(&self.model, &self.workspace, side, springs.all[spring].across);
-                if let Some(taxel) = met.taxel(contact.arm + self.workspace.reference) {
-                    loads.push(self.taxel_load(1 - side, taxel, other, -force));
-                }
+                let taxel = met.taxel(contact.arm + self.workspace.reference);
+                loads.extend(taxel.and_then(|taxel| self.taxel_load(1 - side, taxel, other, -force)));
             }
         }
         loads.sort_by_key(|load| load.taxel);
-        if self.workspace.fingers_meet {
-            loads.dedup_by(|next, kept| {
-                let same = next.taxel == kept.taxel;
-                if same {
-                    kept.normal += next.normal;
-                    kept.along += next.along;
-                    kept.across += next.across;
-                }
-                same
-            });
-        }
+        loads.dedup_by(|next, kept| {
+            let same = next.taxel == kept.taxel;
+            if same {
+                kept.normal += next.normal;
+                kept.along += next.along;
+                kept.across += next.across;
+            }
+            same
+        });
         loads
     }
 
     /// Normal force of each pad on the object (N); `None` where pads touch nothing else.
     fn force_on_object(&self) -> Option<[f64; 2]> {
-        let springs = &self.model.springs;
         let (mut force, mut touch_more) = ([0.0; 2], self.workspace.fingers_meet);
-        for contact in &self.workspace.contacts {
-            let (side, spring) = (contact.site as usize / springs.all.len(), contact.site as usize % springs.all.len());
-            let Acting::Segment(link) = contact.acting else { continue };
-            let (normal, tangential) = contact.force(self.workspace.step);
-            if normal <= 0.0 || spring >= springs.on_pad {
-                continue;
-            }
+        for (contact, side, spring, link, on_spring) in self.pressed() {
+            let Some(load) = self.taxel_load(side, spring, link, on_spring) else { continue };
             match contact.against {
-                Against::Object => {
-                    let load = self.taxel_load(side, spring, link, contact.normal * normal + tangential);
-                    force[side] += f64::from(load.normal);
-                }
+                Against::Object => force[side] += f64::from(load.normal),
                 Against::World | Against::Finger(_) => touch_more = true,
             }
         }
         touch_more.then_some(force)
     }
 
-    fn taxel_load(&self, side: usize, taxel: usize, link: u32, force: DVec3) -> TaxelLoad {
+    /// The load of a spring, where it belongs to a taxel and the force pushes into the pad: what presses from behind is
+    /// not sensed.
+    fn taxel_load(&self, side: usize, spring: usize, link: u32, force: DVec3) -> Option<TaxelLoad> {
+        let on_pad = self.model.springs.on_pad;
         let [along, across, inward] =
             (segment_axes_of(&self.model, &self.workspace, link).transpose() * force).to_array();
-        TaxelLoad {
-            taxel: (side * self.model.springs.on_pad + taxel) as u16,
+        (spring < on_pad && inward < 0.0).then(|| TaxelLoad {
+            taxel: (side * on_pad + spring) as u16,
             normal: -inward as f32,
             along: along as f32,
             across: across as f32,
-        }
+        })
     }
 
     /// Total force (N) and torque about its centre of mass (N m) that fingers and support exert on the object, in

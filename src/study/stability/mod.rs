@@ -89,9 +89,15 @@ impl Conditions {
     }
 }
 
-/// Accuracies of the table: the named ones, and a coarse and a fine tolerance. Coarsest first.
-pub const ACCURACIES: [Accuracy; 5] =
-    [Accuracy::Draft, Accuracy::Standard, Accuracy::Tolerance(1e-3), Accuracy::Tolerance(1e-5), Accuracy::Reference];
+/// Accuracies of the table: the named ones, and tolerances between and beyond them. Coarsest first.
+pub const ACCURACIES: [Accuracy; 6] = [
+    Accuracy::Draft,
+    Accuracy::Standard,
+    Accuracy::Tolerance(1e-3),
+    Accuracy::Tolerance(1e-5),
+    Accuracy::Reference,
+    Accuracy::Tolerance(1e-7),
+];
 
 /// Accuracies of a quick run.
 pub const QUICK_ACCURACIES: &[Accuracy] = ACCURACIES.split_at(2).0;

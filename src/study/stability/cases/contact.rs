@@ -1,7 +1,7 @@
 //! Hard cases of contact.
 
 use super::super::{Conditions, Findings, Measurement};
-use super::fingers::missed;
+use super::fingers::{gains, missed};
 use super::{FULL_TORQUE, bare, stepped, torque};
 use glam::DVec3;
 use palpate_geometry::Primitive;
@@ -162,6 +162,30 @@ pub(super) fn initial_overlap(conditions: &Conditions) -> Findings {
     findings.push(Measurement::at_most("way on through a plate (m)", forward, 0.0));
     findings.push(Measurement::at_most("most energy over the first at a plate", most / start, 1.0 + 1e-9));
     findings.push(missed(&run));
+    Ok(findings)
+}
+
+/// A cube whose edge, or whose corner, passes over a fingertip, without damping or friction.
+pub(super) fn dragged_edge(conditions: &Conditions) -> Findings {
+    const SPEED: f64 = 0.05;
+    const HALF: f64 = 0.01;
+    let mut findings = Vec::new();
+    for (what, reach, turn) in [("edge", 2f64.sqrt(), [0.0, 45.0, 0.0]), ("corner", 3f64.sqrt(), [45.0, 54.735_61, 0.0])] {
+        let mut scene = bare(10);
+        (scene.gripper.finger.damping_time, scene.gripper.pad.dissipation) = (0.0, 0.0);
+        scene.object.rotation_deg = turn;
+        scene.object.friction = Auto::Value(0.0);
+        // Its farthest place is 2 mm in the left pad, and begins 8 mm below the tip.
+        let skin = 0.5 * scene.gripper.mount.opening;
+        scene.gripper.mount.offset = [skin + 0.002 - reach * HALF, 0.002, 0.0];
+        scene.gripper.mount.grasp_depth = scene.gripper.finger.length + 0.008 + reach * HALF;
+        let cube = of_mass(Primitive::Cuboid { half: DVec3::splat(HALF) }, 1.0, 0.0);
+        let mut run = stepped(&scene, Some(&cube), conditions);
+        run.throw_object(DVec3::Z * SPEED, DVec3::ZERO);
+        let gains = gains(&mut run, conditions, 0.6)?;
+        findings.extend(gains.map(|gain| Measurement { what: format!("{what}: {}", gain.what), ..gain }));
+        findings.push(missed(&run));
+    }
     Ok(findings)
 }
 

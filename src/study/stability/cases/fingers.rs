@@ -2,9 +2,10 @@
 
 use super::super::{Conditions, Findings, Measurement};
 use super::{FULL_TORQUE, bare, stepped, torque};
+use glam::DVec3;
 use palpate_geometry::Primitive;
 use palpate_sim::objects::ObjectModel;
-use palpate_sim::physics::{Drive, SteppedScene, Stepping};
+use palpate_sim::physics::{Drive, NotFinite, SteppedScene, Stepping};
 use palpate_sim::scene::Scene;
 
 pub(super) fn stiff_joints(conditions: &Conditions) -> Findings {
@@ -47,29 +48,66 @@ pub(super) fn twentyfold_actuation(conditions: &Conditions) -> Findings {
 
 pub(super) fn passive_swing(conditions: &Conditions) -> Findings {
     let mut scene = Scene::default();
+    undamp(&mut scene);
+    let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
+    swing(stepped(&scene, Some(&ball), conditions), conditions)
+}
+
+/// Fingertips swing against the edges of a thin plate between them, which is turned a little.
+pub(super) fn plate_edges(conditions: &Conditions) -> Findings {
+    let mut scene = bare(10);
+    undamp(&mut scene);
+    scene.object.rotation_deg = [4.0, 8.0, 3.0];
+    let half = DVec3::new(0.025, 0.02, 0.001);
+    let plate = ObjectModel::from_primitive("plate", Primitive::Cuboid { half }, 400.0, 0.6);
+    swing(stepped(&scene, Some(&plate), conditions), conditions)
+}
+
+/// Fingers that swing against each other.
+pub(super) fn clapping(conditions: &Conditions) -> Findings {
+    let mut scene = bare(10);
+    undamp(&mut scene);
+    scene.gripper.mount.opening = 0.03;
+    swing(stepped(&scene, None, conditions), conditions)
+}
+
+fn undamp(scene: &mut Scene) {
     scene.gripper.finger.damping_time = 0.0;
     scene.gripper.pad.dissipation = 0.0;
     scene.gripper.pad.shear_damping_time = 0.0;
-    let ball = ObjectModel::from_primitive("ball", Primitive::Sphere { radius: 0.02 }, 400.0, 0.6);
-    let mut run = stepped(&scene, Some(&ball), conditions);
+}
+
+/// Fingers that are bent outward and let go: energy is not gained.
+fn swing(mut run: SteppedScene, conditions: &Conditions) -> Findings {
     run.state.q[..10].fill(-0.06);
     run.state.q[10..].fill(-0.05);
+    let gains = gains(&mut run, conditions, 2.0)?;
+    Ok(gains.into_iter().chain([missed(&run)]).collect())
+}
+
+/// Runs without a drive: the largest gain of energy in a tick, that in all, and whether anything was touched.
+pub(super) fn gains(
+    run: &mut SteppedScene,
+    conditions: &Conditions,
+    seconds: f64,
+) -> Result<[Measurement; 3], NotFinite> {
     let start = run.energy();
-    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows the energy of an equal error in
-    // every joint at the largest spring tension.
-    let tightest: f64 = run.state.q.iter().map(|q| q.abs()).sum();
-    let allowed = 1e-6 + conditions.setting.tolerance() * scene.gripper.finger.joint_stiffness() * tightest;
-    let (mut before, mut largest) = (start, 0.0f64);
-    for _ in 0..(conditions.span(2.0) / conditions.h()) as usize {
+    let (mut before, mut largest, mut force, mut tightest) = (start, 0.0f64, 0.0f64, 0.0f64);
+    for _ in 0..(conditions.span(seconds) / conditions.h()) as usize {
+        tightest = tightest.max(run.state.q.iter().map(|q| q.abs()).sum());
         run.step(&Drive::default())?;
         let now = run.energy();
         largest = largest.max(now - before);
         before = now;
+        force = force.max(run.skin_forces().map(|force| force.normal).sum());
     }
-    Ok(vec![
-        Measurement::at_most("largest gain in one tick (J)", largest, allowed),
-        Measurement::at_most("net gain (J)", before - start, 0.0),
-        missed(&run),
+    // Frozen inertia and explicit Coriolis forces allow small gains; a tolerance allows the energy of an equal error in
+    // every joint at the largest spring tension.
+    let error = conditions.setting.tolerance() * run.joint_stiffness() * tightest;
+    Ok([
+        Measurement::at_most("largest gain in one tick (J)", largest, 1e-6 + error),
+        Measurement::at_most("net gain (J)", before - start, error),
+        Measurement::at_least("largest force on the pads (N)", force, 0.05),
     ])
 }
 

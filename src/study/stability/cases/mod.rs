@@ -37,6 +37,24 @@ pub const CASES: &[Case] = &[
         measure: fingers::passive_swing,
     },
     Case {
+        name: "plate edges",
+        claim: "undamped fingertips swing against the edges of a thin plate: no energy is gained",
+        settings: EVERY,
+        measure: fingers::plate_edges,
+    },
+    Case {
+        name: "clapping fingers",
+        claim: "undamped fingers swing against each other: no energy is gained",
+        settings: EVERY,
+        measure: fingers::clapping,
+    },
+    Case {
+        name: "dragged edge",
+        claim: "an edge and a corner of a cube pass over an undamped fingertip: no energy is gained",
+        settings: EVERY,
+        measure: contact::dragged_edge,
+    },
+    Case {
         name: "explicit step",
         claim: "for comparison: diverges beyond 2 / omega_max, which is reported; the convex step does not",
         settings: Settings::Once,
