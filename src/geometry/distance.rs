@@ -111,7 +111,7 @@ impl DistanceGrid {
         self.interpolated(inside).map_or(to_box, |distance| to_box.max(distance - (p - inside).length()))
     }
 
-    /// Distance and its unit gradient from a quadratic B-spline through 27 nodes. Both are continuous, where the gradient
+    /// Distance and its gradient from a quadratic B-spline through 27 nodes. Both are continuous, where the gradient
     /// of a trilinear interpolation jumps from cell to cell, which a contact feels as an edge.
     #[inline]
     pub fn surface(&self, p: DVec3) -> (f64, DVec3) {
@@ -130,19 +130,21 @@ impl DistanceGrid {
         let row = self.size[2];
         let sheet = row * self.size[1];
         let base = (nearest[0] - 1) * sheet + (nearest[1] - 1) * row + nearest[2] - 1;
+        // Every line of three nodes lies within this.
+        let around = &self.values[base..][..2 * (sheet + row) + 3];
         let (mut distance, mut gradient) = (0.0, DVec3::ZERO);
         for i in 0..3 {
+            let (mut value, mut slope_y, mut slope_z) = (0.0, 0.0, 0.0);
             for j in 0..3 {
-                let from = base + i * sheet + j * row;
-                let nodes = &self.values[from..from + 3];
-                let (mut value, mut slope) = (0.0, 0.0);
-                for k in 0..3 {
-                    value += wz[k] * f64::from(nodes[k]);
-                    slope += dz[k] * f64::from(nodes[k]);
-                }
-                distance += wx[i] * wy[j] * value;
-                gradient += DVec3::new(dx[i] * wy[j] * value, wx[i] * dy[j] * value, wx[i] * wy[j] * slope);
+                let nodes = &around[i * sheet + j * row..][..3];
+                let [a, b, c] = [nodes[0], nodes[1], nodes[2]].map(f64::from);
+                let line = wz[0] * a + wz[1] * b + wz[2] * c;
+                value += wy[j] * line;
+                slope_y += dy[j] * line;
+                slope_z += wy[j] * (dz[0] * a + dz[1] * b + dz[2] * c);
             }
+            distance += wx[i] * value;
+            gradient += DVec3::new(dx[i] * value, wx[i] * slope_y, wx[i] * slope_z);
         }
         (distance, gradient / self.cell)
     }

@@ -14,6 +14,33 @@ use super::hessian::Lanes;
 use crate::gripper::{Finger, Pad, SegmentPose, bend};
 use glam::DVec2;
 
+/// A segment of both fingers, each in its plane: x, y.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BothSegments {
+    /// Starts (m).
+    pub(super) start: [Lanes; 2],
+    /// Unit vectors towards the tips.
+    pub(super) along: [Lanes; 2],
+}
+
+impl BothSegments {
+    #[cfg(any(test, feature = "rapier"))]
+    pub(super) fn pair(left: &SegmentPose, right: &SegmentPose) -> Self {
+        let lanes = |a: DVec2, b: DVec2| [Lanes::new([a.x, b.x]), Lanes::new([a.y, b.y])];
+        Self { start: lanes(left.start, right.start), along: lanes(left.along, right.along) }
+    }
+
+    /// The segment of one finger.
+    pub(super) fn of(&self, finger: usize) -> SegmentPose {
+        let point = |[x, y]: [Lanes; 2]| DVec2::new(x.to_array()[finger], y.to_array()[finger]);
+        SegmentPose { start: point(self.start), along: point(self.along) }
+    }
+
+    fn centre(&self, length: f64) -> [Lanes; 2] {
+        [self.start[0] + self.along[0] * (0.5 * length), self.start[1] + self.along[1] * (0.5 * length)]
+    }
+}
+
 /// Constants of a chain; both fingers share them.
 #[derive(Clone, Debug)]
 pub(super) struct ChainModel {
@@ -66,27 +93,37 @@ impl ChainModel {
         segments[j].point(0.5 * self.lengths[j], 0.0)
     }
 
-    /// Fills the inertia matrices M of both fingers (N x N, both triangles) for the current layout.
-    pub(super) fn inertia(&self, fingers: [&[SegmentPose]; 2], m: &mut [Lanes]) {
+    /// Lays out the segments of both fingers at 2 N angles.
+    pub(super) fn bend_both(&self, q: &[f64], both: &mut [BothSegments]) {
         let n = self.joints;
-        let lanes = |of: &dyn Fn(&[SegmentPose]) -> DVec2| {
-            let [left, right] = fingers.map(of);
-            [Lanes::new([left.x, right.x]), Lanes::new([left.y, right.y])]
-        };
+        let (mut start, mut angle) = ([Lanes::ZERO; 2], Lanes::ZERO);
+        for (j, (segment, length)) in both.iter_mut().zip(&self.lengths).enumerate() {
+            if j > 0 {
+                angle += Lanes::new([q[j - 1], q[n + j - 1]]);
+            }
+            let (sin, cos) = angle.sin_cos();
+            *segment = BothSegments { start, along: [sin, cos] };
+            start = [start[0] + sin * *length, start[1] + cos * *length];
+        }
+    }
+
+    /// Fills the inertia matrices M of both fingers (N x N, both triangles) for the current layout.
+    pub(super) fn inertia(&self, both: &[BothSegments], m: &mut [Lanes]) {
+        let n = self.joints;
         // Composite of the segments from the tip inward: mass, first and second moment about the plane's origin.
         let (mut mass, mut first, mut second) = (0.0, [Lanes::ZERO; 2], Lanes::ZERO);
         for i in (0..n).rev() {
             let link = i + 1;
-            let [x, y] = lanes(&|segments| self.centre(segments, link));
+            let [x, y] = both[link].centre(self.lengths[link]);
             mass += self.masses[link];
             first = [first[0] + x * self.masses[link], first[1] + y * self.masses[link]];
             second += (x * x + y * y) * self.masses[link] + self.inertias[link];
-            let [x, y] = lanes(&|segments| segments[link].start);
+            let [x, y] = both[link].start;
             // second - (p_i + p_j) . first + mass p_i . p_j
             let at_i = second - (x * first[0] + y * first[1]);
             let per_j = [x * mass - first[0], y * mass - first[1]];
-            for j in 0..=i {
-                let [x, y] = lanes(&|segments| segments[j + 1].start);
+            for (j, segment) in both[1..=link].iter().enumerate() {
+                let [x, y] = segment.start;
                 let value = at_i + (x * per_j[0] + y * per_j[1]);
                 m[i * n + j] = value;
                 m[j * n + i] = value;
@@ -94,39 +131,43 @@ impl ChainModel {
         }
     }
 
-    /// Fills the bias torques: Coriolis, centrifugal and gravity (`gravity` in the finger plane (m/s²)), for a step of
-    /// h (s). Forces that grow with the square of the rates are explicit; to be no source of energy where a segment
-    /// turns by a radian within a step, they are divided by 1 + (h w)², w the fastest turn of a segment.
+    /// Gives `put` the bias torque of each joint: Coriolis, centrifugal and gravity (`gravity` in the finger planes (m/s²)),
+    /// for a step of h (s). Forces that grow with the square of the rates are explicit; to be no source of energy where a
+    /// segment turns by a radian within a step, they are divided by 1 + (h w)², w the fastest turn of a segment.
     pub(super) fn bias(
         &self,
-        segments: &[SegmentPose],
-        (qd, h): (&[f64], f64),
-        gravity: DVec2,
-        accelerations: &mut [DVec2],
-        bias: &mut [f64],
+        both: &[BothSegments],
+        (rates, h): (impl Fn(usize) -> Lanes, f64),
+        gravity: [Lanes; 2],
+        accelerations: &mut [[Lanes; 2]],
+        mut put: impl FnMut(usize, Lanes),
     ) {
         let n = self.joints;
-        let (mut turn, mut fastest) = (0.0f64, 0.0f64);
-        for rate in qd {
-            turn += rate;
+        let (mut turn, mut fastest) = (Lanes::ZERO, Lanes::ZERO);
+        for i in 0..n {
+            turn += rates(i);
             fastest = fastest.max(turn.abs());
         }
-        let share = 1.0 / (1.0 + (h * fastest).powi(2));
-        let mut at_start = -gravity;
-        let mut rate = 0.0;
+        let turned = fastest * h;
+        let share = Lanes::ONE / (turned * turned + Lanes::ONE);
+        let mut at_start = [-gravity[0], -gravity[1]];
+        let mut rate = Lanes::ZERO;
         for link in 1..=n {
-            rate += qd[link - 1];
-            let inward_pull = segments[link].along * (share * rate * rate * self.lengths[link]);
-            accelerations[link] = at_start - 0.5 * inward_pull;
-            at_start -= inward_pull;
+            rate += rates(link - 1);
+            let pull = share * rate * rate * self.lengths[link];
+            let [x, y] = both[link].along;
+            let inward_pull = [x * pull, y * pull];
+            accelerations[link] = [at_start[0] - inward_pull[0] * 0.5, at_start[1] - inward_pull[1] * 0.5];
+            at_start = [at_start[0] - inward_pull[0], at_start[1] - inward_pull[1]];
         }
-        let (mut force, mut moment) = (DVec2::ZERO, 0.0);
+        let (mut force, mut moment) = ([Lanes::ZERO; 2], Lanes::ZERO);
         for i in (0..n).rev() {
             let link = i + 1;
-            let f = accelerations[link] * self.masses[link];
-            force += f;
-            moment += turning(self.centre(segments, link), f);
-            bias[i] = moment - turning(segments[link].start, force);
+            let f = accelerations[link].map(|a| a * self.masses[link]);
+            force = [force[0] + f[0], force[1] + f[1]];
+            let ([x, y], [start_x, start_y]) = (both[link].centre(self.lengths[link]), both[link].start);
+            moment += y * f[0] - x * f[1];
+            put(i, moment - (start_y * force[0] - start_x * force[1]));
         }
     }
 
@@ -167,12 +208,45 @@ mod tests {
         energy
     }
 
-    /// Inertia of the left finger, checked to be that of the right one too.
+    fn alike(segments: &[SegmentPose]) -> Vec<BothSegments> {
+        segments.iter().map(|segment| BothSegments::pair(segment, segment)).collect()
+    }
+
+    /// The number of both fingers, which is one.
+    fn one(lanes: Lanes) -> f64 {
+        let [left, right] = lanes.to_array();
+        assert_eq!(left, right);
+        left
+    }
+
     fn inertia_of_one(model: &ChainModel, segments: &[SegmentPose]) -> Vec<f64> {
         let mut lanes = vec![Lanes::ZERO; model.joints * model.joints];
-        model.inertia([segments, segments], &mut lanes);
-        assert!(lanes.iter().all(|lanes| lanes.to_array()[0] == lanes.to_array()[1]));
-        lanes.iter().map(|lanes| lanes.to_array()[0]).collect()
+        model.inertia(&alike(segments), &mut lanes);
+        lanes.into_iter().map(one).collect()
+    }
+
+    fn bias_of_one(model: &ChainModel, segments: &[SegmentPose], qd: &[f64], gravity: DVec2) -> Vec<f64> {
+        let (mut accelerations, mut bias) = (vec![[Lanes::ZERO; 2]; model.joints + 1], vec![0.0; model.joints]);
+        let rates = |i: usize| Lanes::splat(qd[i]);
+        let gravity = [gravity.x, gravity.y].map(Lanes::splat);
+        model.bias(&alike(segments), (rates, 0.0), gravity, &mut accelerations, |i, lanes| bias[i] = one(lanes));
+        bias
+    }
+
+    #[test]
+    fn both_fingers_bend_like_one() {
+        let model = chain(7);
+        let q: Vec<f64> = (0..14).map(|i| 0.1 * f64::from(i) - 0.6).collect();
+        let mut both = vec![BothSegments::default(); 8];
+        model.bend_both(&q, &mut both);
+        for finger in 0..2 {
+            let mut segments = vec![SegmentPose::default(); 8];
+            model.bend(&q[7 * finger..7 * (finger + 1)], &mut segments);
+            for (segment, both) in segments.iter().zip(&both) {
+                let got = both.of(finger);
+                assert!(got.start.abs_diff_eq(segment.start, 1e-14) && got.along.abs_diff_eq(segment.along, 1e-14));
+            }
+        }
     }
 
     #[test]
@@ -207,8 +281,7 @@ mod tests {
         let (ahead, behind) = (momentum(&moved(1.0)), momentum(&moved(-1.0)));
         let mut segments = vec![SegmentPose::default(); n + 1];
         model.bend(&q, &mut segments);
-        let (mut accelerations, mut bias) = (vec![DVec2::ZERO; n + 1], vec![0.0; n]);
-        model.bias(&segments, (&qd, 0.0), DVec2::ZERO, &mut accelerations, &mut bias);
+        let bias = bias_of_one(&model, &segments, &qd, DVec2::ZERO);
         for i in 0..n {
             let shifted = |sign: f64| {
                 let mut q = q.clone();
@@ -226,11 +299,10 @@ mod tests {
         let model = chain(10);
         let mut segments = vec![SegmentPose::default(); 11];
         model.bend(&[0.0; 10], &mut segments);
-        let (mut accelerations, mut bias) = (vec![DVec2::ZERO; 11], vec![0.0; 10]);
-        model.bias(&segments, (&[0.0; 10], 0.0), DVec2::new(0.0, 9.81), &mut accelerations, &mut bias);
+        let bias = bias_of_one(&model, &segments, &[0.0; 10], DVec2::new(0.0, 9.81));
         assert!(bias.iter().all(|b| b.abs() < 1e-18));
         // Held out level by gravity across it, the first joint carries the weight of 95 mm at its middle.
-        model.bias(&segments, (&[0.0; 10], 0.0), DVec2::new(9.81, 0.0), &mut accelerations, &mut bias);
+        let bias = bias_of_one(&model, &segments, &[0.0; 10], DVec2::new(9.81, 0.0));
         let want = -0.95 * 0.030 * 9.81 * 0.5 * 0.095;
         assert!((bias[0] / want - 1.0).abs() < 1e-12);
     }

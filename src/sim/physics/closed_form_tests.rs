@@ -1,6 +1,7 @@
 //! The step against answers from textbooks. Every scene is tiny and its answer can be checked by hand. Hard cases stand
 //! in `palpate-study`.
 
+use super::chain::BothSegments;
 use super::detect::detect;
 use super::hessian::Lanes;
 use super::step::{Drive, lay_out, step};
@@ -103,10 +104,10 @@ fn a_cantilever_rings_at_its_modes() {
 /// The two lowest natural frequencies of the straight chain (rad/s), by inverse iteration with deflation.
 fn lowest_modes(model: &PhysicsModel) -> [f64; 2] {
     let n = model.chain.joints;
-    let mut segments = vec![crate::gripper::SegmentPose::default(); n + 1];
-    model.chain.bend(&vec![0.0; n], &mut segments);
+    let mut both = vec![BothSegments::default(); n + 1];
+    model.chain.bend_both(&vec![0.0; 2 * n], &mut both);
     let mut m = vec![Lanes::ZERO; n * n];
-    model.chain.inertia([&segments, &segments], &mut m);
+    model.chain.inertia(&both, &mut m);
     let m: Vec<f64> = m.iter().map(|lanes| lanes.to_array()[0]).collect();
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
     let times_m = |x: &[f64]| -> Vec<f64> { m.chunks_exact(n).map(|row| dot(row, x)).collect() };

@@ -150,9 +150,13 @@ impl Contact {
         DMat3::from_cols(column(DVec3::X, n.x, slip.x), column(DVec3::Y, n.y, slip.y), column(DVec3::Z, n.z, slip.z))
     }
 
-    /// Brings the slip limit up to date with the normal impulse at the current iterate.
-    pub(super) fn relag(&mut self, step: ContactStep) {
-        self.limit = self.mu * self.normal_impulse(step, self.normal.dot(self.velocity)).0;
+    /// Brings the slip limit up to date with the normal impulse at the current iterate; true where that changes the friction.
+    pub(super) fn relag(&mut self, step: ContactStep) -> bool {
+        let v_n = self.normal.dot(self.velocity);
+        let limit = self.mu * self.normal_impulse(step, v_n).0;
+        let least = std::mem::replace(&mut self.limit, limit).min(limit);
+        let e = self.shear + (self.velocity - self.normal * v_n) * step.shear_reach();
+        step.h * self.shear_stiffness * e.length() > least
     }
 
     /// Force on A (N): its normal size, and its tangential part.
@@ -162,30 +166,37 @@ impl Contact {
         (gamma / step.h, tangential / step.h)
     }
 
-    /// Shear of the skin at the end of the step (m), as far as friction lets it go.
-    pub(super) fn final_shear(&self, step: ContactStep) -> DVec3 {
-        if self.limit <= 0.0 {
-            return DVec3::ZERO;
-        }
+    /// What the step leaves.
+    pub(super) fn outcome(&self, step: ContactStep) -> Outcome {
         let v_n = self.normal.dot(self.velocity);
-        let e = self.shear + (self.velocity - self.normal * v_n) * step.h;
-        let impulse = step.h * self.shear_stiffness * e.length();
-        if impulse > self.limit { e * (self.limit / impulse) } else { e }
-    }
-
-    /// Error of the lagged slip limit as far as it changed the friction (N s), and the true limit.
-    pub(super) fn lag_mismatch(&self, step: ContactStep) -> (f64, f64) {
-        let (gamma, _) = self.normal_impulse(step, self.normal.dot(self.velocity));
-        let truth = self.mu * gamma;
+        let (impulse, _) = self.normal_impulse(step, v_n);
+        let truth = self.mu * impulse;
         if self.limit <= 0.0 {
             // No friction was applied, so the whole true limit counts as missed.
-            return (truth, truth);
+            return Outcome { impulse, shear: DVec3::ZERO, missed: truth, truth };
         }
-        let used = self.force(step).1.length() * step.h;
-        let slips = used >= self.limit * (1.0 - 1e-9);
-        let mismatch = if slips { (used - truth).abs() } else { (used - truth).max(0.0) };
-        (mismatch, truth)
+        let sliding = self.velocity - self.normal * v_n;
+        let stiffness = step.h * self.shear_stiffness;
+        let e = self.shear + sliding * step.h;
+        let pull = stiffness * e.length();
+        let shear = if pull > self.limit { e * (self.limit / pull) } else { e };
+        let damped = stiffness * (e + sliding * step.shear_damping_time).length();
+        let used = damped.min(self.limit);
+        let missed = if used >= self.limit * (1.0 - 1e-9) { (used - truth).abs() } else { (used - truth).max(0.0) };
+        Outcome { impulse, shear, missed, truth }
     }
+}
+
+/// What a step leaves of a contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    /// Normal impulse (N s).
+    pub(super) impulse: f64,
+    /// Shear of the skin (m), as far as friction lets it go.
+    pub(super) shear: DVec3,
+    /// Error of the lagged slip limit as far as it changed the friction, and the true limit (N s).
+    pub(super) missed: f64,
+    pub(super) truth: f64,
 }
 
 #[cfg(test)]

@@ -389,10 +389,10 @@ fn detect_resting(
         });
     };
     let local = |p: DVec3| gripper_from_object.transpose() * (p - pose.position) + body.centre;
+    // Height above the highest surface, as a plane in the object's frame: three products per point.
+    let up = gripper_from_object.transpose() * environment.up();
+    let base = environment.height_above_top(place(DVec3::ZERO));
     let nearby = workspace.clearances.resting(margin, |gap, nearby| {
-        // Height above the highest surface, as a plane in the object's frame: three products per point.
-        let up = gripper_from_object.transpose() * environment.up();
-        let base = environment.height_above_top(place(DVec3::ZERO));
         let balls = body.resting.0.iter().zip(0..);
         nearby.points.extend(balls.filter_map(|(b, k)| (base + up.dot(b.centre) - b.radius < gap).then_some(k)));
         let rim = environment.rim().iter().zip(0..);
@@ -400,6 +400,9 @@ fn detect_resting(
     });
     for k in nearby.points.iter().map(|k| *k as usize) {
         let ball = &body.resting.0[k];
+        if base + up.dot(ball.centre) - ball.radius > margin {
+            continue;
+        }
         let centre = place(ball.centre);
         let gap = environment.distance(centre) - ball.radius;
         if gap < margin {

@@ -273,15 +273,16 @@ impl Simulation {
 
     /// Normal force of each pad on the object (N); `None` where pads touch nothing else.
     fn force_on_object(&self) -> Option<[f64; 2]> {
-        let (mut force, mut touch_more) = ([0.0; 2], self.workspace.fingers_meet);
-        for (contact, side, spring, link, on_spring) in self.pressed() {
-            let Some(load) = self.taxel_load(side, spring, link, on_spring) else { continue };
-            match contact.against {
-                Against::Object => force[side] += f64::from(load.normal),
-                Against::World | Against::Finger(_) => touch_more = true,
-            }
+        let load = |(_, side, spring, link, force)| self.taxel_load(side, spring, link, force).map(|load| (side, load));
+        let more = |pressed: &(&Contact, usize, usize, u32, DVec3)| pressed.0.against != Against::Object;
+        if !self.workspace.fingers_meet && self.pressed().filter(more).find_map(load).is_none() {
+            return None;
         }
-        touch_more.then_some(force)
+        let mut force = [0.0; 2];
+        for (side, load) in self.pressed().filter(|pressed| !more(pressed)).filter_map(load) {
+            force[side] += f64::from(load.normal);
+        }
+        Some(force)
     }
 
     /// The load of a spring, where it belongs to a taxel and the force pushes into the pad: what presses from behind is

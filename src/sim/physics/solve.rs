@@ -55,24 +55,33 @@ const ABSOLUTE_TOLERANCE: f64 = 1e-13;
 /// lagging costs them.
 const ENOUGH_FOR_LIMITS: f64 = 1e-3;
 
-/// Minimises over `velocity`, starting from it. Needs the workspace's dynamics, and contacts with their relative
-/// velocities at the start; leaves those at the solution.
+/// Share of the gradient that an iteration may leave if the next one is to use the same Hessian: to fill and to factorise it
+/// costs more than two iterations without.
+const STILL_GOOD: f64 = 0.1;
+
+const STALE_SHARE: f64 = 0.1;
+
+/// Minimises over `velocity`, starting from it. Needs the workspace's dynamics with the product of A and the velocities, and
+/// contacts with their relative velocities at the start; leaves those at the solution.
 pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws: &mut Workspace) -> SolveReport {
     let mut report = SolveReport::default();
     let mut passes = 0;
     prepare_coupling(ws);
-    for k in 0..ws.weights.len() {
-        ws.weights[k] = 1.0 / diagonal(model, ws, k);
-    }
-    multiply_by_a(model, ws, velocity, Product::OfVelocity);
+    fill_weights(model, ws);
+    // The Hessian of an earlier step of this length is tried first.
+    let same = ws.factor_of == Some((ws.step.h, ws.fingers_meet));
+    let mut before = if same { f64::INFINITY } else { 0.0 };
+    let known = ws.weighted_size(&ws.a_velocity).max(ws.weighted_size(&ws.rhs));
+    let mut fresh = true;
+    let mut size = fill_gradient(model, q, velocity, ws);
     loop {
-        let size = fill_gradient(model, q, velocity, ws);
-        let allowed = ABSOLUTE_TOLERANCE + model.tolerance * size.forces;
+        let allowed = ABSOLUTE_TOLERANCE + model.tolerance * size.contacts.max(known);
         if !size.gradient.is_finite() {
             report.unbalanced = Some(farthest_from_balance(model, ws, allowed));
             return report;
         }
-        if size.gradient <= allowed && passes == model.relag_passes {
+        let close_enough = if fresh { allowed } else { STALE_SHARE * allowed };
+        if size.gradient <= close_enough && passes == model.relag_passes {
             report.converged = true;
             return report;
         }
@@ -80,8 +89,9 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
         if size.gradient <= allowed.max(enough) && passes < model.relag_passes {
             passes += 1;
             let step = ws.step;
-            for contact in &mut ws.contacts {
-                contact.relag(step);
+            let changed = ws.contacts.iter_mut().fold(false, |changed, contact| contact.relag(step) | changed);
+            if changed {
+                size = fill_gradient(model, q, velocity, ws);
             }
             continue;
         }
@@ -90,9 +100,14 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
             return report;
         }
         report.iterations += 1;
-        fill_hessian(model, q, velocity, ws);
-        fill_coupling(model, ws);
-        ws.hessian.factorise();
+        fresh = size.gradient > STILL_GOOD * before;
+        if fresh {
+            fill_hessian(model, q, velocity, ws);
+            fill_coupling(model, ws);
+            ws.hessian.factorise();
+            ws.factor_of = Some((ws.step.h, ws.fingers_meet));
+        }
+        before = size.gradient;
         for (d, g) in ws.direction.iter_mut().zip(&ws.gradient) {
             *d = -g;
         }
@@ -101,16 +116,36 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
         multiply_by_a(model, ws, &direction, Product::OfDirection);
         relative_velocities(model, &direction, ws, Product::OfDirection);
         ws.direction = direction;
-        let share = line_search(model, q, velocity, ws, &mut report.line_search_steps);
-        for (v, d) in velocity.iter_mut().zip(&ws.direction) {
-            *v += share * d;
+        let slopes = [dot(&ws.direction, &ws.gradient), 0.0];
+        // The whole step is nearly always taken: its gradient is needed then anyway.
+        take_share(velocity, ws, 1.0);
+        size = fill_gradient(model, q, velocity, ws);
+        let slopes = [slopes[0], dot(&ws.direction, &ws.gradient)];
+        let quadratic = dot(&ws.direction, &ws.a_direction);
+        report.line_search_steps += 1;
+        if !(slopes[1] <= ENOUGH_DESCENT * -slopes[0] || slopes[1] <= 1e-14 * quadratic) {
+            take_share(velocity, ws, -1.0);
+            let share = line_search(model, q, velocity, ws, slopes, &mut report.line_search_steps);
+            take_share(velocity, ws, share);
+            size = fill_gradient(model, q, velocity, ws);
         }
-        for (v, d) in ws.a_velocity.iter_mut().zip(&ws.a_direction) {
-            *v += share * d;
-        }
-        for contact in &mut ws.contacts {
-            contact.velocity += contact.change * share;
-        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Moves by a share of the direction.
+fn take_share(velocity: &mut [f64], ws: &mut Workspace, share: f64) {
+    for (v, d) in velocity.iter_mut().zip(&ws.direction) {
+        *v += share * d;
+    }
+    for (v, d) in ws.a_velocity.iter_mut().zip(&ws.a_direction) {
+        *v += share * d;
+    }
+    for contact in &mut ws.contacts {
+        contact.velocity += contact.change * share;
     }
 }
 
@@ -191,11 +226,9 @@ pub(super) fn segment_velocities(model: &PhysicsModel, x: &[f64], ws: &mut Works
     }
 }
 
-/// Sizes of the gradient and of the terms it is the sum of, in the norm of the diagonal of A.
+/// Sizes of the gradient and of the contact forces in it, in the norm of the diagonal of A.
 pub(super) struct Size {
     gradient: f64,
-    forces: f64,
-    /// Contact forces alone.
     contacts: f64,
 }
 
@@ -251,18 +284,22 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
             contact_size += load * load * ws.weights[k];
         });
     } else {
+        let h = ws.step.h;
         let mut beyond = Planar::default();
+        let mut size = Lanes::ZERO;
         for i in (0..n).rev() {
             let [own, met] = &ws.loads[i + 1];
-            beyond = beyond.plus(own).plus(met);
-            let from_contacts = ws.columns[i].dot(&beyond).to_array();
-            for (k, from_contacts) in [i, n + i].into_iter().zip(from_contacts) {
-                let limit = ws.step.h * model.chain.limit_torque(q[k] + ws.step.h * velocity[k]).0;
-                let load = from_contacts + limit;
-                ws.gradient[k] += load;
-                contact_size += load * load * ws.weights[k];
+            beyond = beyond.plus(own);
+            if ws.fingers_meet {
+                beyond = beyond.plus(met);
             }
+            let both = |x: &[f64]| Lanes::new([x[i], x[n + i]]);
+            let limits = (both(q) + both(velocity) * h).to_array().map(|end| h * model.chain.limit_torque(end).0);
+            let load = ws.columns[i].dot(&beyond) + Lanes::new(limits);
+            size += load * load * both(&ws.weights);
+            [ws.gradient[i], ws.gradient[n + i]] = (both(&ws.gradient) + load).to_array();
         }
+        contact_size += size.reduce_add();
     }
     if model.free_body().is_some() {
         let wrench = [on_object.linear.to_array(), on_object.angular.to_array()];
@@ -271,17 +308,7 @@ pub(super) fn fill_gradient(model: &PhysicsModel, q: &[f64], velocity: &[f64], w
             contact_size += w * w * ws.weights[2 * n + i];
         }
     }
-    let (mut gradient, mut momentum, mut known) = (0.0, 0.0, 0.0);
-    for (((g, p), r), weight) in ws.gradient.iter().zip(&ws.a_velocity).zip(&ws.rhs).zip(&ws.weights) {
-        gradient += g * g * weight;
-        momentum += p * p * weight;
-        known += r * r * weight;
-    }
-    Size {
-        gradient: gradient.sqrt(),
-        forces: contact_size.max(momentum).max(known).sqrt(),
-        contacts: contact_size.sqrt(),
-    }
+    Size { gradient: ws.weighted_size(&ws.gradient), contacts: contact_size.sqrt() }
 }
 
 /// The unknown with the largest share in the gradient, or the first whose share is no number at all.
@@ -313,6 +340,17 @@ pub(super) fn diagonal(model: &PhysicsModel, ws: &Workspace, k: usize) -> f64 {
             5 => ws.body_inertia.z_axis.z,
             _ => mass,
         }
+    }
+}
+
+/// One over the diagonal of A.
+fn fill_weights(model: &PhysicsModel, ws: &mut Workspace) {
+    let n = if ws.space.is_some() { 0 } else { model.chain.joints };
+    for i in 0..n {
+        [ws.weights[i], ws.weights[n + i]] = (Lanes::ONE / ws.finger_matrix[i * n + i]).to_array();
+    }
+    for k in 2 * n..ws.weights.len() {
+        ws.weights[k] = 1.0 / diagonal(model, ws, k);
     }
 }
 
@@ -423,9 +461,15 @@ const FLAT_ENOUGH: f64 = 0.05;
 /// Bisections after which the bracket is narrower than any velocity that matters.
 const MOST_SEARCH_STEPS: u32 = 60;
 
-/// Share of the Newton direction to take, from the derivative along it: the whole, or where the slope vanishes.
-fn line_search(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &Workspace, steps: &mut u32) -> f64 {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+/// Share of a direction where the slope along it vanishes, given the slopes at its start and at its end.
+fn line_search(
+    model: &PhysicsModel,
+    q: &[f64],
+    velocity: &[f64],
+    ws: &Workspace,
+    [start, end]: [f64; 2],
+    steps: &mut u32,
+) -> f64 {
     let quadratic = dot(&ws.direction, &ws.a_direction);
     let linear = dot(&ws.direction, &ws.a_velocity) - dot(&ws.direction, &ws.rhs);
     let h = ws.step.h;
@@ -441,11 +485,6 @@ fn line_search(model: &PhysicsModel, q: &[f64], velocity: &[f64], ws: &Workspace
             .sum();
         linear + share * quadratic + contacts + limits
     };
-    let start = dot(&ws.direction, &ws.gradient);
-    let end = slope_at(1.0);
-    if end <= ENOUGH_DESCENT * -start || end <= 1e-14 * quadratic {
-        return 1.0;
-    }
     // Regula falsi (Illinois), with every fourth step a bisection.
     let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, 1.0, end);
     let mut last_side = 0;

@@ -1,16 +1,15 @@
 //! One step: lay out the fingers, assemble the dynamics, find contacts, minimise, move.
 
-use super::chain::turning;
-use super::contact::Acting;
+use super::contact::{Acting, Outcome};
 use super::detect::{detect, segment_axes};
 use super::effects::{move_world, note_passing};
 use super::hessian::{Lanes, multiply};
 use super::model::PhysicsModel;
-use super::solve::{Product, Unbalanced, minimise, relative_velocities, segment_velocities};
+use super::solve::{Product, Unbalanced, minimise, multiply_by_a, relative_velocities, segment_velocities};
 use super::space_step::gather;
 use super::state::State;
-use super::workspace::Workspace;
-use glam::{DQuat, DVec2, DVec3};
+use super::workspace::{Planar, Workspace};
+use glam::{DQuat, DVec3};
 
 /// Statistics of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,12 +87,10 @@ pub fn step(
         contact.compression += ahead * contact.normal.dot(contact.velocity);
     }
     let solved = minimise(model, &state.q, &mut state.velocity, ws);
-    if let Some(body) = state.not_finite(model) {
-        return Err(NotFinite { body });
-    }
     if let Some(Unbalanced { unknown, excess: f64::MAX }) = solved.unbalanced {
         // Forces that are no numbers leave the velocities as they were, and the step without meaning.
-        return Err(NotFinite { body: State::place_of(model, unknown as usize) });
+        let body = state.not_finite(model).unwrap_or_else(|| State::place_of(model, unknown as usize));
+        return Err(NotFinite { body });
     }
     let friction_residual = remember_contacts(model, state, ws);
     state.integrate(model, h);
@@ -160,19 +157,20 @@ fn lay_out_ahead(model: &PhysicsModel, state: &State, ahead: f64, ws: &mut Works
     if let Some(space) = &mut ws.space {
         space.lay_out(model, &ws.q, state.sways_ahead(model, ahead), ws.reference);
     }
-    for finger in 0..2 {
-        let plane = model.planes[finger];
-        let segments = &mut ws.segments[finger * (n + 1)..(finger + 1) * (n + 1)];
-        model.chain.bend(&ws.q[finger * n..(finger + 1) * n], segments);
-        // Turning "along" towards "inward" is a rotation about along x inward = -sign y.
-        for (column, segment) in ws.columns.iter_mut().zip(segments.iter().skip(1)) {
-            let arm = ws.reference - plane.point(segment.start, 0.0);
-            column.set(finger, [-plane.sign * arm.z, plane.sign * arm.x, -plane.sign]);
-        }
+    model.chain.bend_both(&ws.q, &mut ws.both);
+    for (j, both) in ws.both.iter().enumerate() {
+        (ws.segments[j], ws.segments[n + 1 + j]) = (both.of(0), both.of(1));
+    }
+    // Turning "along" towards "inward" is a rotation about along x inward = -sign y.
+    let signs = Lanes::new(model.planes.map(|plane| plane.sign));
+    let gaps = Lanes::new(model.planes.map(|plane| plane.half_gap));
+    for (column, both) in ws.columns.iter_mut().zip(&ws.both[1..]) {
+        let arm = [signs * ws.reference.x - both.start[0] + gaps, both.start[1] + ws.reference.z];
+        *column = Planar([-signs * arm[1], arm[0], -signs]);
     }
 }
 
-/// Fills A and r.
+/// Fills A, r and the product of A with the velocities.
 pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     match model.sideways {
         Some(_) => gather(model, state, ws, (drive.torque, drive.tip_force)),
@@ -189,42 +187,51 @@ pub(super) fn gather_dynamics(model: &PhysicsModel, state: &State, ws: &mut Work
         let known_angular = ws.body_inertia * angular;
         ws.rhs[2 * n..2 * n + 3].copy_from_slice(&known_linear.to_array());
         ws.rhs[2 * n + 3..2 * n + 6].copy_from_slice(&known_angular.to_array());
+        ws.a_velocity[2 * n..2 * n + 3].copy_from_slice(&(linear * body.mass).to_array());
+        ws.a_velocity[2 * n + 3..2 * n + 6].copy_from_slice(&known_angular.to_array());
+    }
+    if ws.space.is_some() {
+        multiply_by_a(model, ws, &state.velocity, Product::OfVelocity);
     }
 }
 
 /// Fills A and r of fingers that stay in their planes.
 fn gather_planar(model: &PhysicsModel, state: &State, ws: &mut Workspace, drive: &Drive) {
     let (n, h) = (model.chain.joints, ws.step.h);
-    let (left, right) = ws.segments.split_at(n + 1);
     if model.finger_inertia {
-        model.chain.inertia([left, right], &mut ws.finger_matrix);
+        model.chain.inertia(&ws.both, &mut ws.finger_matrix);
     } else {
         ws.finger_matrix.fill(Lanes::ZERO);
     }
-    for (finger, segments) in [left, right].into_iter().enumerate() {
-        let joints = finger * n..(finger + 1) * n;
-        let sign = model.planes[finger].sign;
-        let in_plane = |v: DVec3| DVec2::new(sign * v.x, -v.z);
-        let gravity = in_plane(model.finger_gravity - ws.passing.acceleration);
-        let pull = in_plane(drive.tip_force[finger]);
-        let tip = segments[n].point(model.chain.lengths[n], 0.0);
-        let q = &state.q[joints.clone()];
-        let rates = if model.finger_inertia { &state.velocity[joints.clone()] } else { &ws.still };
-        model.chain.bias(segments, (rates, h), gravity, &mut ws.accelerations, &mut ws.bias);
-        let rhs = &mut ws.rhs[joints.clone()];
-        for i in 0..n {
-            let load = drive.torque + turning(tip - segments[i + 1].start, pull);
-            rhs[i] = h * (load - model.chain.stiffness * q[i] - ws.bias[i]);
-        }
-        if let Some(relaxation) = &model.relaxation {
-            relaxation.soften(h, q, &state.crept[joints], rhs);
-        }
+    let in_planes =
+        |v: [DVec3; 2]| [Lanes::new([0, 1].map(|k| model.planes[k].sign * v[k].x)), Lanes::new(v.map(|v| -v.z))];
+    let gravity = in_planes([model.finger_gravity - ws.passing.acceleration; 2]);
+    let pull = in_planes(drive.tip_force);
+    let last = &ws.both[n];
+    let tip = [0, 1].map(|k| last.start[k] + last.along[k] * model.chain.lengths[n]);
+    let moving = f64::from(u8::from(model.finger_inertia));
+    let rates = |i: usize| Lanes::new([state.velocity[i], state.velocity[n + i]]) * moving;
+    let (both, rhs) = (&ws.both, &mut ws.rhs);
+    model.chain.bias(both, (rates, h), gravity, &mut ws.accelerations, |i, bias| {
+        let [x, y] = both[i + 1].start;
+        let load = (tip[1] - y) * pull[0] - (tip[0] - x) * pull[1] + drive.torque;
+        let bent = Lanes::new([state.q[i], state.q[n + i]]) * model.chain.stiffness;
+        [rhs[i], rhs[n + i]] = ((load - bent - bias) * h).to_array();
+    });
+    if let Some(relaxation) = &model.relaxation {
+        relaxation.soften(h, &state.q, &state.crept, &mut ws.rhs[..2 * n]);
     }
+    ws.a_velocity[..2 * n].fill(0.0);
     if model.finger_inertia {
-        multiply(&ws.finger_matrix, &state.velocity[..2 * n], &mut ws.rates, |k, momentum| ws.rhs[k] += momentum);
+        let (matrix, velocity) = (&ws.finger_matrix, &state.velocity[..2 * n]);
+        multiply(matrix, velocity, &mut ws.rates, |k, momentum| ws.a_velocity[k] = momentum);
     }
     let lost = model.relaxation.as_ref().map_or(0.0, |relaxation| relaxation.diagonal_loss(h));
     let diagonal = h * model.chain.damping + h * h * model.chain.stiffness - lost;
+    for ((known, momentum), rate) in ws.rhs.iter_mut().zip(&mut ws.a_velocity).zip(&state.velocity[..2 * n]) {
+        *known += *momentum;
+        *momentum += diagonal * rate;
+    }
     for entry in ws.finger_matrix.iter_mut().step_by(n + 1) {
         *entry += diagonal;
     }
@@ -239,15 +246,13 @@ pub(super) fn remember_contacts(model: &PhysicsModel, state: &mut State, ws: &Wo
     state.lag_h = ws.step.h;
     let (mut mismatch, mut total) = (0.0, 0.0);
     for contact in &ws.contacts {
-        let mut shear = contact.final_shear(ws.step);
+        let Outcome { impulse, mut shear, missed, truth } = contact.outcome(ws.step);
         if let Acting::Segment(link) = contact.acting
             && shear != DVec3::ZERO
         {
             shear = segment_axes_of(model, ws, link).transpose() * shear;
         }
-        let v_n = contact.normal.dot(contact.velocity);
-        state.touched.remember(contact.site, shear, contact.normal_impulse(ws.step, v_n).0);
-        let (missed, truth) = contact.lag_mismatch(ws.step);
+        state.touched.remember(contact.site, shear, impulse);
         mismatch += missed;
         total += truth;
     }

@@ -2,6 +2,7 @@
 //! cases are made of it; grasps run on [`super::Simulation`].
 
 use super::balance::static_residual;
+use super::chain::BothSegments;
 use super::contact::{Acting, Against};
 use super::explicit::explicit_step;
 use super::hessian::{Hessian, Lanes};
@@ -207,10 +208,10 @@ impl SteppedScene {
     /// iteration, since K is k times the unit matrix.
     pub fn fastest_mode(&self) -> f64 {
         let n = self.model.chain.joints;
-        let mut segments = vec![SegmentPose::default(); n + 1];
-        self.model.chain.bend(&vec![0.0; n], &mut segments);
+        let mut both = vec![BothSegments::default(); n + 1];
+        self.model.chain.bend_both(&vec![0.0; 2 * n], &mut both);
         let mut inertia = vec![Lanes::ZERO; n * n];
-        self.model.chain.inertia([&segments, &segments], &mut inertia);
+        self.model.chain.inertia(&both, &mut inertia);
         let mut factor = Hessian::new(n, 0);
         for (i, row) in inertia.chunks_exact(n).enumerate() {
             factor.row_mut(i).copy_from_slice(&row[..=i]);

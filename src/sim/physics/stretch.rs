@@ -65,9 +65,12 @@ pub(super) enum Met {
     Inside,
 }
 
-/// Accuracy of z (m).
+/// Steps along the axis this short (m) change nothing.
 const CLOSE: f64 = 1e-9;
-/// Iterations, at most; one on a flat surface met head-on, else three or four.
+/// Steps this short (m) are taken by what is known. At an edge that begins in between, the normal is then off by 5e-4 at
+/// most.
+const NEAR: f64 = 1e-6;
+/// Iterations, at most; one on a flat surface met head-on, else two or three.
 const MOST_STEPS: usize = 32;
 /// Cosine between axis and normal from which on a surface lies behind the foot.
 const BEHIND: f64 = 0.7;
@@ -92,7 +95,7 @@ impl SpringAtRest {
         // Where a flat surface is met head-on.
         let mut z = distance * stem / self.height;
         let (mut low, mut high) = (0.0, f64::INFINITY);
-        let mut before: Option<(f64, f64)> = None;
+        let mut before: Option<(f64, f64, DVec3)> = None;
         for _ in 0..MOST_STEPS {
             let (gap, slope) = surface(self.foot + self.axis * z);
             if gap <= 0.0 {
@@ -107,7 +110,7 @@ impl SpringAtRest {
             let half_slope = z / stem + gap * along / end;
             let squared = slope.length_squared();
             let curvature = match before {
-                Some((z_before, slope_before)) => {
+                Some((z_before, slope_before, _)) => {
                     ((half_slope - slope_before) / (z - z_before)).clamp(1.0 / stem, 1.0 / stem + 4.0 * squared / end)
                 }
                 None => {
@@ -126,13 +129,18 @@ impl SpringAtRest {
             }
             let newton = (z - half_slope / curvature).max(0.0);
             let next = if newton < low || newton > high { 0.5 * (low + high) } else { newton };
-            if (next - z).abs() <= CLOSE {
-                let touch = self.touch(z, gap, slope);
-                let in_front = z <= CLOSE && along > BEHIND && gap < end;
+            let step = next - z;
+            // The last step is taken without another look, by the slope and its change.
+            let turn =
+                before.filter(|_| step.abs() <= NEAR).map(|(z_before, _, before)| (slope - before) / (z - z_before));
+            if let Some(turn) = turn.or((step.abs() <= CLOSE).then_some(DVec3::ZERO)) {
+                let gap = gap + step * (along + 0.5 * step * turn.dot(self.axis));
+                let touch = self.touch(next, gap, slope + turn * step);
+                let in_front = next <= CLOSE && along > BEHIND && gap < end;
                 let met = if in_front { Met::InFrontOf(touch) } else { Met::Outside(touch) };
                 return (touch.compression > -margin).then_some(met);
             }
-            before = Some((z, half_slope));
+            before = Some((z, half_slope, slope));
             z = next;
         }
         None
@@ -307,7 +315,7 @@ mod tests {
                 ((z * z / (H - END) + gap * gap / END) / H).sqrt()
             });
             let least = least.fold(f64::INFINITY, f64::min);
-            prop_assert!((body.stretch() - least).abs() < 1e-6, "{} instead of {least}", body.stretch());
+            prop_assert!((body.stretch() - least).abs() < 3e-6, "{} instead of {least}", body.stretch());
         }
 
         /// Along edges and around corners.

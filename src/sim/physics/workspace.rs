@@ -1,5 +1,6 @@
 //! Scratch memory of a step: allocated once, overwritten every step, never saved.
 
+use super::chain::BothSegments;
 use super::clearances::Clearances;
 use super::contact::{Against, Contact, ContactStep};
 use super::environment::{Environment, Passing};
@@ -8,7 +9,7 @@ use super::model::PhysicsModel;
 use super::space::Space;
 use super::spatial::{Block, Spatial};
 use crate::gripper::{SegmentFrame, SegmentPose};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec3};
 use palpate_geometry::Pose;
 
 /// Motion of both fingers in the plane y = 0, or a load on them: along x, along z, about y.
@@ -16,13 +17,6 @@ use palpate_geometry::Pose;
 pub(super) struct Planar(pub(super) [Lanes; 3]);
 
 impl Planar {
-    #[inline]
-    pub(super) fn set(&mut self, finger: usize, [x, z, turn]: [f64; 3]) {
-        for (lanes, value) in self.0.iter_mut().zip([x, z, turn]) {
-            lanes.as_mut_array()[finger] = value;
-        }
-    }
-
     /// Of one finger, in space.
     #[inline]
     pub(super) fn of(&self, finger: usize) -> Spatial {
@@ -111,7 +105,8 @@ pub struct Workspace {
     /// Joint angles and pose of the object that geometry is taken from.
     pub(super) q: Vec<f64>,
     pub(super) body: Pose,
-    /// Segments of both fingers in their planes.
+    /// Segments of both fingers in their planes, together and one after the other.
+    pub(super) both: Vec<BothSegments>,
     pub(super) segments: Vec<SegmentPose>,
     /// Both fingers in space, where they leave their planes.
     pub(super) space: Option<Box<Space>>,
@@ -122,10 +117,7 @@ pub struct Workspace {
     /// Velocity of each segment.
     pub(super) spatial: Vec<Spatial>,
     // dynamics
-    pub(super) accelerations: Vec<DVec2>,
-    pub(super) bias: Vec<f64>,
-    /// Rates of a finger without inertia, as its bias forces see them: zero.
-    pub(super) still: Vec<f64>,
+    pub(super) accelerations: Vec<[Lanes; 2]>,
     /// Joint rates of both fingers, as factors of a product.
     pub(super) rates: Vec<Lanes>,
     /// A = M + h C + h² K of both fingers, N x N.
@@ -158,6 +150,8 @@ pub struct Workspace {
     pub(super) a_velocity: Vec<f64>,
     pub(super) a_direction: Vec<f64>,
     pub(super) hessian: Hessian,
+    /// Length of the step that the factor of the Hessian is of (s), and whether the fingers met in it.
+    pub(super) factor_of: Option<(f64, bool)>,
     /// Forces of the contacts between the fingers on each segment of the right finger per unit rate of each joint of
     /// the left one, `N x (N + 1)`.
     pub(super) coupling: Vec<Spatial>,
@@ -171,14 +165,13 @@ impl Workspace {
             step: ContactStep { h: 0.0, ..model.contact },
             q: vec![0.0; 2 * n],
             body: Pose::IDENTITY,
+            both: vec![BothSegments::default(); n + 1],
             segments: vec![SegmentPose::default(); links],
             space: model.sideways.as_ref().map(|_| Box::new(Space::new(model))),
             reference: DVec3::ZERO,
             columns: vec![Planar::default(); n],
             spatial: vec![Spatial::default(); links],
-            accelerations: vec![DVec2::ZERO; n + 1],
-            bias: vec![0.0; n],
-            still: vec![0.0; n],
+            accelerations: vec![[Lanes::ZERO; 2]; n + 1],
             rates: vec![Lanes::ZERO; n],
             finger_matrix: vec![Lanes::ZERO; n * n],
             body_inertia: DMat3::ZERO,
@@ -197,6 +190,7 @@ impl Workspace {
             a_velocity: vec![0.0; unknowns],
             a_direction: vec![0.0; unknowns],
             hessian: Hessian::new(n, unknowns - 2 * n),
+            factor_of: None,
             coupling: vec![Spatial::default(); n * (n + 1)],
         }
     }
@@ -205,6 +199,12 @@ impl Workspace {
     #[inline]
     pub(super) fn frames(&self) -> &[SegmentFrame] {
         self.space.as_ref().map_or(&[], |space| &space.frames)
+    }
+
+    /// Size of a vector of all unknowns in the norm of the diagonal of A.
+    #[inline]
+    pub(super) fn weighted_size(&self, x: &[f64]) -> f64 {
+        x.iter().zip(&self.weights).map(|(x, weight)| x * x * weight).sum::<f64>().sqrt()
     }
 
     /// Force of the surroundings on fingers and object in the last step (N).

@@ -40,10 +40,11 @@
 mod loads;
 mod world;
 
-use super::chain::{ChainModel, turning};
+use super::chain::{BothSegments, ChainModel, turning};
 use super::effects::plan;
 use super::engine::{Engine, SimulationError};
 use super::environment::Environment;
+use super::hessian::Lanes;
 use super::placement::Placement;
 use super::simulation::Refinement;
 use super::step::NotFinite;
@@ -195,8 +196,11 @@ impl RapierSimulation {
             let plane = &self.planes[side.index()];
             let in_plane = |v: DVec3| DVec2::new(plane.sign * v.x, -v.z);
             let segments = self.segments(side, &q);
-            let (mut scratch, mut bias) = (vec![DVec2::ZERO; n + 1], vec![0.0; n]);
-            self.chain.bias(&segments, (&vec![0.0; n], 0.0), in_plane(self.gravity), &mut scratch, &mut bias);
+            let both: Vec<BothSegments> = segments.iter().map(|segment| BothSegments::pair(segment, segment)).collect();
+            let (mut scratch, mut bias) = (vec![[Lanes::ZERO; 2]; n + 1], vec![0.0; n]);
+            let gravity = in_plane(self.gravity).to_array().map(Lanes::splat);
+            let put = |i: usize, lanes: Lanes| bias[i] = lanes.to_array()[0];
+            self.chain.bias(&both, (|_| Lanes::ZERO, 0.0), gravity, &mut scratch, put);
             let touches = self.touches(side);
             for (i, bias) in bias.iter().enumerate() {
                 let angle = q[side.index() * n + i];

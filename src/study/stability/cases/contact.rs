@@ -170,7 +170,9 @@ pub(super) fn dragged_edge(conditions: &Conditions) -> Findings {
     const SPEED: f64 = 0.05;
     const HALF: f64 = 0.01;
     let mut findings = Vec::new();
-    for (what, reach, turn) in [("edge", 2f64.sqrt(), [0.0, 45.0, 0.0]), ("corner", 3f64.sqrt(), [45.0, 54.735_61, 0.0])] {
+    for (what, reach, turn) in
+        [("edge", 2f64.sqrt(), [0.0, 45.0, 0.0]), ("corner", 3f64.sqrt(), [45.0, 54.735_61, 0.0])]
+    {
         let mut scene = bare(10);
         (scene.gripper.finger.damping_time, scene.gripper.pad.dissipation) = (0.0, 0.0);
         scene.object.rotation_deg = turn;
