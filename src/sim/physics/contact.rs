@@ -95,6 +95,9 @@ impl ContactStep {
 /// Shear stiffness of rubber as a share of its compressive stiffness: G / E of an incompressible solid.
 pub(super) const SHEAR_SHARE: f64 = 1.0 / 3.0;
 
+/// Share by which a slip limit that was brought up to date once may still be off.
+const NEAR_ENOUGH: f64 = 0.1;
+
 impl Contact {
     /// Normal impulse gamma (N s) and -d gamma / d v_n, both non-negative.
     #[inline]
@@ -151,9 +154,15 @@ impl Contact {
     }
 
     /// Brings the slip limit up to date with the normal impulse at the current iterate; true where that changes the friction.
-    pub(super) fn relag(&mut self, step: ContactStep) -> bool {
+    /// From the second time on it goes half the way: a limit that is too high leaves too low an impulse, and the next one
+    /// would be as wrong the other way.
+    pub(super) fn relag(&mut self, step: ContactStep, again: bool) -> bool {
         let v_n = self.normal.dot(self.velocity);
-        let limit = self.mu * self.normal_impulse(step, v_n).0;
+        let latest = self.mu * self.normal_impulse(step, v_n).0;
+        if again && (latest - self.limit).abs() <= NEAR_ENOUGH * self.limit {
+            return false;
+        }
+        let limit = if again { 0.5 * (latest + self.limit) } else { latest };
         let least = std::mem::replace(&mut self.limit, limit).min(limit);
         let e = self.shear + (self.velocity - self.normal * v_n) * step.shear_reach();
         step.h * self.shear_stiffness * e.length() > least
@@ -241,7 +250,7 @@ mod tests {
                     / (2.0 * step);
                 assert!(slope.abs_diff_eq(c.hessian(STEP) * axis, 1e-6), "{velocity} {limit}");
             }
-            c.relag(STEP);
+            c.relag(STEP, false);
             assert!(c.limit >= 0.0);
         }
     }

@@ -80,7 +80,7 @@ fn contact_and_limit_impulses(model: &PhysicsModel, state: &State, ws: &mut Work
     let instant = ContactStep { h: INSTANT, ..ws.step };
     ws.step = instant;
     for contact in &mut ws.contacts {
-        contact.relag(instant);
+        contact.relag(instant, false);
     }
     // The gradient of the step's minimisation, with momentum left out, is minus the impulses.
     let known = std::mem::replace(&mut ws.rhs, vec![0.0; model.unknowns()]);

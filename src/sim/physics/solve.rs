@@ -89,7 +89,8 @@ pub(super) fn minimise(model: &PhysicsModel, q: &[f64], velocity: &mut [f64], ws
         if size.gradient <= allowed.max(enough) && passes < model.relag_passes {
             passes += 1;
             let step = ws.step;
-            let changed = ws.contacts.iter_mut().fold(false, |changed, contact| contact.relag(step) | changed);
+            let changed =
+                ws.contacts.iter_mut().fold(false, |changed, contact| contact.relag(step, passes > 1) | changed);
             if changed {
                 size = fill_gradient(model, q, velocity, ws);
             }

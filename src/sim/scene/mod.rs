@@ -261,12 +261,11 @@ impl Solver {
         possible.then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
     }
 
-    /// The same at ten times the tolerance; `None` where the engine controls no error, and above the largest tolerance.
-    pub fn coarser(&self) -> Option<Self> {
-        let tolerance = 10.0 * self.accuracy.step_tolerance();
-        let possible = self.engine == EngineKind::Palpate && Accuracy::TOLERANCES.contains(&tolerance);
+    /// The same at so many times the tolerance, or at the largest; `None` where the engine controls no error.
+    pub fn coarser(&self, factor: f64) -> Option<Self> {
+        let tolerance = (factor * self.accuracy.step_tolerance()).min(*Accuracy::TOLERANCES.end());
         let accuracy = Accuracy::Tolerance(tolerance);
-        possible.then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
+        (self.engine == EngineKind::Palpate).then(|| Self { accuracy, integrator: Integrator::Auto, ..self.clone() })
     }
 }
 
@@ -278,7 +277,7 @@ impl Default for Solver {
             integrator: Integrator::Auto,
             tolerance: 1e-6,
             max_iterations: 100,
-            relag_passes: 1, // zero leaves the friction cone violated up to tenfold at 10 ms, two cost 20 % more
+            relag_passes: 2, // of 1662 random scenes 116 end wrongly at standard with one, 96 with two, no fewer with four
             distance_cell: Auto::Auto,
         }
     }

@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(report.names_on(), ["finger-gravity", "friction", "finger-inertia", "finger-contact"]);
         let contact = report.of(Effect::FingerContact);
         assert!(
-            contact.change.norms.curvature_per_m > 1.0 && contact.change.norms.force_n > 0.05,
+            contact.change.norms.curvature_share > 0.05 && contact.change.norms.force_share > 0.3,
             "{:?}",
             contact.change
         );
