@@ -4,16 +4,21 @@ mod frame;
 mod library;
 
 use super::Failure;
+use super::recognise::load_model;
 use super::setup::within;
 use super::snapshot::sides_from;
 use super::terminal::{Column, Page, Report};
 use palpate_geometry::units::three_digits;
-use palpate_sim::scene::Accuracy;
+use palpate_lab::datasets::{SensorView, sequence_of};
+use palpate_lab::grasping::grasp;
+use palpate_learn::Shipped;
+use palpate_sim::scene::{Accuracy, Scene};
 use palpate_study::{
-    CostRow, NetworkCost, StepSizes, bench_scenes, candle_step_cost, kernel_step_cost, live_step_cost, physics_cost,
-    physics_truth,
+    CostRow, LiveCost, NetworkCost, StepSizes, answer_cost, bench_scenes, candle_step_cost, kernel_step_cost,
+    live_step_cost, physics_cost, physics_truth,
 };
 use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate bench`.
 #[derive(Debug, clap::Args)]
@@ -68,9 +73,12 @@ enum Benchmark {
         #[arg(long, default_value_t = 20.0, value_parser = within(1.0..=600.0))]
         seconds: f64,
     },
-    /// Measure a live step of the macro-layer: a sample in, probabilities out.
+    /// Measure live answers: a step of the macro-layer, and the answers of a model during a simulated grasp.
     Live {
-        /// Sequences per row; the median is printed.
+        /// Model; default: the shipped one.
+        #[arg(long, value_name = "FILE")]
+        model: Option<PathBuf>,
+        /// Sequences per row; median and 95th percentile are printed.
         #[arg(long, default_value_t = 101, value_parser = clap::value_parser!(u16).range(1..=1000))]
         runs: u16,
     },
@@ -115,10 +123,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<(), Failure> {
             let remark = "CPU time of one thread. PyTorch: python tests/peers/lstm_step.py";
             Costs { rows, columns: NETWORK, remarks: vec![remark.to_owned()] }.print(json)
         }
-        Benchmark::Live { runs } => {
-            let rows = FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), usize::from(*runs)));
-            Costs { rows: rows.to_vec(), columns: NETWORK, remarks: Vec::new() }.print(json)
-        }
+        Benchmark::Live { model, runs } => live(model.as_deref(), usize::from(*runs))?.print(json),
     }
 }
 
@@ -127,6 +132,13 @@ const NETWORK: &[Column<NetworkCost>] = &[
     ("channels", |row| row.sizes.channels.to_string()),
     ("CPU ms", |row| format!("{:.4}", row.cpu_ms_median)),
     ("minimum ms", |row| format!("{:.4}", row.cpu_ms_least)),
+];
+
+const LIVE: &[Column<LiveCost>] = &[
+    ("operation", |row| row.what.clone()),
+    ("channels", |row| row.channels.to_string()),
+    ("CPU ms", |row| format!("{:.4}", row.cpu_ms_median)),
+    ("95 % ms", |row| format!("{:.4}", row.cpu_ms_p95)),
 ];
 
 const PHYSICS: &[Column<CostRow>] = &[
@@ -142,6 +154,17 @@ const PHYSICS: &[Column<CostRow>] = &[
     ("error 1/km", |row| row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m * 1e3))),
     ("error mN", |row| row.error.map_or(String::new(), |error| three_digits(error.force_n * 1e3))),
 ];
+
+fn live(path: Option<&Path>, runs: usize) -> Result<Costs<LiveCost>, Failure> {
+    let model = load_model(path, Shipped::PerfectSensors)?;
+    let mut scene = Scene::default();
+    scene.object.source = "tomato".to_owned();
+    let trial = grasp(&scene, scene.load_object()?.as_ref(), 1);
+    let readings = sequence_of(&SensorView::of_model(&model.card).signals(&trial)?);
+    let mut rows = FEW_AND_MANY.map(|channels| live_step_cost(StepSizes::usual(channels), runs)).to_vec();
+    rows.push(answer_cost(format!("answer of {}", model.card.method), &model, &readings, runs));
+    Ok(Costs { rows, columns: LIVE, remarks: vec!["CPU time of one thread; the grasp is of a tomato.".to_owned()] })
+}
 
 fn physics(runs: u16, reference: bool) -> Result<Costs<CostRow>, Failure> {
     let mut rows = Vec::new();

@@ -1,10 +1,11 @@
-//! Cost of the macro-layer: a training step and a live step of our kernel, and the same training step in candle's own
-//! LSTM, with the same data in one run. `tests/peers/lstm_step.py` times PyTorch on the same sizes.
+//! Cost of networks: a training step and a live step of our macro-layer, the same training step in candle's own LSTM, with the
+//! same data in one run, and the live answers of a model. `tests/peers/lstm_step.py` times PyTorch on the same sizes.
 
 use candle_core::{DType, Device, Tensor};
 use candle_nn::rnn::{self, LSTMConfig, RNN as _};
 use candle_nn::{AdamW, Module as _, Optimizer as _, ParamsAdamW, VarBuilder, VarMap};
 use palpate_learn::network::{Batch, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
+use palpate_learn::{Model, Sequence};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -142,20 +143,62 @@ pub fn candle_step_cost(sizes: StepSizes, runs: usize) -> candle_core::Result<Ne
     })
 }
 
-/// Times one live step: a sample in, probabilities out. The row holds the mean over one sequence.
-pub fn live_step_cost(sizes: StepSizes, runs: usize) -> NetworkCost {
+/// Cost of a live answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LiveCost {
+    /// Timed operation.
+    pub what: String,
+    pub channels: usize,
+    /// CPU time, the median (ms).
+    pub cpu_ms_median: f64,
+    /// CPU time, 95th percentile (ms).
+    pub cpu_ms_p95: f64,
+}
+
+impl LiveCost {
+    fn new(what: String, channels: usize, mut times: Vec<f64>) -> Self {
+        times.sort_by(f64::total_cmp);
+        let at = |share: usize| times.get(times.len() * share / 100).map_or(0.0, |t| t * 1e3);
+        Self { what, channels, cpu_ms_median: at(50), cpu_ms_p95: at(95) }
+    }
+}
+
+/// Times one live step of the macro-layer: a sample in, scores out. Each time is the mean over one sequence.
+pub fn live_step_cost(sizes: StepSizes, runs: usize) -> LiveCost {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let layer = MacroLayer::new(shape(sizes), &mut random);
     let samples: Vec<f32> = (0..sizes.steps * sizes.channels).map(|_| random.random::<f32>() - 0.5).collect();
     let mut live = LiveMacroLayer::new(&layer);
-    let mut times = Vec::new();
-    for _ in 0..runs.max(1) {
+    let sequence = || {
         live.reset();
         let start = cpu_time::ThreadTime::now();
         for sample in samples.chunks_exact(sizes.channels) {
             std::hint::black_box(live.step(sample, &[]));
         }
-        times.push(start.elapsed().as_secs_f64() / sizes.steps as f64);
+        start.elapsed().as_secs_f64() / sizes.steps as f64
+    };
+    let times = std::iter::repeat_with(sequence).take(runs.max(1)).collect();
+    LiveCost::new("step of the macro-layer".to_owned(), sizes.channels, times)
+}
+
+/// Times the answers of a model while a grasp runs; of methods that need the whole grasp, the one at its end.
+pub fn answer_cost(what: String, model: &Model, grasp: &Sequence, runs: usize) -> LiveCost {
+    let mut live = model.recogniser.live();
+    let mut times = Vec::new();
+    for _ in 0..runs.max(1) {
+        let Some(live) = &mut live else {
+            let start = cpu_time::ThreadTime::now();
+            std::hint::black_box(model.recogniser.recognise(grasp, None));
+            times.push(start.elapsed().as_secs_f64());
+            continue;
+        };
+        live.begin(None);
+        for (t, row) in grasp.rows() {
+            let start = cpu_time::ThreadTime::now();
+            if std::hint::black_box(live.push(t, row)).is_some() {
+                times.push(start.elapsed().as_secs_f64());
+            }
+        }
     }
-    row("live step, our kernel", sizes, times)
+    LiveCost::new(what, model.card.channels.len(), times)
 }

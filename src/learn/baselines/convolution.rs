@@ -23,9 +23,11 @@ struct Layer {
 }
 
 /// Channels of all convolutions.
-const CHANNELS: usize = 48;
+pub(super) const CHANNELS: usize = 48;
 /// Kernel width and stride of each (steps).
-const KERNELS: [(usize, usize); 3] = [(5, 1), (5, 2), (3, 2)];
+pub(super) const KERNELS: [(usize, usize); 3] = [(5, 1), (5, 2), (3, 2)];
+/// Least variance that normalisation divides by.
+pub(super) const NORM_EPSILON: f64 = 1e-5;
 /// Width of the dense layer.
 pub(super) const DENSE: usize = 128;
 /// Share of values dropped before and after the dense layer.
@@ -34,7 +36,7 @@ const DROPOUT: f32 = 0.3;
 impl Layer {
     fn new(from: usize, to: usize, variables: &VarBuilder<'_>) -> Result<Self> {
         let linear = candle_nn::linear_no_bias(from, to, variables.pp("linear"))?;
-        Ok(Self { linear, norm: candle_nn::batch_norm(to, 1e-5, variables.pp("norm"))? })
+        Ok(Self { linear, norm: candle_nn::batch_norm(to, NORM_EPSILON, variables.pp("norm"))? })
     }
 
     /// Rows `[rows][from]` to `[rows][to]`.

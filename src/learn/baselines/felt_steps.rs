@@ -4,7 +4,6 @@ use super::candle_network::{STEPS, add_noise, mirrored};
 use crate::data::{Dataset, Sequence};
 use crate::gaps;
 use crate::network::Preparation;
-use candle_core::{Device, Result, Tensor};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -90,12 +89,6 @@ impl Views {
         self.felt = felt.min(self.felt);
         self.inputs.iter_mut().for_each(|view| forget_after(view, self.felt));
         self
-    }
-
-    /// All views, `[views][inputs][STEPS]`.
-    pub(super) fn tensor(&self) -> Result<Tensor> {
-        let inputs = self.inputs.first().map_or(0, Vec::len) / STEPS;
-        Tensor::from_vec(self.inputs.concat(), (self.inputs.len(), inputs, STEPS), &Device::Cpu)
     }
 
     /// One view for training, with noise of some deviation: of the grasp or its mirror image; one in two ends early.

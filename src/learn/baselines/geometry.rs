@@ -4,6 +4,7 @@
 //! It answers from the beginning of a grasp too: half of the training grasps end early, and one input says which steps have
 //! been felt.
 
+use super::answering::Answering;
 use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{FeltSteps, LEAST_FELT, STAGES, Views, end_of_stage, stage_of};
@@ -25,6 +26,7 @@ use std::sync::{Arc, OnceLock};
 pub struct GeometryEncoder {
     learned: Learned,
     network: Variables<Encoder>,
+    answering: Answering,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,6 +97,8 @@ impl Shipped {
     }
 }
 
+/// Name of the last layer.
+const LAST: &str = "last";
 /// Number of quantities.
 const MEASURES: usize = Measure::ALL.len();
 /// One in this many objects is held out, to measure how far the estimates are off.
@@ -120,23 +124,12 @@ impl CandleNetwork for Encoder {
     const NOISE: f32 = 0.05;
 
     fn new(inputs: usize, outputs: usize, variables: &VarBuilder<'_>) -> Result<Self> {
-        Ok(Self {
-            trunk: Trunk::new(inputs, variables)?,
-            last: candle_nn::linear(DENSE, outputs, variables.pp("last"))?,
-        })
+        Ok(Self { trunk: Trunk::new(inputs, variables)?, last: candle_nn::linear(DENSE, outputs, variables.pp(LAST))? })
     }
 
     fn scores(&self, x: &Tensor, pass: &mut Pass<'_>) -> Result<Tensor> {
         self.last.forward(&self.trunk.forward(x, 0.1, pass)?)
     }
-}
-
-/// Outputs of the network for some views of a grasp.
-struct Outputs {
-    /// Values before the last layer, `[views][DENSE]`.
-    inner: Vec<Vec<f32>>,
-    /// Outputs, `[views][2 * MEASURES + shapes]`.
-    outer: Vec<Vec<f32>>,
 }
 
 impl GeometryEncoder {
@@ -168,9 +161,10 @@ impl GeometryEncoder {
         };
         let network = learned.train(touches, &of(false), fitting).map_err(LearnError::failed)?;
         fitting.check()?;
-        let mut encoder = Self { learned, network };
+        let answering = Answering::new(&network, LAST).map_err(LearnError::failed)?;
+        let mut encoder = Self { learned, network, answering };
         let held_out: Vec<&Touch> = of(true).into_iter().map(|k| &touches[k]).collect();
-        encoder.learned.spreads = encoder.measured_spreads(&held_out).map_err(LearnError::failed)?;
+        encoder.learned.spreads = encoder.measured_spreads(&held_out);
         Ok(encoder)
     }
 
@@ -194,7 +188,8 @@ impl GeometryEncoder {
         let mut random = ChaCha8Rng::seed_from_u64(0);
         let network = Variables::new(learned.steps.inputs(), outputs, &mut random).map_err(ModelError::failed)?;
         network.read(arrays, prefix)?;
-        Ok(Self { learned, network })
+        let answering = Answering::new(&network, LAST).map_err(ModelError::failed)?;
+        Ok(Self { learned, network, answering })
     }
 
     /// Decodes a file of [`GeometryEncoder::to_bytes`]. `name` is the file name in errors.
@@ -238,9 +233,7 @@ impl GeometryEncoder {
         if views.felt < LEAST_FELT || !self.has_touched(grasp) {
             return None;
         }
-        // Shapes were checked when the network was made, so that no grasp should make it fail.
-        let outputs = self.outputs(&views).ok()?;
-        let (means, shapes) = (mean_of(&outputs.outer), 2 * MEASURES);
+        let (means, shapes) = (self.answering.outputs(&views).outer, 2 * MEASURES);
         let stage = stage_of(views.felt);
         let estimate = |k: usize, measure: Measure| {
             let [centre, deviation] = self.learned.scales[k];
@@ -298,11 +291,8 @@ impl GeometryEncoder {
     /// Features of the readings so far: values before the last layer and all outputs, mean of the grasp and its mirror image.
     pub(crate) fn features(&self, grasp: &Sequence) -> Vec<f32> {
         let views = self.learned.steps.views(grasp);
-        let zeros = || vec![0.0; self.width()];
-        self.outputs(&views).map_or_else(
-            |_failed| zeros(),
-            |outputs| mean_of(&outputs.inner).into_iter().chain(mean_of(&outputs.outer)).collect(),
-        )
+        let outputs = self.answering.outputs(&views);
+        outputs.inner.into_iter().chain(outputs.outer).collect()
     }
 
     /// Number and scaling of its inputs, for networks that start from it.
@@ -310,20 +300,14 @@ impl GeometryEncoder {
         &self.learned.steps
     }
 
-    fn outputs(&self, views: &Views) -> Result<Outputs> {
-        let inner = self.network.network.trunk.forward(&views.tensor()?, 0.0, &mut Pass::answering())?;
-        let outer = self.network.network.last.forward(&inner)?;
-        Ok(Outputs { inner: inner.to_vec2()?, outer: outer.to_vec2()? })
-    }
-
     /// Half widths that hold nine in ten of the held-out grasps, for each stage of a grasp and each quantity.
-    fn measured_spreads(&self, held_out: &[&Touch]) -> Result<Vec<Vec<f64>>> {
+    fn measured_spreads(&self, held_out: &[&Touch]) -> Vec<Vec<f64>> {
         let mut spreads = self.learned.spreads.clone();
         for (stage, of_stage) in spreads.iter_mut().enumerate() {
             let mut off = vec![Vec::new(); MEASURES];
             for touch in held_out {
                 let views = self.learned.steps.views(&touch.grasp).until(end_of_stage(stage));
-                let means = mean_of(&self.outputs(&views)?.outer);
+                let means = self.answering.outputs(&views).outer;
                 for (k, off) in off.iter_mut().enumerate() {
                     let spread = f64::from(means[MEASURES + k]).clamp(*SPREADS.start(), *SPREADS.end()).exp();
                     off.push((f64::from(means[k]) - self.learned.target(k, touch)).abs() / spread);
@@ -336,7 +320,7 @@ impl GeometryEncoder {
                 *spread = off.get(at.saturating_sub(1)).or(off.last()).copied().unwrap_or(NINETY);
             }
         }
-        Ok(spreads)
+        spreads
     }
 }
 
@@ -427,15 +411,6 @@ fn scale_of(measure: usize, touches: &[Touch]) -> [f64; 2] {
     let mean = values().sum::<f64>() / count;
     let deviation = (values().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
     [mean, deviation.max(1e-6)]
-}
-
-fn mean_of(rows: &[Vec<f32>]) -> Vec<f32> {
-    let share = 1.0 / rows.len().max(1) as f32;
-    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
-    for row in rows {
-        mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += share * x);
-    }
-    mean
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! It keeps some of its training grasps. With them it learns new objects later: training goes on from what it has learned, on
 //! kept and new grasps, and each class has one more output.
 
+use super::answering::Answering;
 use super::candle_network::{CandleNetwork, Pass, Training, Variables};
 use super::convolution::{DENSE, Trunk};
 use super::felt_steps::{Columns, FeltSteps, STAGES, Views, end_of_stage, stage_of};
@@ -34,9 +35,9 @@ struct Fitted {
     learned: Learned,
     columns: Columns,
     network: Variables<Head>,
+    answering: Answering,
     kept: KeptGrasps,
-    /// Number of classes, and the class "other".
-    classes: usize,
+    /// The class "other".
     other: Option<usize>,
 }
 
@@ -137,14 +138,14 @@ impl GeometryNetwork {
         let of = |inside: bool| (0..part_of.len()).filter(|k| (part_of[*k] == 0) == inside).collect::<Vec<usize>>();
         let first = work.train(&of(false), [0.0, 0.5]).map_err(LearnError::failed)?;
         fitting.check()?;
-        let calibrations = (0..STAGES).map(|stage| work.calibration(&first, &of(true), stage)).collect::<Result<_>>();
-        let calibrations = calibrations.map_err(LearnError::failed)?;
+        let first = Answering::new(&first, CLASSES).map_err(LearnError::failed)?;
+        let calibrations = (0..STAGES).map(|stage| work.calibration(&first, &of(true), stage)).collect();
         let all: Vec<usize> = (0..data.examples.len()).collect();
         let network = work.train(&all, [0.5, 1.0]).map_err(LearnError::failed)?;
         fitting.check()?;
         let kept = KeptGrasps::of(&truth, classes, other, &views);
         let learned = Learned { steps, revision: Head::REVISION, epochs, calibrations, kept: kept.len() };
-        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
+        Ok(Self(Arc::new(Fitted::new(learned, columns, network, kept, other).map_err(LearnError::failed)?)))
     }
 
     /// Learns grasps of classes that come after its own, and further ones of its own.
@@ -179,7 +180,7 @@ impl GeometryNetwork {
         fitting.check()?;
         let kept = KeptGrasps::of(&truth, classes, other, &views);
         let learned = Learned { kept: kept.len(), ..learned.clone() };
-        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
+        Ok(Self(Arc::new(Fitted::new(learned, columns, network, kept, other).map_err(LearnError::failed)?)))
     }
 
     /// Everything that decides a fit, besides the data, the seed and the options of the fit.
@@ -213,27 +214,35 @@ impl GeometryNetwork {
             Variables::<Head>::new(learned.steps.inputs(), classes, &mut random).map_err(ModelError::failed)?;
         network.read(arrays, "")?;
         let kept = KeptGrasps::read(arrays, learned.kept, &learned.steps, classes)?;
-        Ok(Self(Arc::new(Fitted { learned, columns, network, kept, classes, other })))
+        Ok(Self(Arc::new(Fitted::new(learned, columns, network, kept, other).map_err(ModelError::failed)?)))
     }
 }
 
 impl Fitted {
+    fn new(
+        learned: Learned,
+        columns: Columns,
+        network: Variables<Head>,
+        kept: KeptGrasps,
+        other: Option<usize>,
+    ) -> Result<Self> {
+        let answering = Answering::new(&network, CLASSES)?;
+        Ok(Self { learned, columns, network, answering, kept, other })
+    }
+
     /// Answer to the readings so far.
     fn answer(&self, grasp: &Sequence, before: Option<&Pmf>) -> Verdict {
         let views = self.learned.steps.views(&self.columns.pick(grasp));
-        // Shapes were checked when the network was made, so that no grasp should make it fail.
-        let pmf = uncalibrated(&self.network, &views).unwrap_or_else(|_failed| Pmf::uniform(self.classes));
+        let pmf = uncalibrated(&self.answering, &views);
         let pmf = as_one_of_many(&self.learned.calibrations[stage_of(views.felt)].apply(&pmf), self.other);
         let pmf = before.map_or_else(|| pmf.clone(), |before| before.times(&pmf));
         Verdict { pmf, properties: None }
     }
 }
 
-/// Mean of the logarithms of the probabilities over a grasp and its mirror image.
-fn uncalibrated(network: &Variables<Head>, views: &Views) -> Result<Pmf> {
-    let scores = network.network.scores(&views.tensor()?, &mut Pass::answering())?;
-    let logarithms = candle_nn::ops::log_softmax(&scores, D::Minus1)?.mean(0)?.to_vec1::<f32>()?;
-    Ok(Pmf::from_scores(logarithms.into_iter().map(f64::from)))
+/// Probabilities from the mean scores over a grasp and its mirror image.
+fn uncalibrated(network: &Answering, views: &Views) -> Pmf {
+    Pmf::from_scores(network.outputs(views).outer.into_iter().map(f64::from))
 }
 
 /// Training data of a fit, and how it is done.
@@ -289,16 +298,15 @@ impl Work<'_> {
     }
 
     /// Calibration at a stage of a grasp, on held-out grasps.
-    fn calibration(&self, network: &Variables<Head>, held_out: &[usize], stage: usize) -> Result<Calibration> {
-        let answer = |k: &usize| {
-            Ok((uncalibrated(network, &self.views[*k].clone().until(end_of_stage(stage)))?, self.truth[*k]))
-        };
-        let answers: Vec<(Pmf, usize)> = held_out.iter().map(answer).collect::<Result<_>>()?;
+    fn calibration(&self, network: &Answering, held_out: &[usize], stage: usize) -> Calibration {
+        let answer =
+            |k: &usize| (uncalibrated(network, &self.views[*k].clone().until(end_of_stage(stage))), self.truth[*k]);
+        let answers: Vec<(Pmf, usize)> = held_out.iter().map(answer).collect();
         let truths: Vec<usize> = answers.iter().map(|(_, truth)| *truth).collect();
         let (_, other) = self.size;
         let other = other_weight(other, &truths);
         let weight = |class: usize| other.filter(|(other, _)| *other == class).map_or(1.0, |(_, weight)| weight);
-        Ok(Calibration::fit(&answers, weight, &TEMPERATURES).0)
+        Calibration::fit(&answers, weight, &TEMPERATURES).0
     }
 }
 

@@ -2,6 +2,7 @@
 //! nearest neighbours and support vector machines on features, dynamic time warping, and a convolutional network; the geometry encoder and
 //! what starts from it.
 
+mod answering;
 mod candle_network;
 mod convolution;
 mod feature_rows;

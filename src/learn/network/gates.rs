@@ -43,7 +43,7 @@ pub(super) fn tanh(x: f32) -> f32 {
 macro_rules! dispatched {
     ($(#[$doc:meta])* $name:ident, $body:ident, ($($argument:ident: $kind:ty),*)) => {
         $(#[$doc])*
-        pub(super) fn $name($($argument: $kind),*) {
+        pub(crate) fn $name($($argument: $kind),*) {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
                 #[target_feature(enable = "avx2,fma")]
@@ -166,6 +166,20 @@ fn row_product_body(x: &[f32], w: &[f32], sums: &mut [f32]) {
             *sum += a * r;
         }
     }
+}
+
+dispatched! {
+    /// Applies GELU, x / 2 (1 + tanh(sqrt(2 / pi) (x + 0.044715 x³))) (Hendrycks and Gimpel 2016), as candle does.
+    gelu, gelu_body, (values: &mut [f32])
+}
+
+#[inline(always)]
+fn gelu_body(values: &mut [f32]) {
+    const SCALE: f32 = std::f32::consts::FRAC_2_SQRT_PI * std::f32::consts::FRAC_1_SQRT_2;
+    let of = |x: f32| 0.5 * x * (1.0 + tanh(SCALE * (x + 0.044_715 * x * x * x)));
+    let (whole, rest) = values.as_chunks_mut::<LANES>();
+    whole.iter_mut().for_each(|own| *own = lanes(|k| of(own[k])));
+    rest.iter_mut().for_each(|x| *x = of(*x));
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ use crate::model::ModelCard;
 use crate::recogniser::Recogniser;
 use two_stage::TwoStageNetwork;
 
+pub(crate) use gates::{add_row_product, gelu};
 pub(crate) use gemm::{Matrix, multiply};
 pub use macro_layer::{Batch, Block, LiveMacroLayer, MacroLayer, MacroShape, Pass, ReadOut, Regular};
 pub(crate) use preparation::Preparation;
