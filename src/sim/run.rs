@@ -250,6 +250,11 @@ impl SimRun {
         self.engine.get_mut().command(bar, phase);
     }
 
+    /// Convex minimisations so far.
+    pub fn solves(&self) -> u64 {
+        self.engine.get().solves()
+    }
+
     /// Numerical quality of the frames so far.
     pub fn quality(&self) -> Quality {
         let mut quality = self.engine.get().quality();

@@ -50,5 +50,7 @@ pub use frame::{
     StudyRow, StudySize, StudyStep, StudyTable, TrialNumbers, markdown_table, merged_units, program, run_experiment,
 };
 pub use generated::generated_sections;
-pub use network_cost::{NetworkCost, StepSizes, candle_step_cost, kernel_step_cost, live_step_cost};
+pub use network_cost::{
+    LiveCost, NetworkCost, StepSizes, answer_cost, candle_step_cost, kernel_step_cost, live_step_cost,
+};
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};

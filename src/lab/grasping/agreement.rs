@@ -7,9 +7,9 @@
 //! asked for --> a tenth --> a hundredth --> ..  until three in a row end alike; the finest of them is reported
 //! ```
 //!
-//! [`compare`] asks less: whether a grasp can be trusted as it is. A run at ten times the tolerance, from a start ten
-//! micrometres away, costs half as much as the grasp. Where it gives the same result, the grasp is taken as right; otherwise a run at a
-//! hundredth of the tolerance decides.
+//! [`compare`] asks less: whether a grasp can be trusted as it is. Two coarser runs, from starts 50 µm away on either side, cost
+//! less than the grasp. Where both give the same result, the grasp is taken as right; otherwise a run at a tenth of the
+//! tolerance decides, or nothing does if that takes too long. All of them stop once their end is decided.
 //!
 //! Two in a row are not enough: one in a hundred extreme scenes ends in the same wrong place at two coarse levels. Levels
 //! end one below the accuracy `reference`, but up to three are always computed. `palpate study stability` measures how
@@ -84,6 +84,52 @@ impl EndState {
                 angle <= SAME_ANGLE && (*place - *other_place).length() <= SAME_PLACE
             }
             _ => false,
+        }
+    }
+}
+
+/// Time for which nothing may move until the end of a grasp is decided (s).
+const STILL_S: f64 = 0.12;
+/// Largest change of a joint angle (rad) and of the object's place (m) in that time: a fortieth of what ends may differ by.
+const STILL_ANGLE: f64 = SAME_ANGLE / 40.0;
+const STILL_PLACE: f64 = SAME_PLACE / 40.0;
+
+/// Watches a grasp for the moment from which on its end is decided: the object has left the hand, or nothing moves in the
+/// hold.
+#[derive(Clone, Debug)]
+pub struct EndWatch {
+    first: Frame,
+    /// What the frames since are compared with.
+    still_since: Option<Frame>,
+}
+
+impl EndWatch {
+    /// Takes the first look at the grasp.
+    pub fn new(first: Frame) -> Self {
+        Self { first, still_since: None }
+    }
+
+    /// Takes a sample; returns the end once it is decided.
+    pub fn note(&mut self, frame: &Frame) -> Option<EndState> {
+        if frame.has_lost_object(&self.first) {
+            return Some(EndState::Lost);
+        }
+        if frame.phase != Phase::Hold {
+            self.still_since = None;
+            return None;
+        }
+        let stands = |since: &&Frame| {
+            let still = since.q.iter().zip(&frame.q).all(|(a, b)| (a - b).abs() <= STILL_ANGLE);
+            let places = since.world_from_object.zip(frame.world_from_object);
+            still && places.is_none_or(|(a, b)| (a.position - b.position).length() <= STILL_PLACE)
+        };
+        match self.still_since.as_ref().filter(stands) {
+            Some(since) if frame.t - since.t >= STILL_S => EndState::of(std::slice::from_ref(frame)),
+            Some(_) => None,
+            None => {
+                self.still_since = Some(frame.clone());
+                None
+            }
         }
     }
 }
@@ -171,12 +217,84 @@ pub fn grasp_until_agreement(
     Some(trial)
 }
 
-/// Shift of the object in the coarser simulation of a comparison (m).
-pub const NUDGE: DVec3 = DVec3::new(1e-5, 0.0, 0.0);
-/// Its turn there (rad).
-pub const NUDGE_TURN: DVec3 = DVec3::new(0.0, 0.0, 3e-4);
+/// Change of an object's start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Push {
+    /// Shift (m).
+    pub shift: DVec3,
+    /// Turn about the centre of mass, axis times angle (rad).
+    pub turn: DVec3,
+}
+
 /// Push that changes nothing in a grasp with a single answer (m).
 pub const PUSH: f64 = 1e-6;
+
+/// Coarser simulations that a grasp is compared with: how many times its tolerance they have, and how far to the side the object
+/// starts (m).
+const COARSER: [(f64, f64); 2] = [(30.0, -5e-5), (10.0, 5e-5)];
+/// Turn of the object with that shift (rad/m).
+const TURNED: f64 = 30.0;
+/// Minimisations after which the simulation that decides is given up, at accuracy standard. Finer ones get more, as a method
+/// of second order needs.
+const MOST_SOLVES: f64 = 5000.0;
+
+/// Simulation that a grasp is compared with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherRun {
+    /// Its end; absent where it was given up.
+    pub end: Option<EndState>,
+    /// Convex minimisations.
+    pub solves: u64,
+}
+
+/// Result of comparing where a grasp ends with other simulations of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EndComparison {
+    /// Both coarser simulations give the same result.
+    pub coarser: bool,
+    /// Convex minimisations of these.
+    pub coarser_solves: u64,
+    /// The simulation at a tenth of the tolerance, where the coarser ones differ, and whether it gives the same result.
+    pub tenth: Option<(OtherRun, bool)>,
+}
+
+impl EndComparison {
+    /// Whether the grasp is confirmed.
+    pub fn agrees(&self) -> bool {
+        self.tenth.as_ref().map_or(self.coarser, |(_, agrees)| *agrees)
+    }
+}
+
+/// Compares the end of a grasp with other simulations of it; see the top of this file. `run` simulates the grasp with other
+/// settings and another start until its end is decided or it has taken so many minimisations; `None` cancels the comparison.
+pub fn compare_end(
+    solver: &Solver,
+    end: &EndState,
+    mut run: impl FnMut(&Solver, Push, u64) -> Option<OtherRun>,
+) -> Option<EndComparison> {
+    let alike = |other: &OtherRun| other.end.as_ref().is_some_and(|other| other.is_like(end));
+    let most = most_solves(solver);
+    let mut found = EndComparison { coarser: true, coarser_solves: 0, tenth: None };
+    for (factor, shift) in COARSER {
+        let push = Push { shift: DVec3::X * shift, turn: DVec3::Z * (TURNED * shift) };
+        let other = run(&solver.coarser(factor)?, push, most)?;
+        found.coarser_solves += other.solves;
+        found.coarser = alike(&other);
+        if !found.coarser {
+            let tenth = run(&solver.finer()?, Push::default(), most)?;
+            let agrees = alike(&tenth);
+            found.tenth = Some((tenth, agrees));
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// Minimisations after which a simulation that a grasp is compared with is given up.
+fn most_solves(solver: &Solver) -> u64 {
+    let finer = Accuracy::Standard.step_tolerance() / solver.accuracy.step_tolerance();
+    (MOST_SOLVES * finer.max(1.0).cbrt()) as u64
+}
 
 /// Result of comparing a grasp with other simulations of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,8 +315,8 @@ impl GraspComparison {
     }
 }
 
-/// Compares where a grasp ends with a coarser run from a start nearby, and where they differ with a much finer one; see the
-/// top of this file. `None` where the engine controls no error, and if it was cancelled.
+/// Compares a grasp with other simulations of it, and where they differ with pushes of a micrometre. `None` where the engine
+/// controls no error, without an end, and if it was cancelled.
 pub fn compare(
     scene: &Scene,
     object: Option<&ObjectModel>,
@@ -206,33 +324,39 @@ pub fn compare(
     end: Option<&EndState>,
     cancelled: &dyn Fn() -> bool,
 ) -> Option<GraspComparison> {
-    let run = |solver: Solver, shift: DVec3, turn: DVec3| {
-        let scene = Scene { solver, ..scene.clone() };
+    let run = |solver: &Solver, push: Push, most: u64| {
+        let scene = Scene { solver: solver.clone(), ..scene.clone() };
         let mut grasp = prepare(&scene, object, seed);
         if object.is_some() {
-            grasp.simulation_mut().move_object(shift, turn);
+            grasp.simulation_mut().move_object(push.shift, push.turn);
         }
-        grasp.run_to_end(&scene, cancelled)
+        let mut watch = EndWatch::new(grasp.simulation_mut().first_look());
+        let end = loop {
+            if cancelled() {
+                return None;
+            }
+            match grasp.next_frame().map(|frame| watch.note(frame)) {
+                Some(None) if grasp.solves() <= most => {}
+                Some(None) => break None,
+                Some(decided) => break decided,
+                None => break EndState::of(grasp.frames()),
+            }
+        };
+        Some(OtherRun { end, solves: grasp.solves() })
     };
-    let alike = |trial: &SimulatedTrial| {
-        end.zip(EndState::of(trial.frames()).as_ref()).is_some_and(|(grasp, other)| grasp.is_like(other))
-    };
-    if let Some(coarser) = scene.solver.coarser()
-        && alike(&run(coarser, NUDGE, NUDGE_TURN)?)
-    {
-        return Some(GraspComparison { agrees: true, undecided: false });
-    }
-    let finer = scene.solver.finer()?;
-    let finer = finer.finer().unwrap_or(finer);
-    let finest = run(finer.clone(), DVec3::ZERO, DVec3::ZERO)?;
-    let agrees = finest.data.quality.is_solved() && alike(&finest);
+    let found = compare_end(&scene.solver, end?, run)?;
     let mut undecided = false;
-    if !agrees && object.is_some() {
-        for push in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
-            undecided = undecided || !ends_alike(&finest, &run(finer.clone(), push * PUSH, DVec3::ZERO)?);
+    if let Some((OtherRun { end: Some(tenth), .. }, false)) = &found.tenth
+        && object.is_some()
+        && let Some(finer) = scene.solver.finer()
+    {
+        for axis in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+            let push = Push { shift: axis * PUSH, ..Push::default() };
+            let pushed = run(&finer, push, most_solves(&scene.solver))?.end;
+            undecided = undecided || pushed.is_some_and(|pushed| !pushed.is_like(tenth));
         }
     }
-    Some(GraspComparison { agrees, undecided })
+    Some(GraspComparison { agrees: found.agrees(), undecided })
 }
 
 /// True if two grasps end alike.

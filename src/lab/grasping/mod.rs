@@ -24,8 +24,8 @@ mod timed_grasp;
 pub use accuracy_cost::{AccuracyCost, accuracy_cost};
 pub use adaptation::{AdaptError, Adaptation, AdaptedSensor};
 pub use agreement::{
-    Agreed, EndState, GraspComparison, NUDGE, NUDGE_TURN, PUSH, Recompute, compare, ends_alike, grasp_soundly,
-    grasp_until_agreement, until_agreement,
+    Agreed, EndComparison, EndState, EndWatch, GraspComparison, OtherRun, PUSH, Push, Recompute, compare, compare_end,
+    ends_alike, grasp_soundly, grasp_until_agreement, until_agreement,
 };
 pub use collect::{
     CollectionError, CollectionPlan, CollectionProgress, CollectionReport, NoShard, ReadyCollection, SUCCESSION, Shard,

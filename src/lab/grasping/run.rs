@@ -128,6 +128,11 @@ impl GraspRun {
         &self.frames
     }
 
+    /// Convex minimisations so far.
+    pub fn solves(&self) -> u64 {
+        self.gripper.run.solves()
+    }
+
     /// Runs to the next sample; `None` at the end. A gripper that fails ends the trial with a warning; earlier samples
     /// are kept.
     pub fn next_frame(&mut self) -> Option<&Frame> {

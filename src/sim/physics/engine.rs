@@ -59,6 +59,9 @@ pub trait Engine {
     /// Deepest compression of the pads before the first step (m).
     fn starting_overlap(&mut self) -> f64;
 
+    /// Convex minimisations so far.
+    fn solves(&self) -> u64;
+
     /// Numerical quality of the steps so far; the static residual is that of the present state.
     fn quality(&self) -> Quality;
 }

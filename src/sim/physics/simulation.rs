@@ -399,6 +399,10 @@ impl Engine for Simulation {
         self.starting_overlap()
     }
 
+    fn solves(&self) -> u64 {
+        self.stepper.totals.solves
+    }
+
     fn quality(&self) -> Quality {
         self.quality()
     }

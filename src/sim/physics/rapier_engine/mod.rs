@@ -290,6 +290,11 @@ impl Engine for RapierSimulation {
         Side::BOTH.map(depth).into_iter().fold(0.0, f64::max)
     }
 
+    /// It counts none.
+    fn solves(&self) -> u64 {
+        0
+    }
+
     /// rapier sweeps a fixed number of times and reports no residual: every step counts as converged, and the static
     /// residual tells how far it was not.
     fn quality(&self) -> Quality {

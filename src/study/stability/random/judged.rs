@@ -5,8 +5,8 @@
 //! levels, the object's start is changed by a micrometre in twelve ways. The scene has no single answer if at least two of
 //! them end apart. Where no two levels agree and the twelve do, or where runs had to be given up, it stays undecided.
 
-use super::scene::{Push, Ran, RandomScene};
-use palpate_lab::grasping::{NUDGE, NUDGE_TURN, until_agreement};
+use super::scene::{Ran, RandomScene};
+use palpate_lab::grasping::{EndComparison, Push, compare_end, until_agreement};
 use palpate_sim::scene::{Accuracy, Solver};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -92,22 +92,27 @@ impl LevelResult {
 /// Results that decide the trust light of a trial at standard.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ComparedResult {
-    /// A run at draft from a start ten micrometres away gives the same result.
+    /// The coarser runs from starts nearby give the same result.
     pub coarser: bool,
-    /// Its convex minimisations.
+    /// Their convex minimisations.
     pub coarser_solves: u64,
+    /// The grasp is confirmed: by these runs or, where they differ, by a run at a tenth of the tolerance.
+    pub confirmed: bool,
+    /// Convex minimisations of that run; zero where there was none.
+    pub tenth_solves: u64,
     /// A run at the reference accuracy is solved and gives the same result.
     pub reference: bool,
 }
 
 impl ComparedResult {
     fn new(runs: &Runs<'_>, standard: &Ran, reference: &Ran) -> Self {
-        let coarser = runs.scene.run(&solver(LEVELS[0]), Push { shift: NUDGE, turn: NUDGE_TURN });
-        Self {
-            coarser: coarser.ends_like(standard),
-            coarser_solves: coarser.quality.solves,
-            reference: agree(standard, reference),
-        }
+        let run = |solver: &Solver, push, most| Some(runs.scene.run_until_decided(solver, push, most));
+        let found = standard.end.as_ref().and_then(|end| compare_end(&solver(LEVELS[1]), end, run));
+        let confirmed = found.as_ref().is_some_and(EndComparison::agrees);
+        let (coarser, coarser_solves, tenth) =
+            found.map_or((false, 0, None), |found| (found.coarser, found.coarser_solves, found.tenth));
+        let tenth_solves = tenth.map_or(0, |(run, _)| run.solves);
+        Self { coarser, coarser_solves, confirmed, tenth_solves, reference: agree(standard, reference) }
     }
 }
 
@@ -266,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_scene_is_judged_the_same_again_and_a_quiet_one_has_one_end() {
-        let scenes: Vec<JudgedScene> = [1, 3, 6].map(|number| JudgedScene::new(1, number)).to_vec();
+        let scenes: Vec<JudgedScene> = [1, 2, 6].map(|number| JudgedScene::new(1, number)).to_vec();
         for scene in &scenes {
             assert_eq!((scene.verdict, scene.truth, scene.diverged), (SceneVerdict::Single, 1e-7, false), "{scene:?}");
             assert!(scene.levels.iter().all(|level| level.right && level.agrees != Some(false)), "{scene:?}");
@@ -276,7 +281,7 @@ mod tests {
             assert!(scene.drawn.len() == 2 && scene.drawn[1].agrees == Some(true));
             assert_eq!((scene.ladder(0).len(), scene.ladder(3).len()), (5, 2));
         }
-        let mut again = JudgedScene::new(1, 3);
+        let mut again = JudgedScene::new(1, 2);
         again.cpu_s = scenes[1].cpu_s;
         assert_eq!(again, scenes[1]);
     }

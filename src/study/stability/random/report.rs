@@ -15,12 +15,12 @@ pub enum Policy {
     Flags,
     /// A restless trial is computed again at a tenth of the tolerance, down to the reference; the others are flagged.
     Restless,
-    /// A coarser run from a start ten micrometres away has to give the same result, or else one at a hundredth of the
-    /// tolerance, as for the trust light.
+    /// Two coarser runs from starts 50 µm away have to give the same result, or else one at a tenth of the tolerance, as for
+    /// the trust light.
     Compared,
     /// A run at a tenth of the tolerance flags what it disagrees with.
     RefinedRun,
-    /// The coarser run and one at a tenth have to give the same result, or else one at a hundredth.
+    /// Two coarser runs and one at a tenth have to give the same result, or else one at a hundredth.
     ComparedTwice,
     /// Refined until two levels agree; what never agrees is flagged.
     TwoAgree,
@@ -63,9 +63,9 @@ impl Policy {
             Self::None => "nothing",
             Self::Flags => "flags of a trial",
             Self::Restless => "flags; restless trials again",
-            Self::Compared => "flags; a coarser run from 10 µm away, else a hundredth (trust light)",
+            Self::Compared => "flags; two coarser runs from 50 µm away, else a tenth (trust light)",
             Self::RefinedRun => "flags and a refined run",
-            Self::ComparedTwice => "flags; that coarser run and a tenth, else a hundredth",
+            Self::ComparedTwice => "flags; those coarser runs and a tenth, else a hundredth",
             Self::TwoAgree => "refine until two levels agree",
             Self::ThreeAgree => "refine until three levels agree (`--until-agreement`)",
         }
@@ -89,13 +89,14 @@ impl Policy {
             }
             // What is flagged already is not compared.
             Self::Compared | Self::ComparedTwice if first.is_flagged() => (first, true, spent(1)),
-            Self::Compared | Self::ComparedTwice => {
+            Self::Compared => {
                 let Some(compared) = ladder.compared else { return (first, false, spent(1)) };
-                let twice = self == Self::ComparedTwice;
-                let tenth = levels.get(1).and_then(|second| second.agrees) != Some(false);
-                let settled = compared.coarser && (!twice || tenth);
-                let finest = if settled { 0 } else { levels.get(2).map_or(0, |level| level.solves) };
-                let solves = spent(if twice { 2 } else { 1 }) + compared.coarser_solves + finest;
+                (first, !compared.confirmed, spent(1) + compared.coarser_solves + compared.tenth_solves)
+            }
+            Self::ComparedTwice => {
+                let Some(compared) = ladder.compared else { return (first, false, spent(1)) };
+                let settled = compared.coarser && levels.get(1).and_then(|second| second.agrees) != Some(false);
+                let solves = spent(if settled { 2 } else { 3 }) + compared.coarser_solves;
                 (first, !settled && !compared.reference, solves)
             }
             Self::TwoAgree => agreed(levels, 1, spent),

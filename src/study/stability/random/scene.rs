@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use palpate_geometry::Primitive;
-use palpate_lab::grasping::{EndState, PUSH};
+use palpate_lab::grasping::{EndState, EndWatch, OtherRun, PUSH, Push};
 use palpate_sim::frame::{Frame, Quality};
 use palpate_sim::gripper::{Phase, TorquePoint};
 use palpate_sim::objects::ObjectModel;
@@ -109,11 +109,22 @@ impl RandomScene {
 
     /// Computes the scene to the end of its hold.
     pub(super) fn run(&self, solver: &Solver, push: Push) -> Ran {
+        self.simulate(solver, push, MOST_SOLVES, false)
+    }
+
+    /// Computes it until its end is decided, or it has taken so many minimisations.
+    pub(super) fn run_until_decided(&self, solver: &Solver, push: Push, most: u64) -> OtherRun {
+        let Ran { end, quality } = self.simulate(solver, push, most, true);
+        OtherRun { end, solves: quality.solves }
+    }
+
+    fn simulate(&self, solver: &Solver, push: Push, most_solves: u64, stops_once_decided: bool) -> Ran {
         let scene = Scene { solver: solver.clone(), ..self.scene.clone() };
         let (mut run, _) = SimRun::new(&scene, Some(&self.object));
         run.move_object(push.shift, push.turn);
         let start = run.first_look();
-        let mut frames: Vec<Frame> = vec![start.clone()];
+        let mut watch = EndWatch::new(start.clone());
+        let mut frames: Vec<Frame> = vec![start];
         let mut finite = true;
         let end = loop {
             match run.next_event() {
@@ -123,13 +134,13 @@ impl RandomScene {
                     run.command(self.pressure(t), phase);
                 }
                 Ok(SimEvent::Sampled(frame)) => {
-                    let lost = frame.has_lost_object(&start);
+                    let decided = watch.note(&frame);
                     frames.push(frame);
-                    // Nothing that follows matters.
-                    if lost {
-                        break Some(EndState::Lost);
+                    // Nothing that follows the loss of the object matters.
+                    if let Some(end) = decided.filter(|end| stops_once_decided || *end == EndState::Lost) {
+                        break Some(end);
                     }
-                    if run.quality().solves > MOST_SOLVES {
+                    if run.solves() > most_solves {
                         break None;
                     }
                 }
@@ -149,15 +160,6 @@ impl RandomScene {
     }
 }
 
-/// Change of the object's start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Push {
-    /// Shift (m).
-    pub(super) shift: DVec3,
-    /// Turn about the centre of mass, axis times angle (rad).
-    pub(super) turn: DVec3,
-}
-
 /// Minimisations after which a run is given up: a second of CPU time. Fingertips that graze a stiff edge can rattle there
 /// at steps of the least length, and undamped fingers ring.
 const MOST_SOLVES: u64 = 60_000;
@@ -166,7 +168,7 @@ const MOST_SOLVES: u64 = 60_000;
 #[derive(Clone, Debug)]
 pub(super) struct Ran {
     /// Absent where a number left the range and where the run was given up.
-    end: Option<EndState>,
+    pub(super) end: Option<EndState>,
     pub(super) quality: Quality,
 }
 
