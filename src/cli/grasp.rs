@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         check_replaced(&contacts_path(path), FileKind::Contacts)?;
     }
     let loading = cpu_time::ProcessTime::now();
-    let mut object = nominal.load_object()?;
+    let mut object = load_object(&nominal)?;
     if let (Some(object), Some(class)) = (&mut object, &arguments.class) {
         object.name = class_name(class)?;
     }

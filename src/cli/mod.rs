@@ -138,7 +138,7 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
             scene.object.source = anchored(object);
         }
         // Errors in the file belong to the terminal, before a window opens.
-        scene.load_object()?;
+        setup::load_object(&scene)?;
     }
     if let Some(path) = model {
         Model::load(path)?;

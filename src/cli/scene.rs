@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &SceneCommandArguments) -> Result<(), Failure> {
         SceneCommand::Explain { scene_or_object, scene, json } => (scene_or_object, scene, json),
     };
     let scene = scene_of(scene_or_object.as_deref(), scene)?;
-    let object = scene.load_object()?;
+    let object = load_object(&scene)?;
     let bar = Progress::new("{bar:40} {pos}/{len} effects");
     let progress = |own: StudyProgress| bar.show(own.done, own.of);
     let how = Measuring { threads: threads(None), cancelled: &AtomicBool::new(false), progress: &progress };

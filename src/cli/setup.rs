@@ -1,9 +1,10 @@
 //! Arguments shared by commands, of scenes and of sensors, and opening the store.
 
 use super::Failure;
+use super::terminal::Progress;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
-use palpate_sim::objects::anchored;
+use palpate_sim::objects::{ObjectModel, anchored};
 use palpate_sim::scene::{Accuracy, EngineKind, PRESETS, PosePreset, Scene};
 use palpate_store::Store;
 use palpate_store::labels::class_name;
@@ -71,6 +72,12 @@ impl RecomputeArguments {
     pub(super) fn chosen(&self) -> Recompute {
         if self.until_agreement { Recompute::UntilAgreement } else { Recompute::Unsettled }
     }
+}
+
+/// The object of a scene, with progress: the first time, a mesh of a million triangles takes seconds.
+pub(super) fn load_object(scene: &Scene) -> Result<Option<ObjectModel>, Failure> {
+    let _waiting = Progress::waiting(&format!("preparing {}", scene.object.source));
+    Ok(scene.load_object()?)
 }
 
 /// Number of threads: as asked for, or one per core.

@@ -253,7 +253,7 @@ impl Drawer {
 /// Simulates up to the time to draw; returns all frames until then.
 fn simulated(scene: &Scene, at: Option<f64>) -> Result<(Stage, Vec<Frame>, String), Failure> {
     let at_s = chosen_time(at, scene.timing.duration_s, "the grasp")?;
-    let object = scene.load_object()?;
+    let object = load_object(scene)?;
     let mut run = prepare(scene, object.as_ref(), 0);
     let stage = Stage::new(scene, object.as_ref(), run.begun().data.world_from_gripper);
     let mut frames = vec![run.simulation_mut().first_look()];

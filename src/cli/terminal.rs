@@ -8,6 +8,7 @@ use std::backtrace::{Backtrace, BacktraceStatus};
 use std::error::Error;
 use std::io::{BufRead as _, BufWriter, ErrorKind, IsTerminal as _, Write};
 use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
@@ -134,6 +135,14 @@ impl Progress {
     pub(super) fn new(template: &str) -> Self {
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         Self(ProgressBar::new(0).with_style(style))
+    }
+
+    /// Work whose share cannot be told: what it is, and how long it has taken.
+    pub(super) fn waiting(what: &str) -> Self {
+        let progress = Self::new("{msg} .. {elapsed}");
+        progress.0.set_message(what.to_owned());
+        progress.0.enable_steady_tick(Duration::from_millis(200));
+        progress
     }
 
     /// Work that is named, with the time left.

@@ -9,7 +9,8 @@
 
 use super::TriMesh;
 use glam::DVec3;
-use std::collections::{BTreeMap, HashMap};
+use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 /// Reason why a mesh is no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -106,7 +107,7 @@ fn check_numbers(mesh: &TriMesh) -> Result<(), MeshError> {
 /// Gives corners that coincide one index.
 fn weld(mesh: &TriMesh, tolerance: f64) -> TriMesh {
     let mut welded = TriMesh::default();
-    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut cells: FxHashMap<[i64; 3], Vec<u32>> = FxHashMap::default();
     let new_index: Vec<u32> = mesh
         .points
         .iter()
@@ -144,12 +145,12 @@ fn drop_degenerate(mesh: &mut TriMesh, notes: &mut Vec<String>) {
     let before = mesh.triangles.len();
     mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
     // Per set of corners: how often it is wound one way and how often the other.
-    let mut windings: HashMap<[u32; 3], i32> = HashMap::new();
+    let mut windings: FxHashMap<[u32; 3], i32> = FxHashMap::default();
     for t in &mesh.triangles {
         let (key, turn) = canonical(*t);
         *windings.entry(key).or_insert(0) += turn;
     }
-    let mut kept: HashMap<[u32; 3], ()> = HashMap::new();
+    let mut kept: FxHashMap<[u32; 3], ()> = FxHashMap::default();
     mesh.triangles.retain(|t| {
         let (key, turn) = canonical(*t);
         let net = windings[&key];

@@ -3,7 +3,7 @@
 
 use super::TriMesh;
 use glam::DVec3;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// Directions in which corners are sought. 512 lie 9 degrees apart.
 const DIRECTIONS: usize = 512;
@@ -53,16 +53,29 @@ fn lattice([a, b, c]: [DVec3; 3], spacing: f64) -> impl Iterator<Item = DVec3> {
     })
 }
 
+/// A cell and its neighbours. Most points that are not far lie near one in their own cell.
+const NEAREST_FIRST: [[i64; 3]; 27] = {
+    let mut cells = [[0; 3]; 27];
+    let mut n = 0;
+    while n < 27 {
+        // The cell itself stands in the middle of the count.
+        let m = (n + 13) % 27;
+        cells[n] = [(m / 9) as i64 - 1, (m / 3 % 3) as i64 - 1, (m % 3) as i64 - 1];
+        n += 1;
+    }
+    cells
+};
+
 /// Points kept so far, found again by the cell they lie in.
 struct Cover {
     spacing: f64,
     points: Vec<DVec3>,
-    by_cell: HashMap<[i64; 3], Vec<u32>>,
+    by_cell: FxHashMap<[i64; 3], Vec<u32>>,
 }
 
 impl Cover {
     fn new(spacing: f64) -> Self {
-        Self { spacing, points: Vec::new(), by_cell: HashMap::new() }
+        Self { spacing, points: Vec::new(), by_cell: FxHashMap::default() }
     }
 
     fn cell(&self, p: DVec3) -> [i64; 3] {
@@ -77,20 +90,17 @@ impl Cover {
 
     fn is_far_from_all(&self, p: DVec3) -> bool {
         let [i, j, k] = self.cell(p);
-        (-1..=1).all(|di| {
-            (-1..=1).all(|dj| {
-                (-1..=1).all(|dk| {
-                    self.by_cell
-                        .get(&[i + di, j + dj, k + dk])
-                        .is_none_or(|near| near.iter().all(|n| self.points[*n as usize].distance(p) >= self.spacing))
-                })
-            })
+        NEAREST_FIRST.iter().all(|[di, dj, dk]| {
+            self.by_cell
+                .get(&[i + di, j + dj, k + dk])
+                .is_none_or(|near| near.iter().all(|n| self.points[*n as usize].distance(p) >= self.spacing))
         })
     }
 }
 
 fn farthest_along(points: &[DVec3], direction: DVec3) -> Option<usize> {
-    (0..points.len()).max_by(|a, b| points[*a].dot(direction).total_cmp(&points[*b].dot(direction)))
+    let heights = points.iter().map(|p| p.dot(direction)).enumerate();
+    heights.max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(index, _)| index)
 }
 
 /// Evenly spread directions on a golden spiral.

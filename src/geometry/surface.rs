@@ -4,7 +4,7 @@ use super::{ColouredPart, Finish, TriMesh};
 use crate::palette::Rgb;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 /// One corner of a drawn mesh.
 #[repr(C)]
@@ -45,7 +45,7 @@ impl SurfaceMesh {
         let normals = face_normals(mesh);
         let faces_at = faces_by_place(mesh);
         // Corners that are alike are one: each is moved and projected several times per picture.
-        let mut known: HashMap<SurfaceKey, u32> = HashMap::new();
+        let mut known: FxHashMap<SurfaceKey, u32> = FxHashMap::default();
         for (face, t) in mesh.triangles.iter().enumerate() {
             for corner in t {
                 let place = place_key(mesh.points[*corner as usize]);
@@ -77,8 +77,8 @@ fn place_key(p: DVec3) -> [u32; 3] {
     p.as_vec3().to_array().map(|x| (x + 0.0).to_bits())
 }
 
-fn faces_by_place(mesh: &TriMesh) -> HashMap<[u32; 3], Vec<usize>> {
-    let mut faces: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+fn faces_by_place(mesh: &TriMesh) -> FxHashMap<[u32; 3], Vec<usize>> {
+    let mut faces: FxHashMap<[u32; 3], Vec<usize>> = FxHashMap::default();
     for (face, t) in mesh.triangles.iter().enumerate() {
         for corner in t {
             faces.entry(place_key(mesh.points[*corner as usize])).or_default().push(face);

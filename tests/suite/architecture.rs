@@ -70,6 +70,7 @@ const HOMES: &[(&str, &[&str])] = &[
             "src/study",
         ],
     ),
+    ("rustc_hash", &["src/geometry"]),
     ("rusqlite", &["src/store"]),
     ("ruzstd", &["src/exchange/mcap/reader.rs"]),
     ("safetensors", &["src/learn/tensor_file.rs"]),

@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     if arguments.guided {
         nominal.pose.between = Between::Guided;
     }
-    let object = nominal.load_object()?;
+    let object = load_object(&nominal)?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
     warn_unless_learned(&model, nominal.holds_object());
     let drawer = (!arguments.no_pictures)
