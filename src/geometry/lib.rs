@@ -17,7 +17,7 @@
 //! | 3 | `primitive`, `convex`, `surface` | closed-form solids, convex hulls, meshes to draw |
 //! | 4 | `distance` | signed distance of solids |
 //! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay; figures with axes; heat maps |
-//! | 5 | `bake` | distance grids of meshes |
+//! | 5 | `bake`, `hollows` | distance grids of meshes, hollows filled |
 //! | 6 | `grid_file` | grids kept in files |
 //!
 //! # Example

@@ -172,18 +172,23 @@ fn canonical(t: [u32; 3]) -> ([u32; 3], i32) {
     (key, turn)
 }
 
-/// For each edge (smaller corner first), the triangles on it and whether they walk it upwards.
-type Edges = BTreeMap<(u32, u32), Vec<(usize, bool)>>;
+/// An edge of a triangle: its corners, the smaller first, the triangle, and whether that walks it upwards.
+type Edge = ([u32; 2], usize, bool);
 
-fn edges_of(triangles: &[[u32; 3]]) -> Edges {
-    let mut edges = Edges::new();
-    for (index, t) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (t[k], t[(k + 1) % 3]);
-            edges.entry((a.min(b), a.max(b))).or_default().push((index, a < b));
-        }
-    }
+/// Edges of all triangles, those with the same corners side by side.
+fn edges_of(triangles: &[[u32; 3]]) -> Vec<Edge> {
+    let of = |(index, t): (usize, &[u32; 3])| {
+        let ways = [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+        ways.map(|[a, b]| ([a.min(b), a.max(b)], index, a < b))
+    };
+    let mut edges: Vec<Edge> = triangles.iter().enumerate().flat_map(of).collect();
+    edges.sort_unstable();
     edges
+}
+
+/// True for two edges with the same corners.
+fn same_corners(a: &Edge, b: &Edge) -> bool {
+    a.0 == b.0
 }
 
 /// Makes neighbours agree on their winding, piece by piece, and turns each piece to face outward.
@@ -191,8 +196,8 @@ fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> 
     let edges = edges_of(&mesh.triangles);
     let count = mesh.triangles.len();
     let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); count];
-    for sides in edges.values() {
-        if let [(a, a_up), (b, b_up)] = sides[..] {
+    for sides in edges.chunk_by(same_corners) {
+        if let [(_, a, a_up), (_, b, b_up)] = *sides {
             let agree = a_up != b_up;
             neighbours[a].push((b, agree));
             neighbours[b].push((a, agree));
@@ -325,8 +330,9 @@ fn fill_holes(mesh: &mut TriMesh, widest_allowed: f64, notes: &mut Vec<String>) 
 /// Loops of unbalanced edges, each walked in the direction that the missing triangles would have.
 fn boundary_loops(triangles: &[[u32; 3]]) -> Result<Vec<Vec<u32>>, MeshError> {
     let mut leaving: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for ((a, b), sides) in edges_of(triangles) {
-        let balance: i32 = sides.iter().map(|(_, up)| if *up { 1 } else { -1 }).sum();
+    for sides in edges_of(triangles).chunk_by(same_corners) {
+        let [a, b] = sides[0].0;
+        let balance: i32 = sides.iter().map(|(.., up)| if *up { 1 } else { -1 }).sum();
         let (from, to) = if balance > 0 { (b, a) } else { (a, b) };
         for _ in 0..balance.abs() {
             leaving.entry(from).or_default().push(to);

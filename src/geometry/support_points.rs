@@ -71,11 +71,13 @@ struct Cover {
     spacing: f64,
     points: Vec<DVec3>,
     by_cell: FxHashMap<[i64; 3], Vec<u32>>,
+    /// The point that was found near last: triangles follow each other along the surface.
+    last: usize,
 }
 
 impl Cover {
     fn new(spacing: f64) -> Self {
-        Self { spacing, points: Vec::new(), by_cell: FxHashMap::default() }
+        Self { spacing, points: Vec::new(), by_cell: FxHashMap::default(), last: 0 }
     }
 
     fn cell(&self, p: DVec3) -> [i64; 3] {
@@ -88,13 +90,19 @@ impl Cover {
         self.points.push(p);
     }
 
-    fn is_far_from_all(&self, p: DVec3) -> bool {
+    fn is_far_from_all(&mut self, p: DVec3) -> bool {
+        let is_near = |n: &usize| self.points.get(*n).is_some_and(|point| point.distance(p) < self.spacing);
+        if is_near(&self.last) {
+            return false;
+        }
         let [i, j, k] = self.cell(p);
-        NEAREST_FIRST.iter().all(|[di, dj, dk]| {
-            self.by_cell
-                .get(&[i + di, j + dj, k + dk])
-                .is_none_or(|near| near.iter().all(|n| self.points[*n as usize].distance(p) >= self.spacing))
-        })
+        let in_cell = |[di, dj, dk]: &[i64; 3]| {
+            let near = self.by_cell.get(&[i + di, j + dj, k + dk])?;
+            near.iter().map(|n| *n as usize).find(is_near)
+        };
+        let found = NEAREST_FIRST.iter().find_map(in_cell);
+        self.last = found.unwrap_or(self.last);
+        found.is_none()
     }
 }
 

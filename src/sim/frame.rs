@@ -192,7 +192,7 @@ pub enum TrustLevel {
     Green,
     /// Not compared with another simulation, or some steps missed the accuracy.
     Amber,
-    /// A finer simulation gives another result, or the trial is unsound or failed.
+    /// Other simulations give another result, or the trial is unsound or failed.
     Red,
 }
 
@@ -231,7 +231,7 @@ pub struct Imbalance {
 }
 
 impl Quality {
-    /// True when the trial may be learned from: it was solved, no finer simulation gives another result, and the fingers
+    /// True when the trial may be learned from: it was solved, no other simulation gives another result, and the fingers
     /// started outside of everything. One that misses or loses the object may: a hand in use does so too.
     pub fn is_sound(&self) -> bool {
         self.is_solved() && self.agrees != Some(false) && !matches!(self.failure, Some(GraspFailure::StartedInside(_)))
@@ -285,7 +285,7 @@ impl Quality {
                  unbalanced at its end"
             ));
         }
-        let elsewhere = (self.agrees == Some(false)).then(|| "a finer simulation gives another result".to_owned());
+        let elsewhere = (self.agrees == Some(false)).then(|| "other simulations give another result".to_owned());
         self.failure.map(|failure| failure.to_string()).or(elsewhere)
     }
 }

@@ -5,6 +5,7 @@ use crate::Signals;
 use crate::board::{Board, Detected, Gap, Reading};
 use crate::cadence::Cadence;
 use palpate_geometry::Pose;
+use palpate_sim::PHYSICS_VERSION;
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
@@ -127,6 +128,20 @@ pub struct GraspOrigin {
     /// Identity of the grasp before, if the object has stayed as that one released it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after: Option<String>,
+}
+
+impl GraspOrigin {
+    /// What a reader of the trial has to know where it comes from other physics than this version's.
+    pub fn other_physics(&self) -> Option<String> {
+        let older = if self.physics < PHYSICS_VERSION { "older" } else { "newer" };
+        (self.physics != PHYSICS_VERSION).then(|| {
+            format!(
+                "Simulated with {older} physics ({}, this version has {PHYSICS_VERSION}): shown as it was; simulated again, it \
+                 gives other values.",
+                self.physics
+            )
+        })
+    }
 }
 
 /// Grasps of the same object before a trial, as a recogniser judged them: its answers to the trial build on them.

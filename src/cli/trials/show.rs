@@ -7,7 +7,7 @@ use palpate_sim::frame::Plan;
 use palpate_store::labels::{LabelledTrial, cadence_line, shown_title};
 use palpate_store::{BoardInfo, TrialPlace};
 use palpate_tactile::board::Gap;
-use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialSource};
+use palpate_tactile::trial::{GraspOrigin, SimulatedTrial, Trial, TrialData, TrialSource};
 
 /// Output of `trials show --json` for a simulated trial.
 #[derive(Serialize)]
@@ -19,6 +19,8 @@ struct SimulatedReport {
     version: String,
     /// Version of the physics; null for trials of early versions.
     physics: Option<u32>,
+    #[serde(skip)]
+    other_physics: Option<String>,
     samples: usize,
     #[serde(flatten)]
     summary: GraspSummary,
@@ -95,6 +97,7 @@ pub(super) fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure
                 samples: data.frames.len(),
                 version: header.version,
                 physics: header.origin.as_ref().map(|origin| origin.physics),
+                other_physics: header.origin.as_ref().and_then(GraspOrigin::other_physics),
                 summary,
                 plan: data.plan,
                 scene: header.scene.to_toml(),
@@ -157,7 +160,7 @@ fn labels_text(labels: &LabelledTrial, page: &mut Page) {
 impl Report for SimulatedReport {
     fn text(&self, page: &mut Page) {
         let (id, summary, quality) = (self.id, &self.summary, &self.summary.quality);
-        summary.warnings.iter().for_each(|warning| page.warn(warning));
+        summary.warnings.iter().chain(&self.other_physics).for_each(|warning| page.warn(warning));
         page.line(format!("trial {id}: {} ({}, seed {})", shown_title(&summary.object), self.rig, self.seed));
         let physics = self.physics.map_or_else(|| "unknown".to_owned(), |version| version.to_string());
         page.line(format!("{} samples, recorded by Palpate {}, physics {physics}", self.samples, self.version));

@@ -12,7 +12,9 @@ use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, Gap, Sensor};
-use palpate_tactile::trial::{CorrectedPhases, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::trial::{
+    CorrectedPhases, GraspOrigin, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource,
+};
 use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, SignalDefinition, Signals, whole_fingers};
 use std::sync::Arc;
 
@@ -236,6 +238,7 @@ impl OpenTrial {
         }
         self.phases = phases_of_frames(data.frames.iter(), gripper);
         let SimulatedData { world_from_gripper, plan, quality, frames } = data;
+        self.remarks.extend(self.header.origin.as_ref().and_then(GraspOrigin::other_physics));
         if options.keep >= Keep::Scenery {
             let object = scene.load_object();
             if let Err(cause) = &object {
@@ -459,6 +462,7 @@ mod tests {
     use palpate_store::ImportedTrial;
     use palpate_store::labels::TrialEdit;
     use palpate_tactile::model::SensorModel;
+    use palpate_tactile::trial::SimulatedTrial;
 
     fn stored(object: &str) -> (tempfile::TempDir, Store, TrialId) {
         let folder = tempfile::tempdir().expect("a folder");
@@ -472,7 +476,7 @@ mod tests {
 
     #[test]
     fn a_simulated_trial_opens_as_it_was() -> Result<(), Box<dyn std::error::Error>> {
-        let (_folder, store, id) = stored("lemon");
+        let (folder, store, id) = stored("lemon");
         let models = Models::shipped()?;
         let options = OpenOptions { models, keep: Keep::Scenery, ..OpenOptions::default() };
         let open = OpenTrial::open(&store, id, &options)?;
@@ -495,6 +499,16 @@ mod tests {
         assert_eq!(now.frame.map(|frame| frame.t), Some(open.t_s[now.sample]));
         assert_eq!(open.at(-1.0).map(|now| now.sample), Some(0));
         assert_eq!(open.at(99.0).map(|now| now.sample), Some(open.t_s.len() - 1));
+        // Trials of other physics say so, and are otherwise as they were.
+        assert_eq!(open.remarks, [""; 0]);
+        let TrialData::Simulated(data) = trial.data.clone() else { panic!("simulated") };
+        let mut older = SimulatedTrial { header: trial.header.clone(), data };
+        older.header.origin.as_mut().expect("simulated").physics = 1;
+        let mut other = Store::open(&folder.path().join("older.sqlite"))?;
+        let id = other.insert(&older)?.id();
+        let reopened = OpenTrial::open(&other, id, &options)?;
+        assert!(reopened.remarks.concat().starts_with("Simulated with older physics (1, this version has 2):"));
+        assert_eq!((&reopened.t_s, &reopened.columns), (&open.t_s, &open.columns));
         // The last answer is the one after the grasp.
         assert!(open.answers.last().is_some_and(|answer| answer.beliefs.len() == 1 && !answer.listening));
         Ok(())

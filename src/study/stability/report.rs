@@ -231,11 +231,13 @@ fn in_short(report: &StabilityReport) -> String {
             (format!("{estimate:.2} % ({low:.2} to {high:.2} %)"), format!("{:.1}", row.cost))
         })
     };
-    let ((single, _), (agreed, cost)) = (share(Policy::Flags), share(Policy::ThreeAgree));
+    let [(single, _), (compared, light), (agreed, cost)] =
+        [Policy::Flags, Policy::Compared, Policy::ThreeAgree].map(share);
     let sum = |count: fn(&ChatterRow) -> usize| report.chatter.iter().map(count).sum::<usize>();
     format!(
-        "At accuracy `standard`, {single} of extreme random scenes give a wrong result without raising a flag; {agreed} do if each \
-         is refined until three levels of accuracy agree (`--until-agreement`, {cost} times the cost). Of {} stored grasps of \
+        "At accuracy `standard`, {single} of extreme random scenes give a wrong result without raising a flag; {compared} \
+         are wrong behind a green trust light ({light} times the cost of one run), and {agreed} if each is refined until three \
+         levels of accuracy agree (`--until-agreement`, {cost} times). Of {} stored grasps of \
          ordinary objects, {} have forces that keep jumping (chatter) in the hold.",
         sum(|row| row.grasps),
         sum(|row| row.chattering_stored)

@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_scene_is_judged_the_same_again_and_a_quiet_one_has_one_end() {
-        let scenes: Vec<JudgedScene> = [1, 2, 6].map(|number| JudgedScene::new(1, number)).to_vec();
+        let scenes: Vec<JudgedScene> = [5, 10, 25].map(|number| JudgedScene::new(1, number)).to_vec();
         for scene in &scenes {
             assert_eq!((scene.verdict, scene.truth, scene.diverged), (SceneVerdict::Single, 1e-7, false), "{scene:?}");
             assert!(scene.levels.iter().all(|level| level.right && level.agrees != Some(false)), "{scene:?}");
@@ -281,7 +281,7 @@ mod tests {
             assert!(scene.drawn.len() == 2 && scene.drawn[1].agrees == Some(true));
             assert_eq!((scene.ladder(0).len(), scene.ladder(3).len()), (5, 2));
         }
-        let mut again = JudgedScene::new(1, 2);
+        let mut again = JudgedScene::new(1, 10);
         again.cpu_s = scenes[1].cpu_s;
         assert_eq!(again, scenes[1]);
     }
