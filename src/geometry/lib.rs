@@ -12,13 +12,13 @@
 //! | 0 | `finish` | looks of surfaces beside their colour |
 //! | 0 | `pose` | position and orientation of a frame |
 //! | 1 | `mesh` | triangle meshes and bounds |
-//! | 2 | `mesh_files` | OBJ and STL in, OBJ out |
+//! | 2 | `mesh_files` | OBJ and STL in |
 //! | 2 | `modelling`, `repair`, `support_points`, `mass` | meshes made and repaired, extreme points, mass properties |
 //! | 3 | `primitive`, `convex`, `surface` | closed-form solids, convex hulls, meshes to draw |
 //! | 4 | `distance` | signed distance of solids |
 //! | 4 | [`drawing`] | draw list, camera, two-dimensional overlay; figures with axes; heat maps |
 //! | 5 | `bake`, `hollows` | distance grids of meshes, hollows filled |
-//! | 6 | `grid_file` | grids kept in files |
+//! | 6 | `grid_file`, `union` | grids kept in files; mass of what solids enclose together |
 //!
 //! # Example
 //!
@@ -53,6 +53,7 @@ mod primitive;
 mod repair;
 mod support_points;
 mod surface;
+mod union;
 pub mod units;
 
 pub use bake::{BakeError, SolidPart, bake, choose_cell};
@@ -64,10 +65,11 @@ pub use grid_file::bake_once;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
-pub use mesh_files::{ColouredPart, MeshFileError, read_mesh};
+pub use mesh_files::{ColouredPart, MeshFileError, other_content, read_mesh};
 pub use modelling::{cube_sphere, rounded_box};
 pub use pose::Pose;
 pub use primitive::{Primitive, lathe};
 pub use repair::{MeshError, Repaired, repair};
 pub use support_points::support_points;
 pub use surface::{SurfaceMesh, SurfaceVertex};
+pub use union::union_mass;

@@ -53,6 +53,8 @@ pub struct Repaired {
     pub mesh: TriMesh,
     /// Corners that were joined, which every STL needs.
     pub joined: usize,
+    /// Connected pieces of the surface.
+    pub pieces: usize,
     /// One sentence for each other kind of repair; empty when the mesh was sound.
     pub notes: Vec<String>,
 }
@@ -77,20 +79,37 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
     if mesh.triangles.is_empty() || diagonal <= 0.0 {
         return Err(MeshError::Empty);
     }
-    let mut notes = Vec::new();
     let before = mesh.points.len();
-    let mut mesh = weld(mesh, diagonal * WELD);
-    let joined = before - mesh.points.len();
-    drop_degenerate(&mut mesh, &mut notes);
+    let welded = weld(mesh, diagonal * WELD);
+    let joined = before - welded.points.len();
+    // Two triangles back to back are a wall between two solids, which goes, or a face that is seen from both sides.
+    closed(welded.clone(), diagonal, Sides::Cancel)
+        .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_| fault))
+        .map(|repaired| Repaired { joined, ..repaired })
+}
+
+/// What is done with two triangles back to back.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sides {
+    /// Both go.
+    Cancel,
+    /// One stays.
+    Collapse,
+}
+
+/// Makes a welded mesh closed and outward.
+fn closed(mut mesh: TriMesh, diagonal: f64, sides: Sides) -> Result<Repaired, MeshError> {
+    let mut notes = Vec::new();
+    drop_degenerate(&mut mesh, sides, &mut notes);
     if mesh.triangles.is_empty() {
         return Err(MeshError::Empty);
     }
-    orient(&mut mesh, &mut notes)?;
+    let pieces = orient(&mut mesh, &mut notes)?;
     fill_holes(&mut mesh, diagonal * SMALL_HOLE, &mut notes)?;
     if mesh.signed_volume() < FLAT * diagonal.powi(3) {
         return Err(MeshError::NoVolume);
     }
-    Ok(Repaired { mesh, joined, notes })
+    Ok(Repaired { mesh, joined: 0, pieces, notes })
 }
 
 fn check_numbers(mesh: &TriMesh) -> Result<(), MeshError> {
@@ -140,8 +159,8 @@ fn cells_near(p: DVec3, tolerance: f64) -> impl Iterator<Item = [i64; 3]> {
     })
 }
 
-/// Removes triangles with two equal corners, repeats, and pairs that lie back to back.
-fn drop_degenerate(mesh: &mut TriMesh, notes: &mut Vec<String>) {
+/// Removes triangles with two equal corners, repeats, and those that lie back to back with another.
+fn drop_degenerate(mesh: &mut TriMesh, sides: Sides, notes: &mut Vec<String>) {
     let before = mesh.triangles.len();
     mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
     // Per set of corners: how often it is wound one way and how often the other.
@@ -154,8 +173,9 @@ fn drop_degenerate(mesh: &mut TriMesh, notes: &mut Vec<String>) {
     mesh.triangles.retain(|t| {
         let (key, turn) = canonical(*t);
         let net = windings[&key];
-        // A repeat keeps one of its copies; a sheet seen from both sides cancels.
-        net != 0 && net.signum() == turn && kept.insert(key, ()).is_none()
+        // A repeat keeps one of its copies.
+        let stays = if net == 0 { sides == Sides::Collapse } else { net.signum() == turn };
+        stays && kept.insert(key, ()).is_none()
     });
     let dropped = before - mesh.triangles.len();
     if dropped > 0 {
@@ -191,8 +211,8 @@ fn same_corners(a: &Edge, b: &Edge) -> bool {
     a.0 == b.0
 }
 
-/// Makes neighbours agree on their winding, piece by piece, and turns each piece to face outward.
-fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> {
+/// Makes neighbours agree on their winding, piece by piece, and turns each piece to face outward; returns the number of pieces.
+fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<usize, MeshError> {
     let edges = edges_of(&mesh.triangles);
     let count = mesh.triangles.len();
     let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); count];
@@ -227,7 +247,7 @@ fn orient(mesh: &mut TriMesh, notes: &mut Vec<String>) -> Result<(), MeshError> 
     if turned > 0 {
         notes.push(format!("the winding of {turned} triangles was turned to face outward"));
     }
-    Ok(())
+    Ok(pieces.len())
 }
 
 /// A connected piece of a mesh.
@@ -240,6 +260,9 @@ struct Piece {
     volume: f64,
 }
 
+/// Corners of a piece that have to lie inside another, spread over it.
+const CORNERS_TRIED: usize = 64;
+
 /// With more pieces than this, cavities are not looked for: it is a heap of loose triangles.
 const MOST_PIECES: usize = 64;
 
@@ -249,9 +272,13 @@ fn is_cavity(mesh: &TriMesh, pieces: &[Piece], k: usize) -> bool {
     if pieces.len() > MOST_PIECES {
         return false;
     }
-    let corner = mesh.points[pieces[k].triangles[0][0] as usize];
+    // Pieces that only overlap are solids of a union, whichever way they are wound.
+    let triangles = &pieces[k].triangles;
+    let tried = triangles.iter().step_by(triangles.len().div_ceil(CORNERS_TRIED));
+    let corners: Vec<DVec3> = tried.map(|t| mesh.points[t[0] as usize]).collect();
     let surrounds = |outer: &&Piece| {
-        outer.volume.abs() > pieces[k].volume.abs() && crossings(mesh, &outer.triangles, corner) % 2 == 1
+        outer.volume.abs() > pieces[k].volume.abs()
+            && corners.iter().all(|corner| crossings(mesh, &outer.triangles, *corner) % 2 == 1)
     };
     let around: Vec<&Piece> = pieces.iter().filter(surrounds).collect();
     around.len() % 2 == 1 && around.iter().any(|outer| (outer.volume < 0.0) != (pieces[k].volume < 0.0))

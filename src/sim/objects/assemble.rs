@@ -5,7 +5,7 @@ use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::three_digits;
 use palpate_geometry::{
     BakeError, Bounds, ColouredPart, DistanceField, DistanceGrid, Finish, MassProperties, Pose, Primitive, SolidPart,
-    SurfaceMesh, TriMesh, bake, bake_once, choose_cell, mass_properties, repair, support_points,
+    SurfaceMesh, TriMesh, bake, bake_once, choose_cell, mass_properties, repair, support_points, union_mass,
 };
 use std::sync::Arc;
 
@@ -37,6 +37,10 @@ pub(super) struct Blueprint {
     triangles: usize,
     /// Young's modulus of the surface (Pa), where the file gives one.
     pub(super) modulus: Option<f64>,
+    /// Coefficient of friction, where the file gives one.
+    pub(super) friction: Option<f64>,
+    /// True where what parts share is as heavy as each of them.
+    pub(super) overlap_is_denser: bool,
     pub(super) warnings: Vec<String>,
 }
 
@@ -44,10 +48,15 @@ pub(super) struct Blueprint {
 const LARGEST_PLAUSIBLE: f64 = 3.0;
 /// An object smaller than this is taken to be given in units of a thousand metres (m).
 const SMALLEST_PLAUSIBLE: f64 = 5e-4;
-/// Beyond this, baking and drawing make no sense (m).
-const LARGEST_POSSIBLE: f64 = 10.0;
-/// Larger than the gripper's world: loaded, with a warning (m).
-const LARGEST_GRASPABLE: f64 = 0.5;
+/// What is larger than this (m) does not fit between the fingers, and smaller than this, between two taxels.
+const GRASPABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.5;
+/// Thinner things are mistakes (m).
+const THINNEST: f64 = 1e-5;
+/// Densities that solids have, from foams to metals (kg/m³).
+const DENSITIES: std::ops::RangeInclusive<f64> = 1.0..=25_000.0;
+/// Units that files are written in, and their size (m).
+const LENGTHS: [(&str, f64); 4] =
+    [("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254), ("metres, scaled to millimetres twice", 1e3)];
 /// Triangles of one object beyond this are refused, however many meshes they come in.
 const MOST_TRIANGLES: usize = 4_000_000;
 /// Friction coefficient where nothing is known of the surface: plastic and varnished wood.
@@ -66,6 +75,8 @@ impl Blueprint {
             inertials: Vec::new(),
             triangles: 0,
             modulus: None,
+            friction: None,
+            overlap_is_denser: false,
             warnings: Vec::new(),
         }
     }
@@ -112,6 +123,12 @@ impl Blueprint {
         });
     }
 
+    /// Takes the visual shapes that were added last as collision shapes too.
+    pub(super) fn touch_visual(&mut self, last: usize) {
+        let from = self.visual_solids.len().saturating_sub(last);
+        self.collision.extend_from_slice(&self.visual_solids[from..]);
+    }
+
     /// Builds the object with the options of a scene. The baked distances are kept in files of the folder for caches.
     pub(super) fn build(self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
         let folders = directories::ProjectDirs::from("", "", "palpate");
@@ -149,10 +166,10 @@ impl Blueprint {
         for part in &mut self.visual {
             part.mesh.scale(glam::DVec3::splat(scale));
         }
-        self.repair_meshes(&mut solids)?;
+        let several = self.repair_meshes(&mut solids)?;
         let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
-        self.check_size(&bounds)?;
-        let mass = self.mass(options, &solids, scale);
+        self.check_size(&bounds, scale)?;
+        let mass = self.mass(options, &solids, several, scale);
         let field = match solids.as_slice() {
             [SolidPart::Primitive(shape, place)] => DistanceField::primitive(*shape, place),
             _ => {
@@ -169,7 +186,7 @@ impl Blueprint {
             resting: resting_of(&solids),
             parts: solids.into(),
             mass,
-            friction: DEFAULT_FRICTION,
+            friction: self.friction.unwrap_or(DEFAULT_FRICTION),
             modulus: self.modulus,
             bounds,
             warnings: self.warnings,
@@ -223,37 +240,49 @@ impl Blueprint {
         scale
     }
 
-    fn check_size(&mut self, bounds: &Bounds) -> Result<(), ObjectError> {
-        let size = bounds.size();
-        if size.max_element() > LARGEST_POSSIBLE || size.max_element() < 1e-5 || !size.is_finite() {
+    fn check_size(&self, bounds: &Bounds, scale: f64) -> Result<(), ObjectError> {
+        let (largest, thinnest) = (bounds.size().max_element(), bounds.size().min_element());
+        let name = &self.name;
+        if !bounds.size().is_finite() || !GRASPABLE.contains(&largest) {
+            let [least, most] = [GRASPABLE.start() * 1e3, GRASPABLE.end() * 1e3];
+            // What the lengths would be in other units.
+            let other = |(unit, size): &(&str, f64)| {
+                let across = largest / scale * size;
+                let fits = (10e-3..=300e-3).contains(&across) && *size != scale;
+                fits.then(|| format!("in {unit} it would be {} mm (object.scale = {size})", three_digits(across * 1e3)))
+            };
+            let others: Vec<String> = LENGTHS.iter().filter_map(other).collect();
+            let others = if others.is_empty() { "set object.scale".to_owned() } else { others.join(", ") };
             return Err(ObjectError(format!(
-                "\"{}\" is {:.3e} m across; set object.scale so that it fits a hand",
-                self.name,
-                size.max_element()
+                "\"{name}\" is {} mm across; objects from {least} to {most} mm can be grasped. Are its lengths in another \
+                 unit? {others}",
+                three_digits(largest * 1e3)
             )));
         }
-        if size.max_element() > LARGEST_GRASPABLE {
-            let cm = size.max_element() * 100.0;
-            self.warnings.push(format!("\"{}\" is {cm:.0} cm across, far larger than the gripper", self.name));
+        if thinnest < THINNEST {
+            return Err(ObjectError(format!("\"{name}\" is {thinnest:.1e} m thick; give it at least 0.01 mm")));
         }
         Ok(())
     }
 
-    fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<(), ObjectError> {
+    /// Repairs all meshes; returns whether the object is made of several pieces, which may overlap.
+    fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<bool, ObjectError> {
+        let mut pieces = solids.iter().filter(|solid| matches!(solid, SolidPart::Primitive(..))).count();
         for solid in solids {
             if let SolidPart::Mesh(mesh) = solid {
                 let repaired = repair(mesh).map_err(|cause| ObjectError::unsound(&self.name, &cause))?;
                 *mesh = repaired.mesh;
+                pieces += repaired.pieces;
                 self.warnings
                     .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{}\": {note}", self.name)));
             }
         }
-        Ok(())
+        Ok(pieces > 1)
     }
 
     /// Mass from the scene, the file, or volume and density, in this order.
-    fn mass(&mut self, options: &LoadOptions, solids: &[SolidPart], scale: f64) -> MassProperties {
-        let from_shape = solids
+    fn mass(&mut self, options: &LoadOptions, solids: &[SolidPart], several: bool, scale: f64) -> MassProperties {
+        let sum = solids
             .iter()
             .map(|solid| match solid {
                 SolidPart::Primitive(shape, place) => {
@@ -263,6 +292,8 @@ impl Blueprint {
                 SolidPart::Mesh(mesh) => mass_properties(mesh, options.density),
             })
             .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
+        let from_shape =
+            if several && !self.overlap_is_denser { self.without_overlap(sum, solids, options.density) } else { sum };
         let from_shape = self.sound_or_boxed(from_shape, solids);
         let declared = self
             .inertials
@@ -292,7 +323,21 @@ impl Blueprint {
             let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
             bounds.grown(0.5 * bounds.size().max_element()).distance(m.centre) == 0.0
         };
-        if !chosen.is_physical() || !reach(&chosen) || !inertia_fits(&chosen, &from_shape) {
+        let density = chosen.mass / from_shape.mass * options.density;
+        let odd_mass = options.mass.is_none() && declared.mass > 0.0 && !DENSITIES.contains(&density);
+        if odd_mass {
+            let cm3 = from_shape.mass / options.density * 1e6;
+            self.warnings.push(format!(
+                "the mass that \"{}\" declares is doubtful: {} kg on {} cm³ is {density:.0} kg/m³; set object.mass (kg) to decide",
+                self.name,
+                three_digits(chosen.mass),
+                three_digits(cm3)
+            ));
+        }
+        let fits = inertia_fits(&chosen, &from_shape);
+        if odd_mass && !fits {
+            chosen = from_shape.with_mass(chosen.mass);
+        } else if !chosen.is_physical() || !reach(&chosen) || !fits {
             self.warnings.push(format!(
                 "the inertia that \"{}\" declares is impossible for its shape; it was computed from the shape",
                 self.name
@@ -306,7 +351,22 @@ impl Blueprint {
     }
 }
 
+/// Share of the volume by which solids have to overlap to be counted as one.
+const OVERLAP: f64 = 2e-3;
+
 impl Blueprint {
+    /// Mass properties in which what several pieces share counts once. The plain sum is exact where they share nothing.
+    fn without_overlap(&mut self, sum: MassProperties, solids: &[SolidPart], density: f64) -> MassProperties {
+        let union = union_mass(solids, density);
+        if union.mass > (1.0 - OVERLAP) * sum.mass || union.mass <= 0.0 {
+            return sum;
+        }
+        let share = 100.0 * (1.0 - union.mass / sum.mass);
+        self.warnings
+            .push(format!("parts of \"{}\" overlap by {share:.0} % of their volume, which counts once", self.name));
+        union
+    }
+
     /// Mass properties that a body can have: those computed, or where a tangled mesh gives impossible ones, those of a
     /// box around it.
     fn sound_or_boxed(&mut self, computed: MassProperties, solids: &[SolidPart]) -> MassProperties {

@@ -34,14 +34,58 @@ pub(super) fn read_referenced(path: &Path) -> std::io::Result<Vec<u8>> {
 /// Places where a mesh reference of a URDF in `folder` may lie, in the order in which they are tried.
 ///
 /// - `package://NAME/rest`, `model://NAME/rest`: `rest` under any folder above that is called NAME or holds one called
-///   NAME, under the entries of ROS_PACKAGE_PATH, then under the URDF's own folders
+///   NAME, under `share` of the entries of AMENT_PREFIX_PATH, under the entries of ROS_PACKAGE_PATH, then under the URDF's own
+///   folders
 /// - `file:///path`, absolute and relative paths: unchanged, relative ones from the URDF's folder
+/// - all of these with `%20` and backslashes decoded
 pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
     let reference = reference.trim();
     if reference.is_empty() {
         return Vec::new();
     }
-    if let Some(path) = reference.strip_prefix("file://") {
+    let plain = plain_candidates(reference, folder);
+    // As other systems write it: with escapes, or with backslashes.
+    let written = percent_decoded(reference).replace('\\', "/");
+    if written == reference { plain } else { plain.into_iter().chain(plain_candidates(&written, folder)).collect() }
+}
+
+/// A text in which `%20` and the like are the characters that they stand for.
+fn percent_decoded(text: &str) -> String {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((first, others)) = rest.split_first() {
+        let code = (*first == b'%').then(|| others.get(..2)).flatten().and_then(|pair| std::str::from_utf8(pair).ok());
+        rest = match code.and_then(|pair| u8::from_str_radix(pair, 16).ok()) {
+            Some(byte) => {
+                bytes.push(byte);
+                &others[2..]
+            }
+            None => {
+                bytes.push(*first);
+                others
+            }
+        };
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
+}
+
+/// The only file beside a path whose name differs from its own in capitals alone.
+pub(super) fn in_another_case(path: &Path) -> Option<PathBuf> {
+    let wanted = path.file_name()?.to_str()?.to_lowercase();
+    let alike =
+        |entry: &std::fs::DirEntry| entry.file_name().to_str().is_some_and(|name| name.to_lowercase() == wanted);
+    let mut found =
+        std::fs::read_dir(path.parent()?).ok()?.filter_map(Result::ok).filter(alike).map(|entry| entry.path());
+    found.next().filter(|_| found.next().is_none())
+}
+
+fn plain_candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
+    if let Some(path) =
+        ["file://localhost/", "file:///", "file:/"].iter().find_map(|scheme| reference.strip_prefix(scheme))
+    {
+        return vec![Path::new("/").join(path)];
+    }
+    if let Some(path) = reference.strip_prefix("file:") {
         return vec![folder.join(path)];
     }
     let in_package = ["package://", "model://"].iter().find_map(|scheme| reference.strip_prefix(scheme));
@@ -56,6 +100,9 @@ pub(super) fn candidates(reference: &str, folder: &Path) -> Vec<PathBuf> {
             found.push(above.join(rest));
         }
         found.push(above.join(package).join(rest));
+    }
+    if let Some(paths) = std::env::var_os("AMENT_PREFIX_PATH") {
+        found.extend(std::env::split_paths(&paths).map(|prefix| prefix.join("share").join(package).join(rest)));
     }
     if let Some(paths) = std::env::var_os("ROS_PACKAGE_PATH") {
         for root in std::env::split_paths(&paths) {
@@ -95,7 +142,12 @@ mod tests {
         let found = candidates("package://mug_description/meshes/mug.stl", Path::new("/ws/src/mug_description/urdf"));
         assert!(found.contains(&PathBuf::from("/ws/src/mug_description/meshes/mug.stl")));
         assert_eq!(candidates("../meshes/a.obj", Path::new("/x/urdf")), [PathBuf::from("/x/urdf/../meshes/a.obj")]);
-        assert_eq!(candidates("file:///m/a.obj", Path::new("/x")), [PathBuf::from("/m/a.obj")]);
+        for uri in ["file:///m/a.obj", "file:/m/a.obj", "file://localhost/m/a.obj"] {
+            assert_eq!(candidates(uri, Path::new("/x")), [PathBuf::from("/m/a.obj")]);
+        }
+        let escaped = candidates("my%20parts\\a%c3%b6.obj", Path::new("/x"));
+        assert!(escaped.contains(&PathBuf::from("/x/my parts/aö.obj")), "{escaped:?}");
+        assert_eq!(percent_decoded("100%.stl"), "100%.stl");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::assemble::{Blueprint, ShapeSource};
 use super::catalogue::{BuiltIn, catalogue, read_embedded};
-use super::files::{candidates, read_file, read_referenced};
+use super::files::{candidates, in_another_case, read_file, read_referenced};
 use super::options::LoadOptions;
 use super::{ObjectError, ObjectModel, RandomShape, urdf};
 use palpate_geometry::{MeshFileError, Pose, SurfaceMesh, read_mesh};
@@ -183,15 +183,19 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
     let read = |path: &str| content.of(read_referenced(Path::new(path)));
     let mesh = |reference: &str| {
         let places = candidates(reference, folder);
-        match places.iter().find(|place| place.is_file()) {
+        let found = places.iter().find(|place| place.is_file()).cloned();
+        match found.or_else(|| places.iter().find_map(|place| in_another_case(place))) {
             Some(place) => read_mesh(&place.to_string_lossy(), &read),
             None if reference.to_ascii_lowercase().ends_with(".dae") => read_mesh(reference, &read),
             None => {
                 let cause = match places.first() {
-                    Some(first) if places.len() == 1 => format!("there is no file {}", first.display()),
-                    Some(first) => {
-                        format!("it is neither at {} nor at {} other places", first.display(), places.len() - 1)
-                    }
+                    Some(first) if reference.contains("://") && places.len() > 1 => format!(
+                        "it is neither at {} nor at {} other places; name the folder above its package in ROS_PACKAGE_PATH, or \
+                         an installed workspace in AMENT_PREFIX_PATH",
+                        first.display(),
+                        places.len() - 1
+                    ),
+                    Some(first) => format!("there is no file {}", first.display()),
                     None => "the reference is empty".to_owned(),
                 };
                 Err(MeshFileError::unreadable(reference, cause))

@@ -91,6 +91,8 @@ impl RandomShape {
     /// Builds the object. Each is needed once, so its distances are not kept in a file.
     pub(super) fn build(&self, options: &LoadOptions) -> Result<ObjectModel, ObjectError> {
         let mut blueprint = Blueprint::new(&self.name);
+        // Their masses were drawn so, and models have learned them.
+        blueprint.overlap_is_denser = true;
         for (solid, place) in &self.solids {
             blueprint.add_visual(&solid.source(), place, None);
         }

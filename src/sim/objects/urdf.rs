@@ -8,9 +8,9 @@
 use super::ObjectError;
 use super::assemble::{Blueprint, Inertial, ShapeSource};
 use super::xml::{self, Element};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::{ColouredPart, MassProperties, MeshFileError, Pose, Primitive};
+use palpate_geometry::{ColouredPart, MassProperties, MeshFileError, Pose, Primitive, other_content};
 use std::collections::HashMap;
 
 /// Reads meshes by the reference that the URDF makes to them.
@@ -37,6 +37,10 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
     let mut blueprint = Blueprint::new(name);
     blueprint.robot = robot.attribute("name").map(str::to_owned);
     let links = named(&robot, "link");
+    let twice = links.iter().enumerate().find(|(k, link)| links[..*k].iter().any(|other| other.0 == link.0));
+    if let Some((_, (name, _))) = twice {
+        return Err(malformed(format!("two links are called \"{name}\"; give each a name of its own")));
+    }
     let joints = joints_of(&robot, &mut blueprint.warnings).map_err(malformed)?;
     let poses = link_poses(&links, &joints, &mut blueprint.warnings).map_err(malformed)?;
     let materials = named(&robot, "material");
@@ -48,12 +52,16 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         };
         let visuals = shape_tags(link, element, "visual", &mut blueprint.warnings);
         let collisions = shape_tags(link, element, "collision", &mut blueprint.warnings);
+        let mut seen = 0;
         for (visual, shape) in &visuals {
             let material = visual.child("material");
             let colour = material.and_then(|m| colour_of(m).or_else(|| colour_named(m.attribute("name")?)));
             let place = *root_from_link * origin_of(visual, link).map_err(malformed)?;
             match shape_of(shape, link, read_mesh) {
-                Ok(shape) => blueprint.add_visual(&shape, &place, colour),
+                Ok(shape) => {
+                    blueprint.add_visual(&shape, &place, colour);
+                    seen += 1;
+                }
                 // The collision shape is drawn in place of a missing visual.
                 Err(error) if !collisions.is_empty() => blueprint.warnings.push(error.to_string()),
                 Err(error) => return Err(error),
@@ -61,10 +69,21 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         }
         for (collision, shape) in &collisions {
             let place = *root_from_link * origin_of(collision, link).map_err(malformed)?;
-            blueprint.add_collision(&shape_of(shape, link, read_mesh)?, &place);
+            match shape_of(shape, link, read_mesh) {
+                Ok(shape) => blueprint.add_collision(&shape, &place),
+                // What is seen is touched in place of a collision shape that cannot be read.
+                Err(error) if seen > 0 && collisions.len() == 1 => {
+                    blueprint
+                        .warnings
+                        .push(format!("{error}; the visual shape of link \"{link}\" is used in its place"));
+                    blueprint.touch_visual(seen);
+                }
+                Err(error) => return Err(error),
+            }
             note_modulus(collision, link, &mut blueprint);
         }
-        let own = inertial_of(link, element).map_err(malformed)?;
+        note_friction(&robot, link, element, &mut blueprint);
+        let own = inertial_of(link, element, &mut blueprint.warnings).map_err(malformed)?;
         if !(visuals.is_empty() && collisions.is_empty()) || own.is_some_and(|(mass, _)| mass.mass != 0.0) {
             let possible = own.filter(|(own, _)| own.mass.is_finite() && own.mass > 0.0 && own.mass < 1e4);
             let declared = possible.map(|(own, place)| own.seen_from(&(*root_from_link * place)));
@@ -76,7 +95,10 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
 
 /// The `<robot>` of a file. The error names the fault.
 fn robot_of(bytes: &[u8]) -> Result<Element, String> {
-    let text = String::from_utf8_lossy(bytes);
+    if let Some(what) = other_content(bytes) {
+        return Err(what.to_owned());
+    }
+    let text = xml::decoded(bytes);
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.contains("${") || text.contains("$(") || text.contains("<xacro:") {
         return Err("it is a xacro template, not a URDF; run `xacro FILE > object.urdf` first".to_owned());
@@ -102,19 +124,47 @@ fn named<'a>(robot: &'a Element, kind: &str) -> Vec<Named<'a>> {
 fn joints_of<'a>(robot: &'a Element, warnings: &mut Vec<String>) -> Result<Vec<Joint<'a>>, String> {
     let mut joints = Vec::new();
     for (name, element) in named(robot, "joint") {
-        let kind = element.attribute("type").unwrap_or("fixed");
-        if kind != "fixed" {
-            warnings.push(format!("joint \"{name}\" is {kind}; it was welded at its zero position"));
-        }
         let [parent, child] = ["parent", "child"].map(|end| element.child(end).and_then(|e| e.attribute("link")));
         let (Some(parent), Some(child)) = (parent, child) else {
             warnings.push(format!("joint \"{name}\" names no parent or no child and was left out"));
             continue;
         };
-        let parent_from_child = origin_of(element, &name)?;
+        let mut parent_from_child = origin_of(element, &name)?;
+        let kind = element.attribute("type").unwrap_or("fixed");
+        if kind != "fixed" {
+            let (position, why) = rest_of(robot, element);
+            let said = if position == 0.0 { "its zero position".to_owned() } else { format!("{position} ({why})") };
+            warnings.push(format!("joint \"{name}\" is {kind}; it was welded at {said}"));
+            let axis = element.child("axis").and_then(|axis| axis.attribute("xyz")).and_then(numbers);
+            let axis = axis.map_or(DVec3::X, DVec3::from_array).normalize_or(DVec3::X);
+            let moved = match kind {
+                "prismatic" => Pose::from_position(axis * position),
+                _ => Pose::new(DVec3::ZERO, DQuat::from_axis_angle(axis, position)),
+            };
+            parent_from_child = parent_from_child * moved;
+        }
         joints.push(Joint { name, parent, child, parent_from_child });
     }
     Ok(joints)
+}
+
+/// Position at which a movable joint stands (m or rad), and why: zero where its limits allow that, else the nearest limit; one
+/// that mimics another follows it.
+fn rest_of(robot: &Element, joint: &Element) -> (f64, &'static str) {
+    let number = |element: Option<&Element>, key: &str| {
+        element.and_then(|element| element.attribute(key)?.trim().parse::<f64>().ok()).filter(|value| value.is_finite())
+    };
+    let own = |joint: &Element| {
+        let limit = joint.child("limit").filter(|_| joint.attribute("type") != Some("continuous"));
+        let [lower, upper] = ["lower", "upper"].map(|key| number(limit, key));
+        0f64.max(lower.unwrap_or(f64::NEG_INFINITY)).min(upper.unwrap_or(f64::INFINITY))
+    };
+    let Some(mimic) = joint.child("mimic") else { return (own(joint), "the limit that is nearest to zero") };
+    let followed = named(robot, "joint").into_iter().find(|(name, _)| Some(name.as_str()) == mimic.attribute("joint"));
+    let position = followed.map_or(0.0, |(_, other)| own(other));
+    let [times, plus] =
+        [("multiplier", 1.0), ("offset", 0.0)].map(|(key, usual)| number(Some(mimic), key).unwrap_or(usual));
+    (times * position + plus, "as the joint that it mimics says")
 }
 
 /// Pose of each link in the frame of the root. Loops and second parents are refused.
@@ -174,6 +224,17 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     words.filter_map(|word| word.parse().ok()).collect::<Vec<f64>>().try_into().ok()
 }
 
+/// What is wrong with numbers that have decimal commas; empty for others.
+fn decimal_comma(text: &str) -> String {
+    let mut words = text.split_whitespace();
+    if !words.any(|word| {
+        word.split_once(',').is_some_and(|(a, b)| !a.is_empty() && b.starts_with(|c: char| c.is_ascii_digit()))
+    }) {
+        return String::new();
+    }
+    format!(": \"{}\" has decimal commas; write decimal points", text.chars().take(40).collect::<String>())
+}
+
 /// Notes the modulus of a collision shape: Drake's `drake:hydroelastic_modulus`. Of several shapes the softest counts.
 fn note_modulus(collision: &Element, link: &str, blueprint: &mut Blueprint) {
     let properties = collision.child("proximity_properties");
@@ -190,13 +251,54 @@ fn note_modulus(collision: &Element, link: &str, blueprint: &mut Blueprint) {
     }
 }
 
+/// Coefficients of friction that a surface can have.
+const FRICTIONS: std::ops::RangeInclusive<f64> = 0.0..=10.0;
+
+/// Notes the friction of a link in any of three dialects: pybullet's `<contact>`, Gazebo's `<mu1>` and `<mu2>`, Drake's
+/// `mu_static` and `mu_dynamic`. Of several the lowest counts.
+fn note_friction(robot: &Element, link: &str, element: &Element, blueprint: &mut Blueprint) {
+    let value = |element: &'_ Element| element.attribute("value").map(str::trim).map(str::to_owned);
+    let mut texts: Vec<(&'static str, String)> = Vec::new();
+    let lateral = element.child("contact").and_then(|contact| contact.child("lateral_friction"));
+    texts.extend(lateral.and_then(value).map(|text| ("lateral_friction", text)));
+    let gazebo =
+        robot.children.iter().filter(|part| part.name == "gazebo" && part.attribute("reference") == Some(link));
+    for own in gazebo {
+        for key in ["mu1", "mu2"] {
+            texts.extend(own.child(key).map(|mu| (key, mu.text.trim().to_owned())));
+        }
+    }
+    for collision in element.children.iter().filter(|child| child.name == "collision") {
+        let Some(properties) = collision.child("proximity_properties") else { continue };
+        for key in ["mu_static", "mu_dynamic"] {
+            texts.extend(properties.child(key).and_then(value).map(|text| (key, text)));
+        }
+    }
+    for (key, text) in &texts {
+        match text.parse::<f64>() {
+            Ok(mu) if FRICTIONS.contains(&mu) => {
+                blueprint.friction = Some(blueprint.friction.map_or(mu, |known| known.min(mu)));
+            }
+            _ => blueprint.warnings.push(format!(
+                "link \"{link}\": its {key} \"{}\" is not between {} and {}, and was left out",
+                text.chars().take(40).collect::<String>(),
+                FRICTIONS.start(),
+                FRICTIONS.end()
+            )),
+        }
+    }
+}
+
 /// The first `<origin>` of an element; no origin is the identity.
 fn origin_of(element: &Element, owner: &str) -> Result<Pose, String> {
     let Some(origin) = element.child("origin") else { return Ok(Pose::IDENTITY) };
     let vector = |key: &str| origin.attribute(key).map_or(Some([0.0; 3]), numbers).map(DVec3::from_array);
     match (vector("xyz"), vector("rpy")) {
         (Some(xyz), Some(rpy)) if xyz.is_finite() && rpy.is_finite() => Ok(Pose::from_xyz_rpy(xyz, rpy)),
-        _ => Err(format!("an origin of \"{owner}\" is not three finite numbers")),
+        _ => {
+            let texts = ["xyz", "rpy"].map(|key| origin.attribute(key).unwrap_or_default());
+            Err(format!("an origin of \"{owner}\" is not three finite numbers{}", decimal_comma(&texts.join(" "))))
+        }
     }
 }
 
@@ -235,12 +337,16 @@ fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<Sh
     };
     let length = |key: &str| match shape.attribute(key).and_then(|text| text.trim().parse().ok()) {
         Some(value) => positive(value, key),
-        None => Err(bad(format!("the {key} of its {} is not a number", shape.name))),
+        None => {
+            let text = shape.attribute(key).unwrap_or_default();
+            Err(bad(format!("the {key} of its {} is not a number{}", shape.name, decimal_comma(text))))
+        }
     };
     let primitive = match shape.name.as_str() {
         "box" => {
-            let size = shape.attribute("size").and_then(numbers);
-            let [x, y, z] = size.ok_or_else(|| bad("the size of its box is not three numbers".to_owned()))?;
+            let text = shape.attribute("size").unwrap_or_default();
+            let none = || bad(format!("the size of its box is not three numbers{}", decimal_comma(text)));
+            let [x, y, z] = numbers(text).ok_or_else(none)?;
             let size = DVec3::new(positive(x, "size")?, positive(y, "size")?, positive(z, "size")?);
             Primitive::Cuboid { half: 0.5 * size }
         }
@@ -268,8 +374,17 @@ fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<Sh
 
 /// Mass properties as a link declares them, about their own origin, and the pose of that origin in the link. Terms that
 /// are missing or no numbers count as zero.
-fn inertial_of(link: &str, element: &Element) -> Result<Option<(MassProperties, Pose)>, String> {
+fn inertial_of(
+    link: &str,
+    element: &Element,
+    warnings: &mut Vec<String>,
+) -> Result<Option<(MassProperties, Pose)>, String> {
     let Some(inertial) = element.child("inertial") else { return Ok(None) };
+    let mass = inertial.child("mass").and_then(|mass| mass.attribute("value"));
+    if let Some(text) = mass.filter(|text| text.trim().parse::<f64>().is_err()) {
+        let shown: String = text.chars().take(40).collect();
+        warnings.push(format!("link \"{link}\": its mass \"{shown}\" is not a number{}", decimal_comma(text)));
+    }
     let term = |part: &str, key: &str| {
         let text = inertial.child(part).and_then(|part| part.attribute(key));
         text.and_then(|text| text.trim().parse().ok()).unwrap_or(0.0)
@@ -325,6 +440,75 @@ mod tests {
     }
 
     #[test]
+    fn friction_is_read_in_three_dialects() {
+        let of = |inside: &str, beside: &str, near: &str| {
+            let shape = "<geometry><sphere radius='0.02'/></geometry>";
+            let text = format!(
+                "<robot xmlns:drake='http://d'><link name='a'>{inside}<collision>{shape}{beside}</collision></link>{near}</robot>"
+            );
+            let read = blueprint(&text).expect("a URDF");
+            (read.friction, read.warnings.len())
+        };
+        assert_eq!(of("<contact><lateral_friction value='0.05'/></contact>", "", ""), (Some(0.05), 0));
+        assert_eq!(of("", "", "<gazebo reference='a'><mu1>0.3</mu1><mu2> 0.2 </mu2></gazebo>"), (Some(0.2), 0));
+        assert_eq!(of("", "", "<gazebo reference='b'><mu1>0.3</mu1></gazebo>"), (None, 0));
+        let drake = |value: &str| {
+            format!("<drake:proximity_properties><drake:mu_static value='{value}'/></drake:proximity_properties>")
+        };
+        assert_eq!(of("", &drake("0.4"), ""), (Some(0.4), 0));
+        assert_eq!(of("", &drake("-1"), ""), (None, 1));
+    }
+
+    #[test]
+    fn joints_stand_where_their_limits_and_followers_say() {
+        let of = |limit: &str, mimic: &str| {
+            let link = |name: &str| {
+                format!(
+                    "<link name='{name}'><collision><geometry><sphere radius='0.02'/></geometry></collision></link>"
+                )
+            };
+            let joint = |name: &str, child: &str, more: &str| {
+                format!(
+                    "<joint name='{name}' type='prismatic'><axis xyz='0 0 2'/><parent link='a'/><child link='{child}'/>{more}</joint>"
+                )
+            };
+            let parts = [link("a"), link("b"), link("c"), joint("j", "b", limit), joint("k", "c", mimic)];
+            let read = blueprint(&format!("<robot>{}</robot>", parts.concat())).expect("a URDF");
+            let heights = read.collision.iter().map(|solid| match solid {
+                palpate_geometry::SolidPart::Primitive(_, pose) => pose.position.z,
+                palpate_geometry::SolidPart::Mesh(_) => f64::NAN,
+            });
+            heights.skip(1).collect::<Vec<_>>()
+        };
+        assert_eq!(of("<limit lower='-1' upper='1'/>", ""), [0.0, 0.0]);
+        let limit = "<limit lower='0.004' upper='0.01'/>";
+        assert_eq!(of(limit, "<mimic joint='j' multiplier='-1' offset='0.006'/>"), [0.004, 0.002]);
+        assert_eq!(
+            of("<limit lower='-0.01' upper='-0.004'/>", "<mimic joint='gone' offset='0.003'/>"),
+            [-0.004, 0.003]
+        );
+    }
+
+    #[test]
+    fn other_encodings_are_read_and_decimal_commas_are_named() {
+        let text =
+            "<robot><link name='kör'><visual><geometry><box size='0.01 0.02 0.03'/></geometry></visual></link></robot>";
+        let read = |bytes: &[u8]| parse("thing", bytes, &|name| Err(MeshFileError::unreadable(name, "none")));
+        let wide: Vec<u16> = std::iter::once(0xFEFF).chain(text.encode_utf16()).collect();
+        let little: Vec<u8> = wide.iter().flat_map(|unit| unit.to_le_bytes()).collect();
+        let big: Vec<u8> = wide.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+        let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        for bytes in [little, big, latin] {
+            assert_eq!(read(&bytes).expect("read").visual.len(), 1);
+        }
+        let refused = |text: &str| read(text.as_bytes()).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused(&text.replace('.', ",")).contains("\"0,01 0,02 0,03\" has decimal commas"));
+        let twice = "<robot><link name='a'/><link name='a'/></robot>";
+        assert!(refused(twice).contains("two links are called \"a\""));
+        assert!(refused("version https://git-lfs.github.com/spec/v1").contains("git lfs pull"));
+    }
+
+    #[test]
     fn files_that_are_no_urdf_are_refused_with_the_reason() {
         let message = |text: &str| blueprint(text).map(|_| ()).expect_err("refused").to_string();
         assert!(message("").contains("no XML"));
@@ -333,7 +517,7 @@ mod tests {
         assert!(message("<robot><link></robot>").contains("well-formed"));
         assert!(message("<robot><link>").contains("cut short"));
         assert!(message(&"<robot>".repeat(10_000)).contains("nested"));
-        assert!(message("<html></html>").contains("<html>"));
+        assert!(message("<html></html>").contains("web page") && message("<svg/>").contains("<svg>"));
     }
 
     #[test]

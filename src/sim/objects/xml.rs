@@ -1,4 +1,4 @@
-//! XML elements with their attributes, text left out; tolerant of what hand-written files do to attributes.
+//! XML elements with their attributes and texts; tolerant of what hand-written files do to attributes.
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -8,10 +8,12 @@ const DEEPEST: usize = 64;
 /// Largest number of elements of one file.
 const MOST_ELEMENTS: usize = 100_000;
 
-/// XML element without its text.
+/// XML element.
 #[derive(Debug, Default)]
 pub(super) struct Element {
     pub(super) name: String,
+    /// Its own text, without that of its children.
+    pub(super) text: String,
     attributes: Vec<(String, String)>,
     pub(super) children: Vec<Self>,
 }
@@ -55,6 +57,11 @@ pub(super) fn parse(text: &str) -> Result<Element, String> {
                     parent.children.push(done);
                 }
             }
+            Event::Text(text) => {
+                if let Some(parent) = open.last_mut() {
+                    parent.text.push_str(&String::from_utf8_lossy(&text));
+                }
+            }
             Event::Eof => break,
             _ => {}
         }
@@ -82,5 +89,19 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
             attributes.push((key, value));
         }
     }
-    Ok(Element { name, attributes, children: Vec::new() })
+    Ok(Element { name, attributes, ..Element::default() })
+}
+
+/// The text of an XML file: UTF-8, UTF-16 with a byte-order mark, or Latin-1 where it is declared or nothing else fits.
+pub(super) fn decoded(bytes: &[u8]) -> String {
+    let wide = |from: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|pair| from(*pair)).collect();
+        String::from_utf16_lossy(&units)
+    };
+    match bytes {
+        [0xFF, 0xFE, ..] => wide(u16::from_le_bytes),
+        [0xFE, 0xFF, ..] => wide(u16::from_be_bytes),
+        _ => std::str::from_utf8(bytes)
+            .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect(), str::to_owned),
+    }
 }
