@@ -25,7 +25,7 @@
 //! let path = folder.path().join("grasps.csv");
 //! std::fs::write(&path, "trial,label,t_s,grip [N]\n1,mug,0.0,0\n1,mug,0.1,2.5\n")?;
 //! let import = read_trials(&path, None)?;
-//! assert_eq!(import.trials[0].signals.channels, ["grip"]);
+//! assert_eq!(import.trials[0].signals.channels, ["grip [N]"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

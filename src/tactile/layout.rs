@@ -5,6 +5,7 @@
 //! over pairs of joints, at every joint; C5 to C8 the same with the curvature of both halves. `+F` adds force as a
 //! channel of its own beside each contact pressure; a pad's pressure is its force already.
 
+use crate::unit::Dimension;
 use palpate_sim::gripper::{GripperModel, Side};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -168,13 +169,18 @@ impl Quantity {
         matches!(self, Self::Pressure | Self::ContactPressure)
     }
 
+    /// Its dimension.
+    pub fn dimension(self) -> Dimension {
+        match self {
+            Self::Curvature => Dimension::Curvature,
+            Self::Pressure | Self::ContactPressure => Dimension::Pressure,
+            Self::Force => Dimension::Force,
+        }
+    }
+
     /// The unit of its values.
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Curvature => "1/m",
-            Self::Pressure | Self::ContactPressure => "Pa",
-            Self::Force => "N",
-        }
+        self.dimension().unit()
     }
 }
 

@@ -17,12 +17,14 @@
 //! | 0 | [`board`] | sensors, readings and gaps of a board |
 //! | 0 | [`cadence`], [`capture`] | timing statistics of a stream, file format of captured bytes |
 //! | 0 | [`electronics`] | strip, pad, divider and converter |
-//! | 0 | `layout` | sensor layouts, their channels and the definition of their signals |
+//! | 0 | `unit` | units of readings, and their factors |
+//! | 1 | `layout` | sensor layouts, their channels and the definition of their signals |
 //! | 0 | `signals` | channels over time |
-//! | 1 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
-//! | 1 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |
-//! | 1 | [`model`] | sensor models: clean signals to those of real sensors |
-//! | 1 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
+//! | 2 | `column` | names of channels with units |
+//! | 2 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
+//! | 2 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |
+//! | 2 | [`model`] | sensor models: clean signals to those of real sensors |
+//! | 2 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
 //!
 //! # Example
 //!
@@ -43,6 +45,7 @@ pub mod board;
 pub mod cadence;
 pub mod calibration;
 pub mod capture;
+mod column;
 mod curvature;
 pub mod electronics;
 mod layout;
@@ -50,7 +53,9 @@ pub mod model;
 mod pressure;
 mod signals;
 pub mod trial;
+mod unit;
 
+pub use column::{channel_with_unit, unit_of_channel};
 pub use curvature::{curvature, strip_curvature};
 pub use layout::{
     CATALOGUE, Channel, CurvatureSplit, LayoutError, PressureSplit, Quantity, SensorLayout, SignalDefinition, Span,
@@ -58,6 +63,7 @@ pub use layout::{
 };
 pub use pressure::ContactPatch;
 pub use signals::Signals;
+pub use unit::{Dimension, KNOWN_UNITS, Unit};
 
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, GripperModel, Side, TaxelGrid};

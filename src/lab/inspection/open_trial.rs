@@ -15,7 +15,9 @@ use palpate_tactile::board::{Board, Gap, Sensor};
 use palpate_tactile::trial::{
     CorrectedPhases, GraspOrigin, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource,
 };
-use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, SignalDefinition, Signals, whole_fingers};
+use palpate_tactile::{
+    Channel, LayoutError, Quantity, Sensors, SignalDefinition, Signals, unit_of_channel, whole_fingers,
+};
 use std::sync::Arc;
 
 /// How a trial is opened.
@@ -292,13 +294,10 @@ impl OpenTrial {
                 let name = &replay.channels()[self.columns.len()];
                 let channel =
                     whole_fingers(SignalDefinition::Parts).into_iter().find(|channel| channel.name() == *name);
-                let unit = match (&channel, self.source) {
-                    (Some(channel), _) => channel.quantity.unit(),
-                    (None, TrialSource::Recorded) => "counts",
-                    (None, TrialSource::Simulated | TrialSource::Imported) => "",
-                };
+                let (own, unit) = unit_of_channel(name);
+                let unit = if self.source == TrialSource::Recorded && unit.is_empty() { "counts" } else { unit };
                 let values = vec![f32::NAN; self.t_s.len()];
-                self.columns.push(Column { name: name.clone(), channel, unit, values });
+                self.columns.push(Column { name: own.to_owned(), channel, unit, values });
             }
             while let Some(gap) = gaps.next_if(|gap| gap.from_s < row.t_s) {
                 self.push_gap(gap.from_s - began_s);

@@ -39,7 +39,9 @@ fn doubtful_headers() {
     let refused_header = |names: &str, essence: &str| refused(&format!("{names}\n"), &[essence]);
     refused_header("trial,label,t_s,p [Pa],p", "two columns are called \"p\"");
     refused_header("trial,label,t_s,T_s,p", "two columns are called \"t_s\"");
-    refused_header("trial,label,t_s [ms],p", "\"ms\"; times must be in seconds");
+    refused_header("trial,label,t_s [Pa],p", "\"Pa\" is no unit of time");
+    refused_header("trial,label,t_s,p [cups]", "\"cups\" is not a unit that is known (s, ms, us, ns; N,");
+    refused_header("trial,label,t_s,force_left [kPa]", "\"kPa\" is no unit of force");
     refused_header("trial,label,t_s,size", "one column per sensor channel");
     refused_header(&format!("trial,label,t_s,{}", "x".repeat(201)), "201 characters");
     let many = |count: usize| (0..count).map(|i| format!(",c{i}")).collect::<String>();
@@ -81,11 +83,15 @@ fn numbers_that_are_none() {
     rows_refused("a,x,0,,,1\na,x,1,,,oops\n", &["line 3: \"oops\" in the column \"p\" is not a number"]);
     rows_refused("a,x,0,,,oops\na,x,1,,,1\n", &["line 2: \"oops\"", "or remove the column"]);
     rows_refused("a,x,0,,,1\na,x,1,,,\"1,5\"\n", &["decimal commas need a semicolon"]);
-    rows_refused("a,x,0,,,-inf\n", &["line 2: \"-inf\" in the column \"p\" is infinite"]);
-    rows_refused("a,x,0,,,1e39\n", &["beyond 3.4e38"]);
+    for reading in ["-inf", "1e39", "9.9e37", "-9.91E+37"] {
+        rows_refused(
+            &format!("a,x,0,,,{reading}\n"),
+            &["line 2: ", reading, "in the column \"p\" is no reading", "over range"],
+        );
+    }
     rows_refused("a,x,nan,,,1\n", &["the time \"nan\" is not a number"]);
     rows_refused("a,x,inf,,,1\n", &["the time \"inf\""]);
-    rows_refused("a,x,1700000000000,,,1\n", &["1700000000000 s is beyond", "not in milliseconds"]);
+    rows_refused("a,x,1700000000000,,,1\n", &["1700000000000 s is beyond", "as in t_s [ms]"]);
 }
 
 #[test]
@@ -141,4 +147,23 @@ fn more_than_is_meant() {
     let readings = ",1".repeat(200);
     (0..50_000).for_each(|k| heavy.push_str(&format!("{},x,{}{readings}\n", k / 2, k % 2)));
     refused(&heavy, &["25000 trials with 200 channels each are too many"]);
+}
+
+#[test]
+fn two_decimal_signs_are_one_too_many() {
+    let of = |rows: &str| refused(&format!("trial;label;t_s;p\n{rows}"), &["separate thousands", "line 2"]);
+    of("a;x;0.000;2,000\n");
+    of("a;x;0,000;2.000\n");
+    refused("trial;label;t_s;p\na;x;0;1,5\na;x;1;2.5\n", &["line 3", "\"2.5\" with a point and \"1,5\" with a comma"]);
+}
+
+#[test]
+fn times_that_may_be_numbers_of_samples() {
+    let rows: String = (0..9).map(|k| format!("a,x,{k},{k}\n")).collect();
+    refused(&format!("trial,label,t_s,p\n{rows}"), &["line 2: the times rise by 1", "t_s [ms]"]);
+    for (unit, step_s) in [("s", 1.0), ("ms", 1e-3)] {
+        let import = read_csv(format!("trial,label,t_s [{unit}],p\n{rows}").as_bytes(), "f").expect("a unit is enough");
+        let t_s = &import.trials[0].signals.t_s;
+        assert!((t_s[8] - 8.0 * step_s).abs() < 1e-12, "{t_s:?}");
+    }
 }

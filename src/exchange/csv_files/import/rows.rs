@@ -5,9 +5,13 @@ use super::{
     brief,
 };
 use csv::ByteRecord;
+use palpate_tactile::{Dimension, Unit, channel_with_unit};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::str::FromStr;
+
+/// Readings from here on are no readings: instruments write 9.9e37 (SCPI-99, volume 1, 7.2.1) or infinity.
+const OVER_RANGE: f64 = 1e30;
 
 /// A fault with its line.
 pub(super) type Fault = (Option<u64>, String);
@@ -35,6 +39,8 @@ pub(super) struct RawTrial {
 pub(super) struct ChannelColumn {
     place: usize,
     pub(super) name: String,
+    /// Factor of its numbers to the unit in which they are kept.
+    factor: f64,
     /// It holds a number.
     pub(super) numeric: bool,
     /// Line and beginning of its first text.
@@ -55,6 +61,10 @@ pub(super) struct Rows {
     /// Fields of the header.
     width: usize,
     decimal_comma: bool,
+    /// Factor of times to seconds; none where the header names no unit.
+    time_factor: Option<f64>,
+    /// The first numbers with a point and with a comma, each with its line.
+    separators: [Option<(u64, String)>; 2],
     by_name: BTreeMap<String, usize>,
     readings: usize,
 }
@@ -69,12 +79,56 @@ pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result
     let mut record = ByteRecord::new();
     let empty =
         |what: &str| (None, format!("the file has no {what}; it should have a header and below it one row per sample"));
-    let line = next_row(&mut reader, &mut record)?.ok_or_else(|| empty("header"))?;
+    let line = loop {
+        let line = next_row(&mut reader, &mut record)?.ok_or_else(|| empty("header"))?;
+        match preamble(&record) {
+            Preamble::None => break line,
+            Preamble::Skipped => {}
+            Preamble::Header(own) => {
+                record = own;
+                break line;
+            }
+        }
+    };
     let mut rows = Rows::below(&record, separator != b',', warnings).map_err(|fault| (Some(line), fault))?;
     while let Some(line) = next_row(&mut reader, &mut record)? {
-        rows.add(line, &record)?;
+        if !record[0].starts_with(b"#") {
+            rows.add(line, &record)?;
+        }
     }
-    if rows.trials.is_empty() { Err(empty("row below its header")) } else { Ok(rows) }
+    if rows.trials.is_empty() {
+        return Err(empty("row below its header"));
+    }
+    rows.check_times()?;
+    Ok(rows)
+}
+
+/// What a row above the data is.
+enum Preamble {
+    None,
+    /// A remark after `#`, or the line `sep=;` of spreadsheets.
+    Skipped,
+    /// A header after `#`, as numpy writes it.
+    Header(ByteRecord),
+}
+
+fn preamble(record: &ByteRecord) -> Preamble {
+    let first = record[0].strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&record[0]).trim_ascii();
+    let Some(rest) = first.strip_prefix(b"#") else {
+        return if first.starts_with(b"sep=") { Preamble::Skipped } else { Preamble::None };
+    };
+    let fields: ByteRecord = std::iter::once(rest).chain(record.iter().skip(1)).collect();
+    if required_in(&fields) == REQUIRED.len() { Preamble::Header(fields) } else { Preamble::Skipped }
+}
+
+/// Columns that every file has.
+const REQUIRED: [&str; 3] = ["trial", "label", "t_s"];
+
+/// Number of the required columns in a header.
+fn required_in(header: &ByteRecord) -> usize {
+    let names = header.iter().filter_map(|field| name(field, "header").ok()).map(|text| without_unit(text).0);
+    let names: Vec<&str> = names.collect();
+    REQUIRED.iter().filter(|wanted| names.iter().any(|name| name.eq_ignore_ascii_case(wanted))).count()
 }
 
 /// Reads the next row that is not blank and returns the line on which it begins, or none at the end.
@@ -103,21 +157,27 @@ fn is_blank(record: &ByteRecord) -> bool {
 /// Of comma, semicolon and tab, the one that finds most of the required columns in the header, or else most columns.
 fn separator(head: &[u8]) -> u8 {
     let score = |separator: u8| {
-        let mut reader = csv::ReaderBuilder::new().delimiter(separator).has_headers(false).from_reader(head);
-        let header = reader.byte_records().filter_map(Result::ok).find(|r| !is_blank(r)).unwrap_or_default();
-        let names = header.iter().filter_map(|field| name(field, "header").ok()).map(|text| without_unit(text).0);
-        let required = names.filter(|name| ["trial", "label", "t_s"].iter().any(|r| r.eq_ignore_ascii_case(name)));
-        (required.count(), header.len())
+        let mut reader =
+            csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(head);
+        let rows = reader.byte_records().filter_map(Result::ok).filter(|row| !is_blank(row));
+        let header = rows.map(|row| match preamble(&row) {
+            Preamble::None => Some(row),
+            Preamble::Skipped => None,
+            Preamble::Header(own) => Some(own),
+        });
+        let header = header.flatten().next().unwrap_or_default();
+        (required_in(&header), header.len())
     };
     // The last of equals wins, and a comma is the likeliest.
     [b'\t', b';', b','].into_iter().max_by_key(|s| score(*s)).unwrap_or(b',')
 }
 
-/// `pressure_left [Pa]` is the name `pressure_left` and the unit `Pa`; also in round brackets.
+/// `pressure_left [Pa]` is the name `pressure_left` and the unit `Pa`; also in round brackets, where it is a unit.
 fn without_unit(text: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((name, unit)) = text.strip_suffix(close).and_then(|rest| rest.rsplit_once(open))
             && !name.trim().is_empty()
+            && (open == '[' || Unit::parse(unit).is_some())
         {
             return (name.trim(), Some(unit.trim()));
         }
@@ -131,6 +191,7 @@ fn name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, String> {
         format!("the column \"{column}\" holds bytes that are not UTF-8; save the file as \"CSV UTF-8\"")
     })?;
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
+    let text = text.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')).unwrap_or(text).trim();
     let length = text.chars().count();
     if length > LONGEST_NAME {
         return Err(format!(
@@ -164,8 +225,7 @@ impl Rows {
         let names = header.iter().map(|f| name(f, "header")).collect::<Result<Vec<_>, _>>()?;
         let names: Vec<(&str, Option<&str>)> = names.into_iter().map(without_unit).collect();
         let place = |wanted: &str| names.iter().position(|(name, _)| name.eq_ignore_ascii_case(wanted));
-        let missing: Vec<String> =
-            ["trial", "label", "t_s"].iter().filter(|n| place(n).is_none()).map(|n| format!("\"{n}\"")).collect();
+        let missing: Vec<String> = REQUIRED.iter().filter(|n| place(n).is_none()).map(|n| format!("\"{n}\"")).collect();
         let (Some(trial), Some(label), Some(time)) = (place("trial"), place("label"), place("t_s")) else {
             let mut found: Vec<String> = names.iter().filter(|n| !n.0.is_empty()).map(|n| brief(n.0)).collect();
             found.truncate(20);
@@ -175,18 +235,18 @@ impl Rows {
                  channel; the file has {found}"
             ));
         };
-        if let Some(unit) = names[time].1
-            && !["s", "sec", "second", "seconds"].iter().any(|s| unit.eq_ignore_ascii_case(s))
-        {
-            return Err(format!("the unit of t_s is \"{}\"; times must be in seconds", brief(unit)));
-        }
+        let of_time = |text: &str| Unit::parse(text).filter(|unit| unit.dimension == Dimension::Time);
+        let no_time = |text: &str| format!("\"{}\" is no unit of time; known are s, ms, us, ns and min", brief(text));
+        let time_factor = names[time].1.map(|text| of_time(text).ok_or_else(|| no_time(text))).transpose()?;
+        let time_factor = time_factor.map(|unit| unit.factor);
         let words = [place("size"), place("shape")];
         let known = [Some(trial), Some(label), Some(time), words[0], words[1]];
         let mut channels: Vec<ChannelColumn> = Vec::new();
-        for (at, (name, _)) in names.iter().enumerate().filter(|(at, n)| !n.0.is_empty() && !known.contains(&Some(*at)))
+        for (at, (name, unit)) in
+            names.iter().enumerate().filter(|(at, n)| !n.0.is_empty() && !known.contains(&Some(*at)))
         {
             let reserved = ["trial", "label", "t_s", "size", "shape"].iter().find(|r| r.eq_ignore_ascii_case(name));
-            if reserved.is_some() || channels.iter().any(|other| other.name == *name) {
+            if reserved.is_some() || channels.iter().any(|other| names[other.place].0 == *name) {
                 let name = brief(reserved.unwrap_or(name));
                 return Err(format!(
                     "two columns are called \"{name}\"; rename or remove one (units in brackets do not count)"
@@ -195,7 +255,8 @@ impl Rows {
             if channels.len() == MOST_CHANNELS {
                 return Err(format!("there are more than {MOST_CHANNELS} columns of readings; remove some"));
             }
-            channels.push(ChannelColumn { place: at, name: (*name).to_owned(), numeric: false, text: None });
+            let (name, factor) = unit.map_or(Ok(((*name).to_owned(), 1.0)), |unit| channel_with_unit(name, unit))?;
+            channels.push(ChannelColumn { place: at, name, factor, numeric: false, text: None });
         }
         if channels.is_empty() {
             return Err(no_channels());
@@ -207,7 +268,58 @@ impl Rows {
         }
         let (trials, labels, by_name) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
         let (required, width) = ([trial, label, time], names.len());
-        Ok(Self { trials, labels, channels, required, words, width, decimal_comma, by_name, readings: 0 })
+        Ok(Self {
+            trials,
+            labels,
+            channels,
+            required,
+            words,
+            width,
+            decimal_comma,
+            time_factor,
+            separators: [None, None],
+            by_name,
+            readings: 0,
+        })
+    }
+
+    /// Refuses times that may well be numbers of samples, unless the header names their unit.
+    fn check_times(&self) -> Result<(), Fault> {
+        const FEW: usize = 8;
+        let counts = |trial: &&RawTrial| {
+            trial.t_s.len() >= FEW
+                && trial.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+                && trial.t_s[0].fract() == 0.0
+        };
+        match self.trials.iter().find(counts).filter(|_| self.time_factor.is_none()) {
+            None => Ok(()),
+            Some(trial) => {
+                let text = "the times rise by 1 from row to row: seconds, milliseconds, or the numbers of the samples? Name \
+                            their unit in the header, as in t_s [ms] or t_s [s]; numbers of samples must become times";
+                Err((Some(trial.line), text.to_owned()))
+            }
+        }
+    }
+
+    /// A number of this file. A file that writes some with a point and some with a comma is refused: one of the two may
+    /// separate thousands.
+    fn number(&mut self, line: u64, field: &str) -> Result<Option<f64>, Fault> {
+        let Some(value) = number::<f64>(field, self.decimal_comma) else { return Ok(None) };
+        if self.decimal_comma
+            && let Some(kind) = [".", ","].iter().position(|separator| field.contains(separator))
+        {
+            self.separators[kind].get_or_insert_with(|| (line, brief(field)));
+            if let [Some((_, point)), Some((_, comma))] = &self.separators {
+                return Err((
+                    Some(line),
+                    format!(
+                        "the file writes \"{point}\" with a point and \"{comma}\" with a comma, one of which may separate \
+                         thousands; write all numbers without thousands separators and with the same decimal sign"
+                    ),
+                ));
+            }
+        }
+        Ok(Some(value))
     }
 
     /// Adds the row that begins at `line`.
@@ -230,23 +342,25 @@ impl Rows {
     /// Reads the channels. A column may hold text as long as it holds no number.
     fn row(&mut self, line: u64, record: &ByteRecord) -> Result<Vec<f32>, Fault> {
         let mut row = Vec::with_capacity(self.channels.len());
-        for channel in &mut self.channels {
-            let field = String::from_utf8_lossy(&record[channel.place]);
+        for at in 0..self.channels.len() {
+            let field = String::from_utf8_lossy(&record[self.channels[at].place]);
             let field = field.trim();
             let missing = ["", "na", "null"].iter().any(|word| field.eq_ignore_ascii_case(word));
-            let value = match number::<f32>(field, self.decimal_comma) {
-                _ if missing => f32::NAN,
-                Some(value) if value.is_infinite() => {
+            let read = if missing { Some(f64::NAN) } else { self.number(line, field)? };
+            let channel = &mut self.channels[at];
+            let value = match read {
+                Some(value) if value.abs() >= OVER_RANGE => {
                     return Err((
                         Some(line),
                         format!(
-                            "\"{}\" in the column \"{}\" is infinite or beyond 3.4e38; correct it, or leave the field empty",
+                            "\"{}\" in the column \"{}\" is no reading: instruments write such numbers for \"over range\"; \
+                             correct it, or leave the field empty",
                             brief(field),
                             brief(&channel.name)
                         ),
                     ));
                 }
-                Some(value) => value,
+                Some(value) => (value * channel.factor) as f32,
                 None => {
                     channel.text.get_or_insert_with(|| (line, brief(field)));
                     f32::NAN
@@ -278,7 +392,7 @@ impl Rows {
     fn store(&mut self, line: u64, record: &ByteRecord, row: &[f32]) -> Result<(), String> {
         let at = self.trial(line, record)?;
         self.check_words(record)?;
-        let now = self.time(&record[self.required[2]])?;
+        let now = self.time(line, &record[self.required[2]])?;
         let readings = self.readings + row.len();
         let trial = &mut self.trials[at];
         let name = || brief(&trial.name);
@@ -365,16 +479,17 @@ impl Rows {
     }
 
     /// A time (s).
-    fn time(&self, field: &[u8]) -> Result<f64, String> {
+    fn time(&mut self, line: u64, field: &[u8]) -> Result<f64, String> {
         let field = String::from_utf8_lossy(field);
         let field = field.trim();
         if field.is_empty() {
             return Err(empty_field("t_s"));
         }
-        match number::<f64>(field, self.decimal_comma) {
+        let factor = self.time_factor.unwrap_or(1.0);
+        match self.number(line, field).map_err(|(_, fault)| fault)?.map(|t| t * factor) {
             Some(t) if t.abs() <= FARTHEST_TIME_S => Ok(t),
             Some(t) if t.is_finite() => Err(format!(
-                "the time {t} s is beyond {FARTHEST_TIME_S} s; times are in seconds, not in milliseconds or microseconds"
+                "the time {t} s is beyond {FARTHEST_TIME_S} s; name the unit in the header if it is another, as in t_s [ms]"
             )),
             _ => Err(format!("the time \"{}\" is not a number of seconds", brief(field))),
         }
@@ -465,7 +580,7 @@ mod tests {
         };
         assert_eq!((found.required, found.words, found.width), ([5, 3, 2], [None, Some(4)], 7));
         let channels: Vec<(usize, &str)> = found.channels.iter().map(|c| (c.place, c.name.as_str())).collect();
-        assert_eq!((channels, warnings.len()), (vec![(1, "Pressure_Left"), (6, "k")], 1));
+        assert_eq!((channels, warnings.len()), (vec![(1, "Pressure_Left [Pa]"), (6, "k [1/m]")], 1));
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn a_regular_file_is_read_as_it_stands() {
         ]
     );
     let second = &import.trials[1].signals;
-    assert_eq!(second.channels, ["left", "right"]);
+    assert_eq!(second.channels, ["left [Pa]", "right [Pa]"]);
     assert_eq!(
         (second.t_s.as_slice(), second.values.as_slice()),
         ([5.0, 5.01].as_slice(), [3.0, 30.0, 4.0, 40.0].as_slice())
@@ -183,4 +183,32 @@ fn a_file_is_named_in_its_errors() {
     std::fs::File::create(&path).and_then(|file| file.set_len(LARGEST_FILE + 1)).expect("a hollow file");
     let large = read_file(&path).expect_err("too large").to_string();
     assert!(large.contains("larger than 2 GiB"), "{large}");
+}
+
+#[test]
+fn readings_in_any_unit_become_the_same() {
+    let plain = read(
+        "trial,label,t_s,pressure_left [Pa],curvature_right [1/m],force_left [N],grip [V]\na,x,0,1200,7.5,0.6,2\na,x,0.02,1300,7.75,0.65,2.5\n",
+    );
+    let other = "trial,label,t_s (ms),pressure_left [psi],curvature_right [1/mm],force_left [gf],grip [mV]\n";
+    let row = |t: f64, p: f64, k: f64, f: f64, g: f64| {
+        format!("a,x,{},{},{},{},{}\n", t * 1e3, p / 6_894.757_293_168_361, k * 1e-3, f / 9.806_65e-3, g * 1e3)
+    };
+    let import = read(&(other.to_owned() + &row(0.0, 1200.0, 7.5, 0.6, 2.0) + &row(0.02, 1300.0, 7.75, 0.65, 2.5)));
+    let [plain, other] = [&plain, &import].map(|import| &import.trials[0].signals);
+    assert_eq!(plain.channels, ["pressure_left", "curvature_right", "force_left", "grip [V]"]);
+    assert_eq!(other.channels, plain.channels);
+    let near = |(a, b): (&f32, &f32)| (a - b).abs() <= 2.0 * f32::EPSILON * a.abs();
+    assert!(plain.values.iter().zip(&other.values).all(near), "{:?} {:?}", plain.values, other.values);
+    assert_eq!(plain.t_s, other.t_s);
+}
+
+#[test]
+fn what_stands_above_the_header_is_skipped() {
+    let plain = read(GOLDEN);
+    for above in ["sep=,\n", "\u{feff}sep=,\r\n", "# logger v3\n# rig: bench, \"left\"\n", "# "] {
+        assert_eq!(read(&format!("{above}{GOLDEN}")), plain, "{above}");
+    }
+    assert_eq!(read(&GOLDEN.replace("\nb,", "\n# a remark, and another\nb,")), plain);
+    assert_eq!(read(&GOLDEN.replacen("trial,label,t_s", "'trial','label','t_s'", 1)), plain);
 }
