@@ -46,9 +46,11 @@ pub use csv_files::{
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
 
+use palpate_geometry::other_content;
 use palpate_store::{FileKind, Store, StoreError, TrialQuality};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
+use std::io::Read as _;
 use std::path::Path;
 
 /// CSV: a file for each trial.
@@ -84,7 +86,25 @@ pub fn write_trials(export: &TrialExport<'_>, path: &Path) -> Result<Written, Ex
 pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportError> {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let label = label.or(stem.as_deref()).unwrap_or("import");
-    format_of(path).unwrap_or(CSV).read(path, label)
+    let format = format_of(path).unwrap_or(CSV);
+    // An archive of NumPy is a ZIP archive by right.
+    if format.kind().endings() != ["npz"] {
+        let head = first_bytes(path).map_err(|cause| ImportError::of(path, cause))?;
+        if let Some(what) = other_content(&head) {
+            return Err(ImportError::of(path, what));
+        }
+    }
+    format.read(path, label)
+}
+
+/// The beginning of a regular file.
+fn first_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    let mut head = Vec::new();
+    std::fs::File::open(path)?.take(200).read_to_end(&mut head)?;
+    Ok(head)
 }
 
 /// Trials that are sound, and those that diverged, did not converge or did not come to rest: a file of another program would

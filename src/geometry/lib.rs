@@ -65,7 +65,7 @@ pub use grid_file::bake_once;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
-pub use mesh_files::{ColouredPart, MeshFileError, other_content, read_mesh};
+pub use mesh_files::{ColouredPart, MeshFileError, other_content, read_mesh, text_of};
 pub use modelling::{cube_sphere, rounded_box};
 pub use pose::Pose;
 pub use primitive::{Primitive, lathe};

@@ -207,6 +207,21 @@ fn lines(text: &str) -> impl Iterator<Item = &str> {
     text.split('\n').flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
 }
 
+/// The text of a file: UTF-8, UTF-16 with a byte-order mark, or Latin-1 where it is neither; without a mark.
+pub fn text_of(bytes: &[u8]) -> String {
+    let wide = |from: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|pair| from(*pair)).collect();
+        String::from_utf16_lossy(&units)
+    };
+    match bytes {
+        [0xFF, 0xFE, ..] => wide(u16::from_le_bytes),
+        [0xFE, 0xFF, ..] => wide(u16::from_be_bytes),
+        [0xEF, 0xBB, 0xBF, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
+        _ => std::str::from_utf8(bytes)
+            .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect(), str::to_owned),
+    }
+}
+
 /// What a file holds instead of what its name says, and the remedy: what version control and browsers leave behind.
 pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
     let head = &bytes[..bytes.len().min(200)];
@@ -365,6 +380,7 @@ mod tests {
             usual.replace("endsolid", "end solid").replace("endloop", "end loop").replace("endfacet", "end facet"),
             usual.replace("normal 0 0 1", "normal nan nan -1.#IND"),
             format!("# made by hand\n{usual}"),
+            format!("; from a scanner\n{usual}"),
             format!("solid a\n{facet}"),
         ];
         for text in others {

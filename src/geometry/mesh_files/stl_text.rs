@@ -10,25 +10,25 @@ const HEAD: usize = 2000;
 
 /// True for a text STL, false for a binary one, whose header may begin with the same word.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
-    let head = &bytes[..bytes.len().min(HEAD)];
-    let text = String::from_utf8_lossy(head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head)).to_ascii_lowercase();
-    let begins = super::lines(&text).map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
-    let is_solid = begins.is_some_and(|line| line.starts_with("solid") || line.starts_with("facet"));
-    is_solid
-        && !head.contains(&0)
-        && (text.contains("facet") || text.contains("endsolid") || text.contains("end solid"))
+    let text = super::text_of(&bytes[..bytes.len().min(HEAD) & !1]).to_ascii_lowercase();
+    let mut words = super::lines(&text).filter_map(|line| line.split_whitespace().next());
+    !text.contains('\0') && words.any(|word| ["facet", "endsolid", "end"].contains(&word))
 }
 
 /// The triangles of all solids of a file; the error is a sentence with the line.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
-    let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+    let text = super::text_of(bytes);
     let mut mesh = TriMesh::default();
-    let mut last = 0;
+    // Remarks may stand above the first solid.
+    let (mut last, mut begun) = (0, false);
     for (number, line) in (1..).zip(super::lines(&text)) {
         let mut words = line.split_whitespace();
         let Some(word) = words.next() else { continue };
         last = number;
-        match word.to_ascii_lowercase().as_str() {
+        let word = word.to_ascii_lowercase();
+        begun |= ["solid", "facet"].contains(&word.as_str());
+        match word.as_str() {
+            _ if !begun => {}
             "vertex" => {
                 let mut place = [0.0; 3];
                 for value in &mut place {

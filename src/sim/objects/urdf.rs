@@ -10,7 +10,7 @@ use super::assemble::{Blueprint, Inertial, ShapeSource};
 use super::xml::{self, Element};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::{ColouredPart, MassProperties, MeshFileError, Pose, Primitive, other_content};
+use palpate_geometry::{ColouredPart, MassProperties, MeshFileError, Pose, Primitive, other_content, text_of};
 use std::collections::HashMap;
 
 /// Reads meshes by the reference that the URDF makes to them.
@@ -98,7 +98,7 @@ fn robot_of(bytes: &[u8]) -> Result<Element, String> {
     if let Some(what) = other_content(bytes) {
         return Err(what.to_owned());
     }
-    let text = xml::decoded(bytes);
+    let text = text_of(bytes);
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.contains("${") || text.contains("$(") || text.contains("<xacro:") {
         return Err("it is a xacro template, not a URDF; run `xacro FILE > object.urdf` first".to_owned());

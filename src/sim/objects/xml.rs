@@ -91,17 +91,3 @@ fn element(start: &BytesStart<'_>) -> Result<Element, String> {
     }
     Ok(Element { name, attributes, ..Element::default() })
 }
-
-/// The text of an XML file: UTF-8, UTF-16 with a byte-order mark, or Latin-1 where it is declared or nothing else fits.
-pub(super) fn decoded(bytes: &[u8]) -> String {
-    let wide = |from: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|pair| from(*pair)).collect();
-        String::from_utf16_lossy(&units)
-    };
-    match bytes {
-        [0xFF, 0xFE, ..] => wide(u16::from_le_bytes),
-        [0xFE, 0xFF, ..] => wide(u16::from_be_bytes),
-        _ => std::str::from_utf8(bytes)
-            .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect(), str::to_owned),
-    }
-}

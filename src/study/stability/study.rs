@@ -26,7 +26,7 @@ pub struct StabilityPlan {
 
 impl StabilityPlan {
     /// The full form: hours of CPU time.
-    pub const FULL: Self = Self { thorough: true, grasps: 1000, scenes: 2000, seed: 1 };
+    pub const FULL: Self = Self { thorough: true, grasps: 1000, scenes: 4000, seed: 2 };
     /// The quick form: under a minute.
     pub const QUICK: Self = Self { thorough: false, grasps: 16, scenes: 5, seed: 1 };
 }

@@ -17,7 +17,15 @@ const MOST_ALIKE: usize = 100;
 pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<ImportedTrial>, Fault> {
     let numeric: Vec<bool> = rows.channels.iter().map(|channel| channel.numeric).collect();
     if !numeric.contains(&true) {
-        return Err((None, no_channels()));
+        let first =
+            rows.channels.iter().filter_map(|channel| channel.text.as_ref().map(|text| (text, &channel.name))).min();
+        return Err(first.map_or_else(
+            || (None, no_channels()),
+            |((line, text), name)| {
+                let (text, name) = (brief(text), brief(name));
+                (Some(*line), format!("\"{text}\" in the column \"{name}\" is not a number, and {}", no_channels()))
+            },
+        ));
     }
     for channel in rows.channels.iter().filter(|channel| !channel.numeric) {
         warnings.push(format!("the column \"{}\" holds no number and was left out", brief(&channel.name)));
@@ -111,6 +119,7 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     if total.saturating_mul(width) > MOST_VALUES {
         return Err((None, too_many_values()));
     }
+    warn_of_pauses(&trials, rate_hz, warnings);
     let mut changed_rates = Vec::new();
     for ((trial, samples), own_hz) in trials.iter_mut().zip(lengths).zip(rates) {
         let Some(samples) = samples else { continue };
@@ -127,6 +136,28 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
         warnings.push(format!("the trials have only {rate_hz} samples per second; check that t_s is in seconds"));
     }
     Ok(trials)
+}
+
+/// Missing samples from which on a pause is told.
+const PAUSE: f64 = 3.5;
+
+/// Tells where readings are missing for a while: a straight line stands there.
+fn warn_of_pauses(trials: &[RawTrial], rate_hz: f64, warnings: &mut Vec<String>) {
+    let mut alike = Alike::default();
+    for trial in trials {
+        for pair in trial.t_s.windows(2).filter(|pair| (pair[1] - pair[0]) * rate_hz - 1.0 > PAUSE) {
+            let missing = ((pair[1] - pair[0]) * rate_hz).round() - 1.0;
+            alike.warn(warnings, || {
+                format!(
+                    "trial \"{}\": no readings from {} s to {} s ({missing} samples); a straight line stands there",
+                    brief(&trial.name),
+                    three_digits(pair[0]),
+                    three_digits(pair[1])
+                )
+            });
+        }
+    }
+    alike.close(warnings, "pauses without readings");
 }
 
 /// Samples of a trial at the common rate.

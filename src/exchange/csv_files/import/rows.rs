@@ -44,7 +44,7 @@ pub(super) struct ChannelColumn {
     /// It holds a number.
     pub(super) numeric: bool,
     /// Line and beginning of its first text.
-    text: Option<(u64, String)>,
+    pub(super) text: Option<(u64, String)>,
 }
 
 /// All rows of a file.
@@ -398,11 +398,13 @@ impl Rows {
         let name = || brief(&trial.name);
         match trial.t_s.last() {
             Some(before) if *before > now => {
-                return Err(format!(
-                    "in trial \"{}\" the time falls from {before} s to {now} s; sort its rows, and give every grasp \
-                         a trial name of its own",
-                    name()
-                ));
+                let wrapped = (4294.0..4296.0).contains(before) && now < 1.0;
+                let advice = if wrapped {
+                    "a counter of microseconds starts again after 4294.97 s; add that to the times from here on"
+                } else {
+                    "sort its rows, and give every grasp a trial name of its own"
+                };
+                return Err(format!("in trial \"{}\" the time falls from {before} s to {now} s; {advice}", name()));
             }
             Some(before) if *before >= now => {
                 trial.repeated += 1;
