@@ -1,8 +1,8 @@
 """The three matched scenes as numbers, for the scripts beside this file; `scenes/*.toml` says the same to Palpate.
 
-A finger is N = 10 hinges at the middle of equal segments, each with a linear spring and damper; its skin is 20 balls of
-4 mm radius, 4 mm in front of the neutral axis, each on a linear spring of 1250 N/m across the finger and no damper. The scene is a mirror image
-of itself, so that one finger tells all: lengths in m, x inward from the palm, y from the palm to the tip.
+A finger is N = 10 hinges at the middle of equal segments, each with a linear spring and damper. Its skin is 20 pieces of
+rubber without damping, 8 mm high, with feet on the neutral axis and round tips of 4 mm radius, of 1250 N/m each: `pressing`
+has their law, with K = 1250 N/m times 8 mm. The scene is a mirror image of itself, so that one finger tells all: lengths in m, x inward from the palm, y from the palm to the tip.
 """
 
 import csv
@@ -21,7 +21,8 @@ N, LENGTH, MASS = 10, 0.1, 0.03
 STIFFNESS, DAMPING = 4.2e-3 / 0.01, 0.02 * 4.2e-3 / 0.01  # N m/rad, N m s/rad
 DEPTH = 0.020  # bellows and pad, for the inertia of a segment
 HALF_GAP, BALL, DROP = 0.050, 0.020, 0.086  # finger to middle, radius of the ball, palm to its centre
-TAXELS, SKIN, AHEAD, CONTACT = 20, 0.004, 0.004, 1250.0  # balls, their radius, distance from the axis, N/m
+TAXELS, SKIN, AHEAD, CONTACT = 20, 0.004, 0.004, 1250.0  # pieces, radius and centre of their tips, N/m
+HEIGHT = AHEAD + SKIN
 SHEAR, FRICTION = CONTACT / 3, 0.8  # N/m, -
 BALL_MASS, SUPPORT = 0.03, 1e4  # kg, N/m
 GRAVITY, TORQUE = 9.81, 0.06  # m/s2, N m at 1 bar
@@ -87,9 +88,40 @@ def palpate(program, scene, settings=(), accuracy="draft"):
     return q[every - 1 :: every], force[every - 1 :: every], report["cpu_ms"]
 
 
-def slanted(cosine):
-    """Stiffness of a taxel along a normal at this cosine to its axis, as a share of that along the axis."""
-    return 1 / (cosine**2 + (1 - cosine**2) * CONTACT / SHEAR)
+def skin():
+    """Feet along and above their segments, axes as (along, inward) and heights of all pieces. The feet of the last segment
+    stand back from its end, so that the pieces stay within the finger where they are widest."""
+    segment, along = (np.array(column) for column in zip(*taxels()))
+    room = lengths()[segment] - np.where(segment == N, np.sqrt(SKIN * HEIGHT), 0.0)
+    feet = np.minimum(along, room)
+    reach = np.stack([along - feet, np.full(TAXELS, HEIGHT)], axis=1)
+    heights = np.linalg.norm(reach, axis=1)
+    return feet, reach / heights[:, None], heights
+
+
+def pressing(foot, axis, height, ball):
+    """Normal and normal force of pieces of skin pressed by the ball; all (pieces, ..).
+
+    A piece is a spheroid about its foot with half-axes H along its axis and sqrt(rho H) across. It shrinks by one factor
+    s until it is clear of the ball, U = K H (1 - s)^2 / 2, and presses with -dU/dd, d its distance from the ball:
+
+        H s^2 = min over z of  z^2 / (H - rho) + phi(z)^2 / rho,   phi(z) = |foot + z axis - ball| - R
+    """
+    ahead = np.einsum("tx,tx->t", ball - foot, axis)
+    aside2 = np.maximum(np.einsum("tx,tx->t", ball - foot, ball - foot) - ahead**2, 0.0)
+    stem, most = height - SKIN, np.maximum(ahead, 0.0)
+    z = np.zeros_like(ahead)
+    for _ in range(30):
+        away = np.sqrt(aside2 + (z - ahead) ** 2)
+        slope, phi = (z - ahead) / away, away - BALL
+        first = z / stem + phi * slope / SKIN
+        second = 1 / stem + (slope**2 + phi * aside2 / away**3) / SKIN
+        z = np.clip(z - first / second, 0.0, most)
+    away = np.sqrt(aside2 + (z - ahead) ** 2)
+    phi = np.maximum(away - BALL, 1e-9)
+    stretch = np.sqrt((z**2 / stem + phi**2 / SKIN) / height)
+    normal = (foot + axis * z[:, None] - ball) / away[:, None]
+    return normal, CONTACT * HEIGHT * np.maximum(1 - stretch, 0.0) * phi / (SKIN * stretch)
 
 
 def rms_deg(a, b):

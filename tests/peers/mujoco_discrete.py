@@ -8,8 +8,8 @@ MuJoCo's contact is a spring of k_eff = k / ((1 - d) A) N/m, with d the constant
 `solref` and A the inverse inertia of the pair as the solver sees it. With `integrator="discrete"` that is the inertia
 M + h D + h^2 K, so that A changes with the step and with the pose (54, 34, 18, 2 1/kg at h = 0 .. 1/150 s): a stiffness
 in N/m cannot be asked for, only found. Here k of every pair is set from the mean A over its time of contact, anew for
-each step length; what remains is MuJoCo's. A taxel that meets the ball at an
-angle gives way sideways too (`matched.slanted`); the mean over the time of contact is asked for. Every contact also adds an inertia of d / ((1 - d) A): d = 0.001 makes that
+each step length; what remains is MuJoCo's. Its contact is that of two balls; the force of a
+piece of skin (`matched.pressing`) as a share of that of a spring at the same depth is averaged over the time of contact. Every contact also adds an inertia of d / ((1 - d) A): d = 0.001 makes that
 negligible. Friction in MuJoCo is a damper tied to the same d, so that the free sphere, which friction has to carry, needs
 d = 0.9 and impratio 100, the settings that hold best; the normal stiffness is matched all the same.
 
@@ -87,6 +87,24 @@ def model(name):
     return mujoco.MjModel.from_xml_string(xml)
 
 
+def piece_of(name):
+    """Number of a piece of skin by the name of its ball, as in left7_1."""
+    segment, k = name.lstrip("leftrigh").split("_")
+    return [j for j, _ in m.taxels()].index(int(segment)) + int(k)
+
+
+def skin_share(mj, data, pair, depth):
+    """Force of a piece of skin as a share of that of a spring of m.CONTACT at this depth."""
+    taxel, ball = mj.pair_geom1[pair], mj.pair_geom2[pair]
+    side = 1 if mj.geom(taxel).name.startswith("left") else -1
+    inward, _, up = (data.xmat[mj.geom_bodyid[taxel]].reshape(3, 3) * [side, 1, 1]).T
+    _, axes, heights = (column[piece_of(mj.geom(taxel).name)] for column in m.skin())
+    axis = axes[1] * inward - axes[0] * up
+    foot = data.geom_xpos[taxel] + m.SKIN * inward - heights * axis
+    _, force = m.pressing(foot[None], axis[None], heights, data.geom_xpos[ball])
+    return force[0] / (m.CONTACT * max(depth, 1e-6))
+
+
 def matched(name, h):
     """The model with each pair's stiffness set so that its contact is m.CONTACT N/m at steps of h."""
     mj = model(name)
@@ -114,9 +132,8 @@ def matched(name, h):
             if step % max(round(1 / 150 / h), 1) == 0:
                 for c in range(data.ncon):
                     pair = pair_of[frozenset(data.contact[c].geom)]
-                    axis = data.xmat[mj.geom_bodyid[mj.pair_geom1[pair]]].reshape(3, 3)[:, 0]
-                    cosine = abs(axis @ data.contact[c].frame[:3]) if on_skin[pair] else 1.0
-                    sums[pair] += data.efc_R[data.contact[c].efc_address] * d / (1 - d), m.slanted(cosine), 1
+                    share = skin_share(mj, data, pair, -data.contact[c].dist) if on_skin[pair] else 1.0
+                    sums[pair] += data.efc_R[data.contact[c].efc_address] * d / (1 - d), share, 1
         seen = sums[:, 2] > 0
         inverse[seen] = sums[seen, 0] / sums[seen, 2]
         slant[seen] = sums[seen, 1] / sums[seen, 2]

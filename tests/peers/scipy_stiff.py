@@ -24,7 +24,7 @@ MASS, INERTIA = m.masses(), m.inertias()
 ROOT_MASS = np.sqrt(MASS)
 TAXEL = [(j, s) for j, s in m.taxels() if j > 0]  # those on the fixed half segment touch nothing
 SEGMENT = np.array([j for j, _ in TAXEL])
-ALONG = np.array([s for _, s in TAXEL])
+FEET, AXES, HEIGHTS = (column[-len(TAXEL):] for column in m.skin())
 SLIP_TIME = 1e-4
 
 
@@ -57,25 +57,14 @@ class Scene:
         return np.swapaxes(quarter_turn(arms) * carried[:, :, None], 1, 2)
 
     def contacts(self, y, along, starts):
-        """Where each taxel touches, the ball, the normal there, normal force; all (taxels, ..).
-
-        A taxel is a strand: its ball is pushed back by c x along the normal, c the cosine between axis and normal and x the
-        way along the axis until it just touches. The strand gives way along its axis with k and sideways with k / 3, in
-        series along the normal: 1 / k_n = c^2 / k + 3 (1 - c^2) / k, and the force along the normal is k_n c x.
-        """
-        axis = quarter_turn(along[SEGMENT])
-        foot = starts[SEGMENT] + along[SEGMENT] * ALONG[:, None]
+        """Where each taxel touches: the ball, the normal there, normal force; all (taxels, ..)."""
+        ahead = along[SEGMENT]
+        axis = ahead * AXES[:, :1] + quarter_turn(ahead) * AXES[:, 1:]
+        foot = starts[SEGMENT] + ahead * FEET[:, None]
         height = y[2 * m.N] if self.free else 0.0
         ball = np.array([m.HALF_GAP, m.DROP - height])
-        ahead = np.einsum("tx,tx->t", ball - foot, axis)
-        reach = m.SKIN + m.BALL
-        aside = np.sum((ball - foot - axis * ahead[:, None]) ** 2, axis=1)
-        half_chord = np.sqrt(np.maximum(reach**2 - aside, 0.0))
-        centre = ahead - half_chord
-        pushed = np.where(aside < reach**2, np.maximum(m.AHEAD - centre, 0.0), 0.0)
-        normal = (foot + axis * centre[:, None] - ball) / reach
-        cosine = np.maximum(half_chord / reach, 0.02)
-        return ball, normal, m.CONTACT * pushed * cosine * m.slanted(cosine)
+        normal, force = m.pressing(foot, axis, HEIGHTS, ball)
+        return ball, normal, force
 
     def rate(self, _t, y):
         q, qd = y[: m.N], y[m.N : 2 * m.N]

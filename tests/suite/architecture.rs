@@ -34,6 +34,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("csv", &["src/exchange/csv_files"]),
     ("ctrlc", &["src/cli/interrupt.rs"]),
     ("directories", &["src/sim/objects/assemble.rs", "src/store/store.rs"]),
+    ("earcut", &["src/geometry/mesh_files"]),
     ("eframe", &["src/app"]),
     ("egui", &["src/app"]),
     ("egui_plot", &["src/app"]),
@@ -78,10 +79,10 @@ const HOMES: &[(&str, &[&str])] = &[
     ("serde_json", &["src"]),
     ("serialport", &["src/device/serial", "src/device/emulator/port.rs"]),
     ("statrs", &["src/learn/metrics", "src/tactile/calibration/straight_line.rs"]),
-    ("stl_io", &["src/geometry/mesh_files.rs"]),
+    ("stl_io", &["src/geometry/mesh_files"]),
     ("strsim", &["src/sim/objects", "src/sim/scene"]),
     ("thiserror", &["src"]),
-    ("tobj", &["src/geometry/mesh_files.rs"]),
+    ("tobj", &["src/geometry/mesh_files"]),
     ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs"]),
     ("tracing", &["src"]),
     ("tracing_subscriber", &["src/cli/terminal.rs"]),
@@ -261,9 +262,9 @@ fn files_do_not_import_each_other() {
 fn imports_are_found_through_re_exports() {
     let sources = sources("geometry");
     let imports = sources.imports();
-    assert!(imports["mesh_files.rs"].contains("mesh.rs"), "{imports:?}");
+    assert!(imports["mesh_files/mod.rs"].contains("mesh.rs"), "{imports:?}");
     assert!(imports["drawing/overlay.rs"].contains("palette.rs"), "{imports:?}");
-    assert!(related("drawing/mod.rs", "drawing/camera.rs") && !related("mesh.rs", "mesh_files.rs"));
+    assert!(related("drawing/mod.rs", "drawing/camera.rs") && !related("mesh.rs", "mesh_files/mod.rs"));
 }
 
 #[test]

@@ -324,7 +324,7 @@ fn a_model_is_taught_an_object_by_its_file() {
 
     // It knows the new object, and the others as well as before.
     let objects = "carton.urdf,lemon,case,smallbutton";
-    json(at, &["collect", "--objects", objects, "--trials", "10", "--preset", "B", "--seed", "99", "--json"]);
+    json(at, &["collect", "--objects", objects, "--trials", "10", "--preset", "B", "--seed", "98", "--json"]);
     let trials: Vec<String> = (1..=40).map(|id| id.to_string()).collect();
     let mut arguments = vec!["recognise", "--model", "m.safetensors", "--json"];
     arguments.extend(trials.iter().map(String::as_str));

@@ -292,8 +292,9 @@ impl Blueprint {
                 SolidPart::Mesh(mesh) => mass_properties(mesh, options.density),
             })
             .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
-        let from_shape =
-            if several && !self.overlap_is_denser { self.without_overlap(sum, solids, options.density) } else { sum };
+        let overlap =
+            (several && !self.overlap_is_denser).then(|| without_overlap(&sum, solids, options.density)).flatten();
+        let from_shape = overlap.unwrap_or(sum);
         let from_shape = self.sound_or_boxed(from_shape, solids);
         let declared = self
             .inertials
@@ -312,8 +313,12 @@ impl Blueprint {
         } else {
             if options.mass.is_none() {
                 let (density, grams) = (options.density, three_digits(from_shape.mass * 1e3));
+                let share = overlap.map(|union| 100.0 * (1.0 - union.mass / sum.mass));
+                let shared = share.map_or_else(String::new, |share| {
+                    format!(" (its parts overlap by {share:.0} % of theirs, which counts once)")
+                });
                 self.warnings.push(format!(
-                    "\"{}\" gives no usable mass; {grams} g follow from its volume at {density} kg/m³",
+                    "\"{}\" gives no usable mass; {grams} g follow from its volume at {density} kg/m³{shared}",
                     self.name
                 ));
             }
@@ -355,18 +360,6 @@ impl Blueprint {
 const OVERLAP: f64 = 2e-3;
 
 impl Blueprint {
-    /// Mass properties in which what several pieces share counts once. The plain sum is exact where they share nothing.
-    fn without_overlap(&mut self, sum: MassProperties, solids: &[SolidPart], density: f64) -> MassProperties {
-        let union = union_mass(solids, density);
-        if union.mass > (1.0 - OVERLAP) * sum.mass || union.mass <= 0.0 {
-            return sum;
-        }
-        let share = 100.0 * (1.0 - union.mass / sum.mass);
-        self.warnings
-            .push(format!("parts of \"{}\" overlap by {share:.0} % of their volume, which counts once", self.name));
-        union
-    }
-
     /// Mass properties that a body can have: those computed, or where a tangled mesh gives impossible ones, those of a
     /// box around it.
     fn sound_or_boxed(&mut self, computed: MassProperties, solids: &[SolidPart]) -> MassProperties {
@@ -384,6 +377,13 @@ impl Blueprint {
         };
         cuboid.mass_properties().with_mass(mass).seen_from(&Pose::from_position(bounds.centre()))
     }
+}
+
+/// Mass properties of several pieces where what they share counts once; none where they share nothing, for which their plain sum
+/// is exact.
+fn without_overlap(sum: &MassProperties, solids: &[SolidPart], density: f64) -> Option<MassProperties> {
+    let union = union_mass(solids, density);
+    (union.mass > 0.0 && union.mass < (1.0 - OVERLAP) * sum.mass).then_some(union)
 }
 
 /// Declared inertias off by more than this factor per kilogram are unit errors or placeholders, not hollow bodies.

@@ -64,7 +64,9 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
 
     /// Origin of the result, as a line below a table or picture.
     pub fn origin(&self) -> String {
-        format!("`{}`, {}, version {}", self.command, self.cpu_time(), self.program)
+        let today = program();
+        let older = if self.program == today { String::new() } else { format!(", not repeated with {today}") };
+        format!("`{}`, {}, version {}{older}", self.command, self.cpu_time(), self.program)
     }
 
     /// The origin without Markdown, for pictures and terminals.
