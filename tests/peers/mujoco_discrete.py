@@ -40,17 +40,19 @@ BASE = 0.156  # height of the palm: pedestal 50 mm, half the ball, 86 mm
 def finger(side, sign):
     """Nested bodies; the hinge axis turns the tip towards the other finger."""
     lengths, masses, inertias = m.lengths(), m.masses(), m.inertias()
+    feet, axes, heights = m.skin()
+    tips = np.stack([feet, np.zeros(m.TAXELS)], axis=1) + axes * (heights - m.SKIN)[:, None]
     balls = {}
-    for j, along in m.taxels():
-        balls.setdefault(j, []).append(along)
+    for (j, _), tip in zip(m.taxels(), tips):
+        balls.setdefault(j, []).append(tip)
     text, close = "", ""
     for j in range(1, m.N + 1):
         text += f'<body name="{side}{j}" pos="0 0 {-lengths[j - 1]}">'
         text += f'<joint type="hinge" axis="0 {-sign} 0" stiffness="{m.STIFFNESS}" damping="{m.DAMPING}"/>'
         i = inertias[j]
         text += f'<inertial pos="0 0 {-lengths[j] / 2}" mass="{masses[j]}" diaginertia="{i} {i} {i}"/>'
-        for k, along in enumerate(balls.get(j, [])):
-            text += f'<geom name="{side}{j}_{k}" type="sphere" size="{m.SKIN}" pos="{sign * m.AHEAD} 0 {-along}" '
+        for k, (along, above) in enumerate(balls.get(j, [])):
+            text += f'<geom name="{side}{j}_{k}" type="sphere" size="{m.SKIN}" pos="{sign * above} 0 {-along}" '
             text += 'mass="0"/>'
         close += "</body>"
     return f'<body name="{side}0" pos="{-sign * m.HALF_GAP} 0 {BASE}">' + text + close + "</body>"
@@ -95,12 +97,13 @@ def piece_of(name):
 
 def skin_share(mj, data, pair, depth):
     """Force of a piece of skin as a share of that of a spring of m.CONTACT at this depth."""
-    taxel, ball = mj.pair_geom1[pair], mj.pair_geom2[pair]
+    both = mj.pair_geom1[pair], mj.pair_geom2[pair]
+    ball, taxel = both if mj.geom(both[0]).name == "ball" else both[::-1]
     side = 1 if mj.geom(taxel).name.startswith("left") else -1
     inward, _, up = (data.xmat[mj.geom_bodyid[taxel]].reshape(3, 3) * [side, 1, 1]).T
     _, axes, heights = (column[piece_of(mj.geom(taxel).name)] for column in m.skin())
     axis = axes[1] * inward - axes[0] * up
-    foot = data.geom_xpos[taxel] + m.SKIN * inward - heights * axis
+    foot = data.geom_xpos[taxel] - (heights - m.SKIN) * axis
     _, force = m.pressing(foot[None], axis[None], heights, data.geom_xpos[ball])
     return force[0] / (m.CONTACT * max(depth, 1e-6))
 

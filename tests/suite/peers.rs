@@ -28,7 +28,7 @@ fn stored(name: &str) -> Vec<Row> {
 
 fn palpate(scene: &str) -> (Scene, SimulatedTrial) {
     let mut scene = Scene::from_file(&folder().join(format!("scenes/{scene}.toml"))).unwrap();
-    scene.solver.accuracy = "1e-5".parse().unwrap();
+    scene.solver.accuracy = "1e-6".parse().unwrap();
     let object = scene.load_object().unwrap();
     let trial = grasp(&scene, object.as_ref(), 0);
     assert!(trial.data.quality.finite && trial.data.quality.converged);
