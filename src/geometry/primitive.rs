@@ -25,6 +25,34 @@ pub enum Primitive {
     },
 }
 
+/// A line that lies inside as a whole.
+const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// Stretch of a line inside a ball about the origin.
+fn inside_ball(from: DVec3, way: DVec3, radius: f64) -> Option<[f64; 2]> {
+    let (a, b, c) = (way.length_squared(), from.dot(way), from.length_squared() - radius * radius);
+    if a == 0.0 {
+        return (c < 0.0).then_some(EVERYWHERE);
+    }
+    let root = (b * b - a * c).sqrt();
+    root.is_finite().then(|| [(-b - root) / a, (-b + root) / a])
+}
+
+/// Stretch of a line between two planes at plus and minus `half` along an axis.
+fn inside_slab(from: f64, way: f64, half: f64) -> Option<[f64; 2]> {
+    if way == 0.0 {
+        return (from.abs() < half).then_some(EVERYWHERE);
+    }
+    let (a, b) = ((-half - from) / way, (half - from) / way);
+    Some([a.min(b), a.max(b)])
+}
+
+/// What two stretches have in common.
+fn common([a, b]: [f64; 2], [c, d]: [f64; 2]) -> Option<[f64; 2]> {
+    let both = [a.max(c), b.min(d)];
+    (both[0] < both[1]).then_some(both)
+}
+
 impl Primitive {
     /// Signed distance (m) to the surface, negative inside.
     #[inline]
@@ -41,6 +69,28 @@ impl Primitive {
             }
             Self::Capsule { radius, half_length } => {
                 (p - DVec3::Z * p.z.clamp(-half_length, half_length)).length() - radius
+            }
+        }
+    }
+
+    /// Stretch of the line `from + t way` that lies inside, as the least and the largest t.
+    pub fn stretch_along(&self, from: DVec3, way: DVec3) -> Option<[f64; 2]> {
+        match *self {
+            Self::Sphere { radius } => inside_ball(from, way, radius),
+            Self::Cuboid { half } => {
+                let slabs = [0, 1, 2].map(|k| inside_slab(from[k], way[k], half[k]));
+                slabs.into_iter().try_fold(EVERYWHERE, |own, slab| common(own, slab?))
+            }
+            Self::Cylinder { radius, half_length } => {
+                let flat = |p: DVec3| DVec3::new(p.x, p.y, 0.0);
+                common(inside_ball(flat(from), flat(way), radius)?, inside_slab(from.z, way.z, half_length)?)
+            }
+            Self::Capsule { radius, half_length } => {
+                let ball = |z: f64| inside_ball(from - DVec3::Z * z, way, radius);
+                let straight = Self::Cylinder { radius, half_length }.stretch_along(from, way);
+                let parts = [straight, ball(half_length), ball(-half_length)].into_iter().flatten();
+                // The whole is convex.
+                parts.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
             }
         }
     }
@@ -237,6 +287,31 @@ mod tests {
         Primitive::Cylinder { radius: 0.0175, half_length: 0.03 },
         Primitive::Capsule { radius: 0.01, half_length: 0.02 },
     ];
+
+    #[test]
+    fn a_line_is_inside_where_its_distance_is_negative() {
+        let shapes = [
+            Primitive::Sphere { radius: 0.02 },
+            Primitive::Cuboid { half: DVec3::new(0.01, 0.02, 0.03) },
+            Primitive::Cylinder { radius: 0.01, half_length: 0.02 },
+            Primitive::Capsule { radius: 0.01, half_length: 0.02 },
+        ];
+        for shape in shapes {
+            for k in 0..200u32 {
+                let unit = |m: u32| f64::from(k.wrapping_mul(m) % 1009) / 1009.0 - 0.5;
+                let from = DVec3::new(unit(7919), unit(104_729), unit(15_485_863)) * 0.06;
+                let ways = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(unit(31), unit(37), unit(41))];
+                let way = ways[k as usize % 4];
+                let found = shape.stretch_along(from, way);
+                for n in -200..=200 {
+                    let t = f64::from(n) * 1e-3;
+                    let distance = shape.distance(from + way * t);
+                    let inside = found.is_some_and(|[a, b]| a < t && t < b);
+                    assert!(distance.abs() < 1e-9 || inside == (distance < 0.0), "{shape:?} {from} {way} {t}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn distances_match_closed_forms() {

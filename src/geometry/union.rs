@@ -122,32 +122,19 @@ fn through_mesh(lines: &Lines, mesh: &TriMesh, stretches: &mut Vec<Stretch>) {
     }
 }
 
-/// The stretches inside a convex primitive, found by its distance.
+/// The stretches inside a primitive, which is convex.
 fn through_primitive(lines: &Lines, part: &SolidPart, stretches: &mut Vec<Stretch>) {
     let SolidPart::Primitive(shape, pose) = part else { return };
     let (bounds, inverse) = (part.bounds(), pose.inverse());
     // Round ones reach beyond the flat facets that bound them.
     let [low, high] = [bounds.min - 0.01 * bounds.size(), bounds.max + 0.01 * bounds.size()].map(|p| p.to_array());
     let [along, u, v] = lines.axes;
-    let fine = 1e-7 * bounds.size().max_element();
+    let way = inverse.direction(lines.point(1.0, [0.0; 2]));
     for i in lines.between(0, low[u], high[u]) {
         for j in lines.between(1, low[v], high[v]) {
-            let across = lines.across([i, j]);
-            let reach = |from: f64, way: f64| {
-                let mut x = from;
-                while (low[along]..=high[along]).contains(&x) {
-                    let distance = shape.distance(inverse.point(lines.point(x, across)));
-                    if distance < fine {
-                        return Some(x);
-                    }
-                    x += way * distance;
-                }
-                None
-            };
-            if let (Some(from), Some(to)) = (reach(low[along], 1.0), reach(high[along], -1.0))
-                && from < to
-            {
-                stretches.push((i * LINES + j, from, to));
+            let from = inverse.point(lines.point(lines.corner[along], lines.across([i, j])));
+            if let Some([a, b]) = shape.stretch_along(from, way) {
+                stretches.push((i * LINES + j, lines.corner[along] + a, lines.corner[along] + b));
             }
         }
     }

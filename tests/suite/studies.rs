@@ -49,6 +49,9 @@ fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult 
         let is_older = NOT_REPEATED.contains(&key);
         assert_eq!(stored.program != program(), is_older, "{key}: {}; run the study again", stored.program);
         assert_eq!(stored.origin().contains("not repeated with"), is_older);
+        if is_older {
+            continue;
+        }
         let plan = StudyPlan::of_size(StudySize::Full);
         let today = study_fingerprint(*study, &plan);
         assert!(is_current(&stored.result, *study, &plan), "{key}: other recognisers ({today}); run the study again");
