@@ -6,6 +6,7 @@ use palpate_device::emulator::{
 };
 #[cfg(unix)]
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
+use palpate_geometry::read_text;
 use palpate_sim::objects::anchored;
 
 /// Arguments of `palpate emulate`.
@@ -131,7 +132,7 @@ fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
             let wrong = |why: String| {
                 format!("{}: {why}. `palpate emulate --print-secrets` prints a valid file", path.display())
             };
-            let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+            let text = read_text(path, LARGEST_FILE).map_err(|e| wrong(e.to_string()))?;
             let parts: HiddenParts = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
             parts.check().map_err(|error| wrong(error.to_string()))?;
             parts
@@ -147,11 +148,14 @@ fn parts(arguments: &EmulateArguments) -> Result<HiddenParts, Failure> {
     Ok(parts)
 }
 
+/// Largest file of a script or of hidden parts (bytes).
+const LARGEST_FILE: u64 = 1 << 20;
+
 /// Reads the script from the argument or from the file it names.
 fn script(arguments: &EmulateArguments) -> Result<Vec<Step>, Failure> {
     let Some(given) = arguments.script.as_deref().filter(|script| *script != "-") else { return Ok(Vec::new()) };
     let path = std::path::Path::new(given);
-    let text = if path.is_file() { std::fs::read_to_string(path)? } else { given.to_owned() };
+    let text = if path.is_file() { read_text(path, LARGEST_FILE)? } else { given.to_owned() };
     steps(&text)
 }
 

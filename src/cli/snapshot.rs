@@ -121,10 +121,13 @@ pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result
     arguments.out.as_ref().map_or(Ok(()), |out| say(out.display()))
 }
 
+/// Largest picture to compare with (bytes).
+const LARGEST_PICTURE: u64 = 256 << 20;
+
 fn golden(path: &Path) -> Result<Picture, Failure> {
     let named =
         |cause: &dyn std::fmt::Display| -> Failure { format!("cannot read \"{}\": {cause}", path.display()).into() };
-    let bytes = std::fs::read(path).map_err(|e| named(&e))?;
+    let bytes = palpate_geometry::read_regular(path, LARGEST_PICTURE).map_err(|e| named(&e))?;
     Picture::from_png(&bytes).map_err(|e| named(&e))
 }
 

@@ -46,7 +46,7 @@ pub use csv_files::{
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
 
-use palpate_geometry::other_content;
+use palpate_geometry::{open_regular, other_content};
 use palpate_store::{FileKind, Store, StoreError, TrialQuality};
 use palpate_tactile::trial::TrialId;
 use std::collections::BTreeSet;
@@ -97,13 +97,10 @@ pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportErr
     format.read(path, label)
 }
 
-/// The beginning of a regular file.
+/// The beginning of a file.
 fn first_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
     let mut head = Vec::new();
-    std::fs::File::open(path)?.take(200).read_to_end(&mut head)?;
+    open_regular(path)?.take(200).read_to_end(&mut head)?;
     Ok(head)
 }
 

@@ -9,6 +9,7 @@
 //! | 0 | [`units`] | conversions to and from SI units |
 //! | 0 | [`palette`] | colours, themes and colour maps |
 //! | 0 | `circle`, `hull` | curvature of tracked points; area of a planar hull |
+//! | 0 | `file` | files that people name: regular ones, up to a size |
 //! | 0 | `finish` | looks of surfaces beside their colour |
 //! | 0 | `pose` | position and orientation of a frame |
 //! | 1 | `mesh` | triangle meshes and bounds |
@@ -39,6 +40,7 @@ mod circle;
 mod convex;
 mod distance;
 pub mod drawing;
+mod file;
 mod finish;
 mod grid_file;
 mod hollows;
@@ -60,12 +62,13 @@ pub use bake::{BakeError, SolidPart, bake, choose_cell};
 pub use circle::signed_curvature;
 pub use convex::convex_hull;
 pub use distance::{DistanceField, DistanceGrid};
+pub use file::{open_regular, other_content, read_regular, read_text, text_of};
 pub use finish::Finish;
 pub use grid_file::bake_once;
 pub use hull::convex_hull_area;
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::{Bounds, TriMesh};
-pub use mesh_files::{ColouredPart, MeshFileError, other_content, read_mesh, text_of};
+pub use mesh_files::{ColouredPart, MeshFileError, read_mesh};
 pub use modelling::{cube_sphere, rounded_box};
 pub use pose::Pose;
 pub use primitive::{Primitive, lathe};

@@ -110,7 +110,11 @@ impl Model {
     /// Reads a model from a file.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
         let unreadable = |cause: std::io::Error| unreadable(path, &cause);
-        let size = std::fs::metadata(path).map_err(unreadable)?.len();
+        let about = std::fs::metadata(path).map_err(unreadable)?;
+        if !about.is_file() {
+            return Err(ModelError::malformed(&path.display().to_string(), "it is not a regular file"));
+        }
+        let size = about.len();
         if size > LARGEST_FILE {
             return Err(ModelError::malformed(&path.display().to_string(), format!("{size} bytes is too large")));
         }

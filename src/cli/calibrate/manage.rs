@@ -205,11 +205,7 @@ const LARGEST_FILE: u64 = 1 << 24;
 
 fn import(store: &mut Store, file: &Path) -> Result<(), Failure> {
     let refuse = |cause: String| format!("cannot import \"{}\": {cause}", file.display());
-    let size = std::fs::metadata(file).map_err(|e| refuse(e.to_string()))?.len();
-    if size > LARGEST_FILE {
-        return Err(refuse(format!("{size} bytes are too many for calibrations")).into());
-    }
-    let text = std::fs::read_to_string(file).map_err(|e| refuse(e.to_string()))?;
+    let text = palpate_geometry::read_text(file, LARGEST_FILE).map_err(|e| refuse(e.to_string()))?;
     let others: Vec<StoredCalibration> = serde_json::from_str(&text)
         .map_err(|e| refuse(format!("not a list of calibrations as written by `palpate calibrate export` ({e})")))?;
     for other in &others {

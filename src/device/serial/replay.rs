@@ -18,7 +18,7 @@ pub(super) struct Replay {
 
 impl Replay {
     pub(super) fn open(path: &Path, speed: f64) -> Result<Self, PortError> {
-        let file = File::open(path).map_err(|error| PortError::capture(path, error.to_string()))?;
+        let file = palpate_geometry::open_regular(path).map_err(|error| PortError::capture(path, error.to_string()))?;
         let pieces = CaptureReader::new(BufReader::new(file));
         let pieces = pieces.map_err(|error| PortError::capture(path, error.to_string()))?;
         Ok(Self { pieces, speed })

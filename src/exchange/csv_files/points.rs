@@ -25,7 +25,7 @@ fn stimulus_columns(kind: SensorKind) -> &'static [(&'static str, f64)] {
 pub fn read_points_csv(path: &Path, kind: SensorKind) -> Result<Vec<Point>, PointsError> {
     let name = path.display();
     let unreadable = |cause: String| PointsError(format!("cannot read the points \"{name}\": {cause}"));
-    let file = std::fs::File::open(path).map_err(|e| unreadable(e.to_string()))?;
+    let file = palpate_geometry::open_regular(path).map_err(|e| unreadable(e.to_string()))?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(file);
     let headers = reader.headers().map_err(|e| unreadable(e.to_string()))?.clone();
     let column = |name: &str| headers.iter().position(|header| header.eq_ignore_ascii_case(name));

@@ -10,7 +10,6 @@ use palpate_sim::objects::catalogue;
 use palpate_store::ImportedTrial;
 use palpate_tactile::Signals;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -24,7 +23,7 @@ const LONGEST_NAME: usize = 200;
 
 /// Reads the trials of an MCAP file. A file of another program is one trial with this label.
 pub(super) fn read_mcap(path: &Path, label: &str) -> Result<Import, ImportError> {
-    let file = File::open(path).map_err(|cause| ImportError::of(path, cause))?;
+    let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
     read_bag(BufReader::new(file), &file_name(path), label)
 }
 

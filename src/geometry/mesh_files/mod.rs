@@ -3,6 +3,7 @@
 mod obj_text;
 mod stl_text;
 
+use crate::file::other_content;
 use crate::palette::Rgb;
 use crate::{Finish, TriMesh};
 use glam::DVec3;
@@ -205,40 +206,6 @@ fn without_normals(mut bytes: Vec<u8>) -> Vec<u8> {
 /// Lines of a text with any line ends.
 fn lines(text: &str) -> impl Iterator<Item = &str> {
     text.split('\n').flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
-}
-
-/// The text of a file: UTF-8, UTF-16 with a byte-order mark, or Latin-1 where it is neither; without a mark.
-pub fn text_of(bytes: &[u8]) -> String {
-    let wide = |from: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|pair| from(*pair)).collect();
-        String::from_utf16_lossy(&units)
-    };
-    match bytes {
-        [0xFF, 0xFE, ..] => wide(u16::from_le_bytes),
-        [0xFE, 0xFF, ..] => wide(u16::from_be_bytes),
-        [0xEF, 0xBB, 0xBF, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
-        _ => std::str::from_utf8(bytes)
-            .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect(), str::to_owned),
-    }
-}
-
-/// What a file holds instead of what its name says, and the remedy: what version control and browsers leave behind.
-pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
-    let head = &bytes[..bytes.len().min(200)];
-    let text = String::from_utf8_lossy(head).trim_start_matches('\u{feff}').trim_start().to_ascii_lowercase();
-    if text.starts_with("version https://git-lfs") {
-        Some("it is a Git LFS pointer in place of the file; run `git lfs pull` where it comes from")
-    } else if text.starts_with("<!doctype html") || text.starts_with("<html") {
-        Some("it is a web page in place of the file; download the file itself (\"raw\")")
-    } else if bytes.starts_with(b"glTF") {
-        Some("it is a GLB file; export it as OBJ or STL")
-    } else if bytes.starts_with(b"PK\x03\x04") {
-        Some("it is a ZIP archive; unpack it first")
-    } else if bytes.starts_with(&[0x1f, 0x8b]) {
-        Some("it is compressed by gzip; unpack it first")
-    } else {
-        None
-    }
 }
 
 #[cfg(test)]

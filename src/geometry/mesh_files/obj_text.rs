@@ -5,7 +5,7 @@
 
 /// Rewrites a file; the error is a sentence with the line.
 pub(super) fn cleaned(bytes: &[u8]) -> Result<String, String> {
-    let text = super::text_of(bytes);
+    let text = crate::file::text_of(bytes);
     let mut out = String::with_capacity(text.len());
     let (mut corners, mut highest) = (0_i64, (0_i64, 0));
     for (number, line) in whole_lines(&text) {

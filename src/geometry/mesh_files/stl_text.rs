@@ -10,14 +10,14 @@ const HEAD: usize = 2000;
 
 /// True for a text STL, false for a binary one, whose header may begin with the same word.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
-    let text = super::text_of(&bytes[..bytes.len().min(HEAD) & !1]).to_ascii_lowercase();
+    let text = crate::file::text_of(&bytes[..bytes.len().min(HEAD) & !1]).to_ascii_lowercase();
     let mut words = super::lines(&text).filter_map(|line| line.split_whitespace().next());
     !text.contains('\0') && words.any(|word| ["facet", "endsolid", "end"].contains(&word))
 }
 
 /// The triangles of all solids of a file; the error is a sentence with the line.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
-    let text = super::text_of(bytes);
+    let text = crate::file::text_of(bytes);
     let mut mesh = TriMesh::default();
     // Remarks may stand above the first solid.
     let (mut last, mut begun) = (0, false);

@@ -1,5 +1,6 @@
 //! Files of an object, and references between them.
 
+use palpate_geometry::read_regular;
 use std::path::{Component, Path, PathBuf};
 
 /// Files beyond this size are not read (bytes).
@@ -10,15 +11,7 @@ const READABLE: [&str; 3] = ["obj", "stl", "mtl"];
 
 /// Reads a file on behalf of the user: regular files of bearable size only.
 pub(super) fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
-    if metadata.len() > LARGEST_FILE {
-        let mib = metadata.len() >> 20;
-        return Err(std::io::Error::other(format!("{mib} MiB is too large; the limit is {} MiB", LARGEST_FILE >> 20)));
-    }
-    std::fs::read(path)
+    read_regular(path, LARGEST_FILE)
 }
 
 /// Reads a file that another file refers to: only meshes and their materials.

@@ -87,11 +87,7 @@ impl Scene {
     pub fn from_file(path: &Path) -> Result<Self, SceneError> {
         let unreadable =
             |cause: String| SceneError::Refused(format!("cannot read the scene \"{}\": {cause}", path.display()));
-        let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
-        if size > LARGEST_FILE {
-            return Err(unreadable(format!("{size} bytes is too large for a scene")));
-        }
-        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
+        let text = palpate_geometry::read_text(path, LARGEST_FILE).map_err(|e| unreadable(e.to_string()))?;
         let mut scene = Self::from_toml(&text)?;
         let beside = path.parent().unwrap_or(Path::new("")).join(&scene.object.source);
         let beside = beside.to_str().filter(|_| beside.is_file());

@@ -60,7 +60,7 @@ const FARTHEST_TIME_S: f64 = 1e11;
 
 /// Reads a file of grasps.
 pub(super) fn read_file(path: &Path) -> Result<Import, ImportError> {
-    let opened = std::fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+    let opened = palpate_geometry::open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let fault = match opened {
         Ok((length, _)) if length > LARGEST_FILE => rows::file_too_large(),
         Ok((_, file)) => return read_csv(file, &file_name(path)),
