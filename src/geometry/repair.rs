@@ -84,7 +84,7 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
     let joined = before - welded.points.len();
     // Two triangles back to back are a wall between two solids, which goes, or a face that is seen from both sides.
     closed(welded.clone(), diagonal, Sides::Cancel)
-        .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_| fault))
+        .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_again| fault))
         .map(|repaired| Repaired { joined, ..repaired })
 }
 

@@ -35,7 +35,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
                     let text = words
                         .next()
                         .ok_or_else(|| format!("line {number}: the corner has fewer than three numbers"))?;
-                    let read = text.parse::<f32>().map_err(|_| format!("line {number}: {}", no_number(text)))?;
+                    let read = text.parse::<f32>().map_err(|_none| format!("line {number}: {}", no_number(text)))?;
                     if !read.is_finite() {
                         return Err(format!("line {number}: \"{}\" is no place of a corner", brief(text)));
                     }
@@ -50,7 +50,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
             _ => return Err(format!("line {number}: \"{}\" is no line of a text STL", brief(line.trim()))),
         }
     }
-    if mesh.points.len() % 3 != 0 {
+    if !mesh.points.len().is_multiple_of(3) {
         return Err(format!("it ends inside a facet, at line {last}; the file is cut short"));
     }
     mesh.triangles = (0..mesh.points.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
@@ -58,7 +58,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriMesh, String> {
 }
 
 fn check_facet(mesh: &TriMesh, number: usize) -> Result<(), String> {
-    if mesh.points.len() % 3 == 0 {
+    if mesh.points.len().is_multiple_of(3) {
         return Ok(());
     }
     Err(format!("line {number}: the facet that ends here does not have three corners"))

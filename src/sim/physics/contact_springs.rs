@@ -78,7 +78,7 @@ impl ContactSprings {
         let radius = (END * grid.row_pitch().max(grid.column_pitch())).min(0.5 * lowest);
         let mut all = Vec::with_capacity(grid.count() + TIP_ROWS * TIP_COLUMNS);
         let mut by_segment: Vec<Range<usize>> = Vec::with_capacity(lengths.len());
-        for j in 0..lengths.len() {
+        for (j, length) in lengths.iter().enumerate() {
             let from = all.len();
             // Rows follow each other along the finger, so that a segment's taxels are neighbours.
             while all.len() < grid.count() && grid.segment(all.len(), finger.joints) == j {
@@ -86,7 +86,7 @@ impl ContactSprings {
                 let tip = DVec3::new(grid.place(taxel, finger).1, grid.across(taxel), grid.height(taxel));
                 // Half the width of the round end at the foot, which stays within the finger.
                 let beside = (radius * tip.z).sqrt();
-                let along = if j == finger.joints { tip.x.min(lengths[j] - beside) } else { tip.x };
+                let along = if j == finger.joints { tip.x.min(length - beside) } else { tip.x };
                 let across = tip.y.abs().min((0.5 * finger.width - beside).max(0.0)).copysign(tip.y);
                 let foot = DVec3::new(along, across, 0.0);
                 all.push(ContactSpring::new(foot, tip, |height| pad.modulus * grid.area() / height));
