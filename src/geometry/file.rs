@@ -6,8 +6,11 @@ use std::path::Path;
 
 /// Opens a regular file: devices and pipes may never end, or never begin.
 pub fn open_regular(path: &Path) -> io::Result<File> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is not a regular file"));
+    let about = std::fs::metadata(path)?;
+    if !about.is_file() {
+        let what =
+            if about.is_dir() { "it is a directory" } else { "it is not a regular file, but a device or a pipe" };
+        return Err(io::Error::other(what));
     }
     File::open(path)
 }

@@ -419,9 +419,9 @@ fn settings_are_adopted_from_the_picture_of_what_accuracy_costs() {
 /// upper half.
 fn point_at(bench: &mut Bench, text: &str) -> egui::Pos2 {
     let plot = bench.harness.get_by_label_contains("Error against CPU time").rect();
-    for row in 1..14 {
-        for column in 1..28 {
-            let at = plot.min + plot.size() * egui::vec2(column as f32 / 28.0, row as f32 / 28.0);
+    for row in 1..28 {
+        for column in 1..56 {
+            let at = plot.min + plot.size() * egui::vec2(column as f32 / 56.0, row as f32 / 56.0);
             bench.harness.hover_at(at);
             bench.harness.run_steps(2);
             if bench.harness.query_by_label_contains(text).is_some() {
