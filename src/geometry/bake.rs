@@ -185,7 +185,7 @@ fn inside_by_winding(grid: &DistanceGrid, mesh: &TriMesh) -> Vec<bool> {
 
 /// Lines are shifted off the nodes by these shares of a cell, so that they do not run along edges of meshes
 /// modelled on round numbers.
-const LINE_SHIFT: [f64; 2] = [0.001_373, 0.000_719];
+pub(super) const LINE_SHIFT: [f64; 2] = [0.001_373, 0.000_719];
 
 fn inside_along(grid: &DistanceGrid, mesh: &TriMesh, axis: usize) -> Vec<bool> {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -195,10 +195,6 @@ fn inside_along(grid: &DistanceGrid, mesh: &TriMesh, axis: usize) -> Vec<bool> {
     for t in &mesh.triangles {
         let corners = mesh.corners(*t).map(|p| ((p - grid.origin) / grid.cell).to_array());
         let flat = corners.map(|c| [c[u] - LINE_SHIFT[0], c[v] - LINE_SHIFT[1]]);
-        let area = cross(flat[0], flat[1], flat[2]);
-        if area == 0.0 {
-            continue;
-        }
         let lines = |k: usize, count: usize| {
             let low = flat.iter().map(|f| f[k]).fold(f64::INFINITY, f64::min).ceil().max(0.0);
             let high = flat.iter().map(|f| f[k]).fold(f64::NEG_INFINITY, f64::max).floor();
@@ -206,15 +202,9 @@ fn inside_along(grid: &DistanceGrid, mesh: &TriMesh, axis: usize) -> Vec<bool> {
         };
         for i in lines(0, nu) {
             for j in lines(1, nv) {
-                let p = [i as f64, j as f64];
-                let weights = [
-                    cross(flat[1], flat[2], p) / area,
-                    cross(flat[2], flat[0], p) / area,
-                    cross(flat[0], flat[1], p) / area,
-                ];
-                if weights.iter().all(|w| *w >= 0.0) {
+                if let Some((weights, turn)) = shares_at(&flat, [i as f64, j as f64]) {
                     let along = (0..3).map(|c| weights[c] * corners[c][axis]).sum();
-                    crossings[i * nv + j].push((along, if area > 0.0 { 1 } else { -1 }));
+                    crossings[i * nv + j].push((along, turn));
                 }
             }
         }
@@ -236,6 +226,14 @@ fn inside_along(grid: &DistanceGrid, mesh: &TriMesh, axis: usize) -> Vec<bool> {
         }
     }
     inside
+}
+
+/// Shares of the corners of a planar triangle at a point inside it, and +1 where it is walked to the left, -1 to the right.
+pub(super) fn shares_at(corners: &[[f64; 2]; 3], p: [f64; 2]) -> Option<([f64; 3], i32)> {
+    let [a, b, c] = *corners;
+    let area = cross(a, b, c);
+    let shares = [(b, c), (c, a), (a, b)].map(|(from, to)| cross(from, to, p) / area);
+    (area != 0.0 && shares.iter().all(|share| *share >= 0.0)).then_some((shares, if area > 0.0 { 1 } else { -1 }))
 }
 
 /// Twice the signed area of a planar triangle.

@@ -3,15 +3,12 @@
 //! Lines through the solids are cut into the stretches that lie inside any of them, and the integrals of volume, centre and
 //! inertia are taken along each stretch exactly and across the lines by the midpoint rule.
 
+use super::bake::{LINE_SHIFT, shares_at};
 use super::{Bounds, MassProperties, SolidPart, TriMesh};
 use glam::{DMat3, DVec3};
 
 /// Lines in each of the two directions across. A sphere's volume is then off by some 1e-4.
 const LINES: usize = 400;
-
-/// Lines are shifted by these shares of their spacing, so that they do not run along edges of meshes modelled on round
-/// numbers.
-const LINE_SHIFT: [f64; 2] = [0.001_373, 0.000_719];
 
 /// Parallel lines through some solids.
 struct Lines {
@@ -89,10 +86,6 @@ fn through_mesh(lines: &Lines, mesh: &TriMesh, stretches: &mut Vec<Stretch>) {
     for t in &mesh.triangles {
         let corners = mesh.corners(*t).map(|p| p.to_array());
         let flat = corners.map(|c| [c[u], c[v]]);
-        let area = cross(flat[0], flat[1], flat[2]);
-        if area == 0.0 {
-            continue;
-        }
         let range = |k: usize| {
             let low = flat.iter().map(|f| f[k]).fold(f64::INFINITY, f64::min);
             let high = flat.iter().map(|f| f[k]).fold(f64::NEG_INFINITY, f64::max);
@@ -100,11 +93,9 @@ fn through_mesh(lines: &Lines, mesh: &TriMesh, stretches: &mut Vec<Stretch>) {
         };
         for i in range(0) {
             for j in range(1) {
-                let p = lines.across([i, j]);
-                let weights = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| cross(flat[a], flat[b], p) / area);
-                if weights.iter().all(|w| *w >= 0.0) {
-                    let place = (0..3).map(|c| weights[c] * corners[c][along]).sum();
-                    crossings.push((i * LINES + j, place, if area > 0.0 { 1 } else { -1 }));
+                if let Some((shares, turn)) = shares_at(&flat, lines.across([i, j])) {
+                    let place = (0..3).map(|c| shares[c] * corners[c][along]).sum();
+                    crossings.push((i * LINES + j, place, turn));
                 }
             }
         }
@@ -183,11 +174,6 @@ impl Sums {
         let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - moments;
         MassProperties { mass, centre: lines.corner + centre, inertia: (inertia + inertia.transpose()) * 0.5 }
     }
-}
-
-/// Twice the signed area of a planar triangle.
-fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 #[cfg(test)]

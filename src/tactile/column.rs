@@ -19,17 +19,17 @@ pub fn channel_with_unit(name: &str, unit: &str) -> Result<(String, f64), String
             quantity.unit()
         )),
         Some(_) => Ok((name.to_owned(), known.factor)),
-        None => Ok((format!("{name} [{}]", known.base()), known.factor)),
+        None => Ok((format!("{name} [{}]", known.dimension.unit()), known.factor)),
     }
 }
 
-/// Name of a channel without its unit, and the unit of its values; empty where nothing tells it.
+/// Name of a channel without its unit, and the unit of its values; empty where it is not known.
 pub fn unit_of_channel(name: &str) -> (&str, &'static str) {
     if let Some((quantity, _)) = Quantity::of_name(name) {
         return (name, quantity.unit());
     }
     let named = name.strip_suffix(']').and_then(|rest| rest.rsplit_once(" ["));
-    named.and_then(|(name, unit)| Some((name, Unit::parse(unit)?.base()))).unwrap_or((name, ""))
+    named.and_then(|(name, unit)| Some((name, Unit::parse(unit)?.dimension.unit()))).unwrap_or((name, ""))
 }
 
 #[cfg(test)]

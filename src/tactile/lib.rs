@@ -18,8 +18,8 @@
 //! | 0 | [`cadence`], [`capture`] | timing statistics of a stream, file format of captured bytes |
 //! | 0 | [`electronics`] | strip, pad, divider and converter |
 //! | 0 | `unit` | units of readings, and their factors |
-//! | 1 | `layout` | sensor layouts, their channels and the definition of their signals |
 //! | 0 | `signals` | channels over time |
+//! | 1 | `layout` | sensor layouts, their channels and the definition of their signals |
 //! | 2 | `column` | names of channels with units |
 //! | 2 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
 //! | 2 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |

@@ -1,5 +1,7 @@
 //! Units that people write beside a reading, and their factors to the units that Palpate computes in.
 
+use palpate_geometry::units::STANDARD_GRAVITY;
+
 /// Kind of quantity that a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
@@ -45,8 +47,8 @@ const UNITS: &[(&str, Dimension, f64, bool)] = &[
     ("seconds", Dimension::Time, 1.0, false),
     ("min", Dimension::Time, 60.0, false),
     ("N", Dimension::Force, 1.0, true),
-    ("gf", Dimension::Force, 9.806_65e-3, false),
-    ("kgf", Dimension::Force, 9.806_65, false),
+    ("gf", Dimension::Force, 1e-3 * STANDARD_GRAVITY, false),
+    ("kgf", Dimension::Force, STANDARD_GRAVITY, false),
     ("lbf", Dimension::Force, 4.448_221_615_260_5, false),
     ("Pa", Dimension::Pressure, 1.0, true),
     ("N/m2", Dimension::Pressure, 1.0, false),
@@ -95,11 +97,6 @@ impl Unit {
         let exact = alike.iter().find(|(symbol, _)| *symbol == text);
         let only = || alike.first().filter(|first| alike.iter().all(|other| other.1 == first.1));
         exact.or_else(only).map(|(_, unit)| *unit)
-    }
-
-    /// The dimension's own unit.
-    pub fn base(self) -> &'static str {
-        self.dimension.unit()
     }
 }
 

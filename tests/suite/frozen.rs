@@ -27,7 +27,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Keys of JSON whose values differ from run to run.
-const UNREPEATABLE: &str = "at bytes check_cpu_ms cost cost_share cpu_hours cpu_ms cpu_ms_median cpu_ms_p95 cpu_s created deleted load_cpu_ms \
+const UNREPEATABLE: &str = "at bytes check_cpu_ms cost cost_share cpu_hours cpu_ms cpu_ms_least cpu_ms_median cpu_ms_p95 cpu_s created deleted load_cpu_ms \
      local moved offsets p50_ms p95_ms program seconds step_us taken threads times_real_time train_cpu_s \
      trial_uid uid us_per_step";
 /// Beginning of a command line in a frozen text.

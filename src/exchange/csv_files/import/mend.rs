@@ -138,10 +138,10 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     Ok(trials)
 }
 
-/// Missing samples from which on a pause is told.
+/// Missing samples from which on a pause is reported.
 const PAUSE: f64 = 3.5;
 
-/// Tells where readings are missing for a while: a straight line stands there.
+/// Warns of times without readings, which a straight line bridges.
 fn warn_of_pauses(trials: &[RawTrial], rate_hz: f64, warnings: &mut Vec<String>) {
     let mut alike = Alike::default();
     for trial in trials {
