@@ -29,12 +29,7 @@ pub(super) fn file_or_folder(kinds: &'static [FileKind]) -> impl TypedValueParse
 /// Parser of the name of a file or folder for trials.
 pub(super) fn trials_target() -> impl TypedValueParser<Value = PathBuf> {
     let kinds: Vec<FileKind> = FORMATS.iter().map(|format| format.kind()).collect();
-    PathBufValueParser::new().try_map(move |path| {
-        let is_parquet = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
-        let checked = checked(path, &kinds, true);
-        let built = "this build writes no Parquet; build with --features parquet, or";
-        checked.map_err(|why| if is_parquet { format!("{built} {}", why.trim_start_matches(UNKNOWN)) } else { why })
-    })
+    PathBufValueParser::new().try_map(move |path| checked(path, &kinds, true))
 }
 
 const UNKNOWN: &str = "no format has this ending; ";

@@ -1,5 +1,6 @@
 //! `palpate trials`: manages the store of trials.
 
+mod import;
 mod labels;
 mod selection;
 mod show;
@@ -7,7 +8,7 @@ mod show;
 use super::output::trials_target;
 use super::prelude::*;
 use labels::LabelCommand;
-use palpate_exchange::{CSV, TrialExport, format_of, read_trials};
+use palpate_exchange::{CSV, TrialExport, format_of};
 use palpate_lab::inspection::OpenOptions;
 use palpate_learn::{Model, Models};
 use palpate_store::labels::shown_title;
@@ -96,15 +97,10 @@ enum TrialsCommand {
         #[arg(long, value_name = "FILE", conflicts_with = "labelled")]
         model: Option<PathBuf>,
     },
-    /// Import grasps from CSV files with the columns trial, label, t_s and any channels, or from MCAP files.
-    Import {
-        /// CSV or MCAP files. Optional columns for stage one: size (tiny, large), shape (cubic, cylindrical, spherical).
-        #[arg(required = true, value_name = "FILE")]
-        files: Vec<PathBuf>,
-        /// Object of MCAP files that other programs wrote (default: the name of the file).
-        #[arg(long, value_name = "NAME")]
-        label: Option<String>,
-    },
+    /// Import grasps from CSV, MCAP, NPZ or Parquet files: with the columns trial, label, t_s and any channels, or with other
+    /// columns, whose roles the options or a profile give.
+    #[command(after_help = import::EXAMPLES)]
+    Import(import::ImportArguments),
     /// Copy trials from other stores into this one, without duplicates.
     Merge {
         /// Stores to copy from.
@@ -121,7 +117,7 @@ enum TrialsCommand {
 }
 
 pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let creates = matches!(arguments.command, TrialsCommand::Import { .. } | TrialsCommand::Merge { .. });
+    let creates = matches!(arguments.command, TrialsCommand::Import(_) | TrialsCommand::Merge { .. });
     let mut store = match &arguments.command {
         _ if creates => open_store(store)?,
         TrialsCommand::List { json, .. } => match existing_store(store)? {
@@ -153,12 +149,7 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             let options = OpenOptions { sensors: signals.view(), ..OpenOptions::default() };
             export(&store, &ids, out, options, model.as_deref())
         }
-        TrialsCommand::Import { files, label } => {
-            for file in files {
-                import(&mut store, file, label.as_deref())?;
-            }
-            Ok(())
-        }
+        TrialsCommand::Import(arguments) => import::run(arguments, &mut store),
         TrialsCommand::Merge { stores } => {
             for other in stores {
                 let merged = store.merge_from(other).map_err(|error| nothing_added(other, &error))?;
@@ -206,17 +197,6 @@ fn numbers(ids: &[TrialId]) -> String {
 }
 
 const NONE_YET: &str = "no trials yet: `palpate grasp lemon` records one";
-
-fn import(store: &mut Store, file: &Path, label: Option<&str>) -> Result<(), Failure> {
-    let import = read_trials(file, label)?;
-    for warning in &import.warnings {
-        warn(warning);
-    }
-    let collection = file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let added = store.insert_imported(&collection, &import.trials).map_err(|error| nothing_added(file, &error))?;
-    let known = import.trials.len() - added as usize;
-    say(format!("{}: {added} trial(s) added as collection {collection}, {known} already there", file.display()))
-}
 
 /// Most trials that a terminal shows without `--limit`.
 const ON_TERMINAL: usize = 1000;

@@ -1,5 +1,6 @@
 //! What a file format of trials is.
 
+use crate::mapping::Mapping;
 use palpate_lab::inspection::{OpenOptions, OpenTrialError};
 use palpate_store::{FileKind, ImportedTrial, NewFile, Store, StoreError};
 use palpate_tactile::LayoutError;
@@ -15,10 +16,8 @@ pub trait TrialFormat: Sync {
     /// Writes trials to a file, which appears whole or not at all, or where each trial has its own, into a folder.
     fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError>;
 
-    /// Reads the trials of a file. `label` names the object of a file that does not.
-    fn read(&self, path: &Path, _label: &str) -> Result<Import, ImportError> {
-        Err(ImportError::of(path, "trials are only written in this format; import CSV or MCAP"))
-    }
+    /// Reads the trials of a file. The mapping gives columns their roles, and a label to a file that has none.
+    fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError>;
 }
 
 /// Trials to be written.

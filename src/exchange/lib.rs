@@ -9,22 +9,24 @@
 //!
 //! | layer | module | holds |
 //! |---|---|---|
+//! | 0 | `mapping` | which columns of a table are which, profiles of other programs |
+//! | 0 | `series` | readings of channels at their own times, and their table |
 //! | 0 | `format` | the trait [`TrialFormat`], what is written and read, errors |
 //! | 1 | `content` | a stored trial as other programs see it |
 //! | 1 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
 //! | 2 | `urdf` | the gripper for viewers of ROS |
-//! | 2 | `npz`, `parquet` | arrays and tables |
+//! | 2 | `npz`, `npz_import`, `parquet` | arrays and tables |
 //! | 3 | `mcap` | messages of ROS 2 |
 //!
 //! # Example
 //!
 //! ```
-//! use palpate_exchange::read_trials;
+//! use palpate_exchange::{Mapping, read_trials};
 //!
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("grasps.csv");
 //! std::fs::write(&path, "trial,label,t_s,grip [N]\n1,mug,0.0,0\n1,mug,0.1,2.5\n")?;
-//! let import = read_trials(&path, None)?;
+//! let import = read_trials(&path, &Mapping::default())?;
 //! assert_eq!(import.trials[0].signals.channels, ["grip [N]"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -32,10 +34,12 @@
 mod content;
 mod csv_files;
 mod format;
+mod mapping;
 mod mcap;
 mod npz;
-#[cfg(feature = "parquet")]
+mod npz_import;
 mod parquet;
+mod series;
 #[cfg(test)]
 mod tests;
 mod urdf;
@@ -45,6 +49,7 @@ pub use csv_files::{
     write_trial_csv,
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S};
 
 use palpate_geometry::{open_regular, other_content};
 use palpate_store::{FileKind, Store, StoreError, TrialQuality};
@@ -57,13 +62,7 @@ use std::path::Path;
 pub const CSV: &dyn TrialFormat = &csv_files::Csv;
 
 /// All formats.
-pub const FORMATS: &[&dyn TrialFormat] = &[
-    CSV,
-    &mcap::Mcap,
-    &npz::Npz,
-    #[cfg(feature = "parquet")]
-    &parquet::Parquet,
-];
+pub const FORMATS: &[&dyn TrialFormat] = &[CSV, &mcap::Mcap, &npz::Npz, &parquet::Parquet];
 
 /// The format that the ending of a name stands for; CSV for a name without ending, which is that of a folder.
 pub fn format_of(path: &Path) -> Option<&'static dyn TrialFormat> {
@@ -81,12 +80,15 @@ pub fn write_trials(export: &TrialExport<'_>, path: &Path) -> Result<Written, Ex
     format.write(export, path)
 }
 
-/// Reads the trials of a file, as CSV where its ending stands for no format. `label` names the object of a file that does
-/// not; without it the file does.
-pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportError> {
-    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let label = label.or(stem.as_deref()).unwrap_or("import");
+/// Reads the trials of a file, as CSV where its ending stands for no format. The mapping says which columns are which; its
+/// label, or else the name of the file, is that of trials without one.
+pub fn read_trials(path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+    mapping.check().map_err(|fault| ImportError::of(path, fault))?;
     let format = format_of(path).unwrap_or(CSV);
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    if let Some((_, what)) = OTHER_FILES.iter().find(|(endings, _)| endings.iter().any(|own| ending == *own)) {
+        return Err(ImportError::of(path, what));
+    }
     // An archive of NumPy is a ZIP archive by right.
     if format.kind().endings() != ["npz"] {
         let head = first_bytes(path).map_err(|cause| ImportError::of(path, cause))?;
@@ -94,8 +96,15 @@ pub fn read_trials(path: &Path, label: Option<&str>) -> Result<Import, ImportErr
             return Err(ImportError::of(path, what));
         }
     }
-    format.read(path, label)
+    format.read(path, mapping)
 }
+
+/// Files that hold trials in forms that are not read, and what to do.
+const OTHER_FILES: [(&[&str], &str); 3] = [
+    (&["db3"], "it is a bag of SQLite; convert it with `ros2 bag convert` and storage_id: mcap"),
+    (&["bag"], "it is a bag of ROS 1; convert it to MCAP with messages of ROS 2"),
+    (&["xlsx", "xls", "ods"], "it is a spreadsheet; save the sheet as CSV"),
+];
 
 /// The beginning of a file.
 fn first_bytes(path: &Path) -> std::io::Result<Vec<u8>> {

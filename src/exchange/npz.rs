@@ -3,7 +3,9 @@
 //! NPY is a header of text, padded to 64 bytes, and the numbers in rows. Source: numpy, *numpy.lib.format*, version 1.0.
 
 use crate::content::{TrialContent, channels_of};
-use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
+use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, new_file};
+use crate::mapping::Mapping;
+use crate::npz_import::read_npz;
 use palpate_geometry::Pose;
 use palpate_lab::inspection::{TouchPhase, scene_hash};
 use palpate_sim::frame::Frame;
@@ -48,6 +50,10 @@ impl TrialFormat for Npz {
         let written = arrays(&trials, &mut archive).and_then(|()| archive.zip.finish().map_err(io::Error::other));
         written.and_then(NewFile::finish).map_err(|e| ExchangeError::cannot_write(path, &e))?;
         Ok(Written::whole(path))
+    }
+
+    fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+        read_npz(path, mapping)
     }
 }
 

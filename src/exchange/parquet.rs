@@ -4,15 +4,25 @@
 //! stand in the file's key-value metadata under `units`, as JSON.
 
 use crate::content::{TrialContent, channels_of};
-use crate::format::{ExchangeError, TrialExport, TrialFormat, Written, new_file};
+use crate::csv_files::read_made;
+use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, file_name, new_file};
+use crate::mapping::Mapping;
+use crate::series::Lines;
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::reader::FileReader as _;
+use ::parquet::file::serialized_reader::SerializedFileReader;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::record::reader::RowIter;
+use ::parquet::record::{Field, Row};
 use ::parquet::schema::types::Type;
 use palpate_store::{FileKind, NewFile};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -45,6 +55,113 @@ impl TrialFormat for Parquet {
         written.finish().map_err(|e| failed(&e))?;
         Ok(Written::whole(path))
     }
+
+    fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+        let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
+        let damaged = || ImportError::of(path, "it is not a sound Parquet file");
+        // A damaged file may let its library stop anywhere.
+        let read = || read_table(file, path, mapping);
+        catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_panic| Err(damaged()))
+    }
+}
+
+/// Reads a table with a row for each sample. Lists become a column for each of their elements, groups one for each member.
+fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+    let failed = |error: ParquetError| ImportError::of(path, why(&error));
+    let reader = SerializedFileReader::new(file).map_err(failed)?;
+    let pairs = reader.metadata().file_metadata().key_value_metadata();
+    let of_metadata = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.as_deref();
+    let is_own = of_metadata("palpate").is_some();
+    let units: BTreeMap<String, String> =
+        of_metadata("units").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+    let own = Mapping {
+        ignore: FIXED
+            .iter()
+            .map(|(name, _)| *name)
+            .filter(|name| !OWN_ROLES.contains(name))
+            .map(str::to_owned)
+            .collect(),
+        ..Mapping::default()
+    };
+    let mapping = if is_own && !mapping.has_roles() { &own } else { mapping };
+    let mut rows = RowIter::from_file_into(Box::new(reader)).peekable();
+    let mut names = Vec::new();
+    if let Some(Ok(first)) = rows.peek() {
+        cells(first, &mut |name, _| names.push(name));
+    }
+    if names.len() > MOST_COLUMNS {
+        return Err(ImportError::of(path, format!("it has more than {MOST_COLUMNS} columns")));
+    }
+    let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let with_unit = |name: &String| match units.get(name).filter(|unit| !unit.is_empty()) {
+        Some(unit) => field(&format!("{name} [{unit}]")),
+        None => field(name),
+    };
+    let header: Vec<String> = names.iter().map(with_unit).collect();
+    let lines = rows.map(|row| {
+        let mut line = b"\n".to_vec();
+        let mut at = 0;
+        let mut first = true;
+        cells(&row.map_err(|error| std::io::Error::other(why(&error)))?, &mut |name, text| {
+            // Later lists may be shorter or longer than the first.
+            while at < names.len() && names[at] != name && names[at..].contains(&name) {
+                line.extend(if first { b"".as_slice() } else { b"," });
+                (first, at) = (false, at + 1);
+            }
+            if names.get(at) == Some(&name) {
+                line.extend(if first { b"".as_slice() } else { b"," });
+                line.extend(field(&text).into_bytes());
+                (first, at) = (false, at + 1);
+            }
+        });
+        line.extend(std::iter::repeat_n(b',', names.len() - at));
+        Ok(line)
+    });
+    let text = Lines { rest: header.join(",").into_bytes(), at: 0, lines };
+    read_made(text, &file_name(path), mapping, &mapping.label_of(path))
+}
+
+/// Why a table cannot be read.
+fn why(error: &ParquetError) -> String {
+    let text = error.to_string();
+    match text.split_once("compile time: ") {
+        Some((_, packing)) => format!("it is packed with {packing}, which is not read here; write it with snappy"),
+        None => format!("it cannot be read as Parquet: {text}"),
+    }
+}
+
+/// Columns of this program's tables that an import reads besides the channels.
+const OWN_ROLES: [&str; 3] = ["trial", "label", "t_s"];
+/// Most columns.
+const MOST_COLUMNS: usize = 2000;
+
+/// Names and texts of the cells of a row.
+fn cells(row: &Row, take: &mut dyn FnMut(String, String)) {
+    for (name, cell) in row.get_column_iter() {
+        cell_texts(name, cell, take);
+    }
+}
+
+fn cell_texts(name: &str, cell: &Field, take: &mut dyn FnMut(String, String)) {
+    let text = match cell {
+        Field::Null | Field::Bytes(_) | Field::MapInternal(_) | Field::Date(_) => String::new(),
+        Field::Bool(value) => u8::from(*value).to_string(),
+        Field::Str(text) => text.clone(),
+        Field::TimeMillis(ms) => (f64::from(*ms) * 1e-3).to_string(),
+        Field::TimestampMillis(ms) => (*ms as f64 * 1e-3).to_string(),
+        Field::TimeMicros(us) | Field::TimestampMicros(us) => (*us as f64 * 1e-6).to_string(),
+        Field::Float(value) => value.to_string(),
+        Field::Double(value) => value.to_string(),
+        Field::Group(row) => {
+            return row.get_column_iter().for_each(|(own, cell)| cell_texts(&format!("{name}.{own}"), cell, take));
+        }
+        Field::ListInternal(list) => {
+            let elements = list.elements().iter().take(MOST_COLUMNS).enumerate();
+            return elements.for_each(|(k, cell)| cell_texts(&format!("{name}_{k}"), cell, take));
+        }
+        other => other.to_string(),
+    };
+    take(name.to_owned(), text);
 }
 
 fn table(trials: &[TrialContent], channels: &[(&str, &'static str)], file: NewFile) -> Result<NewFile, ParquetError> {

@@ -57,7 +57,7 @@ fn channels_come_back_from_mcap_bit_by_bit() -> Result<(), Box<dyn std::error::E
     let models = palpate_learn::Models::shipped()?;
     let options = OpenOptions { models, ..OpenOptions::default() };
     assert_eq!(write(&store, &[1, 2, 3], &options, (&path, &|| false))?.files, [path.as_path()]);
-    let import = read_trials(&path, Some("unused"))?;
+    let import = read_trials(&path, &Mapping { label: Some("unused".to_owned()), ..Mapping::default() })?;
     assert!(import.warnings.is_empty(), "{:?}", import.warnings);
     let labels: Vec<&str> = import.trials.iter().map(|trial| trial.label.as_str()).collect();
     assert_eq!(labels, ["lemon", "ball", "mug"]);
@@ -81,8 +81,51 @@ fn channels_come_back_from_mcap_bit_by_bit() -> Result<(), Box<dyn std::error::E
     assert_eq!(other.insert_imported("bag", &import.trials)?, 3);
     let again = folder.path().join("again.mcap");
     write(&other, &[1, 2, 3], &OpenOptions::default(), (&again, &|| false))?;
-    for (first, second) in import.trials.iter().zip(read_trials(&again, None)?.trials) {
+    for (first, second) in import.trials.iter().zip(read_trials(&again, &Mapping::default())?.trials) {
         assert_eq!((bits(&first.signals), &first.label), (bits(&second.signals), &second.label));
+    }
+    Ok(())
+}
+
+#[test]
+fn arrays_and_tables_come_back_with_times_labels_units_and_gaps() -> Result<(), Box<dyn std::error::Error>> {
+    let (folder, mut store) = store_of(&["lemon", "ball"]);
+    let stored: Vec<Signals> = [1, 2]
+        .iter()
+        .map(|id| {
+            let open = OpenTrial::open(&store, *id, &OpenOptions::default()).expect("opens");
+            let channels = open.columns.iter().map(|column| column.name.clone()).collect();
+            let mut signals = Signals { channels, ..Signals::default() };
+            for (k, t) in open.t_s.iter().enumerate() {
+                let value = |value: f32| if value.is_nan() { 0.0 } else { value };
+                signals.push(*t, &open.columns.iter().map(|column| value(column.values[k])).collect::<Vec<_>>());
+            }
+            signals
+        })
+        .collect();
+    let mut trials: Vec<ImportedTrial> = Vec::new();
+    for (name, signals) in ["lemon", "ball"].iter().zip(&stored) {
+        let label = (*name).to_owned();
+        trials.push(ImportedTrial { name: label.clone(), label, size: None, shape: None, signals: signals.clone() });
+    }
+    // A gap of a channel, and one of all.
+    let width = stored[0].channels.len();
+    (40..50).for_each(|k| trials[0].signals.values[k * width] = f32::NAN);
+    trials[1].signals.values[60 * width..80 * width].fill(f32::NAN);
+    store.insert_imported("gaps", &trials)?;
+    for ending in ["npz", "parquet"] {
+        let path = folder.path().join(format!("out.{ending}"));
+        write(&store, &[3, 4], &OpenOptions::default(), (&path, &|| false))?;
+        let import = read_trials(&path, &Mapping::default())?;
+        assert_eq!(import.trials.len(), 2, "{ending}");
+        for (trial, wanted) in import.trials.iter().zip(&trials) {
+            assert_eq!((&trial.label, &trial.signals.channels), (&wanted.label, &wanted.signals.channels), "{ending}");
+            assert_eq!(bits(&trial.signals).1, bits(&wanted.signals).1, "{ending} {}", wanted.label);
+            // Times within a gap of all channels are made anew.
+            let times = trial.signals.t_s.iter().zip(&wanted.signals.t_s);
+            assert!(times.clone().all(|(t, own)| (t - own).abs() < 1e-12), "{ending} {}", wanted.label);
+        }
+        assert!(import.warnings.iter().any(|text| text.contains("flagged: no readings")), "{:?}", import.warnings);
     }
     Ok(())
 }
@@ -117,6 +160,6 @@ fn an_export_that_ends_early_leaves_no_file() {
         let error = write(&store, ids, &options, (Path::new(path), &|| false)).expect_err("refused").to_string();
         assert!(error.contains(wanted), "{error}");
     }
-    let error = read_trials(Path::new("a.npz"), None).expect_err("refused").to_string();
-    assert!(error.contains("\"a.npz\": trials are only written in this format"), "{error}");
+    let error = read_trials(Path::new("a.npz"), &Mapping::default()).expect_err("refused").to_string();
+    assert!(error.contains("\"a.npz\": No such file"), "{error}");
 }

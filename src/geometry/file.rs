@@ -56,6 +56,8 @@ pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
         Some("it is a web page in place of the file; download the file itself (\"raw\")")
     } else if bytes.starts_with(b"glTF") {
         Some("it is a GLB file; export it as OBJ or STL")
+    } else if text.contains("[content_types].xml") || text.contains("xl/") {
+        Some("it is a spreadsheet; save the sheet as CSV")
     } else if bytes.starts_with(b"PK\x03\x04") {
         Some("it is a ZIP archive; unpack it first")
     } else if bytes.starts_with(&[0x1f, 0x8b]) {

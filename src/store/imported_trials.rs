@@ -10,8 +10,8 @@
 use super::chunks::all_there;
 use super::store::{Store, json};
 use super::store_error::{StoreError, row_fault};
-use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialId, TrialSource};
+use palpate_tactile::{SignalGap, Signals};
 use rusqlite::{OptionalExtension, params};
 
 /// One recorded grasp from a file.
@@ -25,7 +25,7 @@ pub struct ImportedTrial {
     pub size: Option<String>,
     /// Shape of the object, where the file states it for the label: `cubic`, `cylindrical` or `spherical`.
     pub shape: Option<String>,
-    /// Readings: at least two samples, all finite, times as in the file or even from its first one on.
+    /// Readings: at least two samples, times as in the file or even from its first one on; NaN where there are none.
     pub signals: Signals,
 }
 
@@ -59,8 +59,23 @@ fn decode(bytes: &[u8], channels: Vec<String>) -> Option<Signals> {
         signals.t_s.push(f64::from_le_bytes(t.try_into().ok()?));
         signals.values.extend(values.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)));
     }
-    let sound = signals.values.iter().all(|x| x.is_finite()) && signals.t_s.is_sorted_by(|a, b| a < b);
+    let sound = !signals.values.iter().any(|x| x.is_infinite()) && signals.t_s.is_sorted_by(|a, b| a < b);
     sound.then_some(signals)
+}
+
+/// Gaps of a trial, a sentence each.
+pub fn interruptions(signals: &Signals) -> Vec<String> {
+    let sentence = |gap: SignalGap| {
+        let of = if gap.channels.len() == signals.channels.len() {
+            String::new()
+        } else {
+            let names: Vec<&str> = gap.channels.iter().map(|channel| signals.channels[*channel].as_str()).collect();
+            format!(" of {}", names.join(", "))
+        };
+        let SignalGap { samples, from_s, to_s, .. } = gap;
+        format!("no readings{of} from {from_s:.2} s to {to_s:.2} s ({} missing)", samples.len())
+    };
+    signals.gaps().into_iter().map(sentence).collect()
 }
 
 impl Store {
@@ -69,7 +84,7 @@ impl Store {
     pub fn insert_imported(&mut self, collection: &str, trials: &[ImportedTrial]) -> Result<u32, StoreError> {
         let new = "INSERT OR IGNORE INTO trials (state, rig, object, seed, scene, world_from_gripper, quality,
                 warnings, version, samples, collection, size, shape)
-            VALUES ('complete', ?10, ?1, ?2, '', ?3, ?4, '[]', ?5, ?6, ?7, ?8, ?9)";
+            VALUES ('complete', ?10, ?1, ?2, '', ?3, ?4, ?11, ?5, ?6, ?7, ?8, ?9)";
         let sql = "INSERT INTO readings (trial, channels, samples, checksum)
             SELECT id, ?2, ?3, checksum(uid, ?2, ?3) FROM trials WHERE id = ?1";
         self.in_transaction(|transaction| {
@@ -86,6 +101,7 @@ impl Store {
                     trial.size,
                     trial.shape,
                     TrialSource::Imported.name(),
+                    json(&interruptions(&trial.signals)),
                 ];
                 if transaction.execute(new, values)? > 0 {
                     let (id, signals) = (transaction.last_insert_rowid(), &trial.signals);
@@ -97,7 +113,7 @@ impl Store {
         })
     }
 
-    /// Channels of an imported trial; none for a trial of another kind.
+    /// Channels of an imported trial, NaN in its gaps; none for a trial of another kind.
     pub fn readings(&self, id: TrialId) -> Result<Option<Signals>, StoreError> {
         let sql = "SELECT channels, readings.samples, checksum(uid, channels, readings.samples) IS readings.checksum,
                    trials.samples FROM readings JOIN trials ON trials.id = trial WHERE trial = ?1";
@@ -123,6 +139,8 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::labels::{Flag, FlagRemark};
+    use palpate_tactile::trial::TrialData;
 
     fn imported(label: &str) -> ImportedTrial {
         let signals = Signals {
@@ -154,6 +172,25 @@ mod tests {
     }
 
     #[test]
+    fn gaps_are_kept_and_flagged_and_bridged_where_a_trial_is_computed_with() -> Result<(), StoreError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut store = Store::open(&folder.path().join("trials.sqlite"))?;
+        let mut trial = imported("mug");
+        trial.signals.values[3] = f32::NAN;
+        store.insert_imported("mine", std::slice::from_ref(&trial))?;
+        let row = &store.list(false)?[0];
+        let wanted = FlagRemark {
+            flag: Flag::Interrupted,
+            remark: "no readings of bend from 0.00 s to 0.04 s (1 missing)".to_owned(),
+        };
+        assert_eq!((&row.flags[..], row.warnings), (&[wanted][..], 0));
+        assert!(store.readings(row.id)?.expect("imported").values[3].is_nan());
+        let TrialData::Imported(signals) = store.load(row.id)?.data else { panic!("imported") };
+        assert_eq!(signals.values[3], 4.25);
+        Ok(())
+    }
+
+    #[test]
     fn damaged_readings_are_refused() {
         let bytes = encode(&imported("mug").signals);
         let channels = || vec!["grip".to_owned(), "bend".to_owned()];
@@ -162,8 +199,8 @@ mod tests {
             assert!(decode(&bytes[..cut], channels()).is_none());
         }
         assert!(decode(&bytes, vec!["grip".to_owned()]).is_none());
-        let mut nan = bytes.clone();
-        nan[HEADER + 8..HEADER + 12].copy_from_slice(&f32::NAN.to_le_bytes());
-        assert!(decode(&nan, channels()).is_none());
+        let mut infinite = bytes.clone();
+        infinite[HEADER + 8..HEADER + 12].copy_from_slice(&f32::INFINITY.to_le_bytes());
+        assert!(decode(&infinite, channels()).is_none());
     }
 }

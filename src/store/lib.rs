@@ -92,7 +92,7 @@ pub use file_kind::{FileKind, check_target};
 pub use frame_blob::{BlobError, decode_frames, encode_frames};
 pub use free_space::check_space;
 pub use identity::Stored;
-pub use imported_trials::ImportedTrial;
+pub use imported_trials::{ImportedTrial, interruptions};
 pub use journal::{Change, JournalEntry, JournalRepository};
 pub use label_repository::{LabelRepository, LabelRevision};
 pub use library::{

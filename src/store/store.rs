@@ -323,7 +323,9 @@ impl Store {
                 })
             }
             TrialSource::Recorded => TrialData::Recorded(self.board_log(id)?.ok_or_else(|| missing("board"))?),
-            TrialSource::Imported => TrialData::Imported(self.readings(id)?.ok_or_else(|| missing("channels"))?),
+            TrialSource::Imported => {
+                TrialData::Imported(self.readings(id)?.ok_or_else(|| missing("channels"))?.filled())
+            }
         };
         Ok(Trial { header, data })
     }

@@ -132,9 +132,13 @@ impl RowReader {
         let unknown = |error: UnknownSource| rusqlite::Error::FromSqlConversionFailure(3, Type::Text, Box::new(error));
         let source: TrialSource = row.get::<_, String>(3)?.parse().map_err(unknown)?;
         let quality: Option<Quality> = serde_json::from_str(&row.get::<_, String>(7)?).ok();
-        let warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
+        let mut warnings: Vec<String> = json_or_default(&row.get::<_, String>(8)?);
         let object: String = row.get(4)?;
         let mut flags = flaws(json_or_default(&row.get::<_, Option<String>>(16)?.unwrap_or_default()), Some(&object));
+        if source == TrialSource::Imported {
+            let interrupted = |remark| FlagRemark { flag: Flag::Interrupted, remark };
+            flags.extend(std::mem::take(&mut warnings).into_iter().map(interrupted));
+        }
         let duplicate_of = row.get::<_, Option<TrialId>>(23)?;
         flags.extend(duplicate_of.map(|first| FlagRemark {
             flag: Flag::Duplicate,

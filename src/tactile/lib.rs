@@ -62,7 +62,7 @@ pub use layout::{
     whole_fingers,
 };
 pub use pressure::ContactPatch;
-pub use signals::Signals;
+pub use signals::{SignalGap, Signals};
 pub use unit::{Dimension, KNOWN_UNITS, Unit};
 
 use palpate_sim::frame::Frame;

@@ -1,6 +1,8 @@
 //! Signals of a whole trial: named channels over time, the form in which recognisers and files know a
 //! grasp, whatever rig it came from.
 
+use std::ops::Range;
+
 /// Readings of several channels at the same instants.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Signals {
@@ -8,8 +10,21 @@ pub struct Signals {
     pub channels: Vec<String>,
     /// Times of the samples, rising (s).
     pub t_s: Vec<f64>,
-    /// One row of channel values per sample, in the channels' units; never NaN.
+    /// One row of channel values per sample, in the channels' units; NaN only in a gap of an imported trial, see
+    /// [`Self::filled`].
     pub values: Vec<f32>,
+}
+
+/// A time without readings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SignalGap {
+    /// Channels that it concerns, by their numbers.
+    pub channels: Vec<usize>,
+    /// The samples without readings.
+    pub samples: Range<usize>,
+    /// From the last reading before it, or the first sample, to the next one, or the last sample (s).
+    pub from_s: f64,
+    pub to_s: f64,
 }
 
 impl Signals {
@@ -58,6 +73,53 @@ impl Signals {
         self
     }
 
+    /// Times without readings (NaN), in order.
+    pub fn gaps(&self) -> Vec<SignalGap> {
+        let width = self.channels.len();
+        let mut gaps: Vec<SignalGap> = Vec::new();
+        for channel in 0..width {
+            let is_missing = |sample: &usize| self.values[sample * width + channel].is_nan();
+            let mut at = 0;
+            while let Some(begin) = (at..self.len()).find(is_missing) {
+                let end = (begin..self.len()).find(|sample| !is_missing(sample)).unwrap_or(self.len());
+                at = end;
+                match gaps.iter_mut().find(|gap| gap.samples == (begin..end)) {
+                    Some(gap) => gap.channels.push(channel),
+                    None => gaps.push(SignalGap {
+                        channels: vec![channel],
+                        samples: begin..end,
+                        from_s: self.t_s[begin.saturating_sub(1)],
+                        to_s: self.t_s[end.min(self.len() - 1)],
+                    }),
+                }
+            }
+        }
+        gaps.sort_by_key(|gap| (gap.samples.start, gap.samples.end));
+        gaps
+    }
+
+    /// The same with straight lines over gaps; before the first and after the last reading of a channel it holds that one.
+    /// A channel without any reading is zero.
+    pub fn filled(mut self) -> Self {
+        let width = self.channels.len();
+        for channel in 0..width {
+            let known: Vec<usize> =
+                (0..self.len()).filter(|sample| !self.values[sample * width + channel].is_nan()).collect();
+            if known.len() == self.len() {
+                continue;
+            }
+            let read: Vec<(f64, f32)> =
+                known.iter().map(|k| (self.t_s[*k], self.values[k * width + channel])).collect();
+            for sample in 0..self.len() {
+                let value = &mut self.values[sample * width + channel];
+                if value.is_nan() {
+                    *value = on_line(&read, self.t_s[sample]);
+                }
+            }
+        }
+        self
+    }
+
     /// Adds a sample.
     pub fn push(&mut self, t: f64, row: &[f32]) {
         debug_assert_eq!(row.len(), self.channels.len());
@@ -66,9 +128,44 @@ impl Signals {
     }
 }
 
+/// Reading at a time, on the line between its neighbours or as the nearest end.
+fn on_line(read: &[(f64, f32)], t_s: f64) -> f32 {
+    let after = read.partition_point(|(t, _)| *t < t_s);
+    match (after.checked_sub(1).and_then(|before| read.get(before)), read.get(after)) {
+        (Some((t0, v0)), Some((t1, v1))) => {
+            let part = (t_s - t0) / (t1 - t0);
+            (f64::from(*v0) + (f64::from(*v1) - f64::from(*v0)) * part) as f32
+        }
+        (Some((_, value)), None) | (None, Some((_, value))) => *value,
+        (None, None) => 0.0,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn gaps_are_found_and_filled_over_time() {
+        const GAP: f32 = f32::NAN;
+        let signals = Signals {
+            channels: vec!["a".to_owned(), "b".to_owned()],
+            t_s: vec![0.0, 1.0, 2.0, 5.0, 6.0],
+            values: vec![GAP, 9.0, 1.0, GAP, GAP, GAP, 5.0, GAP, GAP, GAP],
+        };
+        let gaps: Vec<_> =
+            signals.gaps().into_iter().map(|gap| (gap.channels, gap.samples, gap.from_s, gap.to_s)).collect();
+        let wanted = [
+            (vec![0], 0..1, 0.0, 1.0),
+            (vec![1], 1..5, 0.0, 6.0),
+            (vec![0], 2..3, 1.0, 5.0),
+            (vec![0], 4..5, 5.0, 6.0),
+        ];
+        assert_eq!(gaps, wanted);
+        assert_eq!(signals.filled().values, [1.0, 9.0, 1.0, 9.0, 2.0, 9.0, 5.0, 9.0, 5.0, 9.0]);
+        let whole = Signals { channels: vec!["a".to_owned()], t_s: vec![0.0, 1.0, 2.0], values: vec![GAP; 3] };
+        assert_eq!((whole.gaps().len(), whole.filled().values), (1, vec![0.0; 3]));
+    }
 
     #[test]
     fn a_stretch_of_time_is_cut_out_and_counted_from_its_beginning() {

@@ -92,7 +92,6 @@ fn a_name_that_no_format_claims_is_refused() {
     let folder = folder();
     let at = folder.path();
     let before = contents(at);
-    let parquet = if cfg!(feature = "parquet") { "choose" } else { "this build writes no Parquet" };
     let names: [(&[&str], &str); 8] = [
         (&["grasp", "ball", "--no-store", "--out", "a.xlsx"], "choose .csv"),
         (&["trials", "export", "1", "--out", "a.xyz"], "choose .csv, .mcap, .npz"),
@@ -109,9 +108,6 @@ fn a_name_that_no_format_claims_is_refused() {
     for (command, name) in [("demo", "a.png"), ("study accuracy", "a.svg"), ("study grasps", "a.csv")] {
         let command: Vec<&str> = command.split(' ').chain(["--out", name]).collect();
         misused(at, &command, &["name of a file; choose that of a folder"]);
-    }
-    if cfg!(not(feature = "parquet")) {
-        misused(at, &["trials", "export", "1", "--out", "a.parquet"], &[parquet, "--features parquet", ".npz"]);
     }
     refused(at, &["trials", "export", "--labelled", "--out", "a.csv"], &["need a folder"]);
     assert!(contents(at) == before && std::fs::read_dir(at).unwrap().all(|entry| entry.unwrap().path().is_file()));

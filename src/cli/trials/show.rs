@@ -40,6 +40,7 @@ struct ImportReport {
     samples: usize,
     duration_s: f64,
     channels: Vec<String>,
+    gaps: Vec<String>,
 }
 
 /// Output of `trials show --json` for a trial of the real gripper.
@@ -83,6 +84,7 @@ pub(super) fn show(store: &Store, id: TrialId, json: bool) -> Result<(), Failure
             samples: signals.len(),
             duration_s: signals.t_s.last().copied().unwrap_or(0.0) - signals.t_s.first().copied().unwrap_or(0.0),
             channels: signals.channels,
+            gaps: header.warnings,
         }
         .print(json),
         TrialData::Simulated(data) => {
@@ -114,6 +116,7 @@ impl Report for ImportReport {
         page.line(format!("trial {}: {} (imported, collection {from})", self.id, shown_title(&self.object)));
         page.line(format!("{} samples over {:.2} s", self.samples, self.duration_s));
         page.line(format!("channels {}", self.channels.join(", ")));
+        self.gaps.iter().for_each(|gap| page.warn(gap));
     }
 }
 

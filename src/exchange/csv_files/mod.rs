@@ -10,12 +10,13 @@ mod points;
 mod simulated;
 mod writing;
 
-pub(crate) use import::read_csv;
+pub(crate) use import::read_made;
 pub use labelled::{Exported, export_labelled, file_name_of};
 pub use points::{PointsError, read_points_csv};
 pub use simulated::{contacts_path, write_contacts_csv, write_trial_csv};
 
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+use crate::mapping::Mapping;
 use labelled::export_board_trial;
 use palpate_store::FileKind;
 use palpate_store::labels::shown_name;
@@ -49,8 +50,8 @@ impl TrialFormat for Csv {
         Ok(written)
     }
 
-    fn read(&self, path: &Path, _label: &str) -> Result<Import, ImportError> {
-        import::read_file(path)
+    fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+        import::read_file(path, mapping)
     }
 }
 
@@ -61,7 +62,9 @@ fn write_trial(export: &TrialExport<'_>, id: TrialId, out: &Path, is_file: bool)
     let path = if is_file { out.to_owned() } else { out.join(name) };
     match data {
         TrialData::Recorded(_) => drop(export_board_trial(export.store, id, &path)?),
-        TrialData::Imported(signals) => writing::write_signals_csv(&path, &signals)?,
+        TrialData::Imported(filled) => {
+            writing::write_signals_csv(&path, &export.store.readings(id)?.unwrap_or(filled))?
+        }
         TrialData::Simulated(data) => {
             let (trial, view) = (SimulatedTrial { header, data }, &export.options.sensors);
             let scene = &trial.header.scene;

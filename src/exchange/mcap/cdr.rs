@@ -92,6 +92,10 @@ impl<'a> CdrReader<'a> {
         Some(bytes)
     }
 
+    pub(super) fn u16(&mut self) -> Option<u16> {
+        self.number().map(u16::from_le_bytes)
+    }
+
     pub(super) fn u32(&mut self) -> Option<u32> {
         self.number().map(u32::from_le_bytes)
     }

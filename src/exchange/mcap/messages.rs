@@ -13,6 +13,9 @@ pub(super) enum MessageKind {
     SmallNumbers,
     Number,
     SmallNumber,
+    WholeNumber,
+    ShortNumber,
+    Wrench,
     Transforms,
     Text,
 }
@@ -23,13 +26,16 @@ const LAYOUT: &str = "MSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\
 const DIMENSION: &str = "MSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n";
 
 impl MessageKind {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 11] = [
         Self::JointState,
         Self::FluidPressure,
         Self::Numbers,
         Self::SmallNumbers,
         Self::Number,
         Self::SmallNumber,
+        Self::WholeNumber,
+        Self::ShortNumber,
+        Self::Wrench,
         Self::Transforms,
         Self::Text,
     ];
@@ -43,6 +49,9 @@ impl MessageKind {
             Self::SmallNumbers => "std_msgs/msg/Float32MultiArray",
             Self::Number => "std_msgs/msg/Float64",
             Self::SmallNumber => "std_msgs/msg/Float32",
+            Self::WholeNumber => "std_msgs/msg/Int32",
+            Self::ShortNumber => "std_msgs/msg/UInt16",
+            Self::Wrench => "geometry_msgs/msg/WrenchStamped",
             Self::Transforms => "tf2_msgs/msg/TFMessage",
             Self::Text => "std_msgs/msg/String",
         }
@@ -67,6 +76,17 @@ impl MessageKind {
             Self::SmallNumbers => ("std_msgs/MultiArrayLayout layout\nfloat32[] data\n", &[LAYOUT, DIMENSION]),
             Self::Number => ("float64 data\n", &[]),
             Self::SmallNumber => ("float32 data\n", &[]),
+            Self::WholeNumber => ("int32 data\n", &[]),
+            Self::ShortNumber => ("uint16 data\n", &[]),
+            Self::Wrench => (
+                "std_msgs/Header header\nWrench wrench\n",
+                &[
+                    "MSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque\n",
+                    "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+                    HEADER,
+                    TIME,
+                ],
+            ),
             Self::Transforms => (
                 "geometry_msgs/TransformStamped[] transforms\n",
                 &[
@@ -144,12 +164,22 @@ pub(super) fn text(text: &str) -> Vec<u8> {
     out.finish()
 }
 
-/// Numbers of a message with the ends of their channels' names; none where it holds other things or is malformed.
-pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Vec<(String, f64)>> {
+/// What a message holds.
+#[derive(Debug, PartialEq)]
+pub(super) struct Numbers {
+    /// Time in its header (ns).
+    pub(super) stamp_ns: Option<u64>,
+    /// Its numbers with the ends of their channels' names.
+    pub(super) values: Vec<(String, f64)>,
+}
+
+/// Numbers of a message; none where it holds other things or is malformed.
+pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Numbers> {
     let mut read = CdrReader::new(bytes)?;
-    let skip_header = |read: &mut CdrReader<'_>| {
-        read.u32()?;
-        read.u32()?;
+    let mut stamp_ns = None;
+    let mut header = |read: &mut CdrReader<'_>| {
+        let (seconds, ns) = (read.u32()?, read.u32()?);
+        stamp_ns = Some(u64::from(seconds) * 1_000_000_000 + u64::from(ns));
         read.text().map(drop)
     };
     let skip_layout = |read: &mut CdrReader<'_>| {
@@ -161,23 +191,31 @@ pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Vec<(Strin
         read.u32().map(drop)
     };
     let counted = |values: Vec<f64>| values.into_iter().enumerate().map(|(k, v)| (format!("_{k}"), v)).collect();
-    match kind {
-        MessageKind::Number => Some(vec![(String::new(), read.f64()?)]),
-        MessageKind::SmallNumber => Some(vec![(String::new(), f64::from(read.f32()?))]),
+    let one = |value: f64| vec![(String::new(), value)];
+    let values = match kind {
+        MessageKind::Number => one(read.f64()?),
+        MessageKind::SmallNumber => one(f64::from(read.f32()?)),
+        MessageKind::WholeNumber => one(f64::from(read.u32()?.cast_signed())),
+        MessageKind::ShortNumber => one(f64::from(read.u16()?)),
         MessageKind::FluidPressure => {
-            skip_header(&mut read)?;
-            Some(vec![(String::new(), read.f64()?)])
+            header(&mut read)?;
+            one(read.f64()?)
+        }
+        MessageKind::Wrench => {
+            header(&mut read)?;
+            let axes = ["_force_x", "_force_y", "_force_z", "_torque_x", "_torque_y", "_torque_z"];
+            axes.iter().map(|axis| Some(((*axis).to_owned(), read.f64()?))).collect::<Option<_>>()?
         }
         MessageKind::Numbers => {
             skip_layout(&mut read)?;
-            read.numbers().map(counted)
+            counted(read.numbers()?)
         }
         MessageKind::SmallNumbers => {
             skip_layout(&mut read)?;
-            read.small_numbers().map(counted)
+            counted(read.small_numbers()?)
         }
         MessageKind::JointState => {
-            skip_header(&mut read)?;
+            header(&mut read)?;
             let count = read.length(4)?;
             let names: Vec<&str> = (0..count).map(|_| read.text()).collect::<Option<_>>()?;
             let mut found = Vec::new();
@@ -185,10 +223,11 @@ pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Vec<(Strin
                 let values = read.numbers()?;
                 found.extend(names.iter().zip(values).map(|(name, value)| (format!("_{name}{suffix}"), value)));
             }
-            Some(found)
+            found
         }
-        MessageKind::Transforms | MessageKind::Text => None,
-    }
+        MessageKind::Transforms | MessageKind::Text => return None,
+    };
+    Some(Numbers { stamp_ns, values })
 }
 
 #[cfg(test)]
@@ -198,7 +237,7 @@ mod tests {
     #[test]
     fn numbers_of_every_kind_read_back() {
         let names = ["left_1".to_owned(), "right_1".to_owned()];
-        let read = |kind, bytes: &[u8]| read_numbers(kind, bytes).expect("numbers");
+        let read = |kind, bytes: &[u8]| read_numbers(kind, bytes).expect("numbers").values;
         let joints = read(MessageKind::JointState, &joint_state(3, &names, &[0.25, -1.0]));
         assert_eq!(joints, [("_left_1".to_owned(), 0.25), ("_right_1".to_owned(), -1.0)]);
         assert_eq!(read(MessageKind::FluidPressure, &fluid_pressure(3, 1e5)), [(String::new(), 1e5)]);

@@ -22,6 +22,7 @@ mod messages;
 mod reader;
 
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+use crate::mapping::Mapping;
 use palpate_store::FileKind;
 use std::path::Path;
 
@@ -43,7 +44,7 @@ impl TrialFormat for Mcap {
         Ok(Written::whole(path))
     }
 
-    fn read(&self, path: &Path, label: &str) -> Result<Import, ImportError> {
-        import::read_mcap(path, label)
+    fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
+        import::read_mcap(path, mapping)
     }
 }

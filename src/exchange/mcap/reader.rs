@@ -10,10 +10,29 @@ const LARGEST: u64 = 256 << 20;
 /// A record that matters to an import.
 #[derive(Debug, PartialEq)]
 pub(super) enum Record<'a> {
-    Schema { id: u16, name: &'a str, encoding: &'a str },
-    Channel { id: u16, schema: u16, topic: &'a str, encoding: &'a str, metadata: Pairs },
-    Message { channel: u16, ns: u64, data: &'a [u8] },
-    Metadata { name: &'a str, pairs: Pairs },
+    Schema {
+        id: u16,
+        name: &'a str,
+        encoding: &'a str,
+    },
+    Channel {
+        id: u16,
+        schema: u16,
+        topic: &'a str,
+        encoding: &'a str,
+        metadata: Pairs,
+    },
+    Message {
+        channel: u16,
+        ns: u64,
+        data: &'a [u8],
+    },
+    Metadata {
+        name: &'a str,
+        pairs: Pairs,
+    },
+    /// A chunk whose content cannot be read.
+    DamagedChunk,
 }
 
 /// Fault of a container.
@@ -124,7 +143,11 @@ pub(super) fn read_records<E: From<ContainerFault>>(
                     return Ok(false);
                 }
                 if code == op::CHUNK {
-                    unpack(&content, &mut take)?;
+                    match unpack(&content, &mut take)? {
+                        Ok(()) => {}
+                        Err(ContainerFault::Chunk(_)) => take(Record::DamagedChunk)?,
+                        Err(fault) => return Err(fault.into()),
+                    }
                 } else if let Some(record) = parse(code, &content) {
                     take(record)?;
                 }
@@ -148,11 +171,30 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
     }
 }
 
-fn unpack<E: From<ContainerFault>>(
+/// Gives the records of a chunk; the outer error is that of `take`.
+fn unpack<E>(
     content: &[u8],
     take: &mut impl FnMut(Record<'_>) -> Result<(), E>,
-) -> Result<(), E> {
-    let damaged = |cause: &str| E::from(ContainerFault::Chunk(cause.to_owned()));
+) -> Result<Result<(), ContainerFault>, E> {
+    let records = match unpacked(content) {
+        Ok(records) => records,
+        Err(fault) => return Ok(Err(fault)),
+    };
+    let mut rest = Fields(&records);
+    while let Some((code, rest_length)) = (|| Some((rest.take(1)?[0], rest.u64()?)))() {
+        let Some(inner) = usize::try_from(rest_length).ok().and_then(|length| rest.take(length)) else {
+            return Ok(Err(ContainerFault::Chunk("a record of it is cut short".to_owned())));
+        };
+        if let Some(record) = parse(code, inner) {
+            take(record)?;
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// Records of a chunk as bytes.
+fn unpacked(content: &[u8]) -> Result<Vec<u8>, ContainerFault> {
+    let damaged = |cause: &str| ContainerFault::Chunk(cause.to_owned());
     let mut fields = Fields(content);
     let head = (|| {
         let (_first, _last) = (fields.u64()?, fields.u64()?);
@@ -160,7 +202,7 @@ fn unpack<E: From<ContainerFault>>(
     })();
     let (size, crc, packing, packed) = head.ok_or_else(|| damaged("its header is cut short"))?;
     if size > LARGEST {
-        return Err(ContainerFault::TooLarge(size).into());
+        return Err(ContainerFault::TooLarge(size));
     }
     let packed = usize::try_from(packed).ok().and_then(|packed| fields.take(packed));
     let packed = packed.ok_or_else(|| damaged("its content is cut short"))?;
@@ -176,21 +218,13 @@ fn unpack<E: From<ContainerFault>>(
             Ok(unpacked) => unpacked.take(size + 1).read_to_end(&mut records).map_err(|e| e.to_string()),
             Err(error) => Err(error.to_string()),
         },
-        other => return Err(ContainerFault::Packing(other.chars().take(20).collect()).into()),
+        other => return Err(ContainerFault::Packing(other.chars().take(20).collect())),
     };
     unpacked.map_err(|cause| damaged(&cause))?;
     if records.len() as u64 != size || (crc != 0 && crc32fast::hash(&records) != crc) {
         return Err(damaged("its checksum or length is wrong"));
     }
-    let mut rest = Fields(&records);
-    while let Some((code, rest_length)) = (|| Some((rest.take(1)?[0], rest.u64()?)))() {
-        let inner = usize::try_from(rest_length).ok().and_then(|length| rest.take(length));
-        let inner = inner.ok_or_else(|| damaged("a record of it is cut short"))?;
-        if let Some(record) = parse(code, inner) {
-            take(record)?;
-        }
-    }
-    Ok(())
+    Ok(records)
 }
 
 #[cfg(test)]
@@ -269,10 +303,12 @@ mod tests {
         packer.write_all(&vec![0; 1 << 20]).expect("packs");
         let bomb = packer.finish().expect("packs");
         assert!(bomb.len() < 10_000);
-        for (size, wanted) in [(100, "wrong"), (2 << 20, "wrong"), (u64::MAX, "longer than the limit")] {
-            let error = read(&chunked("lz4", size, &bomb)).expect_err("refused").to_string();
-            assert!(error.contains(wanted), "{size}: {error}");
+        for size in [100, 2 << 20] {
+            let (seen, whole) = read(&chunked("lz4", size, &bomb)).expect("reads");
+            assert!(seen == ["DamagedChunk"] && !whole, "{size}: {seen:?}");
         }
+        let error = read(&chunked("lz4", u64::MAX, &bomb)).expect_err("refused").to_string();
+        assert!(error.contains("longer than the limit"), "{error}");
         assert!(read(&chunked("snappy", 5, b"abcde")).expect_err("refused").to_string().contains("\"snappy\""));
         assert!(matches!(read(b"PK\x03\x04 some zip"), Err(ContainerFault::NotMcap)));
         assert!(matches!(read(b""), Err(ContainerFault::NotMcap)));

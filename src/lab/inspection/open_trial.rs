@@ -139,6 +139,9 @@ impl OpenTrial {
             TrialData::Simulated(data) => open.read_simulated(data, options)?,
             TrialData::Recorded(_) | TrialData::Imported(_) => {
                 open.read_replayed(store, trial, options, began_s, &gaps)?;
+                if let Some(signals) = store.readings(id)? {
+                    open.break_at_gaps(&signals);
+                }
                 open.find_phases(marks);
                 open.reconstruct(options);
             }
@@ -343,6 +346,19 @@ impl OpenTrial {
         self.t_s.push(from_s + 1e-6);
         self.line_bar.push(f64::NAN);
         self.columns.iter_mut().for_each(|column| column.values.push(f32::NAN));
+    }
+
+    /// Takes out what stands in the gaps of an imported trial.
+    fn break_at_gaps(&mut self, signals: &Signals) {
+        for gap in signals.gaps() {
+            let columns = gap.channels.iter().filter_map(|channel| signals.channels.get(*channel));
+            for name in columns {
+                let own = unit_of_channel(name).0;
+                if let Some(column) = self.columns.iter_mut().find(|column| column.name == own) {
+                    column.values.iter_mut().take(gap.samples.end).skip(gap.samples.start).for_each(|v| *v = f32::NAN);
+                }
+            }
+        }
     }
 
     /// The phases as they are, with the beginning of one moved (s).

@@ -4,7 +4,7 @@ use super::*;
 
 /// The error's text.
 fn refusal(text: &[u8]) -> String {
-    read_csv(text, "f").expect_err("must be refused").to_string()
+    read_csv(text, "f", &Mapping::default(), "").expect_err("must be refused").to_string()
 }
 
 fn refused(text: &str, essence: &[&str]) {
@@ -74,7 +74,7 @@ fn rows_that_do_not_fit() {
 
 #[test]
 fn an_endless_row_is_cut() {
-    let said = read_csv(std::io::repeat(b'x'), "f").expect_err("never ends").to_string();
+    let said = read_csv(std::io::repeat(b'x'), "f", &Mapping::default(), "").expect_err("never ends").to_string();
     assert!(said.contains("longer than 1 MiB"), "{said}");
 }
 
@@ -162,7 +162,8 @@ fn times_that_may_be_numbers_of_samples() {
     let rows: String = (0..9).map(|k| format!("a,x,{k},{k}\n")).collect();
     refused(&format!("trial,label,t_s,p\n{rows}"), &["line 2: the times rise by 1", "t_s [ms]"]);
     for (unit, step_s) in [("s", 1.0), ("ms", 1e-3)] {
-        let import = read_csv(format!("trial,label,t_s [{unit}],p\n{rows}").as_bytes(), "f").expect("a unit is enough");
+        let import = read_csv(format!("trial,label,t_s [{unit}],p\n{rows}").as_bytes(), "f", &Mapping::default(), "")
+            .expect("a unit is enough");
         let t_s = &import.trials[0].signals.t_s;
         assert!((t_s[8] - 8.0 * step_s).abs() < 1e-12, "{t_s:?}");
     }

@@ -4,7 +4,7 @@
 use super::resample::{self, three_digits};
 use super::rows::{Fault, RawTrial, Rows, no_channels, too_many_values};
 use super::{MOST_SAMPLES, MOST_VALUES, brief};
-use palpate_store::ImportedTrial;
+use palpate_store::{ImportedTrial, interruptions};
 use palpate_tactile::Signals;
 
 /// Most memory for the names of the channels of all trials (bytes); a thousand times what a large study takes.
@@ -48,6 +48,7 @@ pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<Impor
         ImportedTrial { name: trial.name, label: trial.label, size, shape, signals }
     };
     let trials: Vec<ImportedTrial> = series.into_iter().map(with_words).collect();
+    warn_of_gaps(&trials, warnings);
     warn_of_lengths(&trials, warnings);
     warn_of_few(trials.len(), labels.len(), warnings);
     Ok(trials)
@@ -89,7 +90,7 @@ fn fill_gaps(trials: &mut [RawTrial], channels: &[String], warnings: &mut Vec<St
             return Err(fault(trial, &problem));
         }
         for (c, channel) in channels.iter().enumerate() {
-            let Some(filled) = resample::fill_gaps(&trial.t_s, &mut trial.values, c) else {
+            let Some(filled) = resample::fill_short_gaps(&trial.t_s, &mut trial.values, c) else {
                 let channel = brief(channel);
                 let problem = format!("has no reading of the channel \"{channel}\"; remove the trial or the column");
                 return Err(fault(trial, &problem));
@@ -119,7 +120,6 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     if total.saturating_mul(width) > MOST_VALUES {
         return Err((None, too_many_values()));
     }
-    warn_of_pauses(&trials, rate_hz, warnings);
     let mut changed_rates = Vec::new();
     for ((trial, samples), own_hz) in trials.iter_mut().zip(lengths).zip(rates) {
         let Some(samples) = samples else { continue };
@@ -129,35 +129,17 @@ fn at_one_rate(mut trials: Vec<RawTrial>, width: usize, warnings: &mut Vec<Strin
     if !changed_rates.is_empty() {
         let count = counted_of(changed_rates.len(), trials.len());
         let own = range(changed_rates.iter().copied().map(three_digits), "Hz");
-        warnings.push(format!("{count} resampled to {rate_hz} Hz: the times are uneven or at another rate ({own})"));
+        let why = match changed_rates.iter().all(|own| (own - rate_hz).abs() <= 0.01 * rate_hz) {
+            true => "the times are uneven".to_owned(),
+            false => format!("the times are uneven or at another rate ({own})"),
+        };
+        warnings.push(format!("{count} resampled to {rate_hz} Hz: {why}"));
     }
     if rate_hz < 1.0 {
         let rate_hz = three_digits(rate_hz);
         warnings.push(format!("the trials have only {rate_hz} samples per second; check that t_s is in seconds"));
     }
     Ok(trials)
-}
-
-/// Missing samples from which on a pause is reported.
-const PAUSE: f64 = 3.5;
-
-/// Warns of times without readings, which a straight line bridges.
-fn warn_of_pauses(trials: &[RawTrial], rate_hz: f64, warnings: &mut Vec<String>) {
-    let mut alike = Alike::default();
-    for trial in trials {
-        for pair in trial.t_s.windows(2).filter(|pair| (pair[1] - pair[0]) * rate_hz - 1.0 > PAUSE) {
-            let missing = ((pair[1] - pair[0]) * rate_hz).round() - 1.0;
-            alike.warn(warnings, || {
-                format!(
-                    "trial \"{}\": no readings from {} s to {} s ({missing} samples); a straight line stands there",
-                    brief(&trial.name),
-                    three_digits(pair[0]),
-                    three_digits(pair[1])
-                )
-            });
-        }
-    }
-    alike.close(warnings, "pauses without readings");
 }
 
 /// Samples of a trial at the common rate.
@@ -181,6 +163,17 @@ fn even_samples(trial: &RawTrial, rate_hz: f64) -> Result<usize, Fault> {
 
 fn fault(trial: &RawTrial, problem: &str) -> Fault {
     (Some(trial.line), format!("trial \"{}\" {problem}", brief(&trial.name)))
+}
+
+/// Gaps stay gaps; the trial is flagged.
+fn warn_of_gaps(trials: &[ImportedTrial], warnings: &mut Vec<String>) {
+    let mut alike = Alike::default();
+    for trial in trials {
+        for gap in interruptions(&trial.signals) {
+            alike.warn(warnings, || format!("trial \"{}\" is flagged: {gap}", brief(&trial.name)));
+        }
+    }
+    alike.close(warnings, "gaps");
 }
 
 fn warn_of_lengths(trials: &[ImportedTrial], warnings: &mut Vec<String>) {

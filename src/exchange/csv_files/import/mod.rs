@@ -31,6 +31,7 @@ mod property_tests;
 mod tests;
 
 use crate::format::{Import, ImportError, file_name};
+use crate::mapping::Mapping;
 use std::io::Read;
 use std::path::Path;
 
@@ -59,24 +60,30 @@ const MOST_VALUES: usize = 200_000_000;
 const FARTHEST_TIME_S: f64 = 1e11;
 
 /// Reads a file of grasps.
-pub(super) fn read_file(path: &Path) -> Result<Import, ImportError> {
+pub(super) fn read_file(path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
     let opened = palpate_geometry::open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let fault = match opened {
         Ok((length, _)) if length > LARGEST_FILE => rows::file_too_large(),
-        Ok((_, file)) => return read_csv(file, &file_name(path)),
+        Ok((_, file)) => return read_csv(file, &file_name(path), mapping, &mapping.label_of(path)),
         Err(cause) => cause.to_string(),
     };
     Err(ImportError::of(path, fault))
 }
 
-/// Reads grasps from any source; `name` stands in error messages.
-pub(crate) fn read_csv(reader: impl Read, name: &str) -> Result<Import, ImportError> {
+/// Reads grasps from any source; `name` stands in error messages, `label` is that of rows without one.
+pub(super) fn read_csv(reader: impl Read, name: &str, mapping: &Mapping, label: &str) -> Result<Import, ImportError> {
     let mut warnings = Vec::new();
-    let trials = rows::read_rows(reader, &mut warnings).and_then(|rows| mend::finish(rows, &mut warnings));
+    let trials =
+        rows::read_rows(reader, mapping, label, &mut warnings).and_then(|rows| mend::finish(rows, &mut warnings));
     match trials {
         Ok(trials) => Ok(Import { trials, warnings }),
         Err((line, fault)) => Err(ImportError { name: name.to_owned(), line, fault }),
     }
+}
+
+/// Reads grasps from text that was made of a file of another kind, which has no lines.
+pub(crate) fn read_made(text: impl Read, name: &str, mapping: &Mapping, label: &str) -> Result<Import, ImportError> {
+    read_csv(text, name, mapping, label).map_err(|error| ImportError { line: None, ..error })
 }
 
 /// The beginning of a text from the file, with control characters escaped.

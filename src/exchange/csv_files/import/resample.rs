@@ -70,53 +70,76 @@ pub(super) fn even_samples(t_s: &[f64], rate_hz: f64) -> f64 {
 /// Readings of `width` channels interpolated at `samples` even times from the first on.
 pub(super) fn resample(t_s: &[f64], values: &[f32], samples: usize, rate_hz: f64) -> (Vec<f64>, Vec<f32>) {
     let width = values.len() / t_s.len();
-    let times: Vec<f64> = (0..samples).map(|k| t_s[0] + k as f64 / rate_hz).collect();
+    let mut times: Vec<f64> = (0..samples).map(|k| t_s[0] + k as f64 / rate_hz).collect();
     let mut even = Vec::with_capacity(samples * width);
     let mut left = 0;
-    for t in &times {
+    // Where nothing was read for long, nothing is known.
+    let longest = LONGEST_PAUSE / rate(t_s);
+    for t in &mut times {
         while left + 2 < t_s.len() && t_s[left + 1] <= *t {
             left += 1;
         }
-        let part = part_between(t_s[left], t_s[left + 1], *t);
+        let (before, after) = (t_s[left], t_s[left + 1]);
+        let mut part = ((*t - before) / (after - before)).clamp(0.0, 1.0);
+        // A sample that is there already stays as it is.
+        if let Some(own) = [before, after].into_iter().find(|own| (*t - own).abs() * rate_hz < SAME_TIME) {
+            (*t, part) = (own, if own == before { 0.0 } else { 1.0 });
+        }
         let rows = &values[left * width..(left + 2) * width];
-        even.extend((0..width).map(|c| mix(rows[c], rows[c + width], part)));
+        let is_known = after - before <= longest || part <= 0.0 || part >= 1.0;
+        even.extend((0..width).map(|c| if is_known { mix(rows[c], rows[c + width], part) } else { f32::NAN }));
     }
     (times, even)
 }
 
-fn part_between(before: f64, after: f64, t: f64) -> f64 {
-    ((t - before) / (after - before)).clamp(0.0, 1.0)
-}
+/// Times this close are one, in steps.
+const SAME_TIME: f64 = 1e-6;
+/// Longest pause that a line bridges, in usual intervals: three readings are missing.
+const LONGEST_PAUSE: f64 = 4.5;
 
 fn mix(before: f32, after: f32, part: f64) -> f32 {
+    if part <= 0.0 {
+        return before;
+    }
+    if part >= 1.0 {
+        return after;
+    }
     let (before, after) = (f64::from(before), f64::from(after));
     (before + (after - before) * part) as f32
 }
 
-/// Interpolates the NaNs of one channel over time; before the first and after the last reading it holds that one.
-/// Returns how many there were, or `None` if nothing else was there.
-pub(super) fn fill_gaps(t_s: &[f64], values: &mut [f32], channel: usize) -> Option<usize> {
+/// Interpolates the NaNs of one channel over time where at most three of its readings are missing; before the first and
+/// after the last reading it holds that one as long. Returns how many there were, or `None` if nothing else was there.
+pub(super) fn fill_short_gaps(t_s: &[f64], values: &mut [f32], channel: usize) -> Option<usize> {
     let width = values.len() / t_s.len();
     let at = |sample: usize| sample * width + channel;
+    let known: Vec<usize> = (0..t_s.len()).filter(|sample| !values[at(*sample)].is_nan()).collect();
+    let (first, last) = (*known.first()?, *known.last()?);
+    if known.len() == t_s.len() {
+        return Some(0);
+    }
+    let own: Vec<f64> = known.iter().map(|sample| t_s[*sample]).collect();
+    let usual = if own.len() > 1 { rate(&own) } else { rate(t_s) };
+    let longest = LONGEST_PAUSE / usual;
     let mut filled = 0;
-    let mut known: Option<usize> = None;
-    for sample in 0..t_s.len() {
-        let value = values[at(sample)];
-        if value.is_nan() {
-            continue;
+    let mut fill = |from: usize, to: usize, gap: std::ops::Range<usize>| {
+        if t_s[to.max(gap.end - 1)] - t_s[from.min(gap.start)] > longest {
+            return;
         }
-        for gap in known.map_or(0, |k| k + 1)..sample {
-            let from = known.unwrap_or(sample);
-            let part = if from == sample { 0.0 } else { part_between(t_s[from], t_s[sample], t_s[gap]) };
-            values[at(gap)] = mix(values[at(from)], value, part);
+        for sample in gap {
+            let part = if from == to { 0.0 } else { (t_s[sample] - t_s[from]) / (t_s[to] - t_s[from]) };
+            values[at(sample)] = mix(values[at(from)], values[at(to)], part);
             filled += 1;
         }
-        known = Some(sample);
+    };
+    if first > 0 {
+        fill(first, first, 0..first);
     }
-    let last = known?;
-    for gap in last + 1..t_s.len() {
-        values[at(gap)] = values[at(last)];
-        filled += 1;
+    for pair in known.windows(2).filter(|pair| pair[1] > pair[0] + 1) {
+        fill(pair[0], pair[1], pair[0] + 1..pair[1]);
+    }
+    if last + 1 < t_s.len() {
+        fill(last, last, last + 1..t_s.len());
     }
     Some(filled)
 }
@@ -170,13 +193,25 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_filled_over_time() {
+    fn short_gaps_are_filled_over_time_and_long_ones_stay() {
         const GAP: f32 = f32::NAN;
         let times = [0.0, 1.0, 2.0, 5.0, 6.0];
-        let mut values = [GAP, 9.0, 1.0, GAP, GAP, GAP, 5.0, GAP, GAP, GAP];
-        assert_eq!(fill_gaps(&times, &mut values, 0), Some(3));
-        assert_eq!(fill_gaps(&times, &mut values, 1), Some(4));
-        assert_eq!(values, [1.0, 9.0, 1.0, 9.0, 2.0, 9.0, 5.0, 9.0, 5.0, 9.0]);
-        assert_eq!(fill_gaps(&times[..1], &mut [GAP], 0), None);
+        let mut values = [GAP, 9.0, 1.0, 8.0, GAP, GAP, 5.0, GAP, GAP, GAP];
+        assert_eq!(fill_short_gaps(&times, &mut values, 0), Some(3));
+        assert_eq!(fill_short_gaps(&times, &mut values, 1), Some(0), "six seconds at one a second");
+        let gaps: Vec<usize> = (0..values.len()).filter(|k| values[*k].is_nan()).collect();
+        assert_eq!((gaps, [0, 2, 4, 6, 8].map(|k| values[k])), (vec![5, 7, 9], [1.0, 1.0, 2.0, 5.0, 5.0]));
+        assert_eq!(fill_short_gaps(&times[..1], &mut [GAP], 0), None);
+    }
+
+    #[test]
+    fn nothing_is_read_into_a_pause() {
+        let times: Vec<f64> = (0..10).chain(60..70).map(|k| 0.02 * f64::from(k)).collect();
+        let values: Vec<f32> = times.iter().map(|t| *t as f32).collect();
+        let (even, read) = resample(&times, &values, 70, 50.0);
+        for (t, value) in even.iter().zip(read) {
+            let known = *t < 0.19 || *t > 1.19;
+            assert!(if known { (f64::from(value) - t).abs() < 1e-6 } else { value.is_nan() }, "{t}: {value}");
+        }
     }
 }

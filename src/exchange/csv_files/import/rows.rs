@@ -4,6 +4,8 @@ use super::{
     FARTHEST_TIME_S, LARGEST_FILE, LONGEST_NAME, LONGEST_ROW, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS, MOST_VALUES,
     brief,
 };
+use crate::mapping::{Mapping, PROFILES, named_column};
+use crate::series::Series;
 use csv::ByteRecord;
 use palpate_tactile::{Dimension, Unit, channel_with_unit};
 use std::collections::BTreeMap;
@@ -54,26 +56,51 @@ pub(super) struct Rows {
     /// Size and shape of each label.
     pub(super) labels: BTreeMap<String, [Option<&'static str>; 2]>,
     pub(super) channels: Vec<ChannelColumn>,
-    /// Places of trial, label and time.
-    required: [usize; 3],
+    roles: Roles,
     /// Places of size and shape.
     words: [Option<usize>; 2],
     /// Fields of the header.
     width: usize,
     decimal_comma: bool,
-    /// Factor of times to seconds; none where the header names no unit.
-    time_factor: Option<f64>,
     /// The first numbers with a point and with a comma, each with its line.
     separators: [Option<(u64, String)>; 2],
     by_name: BTreeMap<String, usize>,
+    /// A pause of this length begins a new trial, and so does a time that falls (s).
+    split_gap_s: Option<f64>,
     readings: usize,
 }
 
-/// Reads all rows below a header.
-pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result<Rows, Fault> {
+/// Which columns say what a row belongs to.
+struct Roles {
+    /// Without it the file is one trial, or one for each change of the label.
+    trial: Option<usize>,
+    label: Label,
+    time: usize,
+    /// Factor of times to seconds; none where no unit is named.
+    time_factor: Option<f64>,
+}
+
+/// Where a label stands.
+enum Label {
+    Column(usize),
+    Fixed(String),
+}
+
+/// Reads all rows below a header. `label` is that of rows without one, where columns are mapped.
+pub(super) fn read_rows(
+    reader: impl Read,
+    mapping: &Mapping,
+    label: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Rows, Fault> {
     let mut reader = BufReader::with_capacity(64 << 10, reader);
-    let separator = separator(reader.fill_buf().map_err(|e| (None, e.to_string()))?);
-    let source = Limited { bytes: reader.bytes(), after_return: false, ended: false, total: 0, row: 0 };
+    for _ in 0..mapping.skip {
+        reader.skip_until(b'\n').map_err(|e| (None, e.to_string()))?;
+    }
+    let head = reader.fill_buf().map_err(|e| (None, e.to_string()))?;
+    let separator = mapping.delimiter.map_or_else(|| separator(head, mapping), |delimiter| delimiter as u8);
+    let source =
+        Limited { bytes: reader.bytes(), after_return: false, ended: false, total: 0, row: 0, skipped: mapping.skip };
     let mut reader =
         csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(source);
     let mut record = ByteRecord::new();
@@ -90,7 +117,26 @@ pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result
             }
         }
     };
-    let mut rows = Rows::below(&record, separator != b',', warnings).map_err(|fault| (Some(line), fault))?;
+    let decimal_comma = separator != b',';
+    let first = holds_numbers(&record, decimal_comma).then(|| record.clone());
+    if first.is_some() {
+        if !mapping.has_roles() {
+            let text = "its first row holds numbers, where the names of the columns should stand; add a header, or name the \
+                        columns by number, as in --time \"1 [s]\" --channel \"force=2 [N]\"";
+            return Err((Some(line), text.to_owned()));
+        }
+        record = (1..=record.len()).map(|number| number.to_string().into_bytes()).collect();
+    }
+    if let (Some(name), Some(value)) = (&mapping.name, &mapping.value) {
+        let series = long_table(&mut reader, &record, line, [name, value], mapping, decimal_comma)?;
+        let text = series.into_csv(label).ok_or_else(|| empty("row with a number"))?;
+        return read_rows(text, &Mapping { split_gap_s: mapping.split_gap_s, ..Mapping::default() }, label, warnings);
+    }
+    let mut rows =
+        Rows::below(&record, decimal_comma, mapping, label, warnings).map_err(|fault| (Some(line), fault))?;
+    if let Some(first) = first {
+        rows.add(line, &first)?;
+    }
     while let Some(line) = next_row(&mut reader, &mut record)? {
         if !record[0].starts_with(b"#") {
             rows.add(line, &record)?;
@@ -101,6 +147,42 @@ pub(super) fn read_rows(reader: impl Read, warnings: &mut Vec<String>) -> Result
     }
     rows.check_times()?;
     Ok(rows)
+}
+
+/// True for a row in which every field is a number.
+fn holds_numbers(record: &ByteRecord, decimal_comma: bool) -> bool {
+    let is_number = |field: &[u8]| number::<f64>(String::from_utf8_lossy(field).trim(), decimal_comma).is_some();
+    record.iter().all(is_number)
+}
+
+/// Reads a table with a row for each value.
+fn long_table<R: Read>(
+    reader: &mut csv::Reader<Limited<R>>,
+    header: &ByteRecord,
+    line: u64,
+    [name, value]: [&String; 2],
+    mapping: &Mapping,
+    decimal_comma: bool,
+) -> Result<Series, Fault> {
+    let header = Header::read(header).map_err(|fault| (Some(line), fault))?;
+    let time = mapping.time.as_deref().unwrap_or(TIME);
+    let columns = || -> Result<_, String> {
+        let (time, unit) = header.needed(time)?;
+        Ok(([time, header.needed(name)?.0, header.needed(value)?.0], time_factor(unit)?.unwrap_or(1.0)))
+    };
+    let ([time, name, value], factor) = columns().map_err(|fault| (Some(line), fault))?;
+    let mut series = Series::default();
+    let mut record = ByteRecord::new();
+    while let Some(line) = next_row(reader, &mut record)? {
+        let text = |place: usize| String::from_utf8_lossy(record.get(place).unwrap_or_default()).trim().to_owned();
+        let (time, channel, field) = (text(time), text(name), text(value));
+        let t_s = number::<f64>(&time, decimal_comma).map(|t| t * factor).or_else(|| date_time_s(&time));
+        let fault = |text: &str| (Some(line), format!("\"{}\" is not a number", brief(text)));
+        let t_s = t_s.filter(|t| t.is_finite()).ok_or_else(|| fault(&time))?;
+        let value = number::<f64>(&field, decimal_comma).ok_or_else(|| fault(&field))?;
+        series.push(0, &channel, t_s, value).map_err(|fault| (Some(line), fault))?;
+    }
+    Ok(series)
 }
 
 /// What a row above the data is.
@@ -121,14 +203,77 @@ fn preamble(record: &ByteRecord) -> Preamble {
     if required_in(&fields) == REQUIRED.len() { Preamble::Header(fields) } else { Preamble::Skipped }
 }
 
-/// Columns that every file has.
-const REQUIRED: [&str; 3] = ["trial", "label", "t_s"];
+/// Columns that every table of this program has.
+const REQUIRED: [&str; 3] = ["trial", "label", TIME];
+/// Column of times (s).
+const TIME: &str = "t_s";
 
 /// Number of the required columns in a header.
 fn required_in(header: &ByteRecord) -> usize {
-    let names = header.iter().filter_map(|field| name(field, "header").ok()).map(|text| without_unit(text).0);
-    let names: Vec<&str> = names.collect();
-    REQUIRED.iter().filter(|wanted| names.iter().any(|name| name.eq_ignore_ascii_case(wanted))).count()
+    number_of(header, &REQUIRED)
+}
+
+/// Number of columns in a header that have one of these names.
+fn number_of(header: &ByteRecord, wanted: &[&str]) -> usize {
+    let names: Vec<&str> = header.iter().filter_map(|field| name(field, "header").ok()).collect();
+    let has = |wanted: &str| names.iter().any(|name| is_called(name, wanted));
+    wanted.iter().filter(|wanted| has(wanted)).count()
+}
+
+/// True where a column of a header, with or without its unit, is meant.
+fn is_called(column: &str, wanted: &str) -> bool {
+    column == wanted || without_unit(column).0.eq_ignore_ascii_case(without_unit(wanted).0)
+}
+
+/// Names and units of the columns of a table.
+struct Header<'a> {
+    /// As they stand there.
+    whole: Vec<&'a str>,
+    names: Vec<(&'a str, Option<&'a str>)>,
+}
+
+impl<'a> Header<'a> {
+    fn read(header: &'a ByteRecord) -> Result<Self, String> {
+        let whole = header.iter().map(|field| name(field, "header")).collect::<Result<Vec<_>, _>>()?;
+        let names = whole.iter().map(|text| without_unit(text)).collect();
+        Ok(Self { whole, names })
+    }
+
+    /// Place and unit of a column that is named with or without its unit.
+    fn column<'b>(&'b self, wanted: &'b str) -> Option<(usize, Option<&'b str>)> {
+        if let Some(at) = self.whole.iter().position(|text| *text == wanted) {
+            return Some((at, self.names[at].1));
+        }
+        let (name, unit) = without_unit(wanted);
+        let at = self.names.iter().position(|(own, _)| own.eq_ignore_ascii_case(name))?;
+        Some((at, unit.or(self.names[at].1)))
+    }
+
+    /// The same for a column that has to be there.
+    fn needed<'b>(&'b self, wanted: &'b str) -> Result<(usize, Option<&'b str>), String> {
+        self.column(wanted).ok_or_else(|| self.lacks(&[wanted]))
+    }
+
+    /// Some columns are not there.
+    fn lacks(&self, missing: &[&str]) -> String {
+        let missing: Vec<String> = missing.iter().map(|name| format!("\"{}\"", brief(name))).collect();
+        format!("there is no column {}; the file has {}", missing.join(" and no "), self.listed())
+    }
+
+    fn listed(&self) -> String {
+        let mut found: Vec<String> =
+            self.whole.iter().filter(|text| !text.is_empty()).map(|text| brief(text)).collect();
+        found.truncate(20);
+        found.join(", ")
+    }
+}
+
+/// Factor of a unit of time to seconds; none where no unit is named.
+fn time_factor(unit: Option<&str>) -> Result<Option<f64>, String> {
+    let of_time = |text: &str| Unit::parse(text).filter(|unit| unit.dimension == Dimension::Time);
+    let no_time = |text: &str| format!("\"{}\" is no unit of time; known are s, ms, us, ns and min", brief(text));
+    let unit = unit.map(|text| of_time(text).ok_or_else(|| no_time(text))).transpose()?;
+    Ok(unit.map(|unit| unit.factor))
 }
 
 /// Reads the next row that is not blank and returns the line on which it begins, or none at the end.
@@ -138,7 +283,7 @@ fn next_row<R: Read>(reader: &mut csv::Reader<Limited<R>>, record: &mut ByteReco
         // The reader stops on the line after the row; the record's own position may be a blank line before it.
         let more = reader.read_byte_record(record);
         let breaks = record.as_slice().iter().filter(|byte| **byte == b'\n').count() as u64;
-        let line = reader.position().line().saturating_sub(1 + breaks).max(1);
+        let line = reader.get_ref().skipped + reader.position().line().saturating_sub(1 + breaks).max(1);
         match more.map_err(csv::Error::into_kind) {
             Ok(false) => return Ok(None),
             Ok(true) if is_blank(record) => {}
@@ -154,8 +299,12 @@ fn is_blank(record: &ByteRecord) -> bool {
     record.as_slice().iter().all(|byte| byte.is_ascii_whitespace() || b",;".contains(byte))
 }
 
-/// Of comma, semicolon and tab, the one that finds most of the required columns in the header, or else most columns.
-fn separator(head: &[u8]) -> u8 {
+/// Of comma, semicolon and tab, the one that finds most of the wanted columns in the header, or else most columns.
+fn separator(head: &[u8], mapping: &Mapping) -> u8 {
+    let named = [&mapping.time, &mapping.trial, &mapping.label, &mapping.name, &mapping.value].into_iter().flatten();
+    let columns = mapping.channels.iter().map(|channel| named_column(channel).1);
+    let known = mapping.known_by.iter().map(String::as_str);
+    let wanted: Vec<&str> = REQUIRED.into_iter().chain(named.map(String::as_str)).chain(columns).chain(known).collect();
     let score = |separator: u8| {
         let mut reader =
             csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(head);
@@ -166,7 +315,7 @@ fn separator(head: &[u8]) -> u8 {
             Preamble::Header(own) => Some(own),
         });
         let header = header.flatten().next().unwrap_or_default();
-        (required_in(&header), header.len())
+        (number_of(&header, &wanted), header.len())
     };
     // The last of equals wins, and a comma is the likeliest.
     [b'\t', b';', b','].into_iter().max_by_key(|s| score(*s)).unwrap_or(b',')
@@ -221,33 +370,48 @@ fn empty_field(column: &str) -> String {
 
 impl Rows {
     /// Finds the columns in a header.
-    fn below(header: &ByteRecord, decimal_comma: bool, warnings: &mut Vec<String>) -> Result<Self, String> {
-        let names = header.iter().map(|f| name(f, "header")).collect::<Result<Vec<_>, _>>()?;
-        let names: Vec<(&str, Option<&str>)> = names.into_iter().map(without_unit).collect();
-        let place = |wanted: &str| names.iter().position(|(name, _)| name.eq_ignore_ascii_case(wanted));
-        let missing: Vec<String> = REQUIRED.iter().filter(|n| place(n).is_none()).map(|n| format!("\"{n}\"")).collect();
-        let (Some(trial), Some(label), Some(time)) = (place("trial"), place("label"), place("t_s")) else {
-            let mut found: Vec<String> = names.iter().filter(|n| !n.0.is_empty()).map(|n| brief(n.0)).collect();
-            found.truncate(20);
-            let (missing, found) = (missing.join(" and no "), found.join(", "));
-            return Err(format!(
-                "there is no column {missing}. Required are trial, label, t_s (in seconds) and one column per sensor \
-                 channel; the file has {found}"
-            ));
+    fn below(
+        header: &ByteRecord,
+        decimal_comma: bool,
+        mapping: &Mapping,
+        fallback: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, String> {
+        let header = Header::read(header)?;
+        let place = |wanted: &str| header.column(wanted).map(|(at, _)| at);
+        let missing: Vec<&str> = REQUIRED.into_iter().filter(|wanted| place(wanted).is_none()).collect();
+        if !mapping.has_roles() && !missing.is_empty() {
+            return Err(unmapped(&header, &missing));
+        }
+        let time = mapping.time.as_deref().unwrap_or(TIME);
+        let (time, unit) = header.needed(time)?;
+        let trial = match &mapping.trial {
+            Some(wanted) => Some(header.needed(wanted)?.0),
+            None => place("trial"),
         };
-        let of_time = |text: &str| Unit::parse(text).filter(|unit| unit.dimension == Dimension::Time);
-        let no_time = |text: &str| format!("\"{}\" is no unit of time; known are s, ms, us, ns and min", brief(text));
-        let time_factor = names[time].1.map(|text| of_time(text).ok_or_else(|| no_time(text))).transpose()?;
-        let time_factor = time_factor.map(|unit| unit.factor);
+        let columns = [mapping.label.as_deref(), mapping.label_column.as_deref(), Some("label")];
+        let found = columns.into_iter().flatten().take(if mapping.label.is_some() { 1 } else { 3 }).find_map(place);
+        let label = found.map_or_else(|| Label::Fixed(fallback.to_owned()), Label::Column);
+        if let (Label::Fixed(name), None) = (&label, &mapping.label) {
+            warnings.push(format!(
+                "no label is given: the trials are called \"{}\" after the file; --label sets another",
+                brief(name)
+            ));
+        }
+        let roles = Roles { trial, label, time, time_factor: time_factor(unit)? };
+        let label = match roles.label {
+            Label::Column(at) => Some(at),
+            Label::Fixed(_) => None,
+        };
         let words = [place("size"), place("shape")];
-        let known = [Some(trial), Some(label), Some(time), words[0], words[1]];
         let mut channels: Vec<ChannelColumn> = Vec::new();
-        for (at, (name, unit)) in
-            names.iter().enumerate().filter(|(at, n)| !n.0.is_empty() && !known.contains(&Some(*at)))
-        {
+        let mut add = |at: usize, name: &str, unit: Option<&str>| {
             let reserved = ["trial", "label", "t_s", "size", "shape"].iter().find(|r| r.eq_ignore_ascii_case(name));
-            if reserved.is_some() || channels.iter().any(|other| names[other.place].0 == *name) {
-                let name = brief(reserved.unwrap_or(name));
+            let (full, factor) = unit.map_or(Ok((name.to_owned(), 1.0)), |unit| channel_with_unit(name, unit))?;
+            if reserved.is_some()
+                || channels.iter().any(|other| other.name == full || without_unit(&other.name).0 == name)
+            {
+                let name = brief(reserved.unwrap_or(&name));
                 return Err(format!(
                     "two columns are called \"{name}\"; rename or remove one (units in brackets do not count)"
                 ));
@@ -255,30 +419,45 @@ impl Rows {
             if channels.len() == MOST_CHANNELS {
                 return Err(format!("there are more than {MOST_CHANNELS} columns of readings; remove some"));
             }
-            let (name, factor) = unit.map_or(Ok(((*name).to_owned(), 1.0)), |unit| channel_with_unit(name, unit))?;
-            channels.push(ChannelColumn { place: at, name, factor, numeric: false, text: None });
+            channels.push(ChannelColumn { place: at, name: full, factor, numeric: false, text: None });
+            Ok(())
+        };
+        for text in &mapping.channels {
+            let (own, column) = named_column(text);
+            let (at, unit) = header.needed(column)?;
+            add(at, own.unwrap_or(header.names[at].0), unit)?;
+        }
+        let names = &header.names;
+        if mapping.channels.is_empty() {
+            let known = [trial, label, Some(time), words[0], words[1]];
+            let is_ignored = |at: usize| mapping.ignore.iter().any(|wanted| is_called(header.whole[at], wanted));
+            for (at, (name, unit)) in names.iter().enumerate() {
+                if !name.is_empty() && !known.contains(&Some(at)) && !is_ignored(at) {
+                    add(at, name, *unit)?;
+                }
+            }
         }
         if channels.is_empty() {
             return Err(no_channels());
         }
-        let nameless: Vec<usize> = (1..).zip(&names).filter(|(_, n)| n.0.is_empty()).map(|(at, _)| at).collect();
+        let nameless: Vec<usize> = (1..).zip(names).filter(|(_, n)| n.0.is_empty()).map(|(at, _)| at).collect();
         if let [first, others @ ..] = nameless.as_slice() {
             let others = if others.is_empty() { String::new() } else { format!(" (and {} more)", others.len()) };
             warnings.push(format!("column {first}{others} has no name in the header and was left out"));
         }
         let (trials, labels, by_name) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        let (required, width) = ([trial, label, time], names.len());
+        let width = names.len();
         Ok(Self {
             trials,
             labels,
             channels,
-            required,
+            roles,
             words,
             width,
             decimal_comma,
-            time_factor,
             separators: [None, None],
             by_name,
+            split_gap_s: mapping.split_gap_s,
             readings: 0,
         })
     }
@@ -291,7 +470,7 @@ impl Rows {
                 && trial.t_s.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
                 && trial.t_s[0].fract() == 0.0
         };
-        match self.trials.iter().find(counts).filter(|_| self.time_factor.is_none()) {
+        match self.trials.iter().find(counts).filter(|_| self.roles.time_factor.is_none()) {
             None => Ok(()),
             Some(trial) => {
                 let text = "the times rise by 1 from row to row: seconds, milliseconds, or the numbers of the samples? Name \
@@ -390,10 +569,11 @@ impl Rows {
 
     /// Adds readings to their trial, or replaces those of the same time.
     fn store(&mut self, line: u64, record: &ByteRecord, row: &[f32]) -> Result<(), String> {
-        let at = self.trial(line, record)?;
+        let now = self.time(line, &record[self.roles.time])?;
+        let at = self.trial(line, record, now)?;
         self.check_words(record)?;
-        let now = self.time(line, &record[self.required[2]])?;
         let readings = self.readings + row.len();
+        let is_split = self.split_gap_s.is_some();
         let trial = &mut self.trials[at];
         let name = || brief(&trial.name);
         match trial.t_s.last() {
@@ -402,7 +582,7 @@ impl Rows {
                 let advice = if wrapped {
                     "a counter of microseconds starts again after 4294.97 s; add that to the times from here on"
                 } else {
-                    "sort its rows, and give every grasp a trial name of its own"
+                    "sort its rows, and give every grasp a trial name of its own, or split the file with --split-by gap"
                 };
                 return Err(format!("in trial \"{}\" the time falls from {before} s to {now} s; {advice}", name()));
             }
@@ -411,10 +591,9 @@ impl Rows {
                 trial.values.truncate(trial.values.len() - row.len());
             }
             _ if trial.t_s.len() == MOST_SAMPLES => {
-                return Err(format!(
-                    "trial \"{}\" has more than {MOST_SAMPLES} samples; give every grasp a trial name of its own",
-                    name()
-                ));
+                let advice =
+                    if is_split { "choose a shorter pause" } else { "give every grasp a trial name of its own" };
+                return Err(format!("trial \"{}\" has more than {MOST_SAMPLES} samples; {advice}", name()));
             }
             _ if readings > MOST_VALUES => return Err(too_many_values()),
             _ => {
@@ -426,37 +605,55 @@ impl Rows {
         Ok(())
     }
 
-    /// The trial of a row.
-    fn trial(&mut self, line: u64, record: &ByteRecord) -> Result<usize, String> {
-        let name = filled_name(&record[self.required[0]], "trial")?;
-        let label = filled_name(&record[self.required[1]], "label")?;
-        let Some(at) = self.by_name.get(name).copied() else {
-            if self.trials.len() == MOST_TRIALS {
-                return Err(format!("there are more than {MOST_TRIALS} trials; split the file"));
-            }
-            self.by_name.insert(name.to_owned(), self.trials.len());
-            let (name, label) = (name.to_owned(), label.to_owned());
-            self.trials.push(RawTrial { name, label, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
-            return Ok(self.trials.len() - 1);
-        };
-        if self.trials[at].label != label {
-            return Err(format!(
-                "the label of trial \"{}\" changes from \"{}\" to \"{}\"; one trial is one grasp of one object",
-                brief(name),
-                brief(&self.trials[at].label),
-                brief(label)
-            ));
+    /// Label of a row.
+    fn label(&self, record: &ByteRecord) -> Result<String, String> {
+        match &self.roles.label {
+            Label::Column(at) => Ok(filled_name(&record[*at], "label")?.to_owned()),
+            Label::Fixed(label) => Ok(label.clone()),
         }
-        Ok(at)
+    }
+
+    /// The trial of a row at a time (s).
+    fn trial(&mut self, line: u64, record: &ByteRecord, now: f64) -> Result<usize, String> {
+        let name = match self.roles.trial {
+            Some(at) => filled_name(&record[at], "trial")?,
+            None => "",
+        };
+        let label = self.label(record)?;
+        let known = self.by_name.get(name).copied();
+        let splits = |trial: &RawTrial| {
+            let falls = |gap: f64| trial.t_s.last().is_some_and(|before| now < *before || now - before >= gap);
+            self.split_gap_s.is_some_and(falls) || (self.roles.trial.is_none() && trial.label != label)
+        };
+        if let Some(at) = known.filter(|at| !splits(&self.trials[*at])) {
+            if self.trials[at].label != label {
+                return Err(format!(
+                    "the label of trial \"{}\" changes from \"{}\" to \"{}\"; one trial is one grasp of one object",
+                    brief(name),
+                    brief(&self.trials[at].label),
+                    brief(&label)
+                ));
+            }
+            return Ok(at);
+        }
+        let count = self.trials.len();
+        if count == MOST_TRIALS {
+            return Err(format!("there are more than {MOST_TRIALS} trials; split the file"));
+        }
+        self.by_name.insert(name.to_owned(), count);
+        let name = match (name, known) {
+            ("", _) => (count + 1).to_string(),
+            (name, None) => name.to_owned(),
+            (name, Some(_)) => format!("{name}, row {line}"),
+        };
+        self.trials.push(RawTrial { name, label, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
+        Ok(count)
     }
 
     /// A label has one size and one shape; an empty field leaves it to other rows.
     fn check_words(&mut self, record: &ByteRecord) -> Result<(), String> {
-        let label = filled_name(&record[self.required[1]], "label")?;
-        if !self.labels.contains_key(label) {
-            self.labels.insert(label.to_owned(), [None, None]);
-        }
-        let Some(known) = self.labels.get_mut(label) else { return Ok(()) };
+        let label = self.label(record)?;
+        let known = self.labels.entry(label.clone()).or_insert([None, None]);
         let allowed = [("size", SIZES.as_slice()), ("shape", SHAPES.as_slice())];
         for (((column, allowed), place), known) in allowed.into_iter().zip(self.words).zip(known) {
             let Some(place) = place else { continue };
@@ -473,7 +670,7 @@ impl Rows {
                 return Err(format!(
                     "the {column} of \"{}\" is \"{before}\" in earlier rows and \"{now}\" here; a label has one \
                          {column}, so correct the word or use two labels",
-                    brief(label)
+                    brief(&label)
                 ));
             }
         }
@@ -487,8 +684,9 @@ impl Rows {
         if field.is_empty() {
             return Err(empty_field("t_s"));
         }
-        let factor = self.time_factor.unwrap_or(1.0);
-        match self.number(line, field).map_err(|(_, fault)| fault)?.map(|t| t * factor) {
+        let factor = self.roles.time_factor.unwrap_or(1.0);
+        let read = self.number(line, field).map_err(|(_, fault)| fault)?.map(|t| t * factor);
+        match read.or_else(|| date_time_s(field)) {
             Some(t) if t.abs() <= FARTHEST_TIME_S => Ok(t),
             Some(t) if t.is_finite() => Err(format!(
                 "the time {t} s is beyond {FARTHEST_TIME_S} s; name the unit in the header if it is another, as in t_s [ms]"
@@ -496,6 +694,72 @@ impl Rows {
             _ => Err(format!("the time \"{}\" is not a number of seconds", brief(field))),
         }
     }
+}
+
+/// A table whose columns have other names, and what to do.
+fn unmapped(header: &Header<'_>, missing: &[&str]) -> String {
+    let advice = match Mapping::known_for(&header.whole) {
+        Some((name, profile)) => format!("it looks like a file of {}: add --profile {name}", profile.title),
+        None => {
+            let like_time = |text: &&&str| text.to_ascii_lowercase().contains("time") || **text == "t";
+            let time = header.whole.iter().find(like_time).map_or("COLUMN [s]", |text| text);
+            format!(
+                "say which columns hold them, as in --time \"{}\" --trial COLUMN --label COLUMN (or --label NAME), or name a \
+                 --profile ({})",
+                brief(time),
+                PROFILES.map(|(name, _)| name).join(", ")
+            )
+        }
+    };
+    format!("{}; {advice}", header.lacks(missing))
+}
+
+/// Seconds of a date and time such as `2026-03-01T12:00:00.020Z`, `2026/03/01 12:00:00` or `12:00:00.5`, from 1970 or
+/// midnight on.
+fn date_time_s(text: &str) -> Option<f64> {
+    let (date, time) = text.split_once(['T', ' ']).map_or((None, text), |(date, time)| (Some(date), time));
+    let time = time.trim();
+    let (clock, zone) = match time.find(['Z', '+', '-']) {
+        Some(at) => time.split_at(at),
+        None => (time, ""),
+    };
+    let numbers = |text: &str, separator: &[char]| -> Option<[f64; 3]> {
+        let parts: Vec<&str> = text.split(separator).collect();
+        let is_plain = |part: &&str| part.starts_with(|c: char| c.is_ascii_digit());
+        let numbers: Vec<f64> =
+            parts.iter().filter(|part| is_plain(part)).filter_map(|part| part.parse().ok()).collect();
+        if parts.len() == 3 { numbers.try_into().ok() } else { None }
+    };
+    let [hour, minute, second] = numbers(&clock.replace(',', "."), &[':'])?;
+    if !(hour < 24.0 && minute < 60.0 && second < 61.0 && hour.fract() == 0.0 && minute.fract() == 0.0) {
+        return None;
+    }
+    let offset = match zone {
+        "" | "Z" => 0.0,
+        zone => {
+            let (hours, minutes) = zone[1..].split_once(':').unwrap_or((&zone[1..], "0"));
+            let [hours, minutes] = [hours, minutes].map(|part| part.parse::<u8>().ok());
+            let seconds = 3600.0 * f64::from(hours?) + 60.0 * f64::from(minutes?);
+            if zone.starts_with('-') { -seconds } else { seconds }
+        }
+    };
+    let days = match date {
+        None => 0.0,
+        Some(date) => {
+            let [year, month, day] = numbers(date, &['-', '/'])?;
+            if !((1970.0..=9999.0).contains(&year) && (1.0..=12.0).contains(&month) && (1.0..=31.0).contains(&day)) {
+                return None;
+            }
+            days_since_1970(year as i64, month as i64, day as i64) as f64
+        }
+    };
+    Some(86_400.0 * days + 3600.0 * hour + 60.0 * minute + second - offset)
+}
+
+/// Days of the Gregorian calendar: whole years begin in March, so that the leap day is the last.
+fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
+    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day - 1 - 719_468
 }
 
 pub(super) fn no_channels() -> String {
@@ -527,6 +791,8 @@ struct Limited<R> {
     total: u64,
     /// Bytes handed out since the present row began.
     row: u64,
+    /// Lines above the header that were skipped.
+    skipped: u64,
 }
 
 impl<R: Read> Read for Limited<R> {
@@ -566,6 +832,7 @@ mod tests {
 
     #[test]
     fn the_separator_is_the_one_that_finds_the_columns() {
+        let separator = |head: &[u8]| separator(head, &Mapping::default());
         assert_eq!(separator(b"trial,label,t_s,p"), b',');
         assert_eq!(separator(b"\n\"trial\";label;t_s;a,b,c,d,e,f\n1,2,3,4"), b';');
         assert_eq!(separator(b"\xEF\xBB\xBFtrial\tlabel\tt_s\tp [a;b]"), b'\t');
@@ -577,12 +844,28 @@ mod tests {
     fn columns_are_found_in_any_order_and_case() {
         let header = ["", "Pressure_Left [Pa]", " T_S [s]", "LABEL", "shape", "Trial", "k (1/m)"];
         let mut warnings = Vec::new();
-        let Ok(found) = Rows::below(&ByteRecord::from(header.to_vec()), false, &mut warnings) else {
+        let header = ByteRecord::from(header.to_vec());
+        let Ok(found) = Rows::below(&header, false, &Mapping::default(), "", &mut warnings) else {
             panic!("all are there")
         };
-        assert_eq!((found.required, found.words, found.width), ([5, 3, 2], [None, Some(4)], 7));
+        assert!(matches!(found.roles, Roles { trial: Some(5), label: Label::Column(3), time: 2, .. }));
+        assert_eq!((found.words, found.width), ([None, Some(4)], 7));
         let channels: Vec<(usize, &str)> = found.channels.iter().map(|c| (c.place, c.name.as_str())).collect();
         assert_eq!((channels, warnings.len()), (vec![(1, "Pressure_Left [Pa]"), (6, "k [1/m]")], 1));
+    }
+
+    #[test]
+    fn dates_and_clock_times_are_seconds() {
+        // date -u -d 2026-03-01T12:00:00 +%s
+        assert_eq!(date_time_s("2026-03-01T12:00:00.25Z"), Some(1_772_366_400.25));
+        assert_eq!(date_time_s("2026/03/01 13:00:00,25+01:00"), Some(1_772_366_400.25));
+        assert_eq!(date_time_s("2024-02-29 00:00:00"), Some(1_709_164_800.0));
+        assert_eq!(date_time_s("01:02:03.5"), Some(3723.5));
+        for text in
+            ["", "12:00", "2026-13-01 00:00:00", "25:00:00", "a:b:c", "2026-03-01", "1:2:3:4", "-1:00:00", "1:00:00+x"]
+        {
+            assert_eq!(date_time_s(text), None, "{text}");
+        }
     }
 
     #[test]

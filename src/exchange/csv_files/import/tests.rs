@@ -3,7 +3,7 @@
 use super::*;
 
 fn read(text: &str) -> Import {
-    read_csv(text.as_bytes(), "grasps.csv").expect("a good file")
+    read_csv(text.as_bytes(), "grasps.csv", &Mapping::default(), "").expect("a good file")
 }
 
 /// The only trial's readings of its only channel.
@@ -165,7 +165,8 @@ fn many_warnings_of_one_kind_are_counted() {
     for trial in 0..150 {
         text.push_str(&format!("{trial},{},0,1\n{trial},{0},1,\n", trial % 2));
     }
-    let import = read_csv(text.replace("149,0", "149,1").as_bytes(), "many").expect("a good file");
+    let import =
+        read_csv(text.replace("149,0", "149,1").as_bytes(), "many", &Mapping::default(), "").expect("a good file");
     assert_eq!(import.warnings.len(), 101);
     assert_eq!(import.warnings[100], "and 50 more channels of trials with missing readings");
 }
@@ -174,14 +175,14 @@ fn many_warnings_of_one_kind_are_counted() {
 fn a_file_is_named_in_its_errors() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("grasps.csv");
-    let missing = read_file(&path).expect_err("not there").to_string();
+    let missing = read_file(&path, &Mapping::default()).expect_err("not there").to_string();
     assert!(missing.starts_with("cannot import \"grasps.csv\": No such file"), "{missing}");
     std::fs::write(&path, GOLDEN).expect("writes");
-    assert_eq!(read_file(&path).expect("a good file"), read(GOLDEN));
-    let is_folder = read_file(folder.path()).expect_err("a folder").to_string();
+    assert_eq!(read_file(&path, &Mapping::default()).expect("a good file"), read(GOLDEN));
+    let is_folder = read_file(folder.path(), &Mapping::default()).expect_err("a folder").to_string();
     assert!(is_folder.contains("directory"), "{is_folder}");
     std::fs::File::create(&path).and_then(|file| file.set_len(LARGEST_FILE + 1)).expect("a hollow file");
-    let large = read_file(&path).expect_err("too large").to_string();
+    let large = read_file(&path, &Mapping::default()).expect_err("too large").to_string();
     assert!(large.contains("larger than 2 GiB"), "{large}");
 }
 
