@@ -62,14 +62,14 @@ pub(super) struct CalibrateArguments {
 
 pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Result<(), Failure> {
     if let Some(command) = &arguments.command {
-        return match existing_store(store)? {
+        return match existing_store_to_change(store)? {
             Some(mut store) => manage::run(command, &mut store),
             None if command.adds() => manage::run(command, &mut open_store(store)?),
             None => manage::without_store(command),
         };
     }
     // Made only where there is a calibration to keep.
-    let known = existing_store(store)?;
+    let known = existing_store_to_change(store)?;
     let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
     let part = part_name(arguments, sensor, known.as_ref())?;
     if arguments.points.is_some() && arguments.live.empty_close.is_none() {

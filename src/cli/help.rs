@@ -24,9 +24,9 @@ pub(super) struct HelpArguments {
 pub(super) fn run(arguments: &HelpArguments) -> Result<(), Failure> {
     let mut program = Arguments::command();
     program.build();
-    let Some(name) = arguments.names.first() else { return say(contents(&program)) };
+    let Some(name) = arguments.names.first() else { return say_as_is(contents(&program)) };
     match TOPICS.iter().find(|topic| topic.name == name) {
-        Some(topic) => say(page::render(topic.text, terminal_width(), emphasis())),
+        Some(topic) => say_as_is(page::render(topic.text, terminal_width(), emphasis())),
         None => command_help(&program, &arguments.names),
     }
 }

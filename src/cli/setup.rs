@@ -6,7 +6,7 @@ use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::{ObjectModel, anchored};
 use palpate_sim::scene::{Accuracy, EngineKind, PRESETS, PosePreset, Scene};
-use palpate_store::Store;
+use palpate_store::{Store, StoreError};
 use palpate_store::labels::class_name;
 use palpate_tactile::SignalDefinition;
 use std::fmt::Display;
@@ -164,31 +164,49 @@ pub(super) fn store_path(path: Option<&Path>) -> Result<PathBuf, Failure> {
 
 /// Opens the named store, or the default one; creates the file where there is none.
 pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
-    opened(&store_path(path)?)
+    warned(Store::open(&store_path(path)?)?)
 }
 
-/// Opens the named store, or the default one, for a command that reads; `None` where there is none, or an empty file: neither
-/// is made a store.
+/// Opens the named store, or the default one, to read it; `None` where there is none, or an empty file: neither is made a
+/// store.
 pub(super) fn existing_store(path: Option<&Path>) -> Result<Option<Store>, Failure> {
+    existing(path, Store::open_to_read)
+}
+
+/// The same for a command that changes what is there.
+pub(super) fn existing_store_to_change(path: Option<&Path>) -> Result<Option<Store>, Failure> {
+    existing(path, Store::open)
+}
+
+fn existing(
+    path: Option<&Path>,
+    open: impl FnOnce(&Path) -> Result<Store, StoreError>,
+) -> Result<Option<Store>, Failure> {
     let path = store_path(path)?;
     match std::fs::metadata(&path) {
         Ok(file) if file.is_file() && file.len() == 0 => Ok(None),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(error) => Err(format!("cannot open the store \"{}\": {error}", path.display()).into()),
-        Ok(_) => opened(&path).map(Some),
+        Ok(_) => warned(open(&path)?).map(Some),
     }
 }
 
-/// The same for a command that cannot do without.
+/// [`existing_store`] for a command that cannot do without.
 pub(super) fn read_store(path: Option<&Path>) -> Result<Store, Failure> {
-    existing_store(path)?.ok_or_else(|| {
-        let path = path.map_or_else(Store::default_path, Path::to_owned);
-        format!("no trials yet: there is no store \"{}\"; `palpate grasp lemon` makes one", path.display()).into()
-    })
+    existing_store(path)?.ok_or_else(|| none_yet(path))
 }
 
-fn opened(path: &Path) -> Result<Store, Failure> {
-    let store = Store::open(path)?;
+/// [`existing_store_to_change`] for a command that cannot do without.
+pub(super) fn store_to_change(path: Option<&Path>) -> Result<Store, Failure> {
+    existing_store_to_change(path)?.ok_or_else(|| none_yet(path))
+}
+
+fn none_yet(path: Option<&Path>) -> Failure {
+    let path = path.map_or_else(Store::default_path, Path::to_owned);
+    format!("no trials yet: there is no store \"{}\"; `palpate grasp lemon` makes one", path.display()).into()
+}
+
+fn warned(store: Store) -> Result<Store, Failure> {
     for warning in store.warnings() {
         super::terminal::warn(warning);
     }

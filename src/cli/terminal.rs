@@ -3,6 +3,7 @@
 
 use super::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
+use palpate_geometry::{one_line, printable_lines};
 use serde::Serialize;
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::error::Error;
@@ -13,15 +14,20 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
 
-/// Prints a line of results.
+/// Prints a line of results. Control characters that a text of others brings are written out, here and below.
 pub(super) fn say(line: impl std::fmt::Display) -> Result<(), Failure> {
-    writeln!(std::io::stdout(), "{line}")?;
+    say_as_is(printable_lines(&line.to_string()))
+}
+
+/// Prints a text of this program, which may set bold type.
+pub(super) fn say_as_is(text: impl std::fmt::Display) -> Result<(), Failure> {
+    writeln!(std::io::stdout(), "{text}")?;
     Ok(())
 }
 
 /// Prints a value as JSON.
 pub(super) fn say_json(value: &impl Serialize) -> Result<(), Failure> {
-    say(serde_json::to_string_pretty(value)?)
+    say_as_is(serde_json::to_string_pretty(value)?)
 }
 
 /// Result of a command.
@@ -56,7 +62,7 @@ enum Part {
 impl Page {
     /// Adds a line.
     pub(super) fn line(&mut self, line: impl std::fmt::Display) {
-        self.0.push(Part::Line(line.to_string()));
+        self.0.push(Part::Line(printable_lines(&line.to_string())));
     }
 
     /// Adds a name and what is to be said of it; nothing where that is absent.
@@ -71,8 +77,9 @@ impl Page {
 
     /// Adds a table: columns of text left-aligned, of numbers right-aligned.
     pub(super) fn table<R: AsRef<[String]>>(&mut self, header: &[&str], rows: impl IntoIterator<Item = R>) {
-        let rows: Vec<R> = rows.into_iter().collect();
-        let rows: Vec<&[String]> = rows.iter().map(AsRef::as_ref).collect();
+        let rows = rows.into_iter().map(|row| row.as_ref().iter().map(|cell| one_line(cell)).collect::<Vec<_>>());
+        let rows: Vec<Vec<String>> = rows.collect();
+        let rows: Vec<&[String]> = rows.iter().map(Vec::as_slice).collect();
         self.0.extend(aligned(header, &rows).map(Part::Line));
     }
 
@@ -91,7 +98,7 @@ impl Page {
         for part in &self.0 {
             match part {
                 Part::Line(line) => writeln!(out, "{line}")?,
-                Part::Fact(name, text) => writeln!(out, "{name:<width$}{text}")?,
+                Part::Fact(name, text) => writeln!(out, "{name:<width$}{}", printable_lines(text))?,
                 Part::Warning(text) => {
                     out.flush()?;
                     warn(text);
@@ -105,12 +112,12 @@ impl Page {
 /// Prints a warning to standard error.
 pub(super) fn warn(line: &str) {
     // Nothing can be reported where standard error is closed.
-    let _closed = writeln!(std::io::stderr(), "warning: {line}");
+    let _closed = writeln!(std::io::stderr(), "warning: {}", printable_lines(line));
 }
 
 /// Prints progress or an instruction to standard error.
 pub(super) fn note(line: &str) {
-    let _closed = writeln!(std::io::stderr(), "{line}");
+    let _closed = writeln!(std::io::stderr(), "{}", printable_lines(line));
 }
 
 /// Lines of standard input as they are typed, until it ends.
@@ -201,7 +208,7 @@ pub(super) fn report_panics() {
 
 /// Prints why a command failed.
 pub(super) fn error(line: &str) {
-    let _closed = writeln!(std::io::stderr(), "error: {line}");
+    let _closed = writeln!(std::io::stderr(), "error: {}", printable_lines(line));
 }
 
 /// True where output failed because its reader has gone.

@@ -128,7 +128,8 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Export { labelled: true, .. } => {
             existing_store(store)?.ok_or("no trial has a label: there is no store yet")?
         }
-        _ => read_store(store)?,
+        TrialsCommand::Show { .. } | TrialsCommand::Export { .. } => read_store(store)?,
+        _ => store_to_change(store)?,
     };
     match &arguments.command {
         TrialsCommand::List { filters, deleted, discarded, sort, reverse, limit, json } => {
@@ -183,7 +184,12 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             store.restore(&ids)?;
             say(format!("restored {} trial(s)", ids.len()))
         }
-        TrialsCommand::Purge => say(format!("removed {} trial(s) permanently", store.purge()?)),
+        TrialsCommand::Purge => {
+            let warned = store.warnings().len();
+            say(format!("removed {} trial(s) permanently", store.purge()?))?;
+            store.warnings().iter().skip(warned).for_each(|warning| warn(warning));
+            Ok(())
+        }
     }
 }
 

@@ -12,6 +12,7 @@
 //! | 0 | `file` | files that people name: regular ones, up to a size |
 //! | 0 | `finish` | looks of surfaces beside their colour |
 //! | 0 | `pose` | position and orientation of a frame |
+//! | 0 | `printable` | texts of others, as they may be shown |
 //! | 1 | `mesh` | triangle meshes and bounds |
 //! | 2 | `mesh_files` | OBJ and STL in |
 //! | 2 | `modelling`, `repair`, `support_points`, `mass` | meshes made and repaired, extreme points, mass properties |
@@ -51,6 +52,7 @@ mod mesh_files;
 mod modelling;
 pub mod palette;
 mod pose;
+mod printable;
 mod primitive;
 mod repair;
 mod support_points;
@@ -72,6 +74,7 @@ pub use mesh_files::{ColouredPart, MeshFileError, read_mesh};
 pub use modelling::{cube_sphere, rounded_box};
 pub use pose::Pose;
 pub use primitive::{Primitive, lathe};
+pub use printable::{is_invisible, one_line, printable_lines};
 pub use repair::{MeshError, Repaired, repair};
 pub use support_points::support_points;
 pub use surface::{SurfaceMesh, SurfaceVertex};

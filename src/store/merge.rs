@@ -147,11 +147,15 @@ impl Store {
             return Err(StoreError::open(other, "no such file"));
         }
         // Open it first as a store: this gives a clear error if it cannot be read.
-        let theirs = Self::open(other)?;
+        let theirs = Self::open_to_read(other)?;
+        if std::fs::canonicalize(theirs.file()).is_ok_and(|own| std::fs::canonicalize(self.file()).is_ok_and(|to| to == own)) {
+            return Err(StoreError::Refused("it is this store itself".to_owned()));
+        }
         let damaged: Vec<TrialId> = theirs.list(true)?.iter().filter(|row| row.damaged).map(|row| row.id).collect();
         let fault = |e: rusqlite::Error| self.fault(&e);
         // Pass the path byte for byte, even if it is not valid UTF-8.
-        let name = ToSqlOutput::Borrowed(ValueRef::Text(theirs.file().as_os_str().as_encoded_bytes()));
+        let name = theirs.name_to_attach();
+        let name = ToSqlOutput::Borrowed(ValueRef::Text(&name));
         self.connection.execute("ATTACH DATABASE ?1 AS other", [name]).map_err(fault)?;
         let merged = self.in_transaction(|transaction| copy(transaction, &damaged));
         self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;

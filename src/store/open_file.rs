@@ -4,6 +4,7 @@
 use super::store_error::StoreError;
 use std::cell::Cell;
 use std::fs::Metadata;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// The file as it was when it was looked at last.
@@ -11,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct OpenFile {
     path: PathBuf,
     identity: Identity,
-    /// Length (bytes); a store never becomes shorter.
+    /// Length (bytes); a store becomes shorter only as a whole, by [`Store::purge`](crate::Store::purge).
     length: Cell<u64>,
 }
 
@@ -35,12 +36,23 @@ impl OpenFile {
         if identity(&file) != self.identity {
             return Err(lost("replaced by another file"));
         }
-        if file.len() < self.length.get() {
+        if file.len() < self.length.get() && stated_length(&self.path) != Some(file.len()) {
             return Err(lost("cut short"));
         }
         self.length.set(file.len());
         Ok(())
     }
+}
+
+/// Length of a database that its header states (bytes): the size of a page and the number of pages.
+fn stated_length(path: &Path) -> Option<u64> {
+    let mut header = [0; 32];
+    std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut header)).ok()?;
+    let page = match u16::from_be_bytes([header[16], header[17]]) {
+        1 => 65_536,
+        size => u64::from(size),
+    };
+    Some(page * u64::from(u32::from_be_bytes([header[28], header[29], header[30], header[31]])))
 }
 
 /// Device and number of a file.

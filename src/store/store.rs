@@ -19,11 +19,15 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{
     SimulatedData, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource, UnknownSource,
 };
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Params, Row, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Params, Row, Transaction, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+/// A view or trigger of others, or a table of which a view has the name.
+const FOREIGN_PARTS: &str = "SELECT name FROM sqlite_master WHERE type = 'view' OR type = 'trigger' AND name NOT IN (
+    'tares_are_not_altered', 'tares_are_not_shortened', 'journal_is_not_altered', 'journal_is_not_shortened') LIMIT 1";
 
 /// Samples per chunk: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
@@ -35,6 +39,26 @@ pub struct Store {
     path: PathBuf,
     file: OpenFile,
     warnings: Vec<String>,
+    /// It is read as a file that nobody changes.
+    is_unchanging: bool,
+}
+
+/// Name by which SQLite takes a file for unchanging, and needs no log beside it.
+fn unchanging(file: &Path) -> String {
+    let escaped = |byte: &u8| match byte {
+        b'/' | b'.' | b'-' | b'_' | b'~' => char::from(*byte).to_string(),
+        byte if byte.is_ascii_alphanumeric() => char::from(*byte).to_string(),
+        byte => format!("%{byte:02x}"),
+    };
+    let path: String = file.as_os_str().as_encoded_bytes().iter().map(escaped).collect();
+    format!("file:{path}?immutable=1")
+}
+
+/// SQLite's log beside a store.
+fn log_of(file: &Path) -> PathBuf {
+    let mut name = file.as_os_str().to_owned();
+    name.push("-wal");
+    name.into()
 }
 
 impl Store {
@@ -56,13 +80,60 @@ impl Store {
                 ))
             })?;
         }
-        // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
-        let file = std::path::absolute(path).map_err(|e| StoreError::open(path, e))?;
-        let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;
-        let mut store = Self { connection, path: path.to_owned(), file: OpenFile::at(file)?, warnings: Vec::new() };
+        let mut store = Self::connect(path, OpenFlags::SQLITE_OPEN_CREATE)?;
         store.prepare()?;
         Ok(store)
+    }
+
+    /// Opens a store that exists, to read it: nothing is written, and another program that writes is not waited for. A store in
+    /// a folder that cannot be written is read as well.
+    pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
+        let mut store = Self::connect(path, OpenFlags::empty())?;
+        let readable = |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
+        if let Err(error) = readable(&store) {
+            // Without a place for its log SQLite reads only what it may take for unchanging.
+            let codes = [ErrorCode::CannotOpen, ErrorCode::ReadOnly, ErrorCode::PermissionDenied];
+            if !error.sqlite_error_code().is_some_and(|code| codes.contains(&code)) {
+                return Err(store.fault(&error));
+            }
+            let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX | OpenFlags::SQLITE_OPEN_URI;
+            let opened = Connection::open_with_flags(unchanging(store.file.path()), flags);
+            store.connection = opened.map_err(|e| StoreError::open(path, plain(&e)))?;
+            store.is_unchanging = true;
+            if std::fs::metadata(log_of(store.file.path())).is_ok_and(|log| log.len() > 0) {
+                store.warnings.push(format!(
+                    "\"{}\" is read-only and was not closed properly: its newest trials cannot be read; open it once where it \
+                     can be written",
+                    path.display()
+                ));
+            }
+        }
+        store.set_busy_timeout(BUSY_TIMEOUT)?;
+        store.check_identity()?;
+        let fault = |e: rusqlite::Error| store.fault(&e);
+        store.connection.pragma_update(None, "query_only", true).map_err(fault)?;
+        add_functions(&store.connection).map_err(fault)?;
+        Ok(store)
+    }
+
+    fn connect(path: &Path, flags: OpenFlags) -> Result<Self, StoreError> {
+        // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
+        let file = std::path::absolute(path).map_err(|e| StoreError::open(path, e))?;
+        let flags = flags
+            | OpenFlags::SQLITE_OPEN_READ_WRITE
+            | OpenFlags::SQLITE_OPEN_NO_MUTEX
+            | OpenFlags::SQLITE_OPEN_URI;
+        let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;
+        let file = OpenFile::at(file)?;
+        Ok(Self { connection, path: path.to_owned(), file, warnings: Vec::new(), is_unchanging: false })
+    }
+
+    /// Name of the file for SQLite, byte for byte.
+    pub(super) fn name_to_attach(&self) -> Vec<u8> {
+        match self.is_unchanging {
+            true => unchanging(self.file.path()).into_bytes(),
+            false => self.file.path().as_os_str().as_encoded_bytes().to_vec(),
+        }
     }
 
     /// Path of the file.
@@ -140,6 +211,11 @@ impl Store {
             .connection
             .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
             .map_err(|e| self.fault(&e))?;
+        let foreign: Option<String> = self
+            .connection
+            .query_row(FOREIGN_PARTS, [], |row| row.get(0))
+            .optional()
+            .map_err(|e| self.fault(&e))?;
         let (application, version) = (read("application_id")?, read("user_version")?);
         let path = self.path.display();
         if application != APPLICATION_ID && tables > 0 {
@@ -158,7 +234,13 @@ impl Store {
                  trials list --store \"{path}\""
             )));
         }
-        Ok(())
+        match foreign {
+            Some(name) => Err(StoreError::Refused(format!(
+                "\"{path}\" holds \"{name}\", a view or trigger that is not of Palpate, which could change what is read or \
+                 written; take the store from a backup, or choose another file with --store"
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Translates an error of SQLite.
@@ -357,9 +439,16 @@ impl Store {
         }
     }
 
-    /// Removes all deleted trials for good; returns how many.
+    /// Removes all deleted trials for good, and gives their space back; returns how many.
     pub fn purge(&mut self) -> Result<usize, StoreError> {
-        self.in_transaction(|transaction| transaction.execute("DELETE FROM trials WHERE deleted IS NOT NULL", []))
+        let sql = "DELETE FROM trials WHERE deleted IS NOT NULL";
+        let purged = self.in_transaction(|transaction| transaction.execute(sql, []))?;
+        // While another program reads, or the disk has no room for a copy, the space is used again by later trials.
+        let shrunk = self.connection.execute_batch("VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
+        if let Err(cause) = shrunk {
+            self.warnings.push(format!("the file did not become smaller ({}); later trials use its space", plain(&cause)));
+        }
+        Ok(purged)
     }
 }
 

@@ -112,7 +112,27 @@ pub(super) fn fault(path: &Path, error: &rusqlite::Error) -> StoreError {
         Some(ErrorCode::ReadOnly) => StoreError::Refused(format!(
             "the store \"{path_name}\" cannot be written: it or its folder is read-only. Choose another with --store"
         )),
-        _ => StoreError::Refused(format!("SQLite error in the store \"{path_name}\": {}", plain(error))),
+        Some(ErrorCode::DatabaseCorrupt) => StoreError::Refused(format!(
+            "the store \"{path_name}\" is damaged or cut short. Take it from a backup; `sqlite3 FILE .recover` may save what is \
+             left"
+        )),
+        Some(ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => {
+            StoreError::Refused(format!("the store \"{path_name}\" cannot be opened: it or its folder may not be read"))
+        }
+        Some(ErrorCode::SystemIoFailure) => StoreError::Refused(format!(
+            "the disk with the store \"{path_name}\" does not answer as it should ({}); check it, and take a backup",
+            plain(error)
+        )),
+        Some(ErrorCode::ConstraintViolation) => StoreError::Refused(format!(
+            "the store \"{path_name}\" does not take this ({}); check the date of this computer, and that no other program \
+             has changed the store",
+            plain(error)
+        )),
+        _ => StoreError::Refused(format!(
+            "the store \"{path_name}\" cannot be used ({}); it may be damaged, or changed by another program: take it from a \
+             backup",
+            plain(error)
+        )),
     }
 }
 

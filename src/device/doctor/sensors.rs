@@ -17,7 +17,7 @@ pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
     let (board, channels) = (&seen.link.board, seen.link.board.channels.join(", "));
     if seen.sensors.is_empty() {
         return Failed.seen(format!("none of flexL, flexR, fsrL and fsrR, but {channels}")).because(
-            "Their names are unknown, or they are columns without a header, of which there are not four",
+            columns(&seen.all.traces.channels),
             "Name them in the sketch, as in flexL:512,flexR:498,fsrL:30,fsrR:28, or print a header line flexL,flexR,fsrL,fsrR",
         );
     }
@@ -34,6 +34,20 @@ pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
     }
     Note.seen(format!("no {}, but {channels}", missing.join(", ")))
         .because("The board has fewer sensors, or names them otherwise", "Name them as the firmware does")
+}
+
+/// What the columns are that have no name of a sensor.
+fn columns(traces: &[ChannelTrace]) -> &'static str {
+    let is_digit = |trace: &ChannelTrace| trace.least >= 0.0 && trace.most <= 9.0 && !trace.decimals;
+    match traces {
+        [first, others @ ..] if others.len() == 4 && first.rises && first.numbers > 2 => {
+            "The first column rises from line to line, as a time does: the four others are the sensors"
+        }
+        _ if traces.len() >= 4 && traces.iter().skip(1).step_by(2).all(is_digit) => {
+            "Every second column is a single digit: numbers with decimal commas"
+        }
+        _ => "Their names are unknown, or they are columns without a header, of which there are not four",
+    }
 }
 
 pub(super) fn bits(seen: &Evidence<'_>) -> CheckFinding {

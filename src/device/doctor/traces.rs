@@ -25,6 +25,9 @@ pub struct ChannelTrace {
     pub most: f64,
     /// Some counts had decimals.
     pub decimals: bool,
+    /// Each count was larger than the one before.
+    pub rises: bool,
+    last: f64,
     /// Newest count, and the time (s) since which it is exactly that.
     still: Option<[f64; 2]>,
     /// Count from which movement is measured, and when it last moved (s).
@@ -46,6 +49,8 @@ impl Default for ChannelTrace {
             least: f64::INFINITY,
             most: f64::NEG_INFINITY,
             decimals: false,
+            rises: true,
+            last: f64::NEG_INFINITY,
             still: None,
             rested: None,
             moved_s: f64::NEG_INFINITY,
@@ -65,6 +70,8 @@ impl ChannelTrace {
         };
         self.numbers += 1;
         self.decimals |= y.fract() != 0.0;
+        self.rises &= y > self.last;
+        self.last = y;
         if self.still.is_none_or(|[count, _]| count != y) {
             self.still = Some([y, t]);
         }

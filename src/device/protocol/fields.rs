@@ -44,9 +44,41 @@ pub(super) enum Parsed {
     Header(Vec<String>),
 }
 
-/// Parses a line; an error says why it is refused.
+/// Parses a line; an error says why it is refused, and what the line is where that is known.
 pub(super) fn parse(line: &[u8]) -> Result<Parsed, &'static str> {
-    let text = std::str::from_utf8(line).map_err(|_not_text| "not text")?.trim();
+    let text = match std::str::from_utf8(line) {
+        Ok(text) => text.trim(),
+        Err(_) if line.iter().all(|byte| byte.is_ascii_graphic() || b" \t\xB0\xB5\xB1".contains(byte)) => {
+            return Err("a sign such as ° or µ is not in UTF-8; leave it out");
+        }
+        Err(_) => return Err("not text"),
+    };
+    parse_text(text).map_err(|why| if why == NO_NUMBER { form_of(text).unwrap_or(why) } else { why })
+}
+
+const NO_NUMBER: &str = "a value is not a number";
+
+/// Form of a line that is known and not read.
+fn form_of(text: &str) -> Option<&'static str> {
+    let is_hex = |word: &str| {
+        let digits = word.rsplit([':', '=']).next().unwrap_or(word).trim_start();
+        digits.strip_prefix("0x").or(digits.strip_prefix("0X")).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_hexdigit()))
+    };
+    if text.starts_with('>') {
+        return Some("Teleplot's form; print name:value, separated by commas, in one line for each sample");
+    }
+    if text.split(SEPARATORS).any(is_hex) {
+        return Some("hexadecimal values; print decimal ones");
+    }
+    if text.contains('=') && !text.contains(':') {
+        return Some("names and values are joined by =; print name:value");
+    }
+    let words: Vec<&str> = text.split(':').next()?.split_whitespace().collect();
+    let is_word = |word: &&str| word.starts_with(|c: char| c.is_alphabetic());
+    (text.contains(':') && words.len() > 1 && words.iter().all(is_word)).then_some("a name has a blank in it")
+}
+
+fn parse_text(text: &str) -> Result<Parsed, &'static str> {
     if text.chars().any(|c| c.is_control() && c != '\t') {
         return Err("control characters");
     }
@@ -64,7 +96,7 @@ fn number(text: &str) -> Result<Option<f64>, &'static str> {
     if NOTHING.iter().any(|word| text.eq_ignore_ascii_case(word)) {
         return Ok(None);
     }
-    let value: f64 = text.parse().map_err(|_no_number| "a value is not a number")?;
+    let value: f64 = text.parse().map_err(|_no_number| NO_NUMBER)?;
     Ok(Some(value).filter(|value| value.is_finite()))
 }
 
@@ -206,6 +238,21 @@ mod tests {
 
     fn pairs(expected: &[(&str, f64)]) -> Vec<(String, Option<f64>)> {
         expected.iter().map(|(name, value)| ((*name).to_owned(), (!value.is_nan()).then_some(*value))).collect()
+    }
+
+    #[test]
+    fn forms_that_are_not_read_are_named() {
+        let cases: [(&[u8], &str); 6] = [
+            (b">flexL:1760000000000:1433|g", "Teleplot"),
+            (b"Left flex: 1433  Right flex: 1552", "a blank"),
+            (b"A0=1433 A1=1552", "joined by ="),
+            (b"flexL:0x599,flexR:0x610", "hexadecimal"),
+            (b"flexL:1433,ang:45\xb0", "UTF-8"),
+            (b"flexL:12a", "not a number"),
+        ];
+        for (line, wanted) in cases {
+            assert!(parse(line).is_err_and(|why| why.contains(wanted)), "{wanted}");
+        }
     }
 
     #[test]

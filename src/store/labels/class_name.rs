@@ -1,5 +1,6 @@
 //! Names of classes, which are the labels in files, tables and on the axes of a confusion matrix.
 
+use palpate_geometry::is_invisible;
 use palpate_sim::objects::{EMPTY, catalogue, titled};
 use std::collections::BTreeMap;
 use unicode_normalization::UnicodeNormalization as _;
@@ -78,6 +79,8 @@ pub fn class_name(text: &str) -> Result<String, LabelError> {
         "a label cannot be empty; write a name, or \"empty\" for the empty hand".to_owned()
     } else if name.contains(char::is_control) {
         format!("the label {:?} holds a control character; write it on one line without tabs", beginning(LONGEST_NAME))
+    } else if name.contains(is_invisible) {
+        format!("the label {:?} holds an invisible character; type it anew", beginning(LONGEST_NAME))
     } else if length > LONGEST_NAME {
         format!("the label \"{}...\" has {length} characters; {LONGEST_NAME} are allowed", beginning(20))
     } else {
@@ -123,6 +126,7 @@ mod tests {
         assert!(refused(" \t ", "cannot be empty"));
         assert!(refused(&"x".repeat(81), "has 81 characters"));
         assert!(refused("a\tb", "control character"));
+        assert!(refused("lem\u{200b}on", "invisible") && refused("lem\u{202e}on", "invisible"));
         assert_eq!((shown_name(""), shown_name("lemon")), ("unlabelled", "lemon"));
         assert_eq!(
             (shown_title(""), shown_title("bigball")),

@@ -7,6 +7,7 @@ use super::{
 use crate::mapping::{Mapping, PROFILES, named_column};
 use crate::series::Series;
 use csv::ByteRecord;
+use palpate_geometry::is_invisible;
 use palpate_tactile::{Dimension, Unit, channel_with_unit};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
@@ -347,10 +348,10 @@ fn name<'a>(field: &'a [u8], column: &str) -> Result<&'a str, String> {
             "the name in \"{column}\" has {length} characters, the limit is {LONGEST_NAME}; shorten it"
         ));
     }
-    if text.chars().any(char::is_control) {
+    if text.chars().any(|c| c.is_control() || is_invisible(c)) {
         let text = brief(text);
         return Err(format!(
-            "the name \"{text}\" in \"{column}\" has a line break or another control character in it; remove it"
+            "the name \"{text}\" in \"{column}\" has a line break or another character in it that is not seen; remove it"
         ));
     }
     Ok(text)
