@@ -8,6 +8,7 @@ use palpate_lab::grasping::{EndState, ErrorNorms, GraspSummary, compare, error_b
 use palpate_sim::frame::TrustLevel;
 use palpate_sim::objects::titled;
 use palpate_sim::poses::jittered;
+use palpate_sim::run::SimRun;
 use palpate_sim::scene::Scene;
 use palpate_store::Stored;
 use palpate_store::labels::class_name;
@@ -85,6 +86,9 @@ struct GraspReport {
     written: Option<String>,
 }
 
+/// A start deeper inside something is no grasp, and takes minutes (m).
+const DEEPEST_START: f64 = 0.1;
+
 pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<(), Failure> {
     let nominal = arguments.scene.scene(arguments.object.as_deref())?;
     if arguments.print_scene {
@@ -106,6 +110,15 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
         Some(seed) => jittered(&nominal, object.as_ref(), seed).0,
         None => nominal,
     };
+    let overlap = SimRun::new(&scene, object.as_ref()).0.starting_overlap();
+    if overlap > DEEPEST_START {
+        return Err(format!(
+            "the open fingers start {:.0} mm inside something: check gripper.mount.offset, support.height and the size of the \
+             object",
+            1e3 * overlap
+        )
+        .into());
+    }
     let seed = arguments.seed.unwrap_or(0);
     let start = cpu_time::ThreadTime::now();
     let mut trial = grasp_soundly(&scene, object.as_ref(), seed, arguments.recompute.chosen());

@@ -44,11 +44,11 @@ impl Numbers {
         self.len() == 0
     }
 
-    /// Index of the first element that is NaN or infinite.
-    fn first_not_finite(&self) -> Option<usize> {
+    /// Index of the first element that is not a number, or so large that no training gives it.
+    fn first_absurd(&self) -> Option<usize> {
         match self {
-            Self::F32(values) => values.iter().position(|x| !x.is_finite()),
-            Self::F64(values) => values.iter().position(|x| !x.is_finite()),
+            Self::F32(values) => values.iter().position(|x| !(x.abs() < LARGEST)),
+            Self::F64(values) => values.iter().position(|x| !(x.abs() < f64::from(LARGEST))),
             Self::I64(_) | Self::I16(_) => None,
         }
     }
@@ -62,6 +62,9 @@ pub struct Array {
     /// The elements.
     pub numbers: Numbers,
 }
+
+/// Numbers of a model are far below this.
+const LARGEST: f32 = 1e30;
 
 /// Arrays by name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -237,8 +240,8 @@ impl Arrays {
         if array.shape != shape {
             return Err(ModelError::shape(name, &array.shape, shape));
         }
-        match array.numbers.first_not_finite() {
-            Some(index) => Err(ModelError(format!("element {index} of array \"{name}\" is not finite"))),
+        match array.numbers.first_absurd() {
+            Some(index) => Err(ModelError(format!("element {index} of array \"{name}\" is not a number, or far larger than any training gives"))),
             None => Ok(array),
         }
     }

@@ -125,7 +125,7 @@ impl Scene {
         let mount = &self.gripper.mount;
         ranges.number("gripper.mount.opening", mount.opening, 0.0..=1.0);
         ranges.number("gripper.mount.grasp_depth", mount.grasp_depth, 0.0..=1.0);
-        ranges.numbers("gripper.mount.offset", &mount.offset, &(-1.0..=1.0));
+        ranges.numbers("gripper.mount.offset", &mount.offset, &(-0.2..=0.2));
         ranges.number("gripper.mount.yaw_deg", mount.yaw_deg, -360.0..=360.0);
         let finger = &self.gripper.finger;
         if let Some(fitted) = &self.gripper.fitted {

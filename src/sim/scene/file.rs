@@ -188,6 +188,13 @@ fn check_keys(written: &toml::Table, known: &toml::Table, prefix: &str) -> Resul
         let inner = format!("{prefix}{key}.");
         match (value, template) {
             (toml::Value::Table(written), toml::Value::Table(known)) => check_keys(written, known, &inner)?,
+            // A list of numbers has one length; further numbers would be dropped in silence.
+            (toml::Value::Array(rows), toml::Value::Array(templates))
+                if templates.iter().all(|template| template.is_float()) && rows.len() != templates.len() =>
+            {
+                let (found, wanted) = (rows.len(), templates.len());
+                return Err(SceneError::Refused(format!("{prefix}{key} has {found} numbers; it takes {wanted}")));
+            }
             (toml::Value::Array(rows), toml::Value::Array(templates)) => {
                 for (row, template) in rows.iter().zip(templates.iter().cycle()) {
                     if let (toml::Value::Table(row), toml::Value::Table(template)) = (row, template) {
