@@ -224,7 +224,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,
         Some(Command::Record(record)) => record::run(record, store)?,
         Some(Command::Replay(replay)) => replay::run(replay, store)?,
-        Some(Command::Snapshot(snapshot)) => snapshot::run(snapshot, store)?,
+        Some(Command::Snapshot(snapshot)) => return snapshot::run(snapshot, store),
         Some(Command::Plot(plot)) => plot::run(plot, store)?,
         Some(Command::Movie(movie)) => movie::run(movie, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,

@@ -3,6 +3,7 @@
 use super::output::TemporaryFolder;
 use super::prelude::*;
 use super::setup::store_path;
+use super::terminal::error;
 use crate::app::{Mode, OffscreenWindow, window_picture};
 use glam::Vec2;
 use palpate_geometry::drawing::{DrawList, StandardView};
@@ -14,6 +15,7 @@ use palpate_render::{DriverChoice, Gpu, Picture, Renderer};
 use palpate_sim::frame::Frame;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialSource;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Arguments of `palpate snapshot`.
@@ -25,7 +27,9 @@ use std::sync::Arc;
   palpate snapshot ball --ghost --bare --out both.png
   palpate snapshot --panels lemon --at 2.9 --out window.png
   palpate snapshot --panels --trial 1 --out inspect.png
-  palpate snapshot cube --out now.png --compare golden/cube.png --tolerance 2 --pixels 150")]
+  palpate snapshot cube --out now.png --compare golden/cube.png --tolerance 2 --pixels 150
+
+Exit codes with --compare: 0 same, 1 differs, 2 wrong use, 3 not compared")]
 pub(super) struct SnapshotArguments {
     /// Built-in name, a URDF, OBJ or STL file, or `empty` (default: that of the scene).
     object: Option<String>,
@@ -64,7 +68,7 @@ pub(super) struct SnapshotArguments {
     /// PNG file to write.
     #[arg(long, value_name = "FILE.png", required_unless_present = "compare", value_parser = file_of(&[FileKind::Png]))]
     out: Option<PathBuf>,
-    /// Compare with this PNG file; exit code 1 where they differ. With --out, a picture of the differences is beside it.
+    /// Compare with this PNG file. With --out, a picture of the differences is beside it.
     #[arg(long, value_name = "GOLDEN.png")]
     compare: Option<PathBuf>,
     /// Largest difference of a colour channel that does not count, 0 to 255.
@@ -105,7 +109,22 @@ pub(super) fn sides_from(least: u32) -> impl Fn(&str) -> Result<[u32; 2], String
     }
 }
 
-pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<(), Failure> {
+pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<ExitCode, Failure> {
+    match (draw(arguments, store), &arguments.compare) {
+        (Ok(is_same), _) => Ok(if is_same { ExitCode::SUCCESS } else { ExitCode::FAILURE }),
+        (Err(failure), None) => Err(failure),
+        (Err(failure), Some(_)) => {
+            error(&format!("not compared: {failure}"));
+            Ok(ExitCode::from(NOT_COMPARED))
+        }
+    }
+}
+
+/// Exit code where nothing was compared.
+const NOT_COMPARED: u8 = 3;
+
+/// Draws the picture, and compares it; false where it differs too much.
+fn draw(arguments: &SnapshotArguments, store: Option<&Path>) -> Result<bool, Failure> {
     if let Some(out) = &arguments.out {
         check_new(out, FileKind::Png)?;
     }
@@ -115,10 +134,11 @@ pub(super) fn run(arguments: &SnapshotArguments, store: Option<&Path>) -> Result
     if let Some(out) = &arguments.out {
         write_new(out, FileKind::Png, &picture.to_png()?)?;
     }
-    if let Some(golden) = golden {
-        compare(arguments, &picture, &golden)?;
+    let is_same = golden.map_or(Ok(true), |golden| compare(arguments, &picture, &golden))?;
+    if let Some(out) = arguments.out.as_ref().filter(|_| is_same) {
+        say(out.display())?;
     }
-    arguments.out.as_ref().map_or(Ok(()), |out| say(out.display()))
+    Ok(is_same)
 }
 
 /// Largest picture to compare with (bytes).
@@ -131,15 +151,15 @@ fn golden(path: &Path) -> Result<Picture, Failure> {
     Picture::from_png(&bytes).map_err(|e| named(&e))
 }
 
-/// Prints how a picture differs from the golden one; an error where it differs too much.
-fn compare(arguments: &SnapshotArguments, picture: &Picture, golden: &Picture) -> Result<(), Failure> {
+/// Prints how a picture differs from the golden one; false where it differs too much.
+fn compare(arguments: &SnapshotArguments, picture: &Picture, golden: &Picture) -> Result<bool, Failure> {
     let difference = picture.difference(golden, arguments.tolerance)?;
     let text = format!(
         "{} pixels differ by more than {}, the most by {}",
         difference.pixels, arguments.tolerance, difference.largest
     );
     if difference.pixels <= arguments.pixels {
-        return say(text);
+        return say(text).map(|()| true);
     }
     let beside = match &arguments.out {
         Some(out) => {
@@ -149,7 +169,8 @@ fn compare(arguments: &SnapshotArguments, picture: &Picture, golden: &Picture) -
         }
         None => ". --out FILE.png writes the picture, and one of the differences beside it".to_owned(),
     };
-    Err(format!("{text}; {} may{beside}", arguments.pixels).into())
+    error(&format!("{text}; {} may{beside}", arguments.pixels));
+    Ok(false)
 }
 
 /// The whole window. The store of the user is only opened where it is shown.

@@ -241,7 +241,9 @@ impl Arrays {
             return Err(ModelError::shape(name, &array.shape, shape));
         }
         match array.numbers.first_absurd() {
-            Some(index) => Err(ModelError(format!("element {index} of array \"{name}\" is not a number, or far larger than any training gives"))),
+            Some(index) => Err(ModelError(format!(
+                "element {index} of array \"{name}\" is not a number, or far larger than any training gives"
+            ))),
             None => Ok(array),
         }
     }

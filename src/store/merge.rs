@@ -148,7 +148,9 @@ impl Store {
         }
         // Open it first as a store: this gives a clear error if it cannot be read.
         let theirs = Self::open_to_read(other)?;
-        if std::fs::canonicalize(theirs.file()).is_ok_and(|own| std::fs::canonicalize(self.file()).is_ok_and(|to| to == own)) {
+        if std::fs::canonicalize(theirs.file())
+            .is_ok_and(|own| std::fs::canonicalize(self.file()).is_ok_and(|to| to == own))
+        {
             return Err(StoreError::Refused("it is this store itself".to_owned()));
         }
         let damaged: Vec<TrialId> = theirs.list(true)?.iter().filter(|row| row.damaged).map(|row| row.id).collect();

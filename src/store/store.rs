@@ -19,7 +19,9 @@ use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{
     SimulatedData, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource, UnknownSource,
 };
-use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, Params, Row, Transaction, TransactionBehavior, params};
+use rusqlite::{
+    Connection, ErrorCode, OpenFlags, OptionalExtension, Params, Row, Transaction, TransactionBehavior, params,
+};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -89,7 +91,8 @@ impl Store {
     /// a folder that cannot be written is read as well.
     pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
         let mut store = Self::connect(path, OpenFlags::empty())?;
-        let readable = |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
+        let readable =
+            |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
         if let Err(error) = readable(&store) {
             // Without a place for its log SQLite reads only what it may take for unchanging.
             let codes = [ErrorCode::CannotOpen, ErrorCode::ReadOnly, ErrorCode::PermissionDenied];
@@ -119,10 +122,8 @@ impl Store {
     fn connect(path: &Path, flags: OpenFlags) -> Result<Self, StoreError> {
         // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
         let file = std::path::absolute(path).map_err(|e| StoreError::open(path, e))?;
-        let flags = flags
-            | OpenFlags::SQLITE_OPEN_READ_WRITE
-            | OpenFlags::SQLITE_OPEN_NO_MUTEX
-            | OpenFlags::SQLITE_OPEN_URI;
+        let flags =
+            flags | OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX | OpenFlags::SQLITE_OPEN_URI;
         let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;
         let file = OpenFile::at(file)?;
         Ok(Self { connection, path: path.to_owned(), file, warnings: Vec::new(), is_unchanging: false })
@@ -211,11 +212,8 @@ impl Store {
             .connection
             .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
             .map_err(|e| self.fault(&e))?;
-        let foreign: Option<String> = self
-            .connection
-            .query_row(FOREIGN_PARTS, [], |row| row.get(0))
-            .optional()
-            .map_err(|e| self.fault(&e))?;
+        let foreign: Option<String> =
+            self.connection.query_row(FOREIGN_PARTS, [], |row| row.get(0)).optional().map_err(|e| self.fault(&e))?;
         let (application, version) = (read("application_id")?, read("user_version")?);
         let path = self.path.display();
         if application != APPLICATION_ID && tables > 0 {
@@ -446,7 +444,8 @@ impl Store {
         // While another program reads, or the disk has no room for a copy, the space is used again by later trials.
         let shrunk = self.connection.execute_batch("VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
         if let Err(cause) = shrunk {
-            self.warnings.push(format!("the file did not become smaller ({}); later trials use its space", plain(&cause)));
+            self.warnings
+                .push(format!("the file did not become smaller ({}); later trials use its space", plain(&cause)));
         }
         Ok(purged)
     }

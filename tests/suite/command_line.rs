@@ -153,6 +153,57 @@ fn wrong_use_exits_with_2() {
     }
 }
 
+/// Every command: what succeeds, and what fails. `--help` succeeds and an option that is not there is wrong use for all.
+const EXIT_CODES: [(&str, &str, &str); 22] = [
+    ("grasp", "ball --no-store", "nothing.urdf"),
+    ("demo", "--object ball --grasps 1 --no-store", "--object nothing"),
+    ("collect", "--objects empty --trials 1", "--objects nothing"),
+    ("train", "", "knn --out m.safetensors --collection nothing"),
+    ("teach", "", "nothing.urdf"),
+    ("evaluate", "", "--models nothing.safetensors"),
+    ("recognise", "1", "99"),
+    ("record", "--list", "--port nothing"),
+    ("replay", "1 --speed 0", "99"),
+    ("snapshot", "ball --out a.png --size 64x64", "nothing.urdf --out b.png"),
+    ("plot", "1 --out a.svg", "99 --out b.svg"),
+    ("movie", "", "99 --out a.gif"),
+    ("scene", "explain empty", "explain nothing.urdf"),
+    ("plan", "show", "set nothing 5000000"),
+    ("trials", "list", "show 99"),
+    ("adapt", "", "--port nothing"),
+    ("calibrate", "list", "flexL --points nothing.csv"),
+    ("fit", "", "99"),
+    ("doctor", "--wiring", "nothing"),
+    ("emulate", "--print-secrets", "--link l --secrets nothing.json"),
+    ("study", "", "merge nothing --out x"),
+    ("help", "store", ""),
+];
+
+#[test]
+fn every_command_exits_with_0_1_or_2() {
+    let folder = folder();
+    let at = folder.path();
+    let words = |command: &str, rest: &str| {
+        let words = [command].into_iter().chain(rest.split_whitespace());
+        words.map(str::to_owned).collect::<Vec<String>>()
+    };
+    assert_eq!(run(at, &["grasp", "ball"]).code, Some(0));
+    let help = run(at, &["--help"]).out;
+    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let listed: Vec<&str> =
+        listed.filter(|line| !line.starts_with("     ")).filter_map(|line| line.split_whitespace().next()).collect();
+    let known: Vec<&str> = EXIT_CODES.iter().map(|(command, ..)| *command).chain(["bench"]).collect();
+    assert!(listed.len() > 20 && listed.iter().all(|command| known.contains(command)), "{listed:?}");
+    for (command, succeeds, fails) in EXIT_CODES {
+        for (rest, code) in [("--help", 0), (succeeds, 0), (fails, 1), ("--no-such-option", 2)] {
+            if !rest.is_empty() {
+                let ran = run(at, &words(command, rest));
+                assert_eq!(ran.code, Some(code), "{command} {rest}: {ran:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn without_a_display_it_says_so_and_names_the_demo() {
     let folder = folder();

@@ -61,7 +61,7 @@ fn frozen(name: &str) -> PathBuf {
 }
 
 /// Compares a text that is the same on all machines with the frozen one, or freezes it.
-fn compare(name: &str, text: &str) {
+pub(crate) fn compare(name: &str, text: &str) {
     let path = frozen(name);
     if std::env::var_os("UPDATE_SCREENSHOTS").is_some() {
         return std::fs::write(path, text).unwrap();

@@ -47,6 +47,7 @@ mod architecture;
 mod architecture_app;
 mod bench;
 mod calibration;
+mod cases;
 mod command_line;
 mod cpu_renderer;
 mod datasets;

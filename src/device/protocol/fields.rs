@@ -62,7 +62,10 @@ const NO_NUMBER: &str = "a value is not a number";
 fn form_of(text: &str) -> Option<&'static str> {
     let is_hex = |word: &str| {
         let digits = word.rsplit([':', '=']).next().unwrap_or(word).trim_start();
-        digits.strip_prefix("0x").or(digits.strip_prefix("0X")).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_hexdigit()))
+        digits
+            .strip_prefix("0x")
+            .or(digits.strip_prefix("0X"))
+            .is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_hexdigit()))
     };
     if text.starts_with('>') {
         return Some("Teleplot's form; print name:value, separated by commas, in one line for each sample");

@@ -408,6 +408,66 @@ mod tests {
         assert!((trial.signals.t_s[15] - 0.15).abs() < 1e-9);
     }
 
+    /// A file of forces at these times: log time, time of the header (ns), and value.
+    fn of_forces(messages: impl Iterator<Item = (u64, u64, f64)>) -> Vec<u8> {
+        let mut out = McapWriter::new(Vec::new(), "another program").expect("writes");
+        let kind = MessageKind::FluidPressure;
+        let schema = out.schema(kind.name(), &kind.definition());
+        let channel = out.channel(schema, "/pad", &Pairs::new());
+        for (logged, stamp, value) in messages {
+            out.message(channel, logged, &messages::fluid_pressure(stamp, value)).expect("writes");
+        }
+        out.finish().expect("writes")
+    }
+
+    fn read(bytes: &[u8]) -> Import {
+        read_bag(bytes, "a.mcap", &Mapping::default(), "mug").expect("reads")
+    }
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn times_of_headers_count_where_messages_were_logged_in_bursts() {
+        let bursts =
+            of_forces((0..100).map(|n| (1000 * MS + n / 10 * 200 * MS + n % 10, 5000 * MS + n * 20 * MS, n as f64)));
+        let import = read(&bursts);
+        let signals = &import.trials[0].signals;
+        assert!(signals.len() == 100 && (signals.t_s[99] - 1.98).abs() < 1e-9, "{:?}", signals.t_s);
+        assert_eq!(signals.values[37], 37.0);
+        assert!(import.warnings[0].contains("bursts"), "{:?}", import.warnings);
+        // Steady log times are kept, whatever the headers say.
+        let steady = of_forces((0..100).map(|n| (1000 * MS + n * 10 * MS, 5000 * MS + n * 20 * MS, n as f64)));
+        assert!((read(&steady).trials[0].signals.t_s[99] - 0.99).abs() < 1e-9);
+    }
+
+    #[test]
+    fn each_run_of_a_clock_is_a_trial_and_chunks_in_any_order_are_one() {
+        let run = |from: u64, count: u64| (0..count).map(move |n| (from + n * 10 * MS, 0, n as f64));
+        let twice = read(&of_forces(run(2000 * MS, 90).chain(run(2000 * MS, 60))));
+        assert_eq!(twice.trials.iter().map(|trial| trial.signals.len()).collect::<Vec<_>>(), [90, 60]);
+        assert!(twice.warnings[0].contains("each run is a trial"), "{:?}", twice.warnings);
+        let swapped = read(&of_forces(run(3000 * MS, 100).chain(run(2000 * MS, 100))));
+        assert_eq!((swapped.trials.len(), swapped.trials[0].signals.len()), (1, 200));
+    }
+
+    #[test]
+    fn what_is_missing_is_a_gap() {
+        let mut out = McapWriter::new(Vec::new(), "another program").expect("writes");
+        let kind = MessageKind::Numbers;
+        let schema = out.schema(kind.name(), &kind.definition());
+        let channel = out.channel(schema, "/taxels", &Pairs::new());
+        for n in 0..100u64 {
+            let width = if n < 50 { 2 } else { 1 };
+            let values = [1.0, if n == 10 { f64::NAN } else { 2.0 }].into_iter().take(width).collect::<Vec<_>>();
+            out.message(channel, n * 20 * MS, &messages::numbers("taxels", values.into_iter())).expect("writes");
+        }
+        let import = read(&out.finish().expect("writes"));
+        let gaps = import.trials[0].signals.gaps();
+        assert!(gaps.len() == 1 && gaps[0].channels == [1] && gaps[0].samples.end == 100, "{gaps:?}");
+        let said = import.warnings.join("; ");
+        assert!(said.contains("1 reading(s) are infinite") && said.contains("no readings of taxels_1"), "{said}");
+    }
+
     #[test]
     fn files_without_numbers_say_what_they_have() {
         let mut out = McapWriter::new(Vec::new(), "x").expect("writes");

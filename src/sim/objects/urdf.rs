@@ -46,7 +46,10 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
     let materials = named(&robot, "material");
     let colour_named =
         |name: &str| materials.iter().rev().filter(|(own, _)| own == name).find_map(|(_, m)| colour_of(m));
-    for (link, element) in &links {
+    // Sums must not depend on the order in which a file names its links.
+    let mut in_order: Vec<&Named<'_>> = links.iter().collect();
+    in_order.sort_by(|a, b| a.0.cmp(&b.0));
+    for (link, element) in in_order {
         let Some(root_from_link) = poses.get(link.as_str()) else {
             continue;
         };

@@ -1,6 +1,7 @@
 //! Small files and what they must be read as.
 
 use super::*;
+use crate::mapping::Mapping;
 
 fn read(text: &str) -> Import {
     read_csv(text.as_bytes(), "grasps.csv", &Mapping::default(), "").expect("a good file")
@@ -212,4 +213,120 @@ fn what_stands_above_the_header_is_skipped() {
     }
     assert_eq!(read(&GOLDEN.replace("\nb,", "\n# a remark, and another\nb,")), plain);
     assert_eq!(read(&GOLDEN.replacen("trial,label,t_s", "'trial','label','t_s'", 1)), plain);
+}
+
+/// A table of another program, read by a profile or by a mapping.
+fn mapped(text: &str, mapping: &Mapping) -> Import {
+    read_csv(text.as_bytes(), "log.csv", mapping, &mapping.label_of(Path::new("mug.7.csv"))).expect("a good file")
+}
+
+#[test]
+fn tables_of_other_programs_are_read_by_their_profiles() {
+    let profile = |name: &str| Mapping::profile(name).expect("there is one");
+    let cases = [
+        (
+            "plotjuggler",
+            "__time,/left/force\n1760000000.0,1\n1760000000.02,2\n1760000000.04,3\n",
+            "mug.7",
+            "/left/force",
+        ),
+        (
+            "serial-studio",
+            "RX Date/Time,Flex\n2026/03/01 12:00:00.00,1\n2026/03/01 12:00:00.02,2\n2026/03/01 12:00:00.04,3\n",
+            "mug.7",
+            "Flex",
+        ),
+        ("edge-impulse", "timestamp,accX\n0,1\n20,2\n40,3\n", "mug", "accX"),
+        ("teleplot", "timestamp(ms);name;value\n1000;flexL;1\n1020;flexL;2\n1040;flexL;3\n", "mug.7", "flexL"),
+        (
+            "lerobot",
+            "episode_index,frame_index,timestamp,task,state\n0,0,0,pick,1\n0,1,0.02,pick,2\n0,2,0.04,pick,3\n",
+            "pick",
+            "state",
+        ),
+    ];
+    for (name, text, label, channel) in cases {
+        let import = mapped(text, &profile(name));
+        let trial = &import.trials[0];
+        assert_eq!(
+            (import.trials.len(), trial.label.as_str(), &trial.signals.channels[..]),
+            (1, label, &[channel.to_owned()][..]),
+            "{name}"
+        );
+        assert_eq!(trial.signals.values, [1.0, 2.0, 3.0], "{name}");
+        let span = trial.signals.t_s[2] - trial.signals.t_s[0];
+        assert!((span - 0.04).abs() < 1e-6, "{name}: {span}");
+        let unmapped =
+            read_csv(text.as_bytes(), "f", &Mapping::default(), "f").expect_err("needs a profile").to_string();
+        let wanted = if profile(name).known_by.is_empty() {
+            "--time \"timestamp\"".to_owned()
+        } else {
+            format!("add --profile {name}")
+        };
+        assert!(unmapped.contains(&wanted), "{name}: {unmapped}");
+    }
+}
+
+#[test]
+fn columns_get_roles_names_and_units() {
+    let text = "# by hand\nnot a header\nclock,what,grip,bend,note\n0,mug,1,10,x\n20,mug,2,11,x\n40,mug,3,12,x\n60,key,4,13,x\n80,key,5,14,x\n";
+    let mapping = Mapping {
+        skip: 2,
+        time: Some("clock [ms]".to_owned()),
+        label: Some("what".to_owned()),
+        channels: vec!["force_left = grip [kgf]".to_owned(), "bend".to_owned()],
+        ..Mapping::default()
+    };
+    let import = mapped(text, &mapping);
+    let labels: Vec<&str> = import.trials.iter().map(|trial| trial.label.as_str()).collect();
+    assert_eq!(labels, ["mug", "key"], "without a column of trials, each label begins one");
+    assert_eq!(import.trials[0].signals.channels, ["force_left", "bend"]);
+    assert_eq!(import.trials[0].signals.row(1), [2.0 * 9.80665, 11.0]);
+    assert!((import.trials[1].signals.t_s[1] - import.trials[1].signals.t_s[0] - 0.02).abs() < 1e-12);
+    // A line of an error counts the skipped ones.
+    let wrong = read_csv(text.replace("4,13", "4,x13").as_bytes(), "f", &mapping, "f").expect_err("no number");
+    assert!(wrong.to_string().contains("line 7") && wrong.to_string().contains("x13"), "{wrong}");
+    let lacking = Mapping { time: Some("t".to_owned()), ..mapping };
+    let error = read_csv(text.as_bytes(), "f", &lacking, "f").expect_err("no such column").to_string();
+    assert!(error.contains("no column \"t\"; the file has clock, what, grip"), "{error}");
+}
+
+#[test]
+fn tables_without_a_header_are_read_by_number() {
+    let text = "100.0,1.1\n100.1,1.2\n100.2,1.3\n";
+    let error = read_csv(text.as_bytes(), "f", &Mapping::default(), "f").expect_err("no header").to_string();
+    assert!(error.contains("first row holds numbers") && error.contains("--channel"), "{error}");
+    let mapping =
+        Mapping { time: Some("1 [s]".to_owned()), channels: vec!["grip=2 [N]".to_owned()], ..Mapping::default() };
+    let import = mapped(text, &mapping);
+    assert_eq!(import.trials[0].signals.channels, ["grip [N]"]);
+    assert_eq!(import.trials[0].signals.values, [1.1, 1.2, 1.3]);
+}
+
+#[test]
+fn a_recording_is_split_at_pauses_and_where_its_clock_starts_again() {
+    let rows = |from: f64| (0..20).map(move |k| format!("{},{k}\n", from + 0.02 * f64::from(k)));
+    let text: String =
+        std::iter::once("t_s,p\n".to_owned()).chain(rows(0.0)).chain(rows(3.0)).chain(rows(0.5)).collect();
+    let mapping = Mapping { label: Some("mug".to_owned()), split_gap_s: Some(1.0), ..Mapping::default() };
+    let import = mapped(&text, &mapping);
+    assert_eq!(import.trials.iter().map(|trial| trial.signals.len()).collect::<Vec<_>>(), [20; 3]);
+    assert!(import.trials.iter().all(|trial| trial.label == "mug"));
+    let whole = Mapping { split_gap_s: None, ..mapping };
+    let error = read_csv(text.as_bytes(), "f", &whole, "f").expect_err("falls").to_string();
+    assert!(error.contains("--split-by gap"), "{error}");
+}
+
+#[test]
+fn a_pause_is_a_gap() {
+    let rows = |from: f64| (0..20).map(move |k| format!("1,mug,{},{k}\n", from + 0.02 * f64::from(k)));
+    let text: String = std::iter::once("trial,label,t_s,p\n".to_owned()).chain(rows(0.0)).chain(rows(1.0)).collect();
+    let import = read(&text);
+    let signals = &import.trials[0].signals;
+    let gaps = signals.gaps();
+    assert_eq!((gaps.len(), gaps[0].samples.len(), signals.len()), (1, 30, 70));
+    assert!((gaps[0].from_s - 0.38).abs() < 1e-9 && (gaps[0].to_s - 1.0).abs() < 1e-9);
+    assert!(
+        import.warnings.iter().any(|text| text.contains("flagged: no readings from 0.38 s to 1.00 s (30 missing)"))
+    );
 }
