@@ -163,3 +163,51 @@ fn an_export_that_ends_early_leaves_no_file() {
     let error = read_trials(Path::new("a.npz"), &Mapping::default()).expect_err("refused").to_string();
     assert!(error.contains("\"a.npz\": No such file"), "{error}");
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(24))]
+
+    /// A grasp that is written in any units gives the answers of the grasp.
+    #[test]
+    fn units_do_not_change_answers(choice in proptest::collection::vec(0usize..100, 12), time in 0usize..4) {
+        let (_folder, store) = store_of(&["lemon"]);
+        let trial = store.load(1).expect("stored");
+        let layout = palpate_tactile::SensorLayout::named("C1+F").expect("known");
+        let gripper = &trial.header.scene.gripper;
+        let definition = palpate_tactile::SignalDefinition::Parts;
+        let sensors = palpate_tactile::Sensors::new(&layout, gripper, definition).expect("sensors");
+        let signals = sensors.signals(trial.frames());
+        let units = |name: &str| match palpate_tactile::unit_of_channel(name).1 {
+            "N" => &["N", "mN", "gf", "kgf", "lbf"][..],
+            "Pa" => &["Pa", "kPa", "hPa", "MPa", "psi", "mbar", "bar", "N/cm2"],
+            "1/m" => &["1/m", "1/mm", "1/cm", "m^-1"],
+            _ => &[""],
+        };
+        let chosen: Vec<&str> =
+            signals.channels.iter().zip(&choice).map(|(name, k)| units(name)[k % units(name).len()]).collect();
+        let clock = ["s", "ms", "us", "ns"][time];
+        let factor = |unit: &str| palpate_tactile::Unit::parse(unit).map_or(1.0, |unit| unit.factor);
+        let mut text = format!("trial,label,t_s [{clock}]");
+        signals.channels.iter().zip(&chosen).for_each(|(name, unit)| text += &format!(",{name} [{unit}]"));
+        for (sample, t) in signals.t_s.iter().enumerate() {
+            text += &format!("\n1,lemon,{}", t / factor(clock));
+            let row = signals.row(sample).iter().zip(&chosen);
+            row.for_each(|(value, unit)| text += &format!(",{}", f64::from(*value) / factor(unit)));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, text.replace(" []", "")).expect("writes");
+        let import = read_trials(&path, &Mapping::default()).expect("reads");
+        let read = &import.trials[0].signals;
+        proptest::prop_assert_eq!(&read.channels, &signals.channels);
+        let model = palpate_learn::Models::shipped().expect("shipped");
+        let model = model.of(palpate_learn::Shipped::PerfectSensors).expect("shipped");
+        let answer = |signals: &Signals| {
+            let chosen = signals.chosen(&model.card.channels).expect("its channels");
+            model.recogniser.recognise(&palpate_lab::datasets::sequence_of(&chosen), None).pmf.probabilities().to_vec()
+        };
+        for (a, b) in answer(&signals).iter().zip(answer(read)) {
+            proptest::prop_assert!((a - b).abs() < 1e-3, "{} {}", a, b);
+        }
+    }
+}

@@ -67,7 +67,7 @@ impl Recipe {
             Shipped::FixedObjects => Self {
                 which,
                 method: "geometry-network",
-                epochs: 40,
+                epochs: 100,
                 trials: [1200, 100, 100],
                 seeds: [7, 2, 11],
                 others: 5000..6000,
