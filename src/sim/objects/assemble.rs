@@ -42,6 +42,10 @@ pub(super) struct Blueprint {
     /// True where what parts share is as heavy as each of them.
     pub(super) overlap_is_denser: bool,
     pub(super) warnings: Vec<String>,
+    /// The link whose shapes are added, and those of the solids that are seen and touched.
+    pub(super) link: String,
+    visual_links: Vec<String>,
+    collision_links: Vec<String>,
 }
 
 /// An object larger than this is taken to be in millimetres when that makes sense of it (m).
@@ -78,6 +82,9 @@ impl Blueprint {
             friction: None,
             overlap_is_denser: false,
             warnings: Vec::new(),
+            link: String::new(),
+            visual_links: Vec::new(),
+            collision_links: Vec::new(),
         }
     }
 
@@ -94,6 +101,7 @@ impl Blueprint {
         if !self.makes_room_for(shape) {
             return;
         }
+        self.visual_links.push(self.link.clone());
         match shape {
             ShapeSource::Primitive(primitive) => {
                 let mut mesh = primitive.tessellate();
@@ -117,6 +125,7 @@ impl Blueprint {
         if !self.makes_room_for(shape) {
             return;
         }
+        self.collision_links.push(self.link.clone());
         self.collision.push(match shape {
             ShapeSource::Primitive(primitive) => SolidPart::Primitive(*primitive, *place),
             ShapeSource::Mesh(parts) => SolidPart::Mesh(joined(parts, place)),
@@ -127,6 +136,7 @@ impl Blueprint {
     pub(super) fn touch_visual(&mut self, last: usize) {
         let from = self.visual_solids.len().saturating_sub(last);
         self.collision.extend_from_slice(&self.visual_solids[from..]);
+        self.collision_links.extend_from_slice(&self.visual_links[from..]);
     }
 
     /// Builds the object with the options of a scene. The baked distances are kept in files of the folder for caches.
@@ -146,13 +156,22 @@ impl Blueprint {
             let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
             return Err(ObjectError::malformed(&self.name, &cause));
         }
-        let mut solids = match options.collision {
-            CollisionShape::File if !self.collision.is_empty() => std::mem::take(&mut self.collision),
-            CollisionShape::File | CollisionShape::Visual => std::mem::take(&mut self.visual_solids),
+        let (mut solids, links) = match options.collision {
+            CollisionShape::File if !self.collision.is_empty() => {
+                (std::mem::take(&mut self.collision), std::mem::take(&mut self.collision_links))
+            }
+            CollisionShape::File | CollisionShape::Visual => {
+                (std::mem::take(&mut self.visual_solids), std::mem::take(&mut self.visual_links))
+            }
             CollisionShape::Hull => {
                 let all = if self.collision.is_empty() { &self.visual_solids } else { &self.collision };
-                vec![SolidPart::Mesh(hull_of(all, &self.name)?)]
+                (vec![SolidPart::Mesh(hull_of(all, &self.name)?)], vec![String::new()])
             }
+        };
+        // What a message is about: the whole object, or one of its links.
+        let names: Vec<String> = match links.len() {
+            1 => vec![self.name.clone()],
+            _ => links.iter().map(|link| format!("{}, link {link}", self.name)).collect(),
         };
         if solids.is_empty() {
             return Err(ObjectError(format!(
@@ -166,7 +185,13 @@ impl Blueprint {
         for part in &mut self.visual {
             part.mesh.scale(glam::DVec3::splat(scale));
         }
-        let several = self.repair_meshes(&mut solids)?;
+        let several = self.repair_meshes(&mut solids, &names)?;
+        for (solid, name) in solids.iter().zip(&names) {
+            let thickness = solid.bounds().size().min_element();
+            if thickness < THINNEST {
+                return Err(ObjectError(format!("\"{name}\" is {thickness:.1e} m thick; give it at least 0.01 mm")));
+            }
+        }
         let bounds = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union);
         self.check_size(&bounds, scale)?;
         let mass = self.mass(options, &solids, several, scale);
@@ -241,7 +266,7 @@ impl Blueprint {
     }
 
     fn check_size(&self, bounds: &Bounds, scale: f64) -> Result<(), ObjectError> {
-        let (largest, thinnest) = (bounds.size().max_element(), bounds.size().min_element());
+        let largest = bounds.size().max_element();
         let name = &self.name;
         if !bounds.size().is_finite() || !GRASPABLE.contains(&largest) {
             let [least, most] = [GRASPABLE.start() * 1e3, GRASPABLE.end() * 1e3];
@@ -259,22 +284,19 @@ impl Blueprint {
                 three_digits(largest * 1e3)
             )));
         }
-        if thinnest < THINNEST {
-            return Err(ObjectError(format!("\"{name}\" is {thinnest:.1e} m thick; give it at least 0.01 mm")));
-        }
         Ok(())
     }
 
     /// Repairs all meshes; returns whether the object is made of several pieces, which may overlap.
-    fn repair_meshes(&mut self, solids: &mut [SolidPart]) -> Result<bool, ObjectError> {
+    fn repair_meshes(&mut self, solids: &mut [SolidPart], names: &[String]) -> Result<bool, ObjectError> {
         let mut pieces = solids.iter().filter(|solid| matches!(solid, SolidPart::Primitive(..))).count();
-        for solid in solids {
+        for (solid, name) in solids.iter_mut().zip(names) {
             if let SolidPart::Mesh(mesh) = solid {
-                let repaired = repair(mesh).map_err(|cause| ObjectError::unsound(&self.name, &cause))?;
+                let repaired = repair(mesh).map_err(|cause| ObjectError::unsound(name, &cause))?;
                 *mesh = repaired.mesh;
                 pieces += repaired.pieces;
                 self.warnings
-                    .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{}\": {note}", self.name)));
+                    .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{name}\": {note}")));
             }
         }
         Ok(pieces > 1)

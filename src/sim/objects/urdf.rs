@@ -53,6 +53,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         let Some(root_from_link) = poses.get(link.as_str()) else {
             continue;
         };
+        blueprint.link.clone_from(link);
         let visuals = shape_tags(link, element, "visual", &mut blueprint.warnings);
         let collisions = shape_tags(link, element, "collision", &mut blueprint.warnings);
         let mut seen = 0;
