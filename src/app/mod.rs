@@ -22,7 +22,7 @@
 //! | modes | `modes/` | layout and keys of each mode |
 //! | panels | `panels/` `bars/` | one file per panel |
 //! | keys | `keys/` | keys of all modes, and their sheet |
-//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `presenter/` | panels beside each other; command palette; file dialog; presenter mode |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `import_dialog.rs` `presenter/` | panels beside each other; command palette; file and import dialogs; presenter mode |
 //! | workbench | `workbench.rs` | draws the window |
 //! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |
@@ -43,6 +43,7 @@ mod figure_plot;
 mod frame_rate;
 mod heat_map;
 mod icons;
+mod import_dialog;
 mod keys;
 mod modes;
 mod offscreen;

@@ -15,6 +15,7 @@ use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::ViewState;
 use crate::app::frame_rate::FrameRate;
+use crate::app::import_dialog::{Ended, ImportDialog};
 use crate::app::panels::PanelKind;
 use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::shown::Inspected;
@@ -100,6 +101,7 @@ const GRASPS: u32 = 4;
 pub struct Workbench {
     app: App,
     path_dialog: Option<PathDialog>,
+    import_dialog: Option<ImportDialog>,
     cleared: bool,
 }
 
@@ -182,7 +184,7 @@ impl Workbench {
         if let Some(cause) = without {
             app.notices.error(format!("Recognition is off: {cause}"));
         }
-        Ok(Self { app, path_dialog: None, cleared: setup.cleared })
+        Ok(Self { app, path_dialog: None, import_dialog: None, cleared: setup.cleared })
     }
 
     /// View state, to be remembered.
@@ -261,6 +263,7 @@ impl Workbench {
         self.app.view.layouts.insert(mode, layout);
         self.run(actions);
         self.ask_for_file();
+        self.import_trials();
     }
 
     /// Draws presenter mode.
@@ -294,6 +297,20 @@ impl Workbench {
             let question = self.path_dialog.take().map(|dialog| dialog.question);
             if let (Closed::Answered(path), Some(question)) = (closed, question) {
                 self.app.answer(question, path);
+            }
+            self.app.ctx.request_repaint();
+        }
+    }
+
+    /// Draws the import dialog, while there is one.
+    fn import_trials(&mut self) {
+        if let Some((path, wake)) = self.app.files.import.take() {
+            self.import_dialog = Some(ImportDialog::new(path, self.app.store.clone(), wake));
+        }
+        if let Some(ended) = self.import_dialog.as_mut().and_then(|dialog| dialog.ui(&self.app.ctx)) {
+            self.import_dialog = None;
+            if let Ended::Imported(said) = ended {
+                self.app.notices.info(said);
             }
             self.app.ctx.request_repaint();
         }

@@ -18,6 +18,11 @@ pub trait TrialFormat: Sync {
 
     /// Reads the trials of a file. The mapping gives columns their roles, and a label to a file that has none.
     fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError>;
+
+    /// Names of the columns that a mapping gives roles; none where their roles are given.
+    fn columns(&self, _path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+        Ok(Vec::new())
+    }
 }
 
 /// Trials to be written.

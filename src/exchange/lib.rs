@@ -99,6 +99,11 @@ pub fn read_trials(path: &Path, mapping: &Mapping) -> Result<Import, ImportError
     format.read(path, mapping)
 }
 
+/// Names of the columns of a file that a mapping gives roles; none where the format gives them.
+pub fn columns_of(path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+    format_of(path).unwrap_or(CSV).columns(path, mapping)
+}
+
 /// Files that hold trials in forms that are not read, and what to do.
 const OTHER_FILES: [(&[&str], &str); 3] = [
     (&["db3"], "it is a bag of SQLite; convert it with `ros2 bag convert` and storage_id: mcap"),

@@ -5,7 +5,7 @@
 use crate::content::{TrialContent, channels_of};
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, new_file};
 use crate::mapping::Mapping;
-use crate::npz_import::read_npz;
+use crate::npz_import::{names_of, read_npz};
 use palpate_geometry::Pose;
 use palpate_lab::inspection::{TouchPhase, scene_hash};
 use palpate_sim::frame::Frame;
@@ -54,6 +54,10 @@ impl TrialFormat for Npz {
 
     fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
         read_npz(path, mapping)
+    }
+
+    fn columns(&self, path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+        names_of(path, mapping)
     }
 }
 

@@ -23,6 +23,12 @@ pub(crate) fn read_npz(path: &Path, mapping: &Mapping) -> Result<Import, ImportE
     read_made(table.text(), &file_name(path), &table.mapping, &label)
 }
 
+/// Names of the arrays.
+pub(crate) fn names_of(path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+    let arrays = arrays(path, mapping).map_err(|fault| ImportError::of(path, fault))?;
+    Ok(arrays.into_keys().collect())
+}
+
 fn arrays(path: &Path, mapping: &Mapping) -> Result<BTreeMap<String, Array>, String> {
     let file = palpate_geometry::open_regular(path).map_err(|cause| cause.to_string())?;
     let no_archive = |cause: &dyn std::fmt::Display| format!("it is not a sound NPZ archive ({cause})");

@@ -22,6 +22,7 @@ use ::parquet::schema::types::Type;
 use palpate_store::{FileKind, NewFile};
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::iter::Peekable;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -63,6 +64,25 @@ impl TrialFormat for Parquet {
         let read = || read_table(file, path, mapping);
         catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_panic| Err(damaged()))
     }
+
+    fn columns(&self, path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+        let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
+        let read = || {
+            let reader = SerializedFileReader::new(file).map_err(|error| ImportError::of(path, why(&error)))?;
+            Ok(names_of(&mut RowIter::from_file_into(Box::new(reader)).peekable()))
+        };
+        let damaged = || ImportError::of(path, "it is not a sound Parquet file");
+        catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_panic| Err(damaged()))
+    }
+}
+
+/// Names of the columns of the first row.
+fn names_of(rows: &mut Peekable<RowIter<'_>>) -> Vec<String> {
+    let mut names = Vec::new();
+    if let Some(Ok(first)) = rows.peek() {
+        cells(first, &mut |name, _| names.push(name));
+    }
+    names
 }
 
 /// Reads a table with a row for each sample. Lists become a column for each of their elements, groups one for each member.
@@ -85,10 +105,7 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
     };
     let mapping = if is_own && !mapping.has_roles() { &own } else { mapping };
     let mut rows = RowIter::from_file_into(Box::new(reader)).peekable();
-    let mut names = Vec::new();
-    if let Some(Ok(first)) = rows.peek() {
-        cells(first, &mut |name, _| names.push(name));
-    }
+    let names = names_of(&mut rows);
     if names.len() > MOST_COLUMNS {
         return Err(ImportError::of(path, format!("it has more than {MOST_COLUMNS} columns")));
     }

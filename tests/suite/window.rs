@@ -2,15 +2,18 @@
 
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
+use crate::golden::compare;
+use crate::panels::side_by_side;
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::Mode;
+use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{Command, LabelCommand};
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardInfo, Store};
-use palpate_tactile::trial::TrialHeader;
+use palpate_tactile::trial::{TrialHeader, TrialSource};
 
 fn window(size: [f32; 2]) -> Bench {
     Bench::new(BenchSetup { size, ..BenchSetup::default() }, CpuRenderer::default())
@@ -161,6 +164,51 @@ fn files_are_saved_and_opened_by_the_dialog() {
     bench.harness.get_by_role_and_label(Role::Button, "Open").click();
     bench.harness.run_steps(3);
     bench.until(|s| s.truth() == "lemon");
+}
+
+/// A log of another program: two grasps with a pause between them.
+fn log_of_another_program(path: &std::path::Path) {
+    let rows = |from: f64| {
+        (0..100).map(move |k| {
+            let t = 0.02 * f64::from(k);
+            let load = (t - 0.5).clamp(0.0, 0.8);
+            format!("{},{:.3},{:.4},{}\n", from + 1e3 * t, 40.0 * load, 12.0 - 4.0 * load, k % 3)
+        })
+    };
+    let header = "timestamp,grip,bend [1/m],mode\n".to_owned();
+    let text: String = std::iter::once(header).chain(rows(0.0)).chain(rows(5000.0)).collect();
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("mug.csv");
+    log_of_another_program(&log);
+    let pictures = [Theme::Dark, Theme::Light].map(|theme| {
+        let setup = BenchSetup { size: [960.0, 600.0], theme, ..BenchSetup::default() };
+        let mut bench = Bench::new(setup, CpuRenderer::default());
+        bench.tell(|app| app.open_file(&log));
+        // The time is found by its name; its unit is doubted.
+        bench.until_shown(true, "samples per second");
+        bench.harness.get_by_label("Unit of timestamp").focus();
+        bench.harness.run_steps(2);
+        type_text(&mut bench, "ms");
+        bench.until_shown(true, "1 trial(s): mug 1");
+        bench.harness.get_by_label("New trial after a pause of 1 s").click();
+        bench.until_shown(true, "2 trial(s): mug 2");
+        let picture = bench.picture();
+        bench.harness.get_by_label("Import 2 trial(s)").click();
+        bench.harness.run_steps(2);
+        bench.until_told("2 trial(s) imported as collection mug");
+        let rows = bench.store().list(false).unwrap();
+        let imported: Vec<&str> =
+            rows.iter().filter(|row| row.source == TrialSource::Imported).map(|row| row.object.as_str()).collect();
+        assert_eq!(imported, ["mug", "mug"]);
+        picture
+    });
+    let [dark, light] = pictures;
+    compare("import", &side_by_side(&dark, &light), "the CPU renderer of the tests");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
+use crate::app::import_dialog::{ENDINGS, holds_trials};
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{FigureOptions, OpenOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
@@ -38,13 +39,17 @@ pub(in crate::app) struct FileFeature {
     /// Folder of the file chosen last.
     folder: Option<PathBuf>,
     exports: Job<(PathBuf, ExportRequest), String>,
+    /// File whose trials are to be imported now.
+    pub(in crate::app) import: Option<(PathBuf, Wake)>,
+    wake: Wake,
     /// All labelled trials are exported as soon as the store has their labels.
     labelled: bool,
 }
 
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake) -> Self {
-        Self { question: None, folder: None, exports: export_job(wake), labelled: false }
+        let exports = export_job(Arc::clone(&wake));
+        Self { question: None, folder: None, exports, import: None, wake, labelled: false }
     }
 
     /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
@@ -99,8 +104,22 @@ impl App {
             self.files.exports.start((self.export_folder(), ExportRequest::Labelled(self.store.clone())));
         }
         for file in self.ctx.input(|i| i.raw.dropped_files.clone()) {
-            self.open(&file.path().to_string_lossy());
+            self.open_file(file.path());
         }
+    }
+
+    /// Grasps what a file holds, or imports its trials.
+    pub fn open_file(&mut self, path: &Path) {
+        if holds_trials(path) {
+            self.files.import = Some((path.to_owned(), Arc::clone(&self.files.wake)));
+        } else {
+            self.open(&path.to_string_lossy());
+        }
+    }
+
+    /// Imports trials of another program.
+    pub(in crate::app) fn ask_for_trials(&mut self) {
+        self.files.ask("Import trials", ENDINGS, None, |app, path| app.open_file(&path));
     }
 
     /// Opens an object or a scene.
@@ -181,7 +200,8 @@ pub(in crate::app) fn drop_hint(ctx: &egui::Context) {
     let painter = ctx.layer_painter(layer);
     painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(150));
     let font = egui::FontId::proportional(22.0);
-    let text = "Drop a URDF, OBJ, STL or scene file to grasp it";
+    let text =
+        "Drop a URDF, OBJ, STL or scene file to grasp it, or a CSV, MCAP, NPZ or Parquet file to import its trials";
     painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, egui::Color32::WHITE);
 }
 

@@ -118,6 +118,7 @@ const GRIPPER: &[Act] = &[
 
 /// Actions without a key.
 pub(in crate::app) static COMMANDS: &[Act] = &[
+    command("Import trials of other programs (CSV, MCAP, NPZ, Parquet)", App::ask_for_trials),
     command("Dark theme", |app| app.set_theme(Theme::Dark)),
     command("Light theme", |app| app.set_theme(Theme::Light)),
     command("Reset layout of all modes", |app| app.view.layouts.clear()),

@@ -53,6 +53,10 @@ impl TrialFormat for Csv {
     fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
         import::read_file(path, mapping)
     }
+
+    fn columns(&self, path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+        import::columns_of(path, mapping)
+    }
 }
 
 /// Writes a trial to a file, or into a folder under its own name; returns the path.

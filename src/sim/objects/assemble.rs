@@ -295,8 +295,7 @@ impl Blueprint {
                 let repaired = repair(mesh).map_err(|cause| ObjectError::unsound(name, &cause))?;
                 *mesh = repaired.mesh;
                 pieces += repaired.pieces;
-                self.warnings
-                    .extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{name}\": {note}")));
+                self.warnings.extend(repaired.notes.into_iter().map(|note| format!("mesh of \"{name}\": {note}")));
             }
         }
         Ok(pieces > 1)

@@ -6,6 +6,7 @@ mod filters;
 mod rows;
 
 use crate::app::actions::Actions;
+use crate::app::features::App;
 use crate::app::features::library::{LibraryFeature, LibrarySelection};
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
@@ -39,7 +40,7 @@ pub(super) fn ui(
         count_ui(ui, &library.selection.query, view, actions);
     }
     if view.found.is_empty() {
-        return empty_ui(ui, library.selection.query.is_filtered(), view);
+        return empty_ui(ui, library.selection.query.is_filtered(), view, actions);
     }
     rows::ui(ui, library, pictures, view, actions);
 }
@@ -79,7 +80,7 @@ fn count_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut A
     });
 }
 
-fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView) {
+fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView, actions: &mut Actions) {
     ui.add_space(12.0);
     ui.vertical_centered(|ui| {
         if !view.complete {
@@ -88,8 +89,9 @@ fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView) {
             ui.weak("No trial matches. Clear the search and the filters to see all.");
         } else {
             ui.weak("No trials yet.");
-            ui.weak("Play a grasp in Demo mode (Ctrl+1), record one of the real gripper with R, or import a file:");
-            ui.monospace("palpate trials import FILE.csv");
+            ui.weak("Play a grasp in Demo mode (Ctrl+1), record one of the real gripper with R, or import a file.");
+            let hint = "CSV, MCAP, NPZ or Parquet; or drop the file anywhere on the window";
+            actions.on(&ui.button("Import ..").on_hover_text(hint), App::ask_for_trials);
         }
     });
 }

@@ -70,6 +70,12 @@ pub(super) fn read_file(path: &Path, mapping: &Mapping) -> Result<Import, Import
     Err(ImportError::of(path, fault))
 }
 
+/// Names of the columns of a file.
+pub(super) fn columns_of(path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+    let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
+    rows::columns(file, mapping).map_err(|(line, fault)| ImportError { name: file_name(path), line, fault })
+}
+
 /// Reads grasps from any source; `name` stands in error messages, `label` is that of rows without one.
 pub(super) fn read_csv(reader: impl Read, name: &str, mapping: &Mapping, label: &str) -> Result<Import, ImportError> {
     let mut warnings = Vec::new();

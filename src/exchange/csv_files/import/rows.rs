@@ -87,6 +87,67 @@ enum Label {
     Fixed(String),
 }
 
+/// A table whose header has been read.
+struct Opened<R> {
+    reader: csv::Reader<Limited<R>>,
+    header: ByteRecord,
+    /// Line of the header.
+    line: u64,
+    /// The first row, where the table has no header.
+    first: Option<ByteRecord>,
+    decimal_comma: bool,
+}
+
+impl<R: Read> Opened<BufReader<R>> {
+    fn open(reader: R, mapping: &Mapping) -> Result<Self, Fault> {
+        let mut reader = BufReader::with_capacity(64 << 10, reader);
+        for _ in 0..mapping.skip {
+            reader.skip_until(b'\n').map_err(|e| (None, e.to_string()))?;
+        }
+        let head = reader.fill_buf().map_err(|e| (None, e.to_string()))?;
+        let separator = mapping.delimiter.map_or_else(|| separator(head, mapping), |delimiter| delimiter as u8);
+        let source = Limited {
+            bytes: BufReader::new(reader).bytes(),
+            after_return: false,
+            ended: false,
+            total: 0,
+            row: 0,
+            skipped: mapping.skip,
+        };
+        let mut reader =
+            csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(source);
+        let mut header = ByteRecord::new();
+        let line = loop {
+            let line = next_row(&mut reader, &mut header)?.ok_or_else(|| empty("header"))?;
+            match preamble(&header) {
+                Preamble::None => break line,
+                Preamble::Skipped => {}
+                Preamble::Header(own) => {
+                    header = own;
+                    break line;
+                }
+            }
+        };
+        let decimal_comma = separator != b',';
+        let first = holds_numbers(&header, decimal_comma).then(|| header.clone());
+        if first.is_some() {
+            header = (1..=header.len()).map(|number| number.to_string().into_bytes()).collect();
+        }
+        Ok(Self { reader, header, line, first, decimal_comma })
+    }
+}
+
+fn empty(what: &str) -> Fault {
+    (None, format!("the file has no {what}; it should have a header and below it one row per sample"))
+}
+
+/// Names of the columns of a table.
+pub(super) fn columns(reader: impl Read, mapping: &Mapping) -> Result<Vec<String>, Fault> {
+    let table = Opened::open(reader, mapping)?;
+    let header = Header::read(&table.header).map_err(|fault| (Some(table.line), fault))?;
+    Ok(header.whole.into_iter().map(str::to_owned).collect())
+}
+
 /// Reads all rows below a header. `label` is that of rows without one, where columns are mapped.
 pub(super) fn read_rows(
     reader: impl Read,
@@ -94,50 +155,25 @@ pub(super) fn read_rows(
     label: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Rows, Fault> {
-    let mut reader = BufReader::with_capacity(64 << 10, reader);
-    for _ in 0..mapping.skip {
-        reader.skip_until(b'\n').map_err(|e| (None, e.to_string()))?;
-    }
-    let head = reader.fill_buf().map_err(|e| (None, e.to_string()))?;
-    let separator = mapping.delimiter.map_or_else(|| separator(head, mapping), |delimiter| delimiter as u8);
-    let source =
-        Limited { bytes: reader.bytes(), after_return: false, ended: false, total: 0, row: 0, skipped: mapping.skip };
-    let mut reader =
-        csv::ReaderBuilder::new().delimiter(separator).has_headers(false).flexible(true).from_reader(source);
-    let mut record = ByteRecord::new();
-    let empty =
-        |what: &str| (None, format!("the file has no {what}; it should have a header and below it one row per sample"));
-    let line = loop {
-        let line = next_row(&mut reader, &mut record)?.ok_or_else(|| empty("header"))?;
-        match preamble(&record) {
-            Preamble::None => break line,
-            Preamble::Skipped => {}
-            Preamble::Header(own) => {
-                record = own;
-                break line;
-            }
-        }
-    };
-    let decimal_comma = separator != b',';
-    let first = holds_numbers(&record, decimal_comma).then(|| record.clone());
-    if first.is_some() {
-        if !mapping.has_roles() {
-            let text = "its first row holds numbers, where the names of the columns should stand; add a header, or name the \
-                        columns by number, as in --time \"1 [s]\" --channel \"force=2 [N]\"";
-            return Err((Some(line), text.to_owned()));
-        }
-        record = (1..=record.len()).map(|number| number.to_string().into_bytes()).collect();
+    let Opened { mut reader, header, line, first, decimal_comma } = Opened::open(reader, mapping)?;
+    if first.is_some() && !mapping.has_roles() {
+        let text = "its first row holds numbers, where the names of the columns should stand; add a header, or name the \
+                    columns by number, as in --time \"1 [s]\" --channel \"force=2 [N]\"";
+        return Err((Some(line), text.to_owned()));
     }
     if let (Some(name), Some(value)) = (&mapping.name, &mapping.value) {
-        let series = long_table(&mut reader, &record, line, [name, value], mapping, decimal_comma)?;
+        let series = long_table(&mut reader, &header, line, [name, value], mapping, decimal_comma)?;
         let text = series.into_csv(label).ok_or_else(|| empty("row with a number"))?;
-        return read_rows(text, &Mapping { split_gap_s: mapping.split_gap_s, ..Mapping::default() }, label, warnings);
+        let own = Mapping { split_gap_s: mapping.split_gap_s, ..Mapping::default() };
+        let boxed: Box<dyn Read> = Box::new(text);
+        return read_rows(boxed, &own, label, warnings);
     }
     let mut rows =
-        Rows::below(&record, decimal_comma, mapping, label, warnings).map_err(|fault| (Some(line), fault))?;
+        Rows::below(&header, decimal_comma, mapping, label, warnings).map_err(|fault| (Some(line), fault))?;
     if let Some(first) = first {
         rows.add(line, &first)?;
     }
+    let mut record = ByteRecord::new();
     while let Some(line) = next_row(&mut reader, &mut record)? {
         if !record[0].starts_with(b"#") {
             rows.add(line, &record)?;
@@ -394,10 +430,7 @@ impl Rows {
         let found = columns.into_iter().flatten().take(if mapping.label.is_some() { 1 } else { 3 }).find_map(place);
         let label = found.map_or_else(|| Label::Fixed(fallback.to_owned()), Label::Column);
         if let (Label::Fixed(name), None) = (&label, &mapping.label) {
-            warnings.push(format!(
-                "no label is given: the trials are called \"{}\" after the file; --label sets another",
-                brief(name)
-            ));
+            warnings.push(format!("no label is given: the trials are called \"{}\" after the file", brief(name)));
         }
         let roles = Roles { trial, label, time, time_factor: time_factor(unit)? };
         let label = match roles.label {

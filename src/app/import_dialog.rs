@@ -1,0 +1,344 @@
+//! Import of trials of other programs: which column of a file is which, with the curves that come of it.
+
+use crate::app::plots::static_plot;
+use crate::app::theme::{self, colour};
+use crate::app::widgets::{failure_ui, remark_ui, text_field, warning_ui, wrapped};
+use egui::{Button, ComboBox, Grid, Id, Modal, RichText, ScrollArea, Ui};
+use egui_plot::{AxisHints, Legend, Line};
+use palpate_exchange::{Import, Mapping, PROFILES, SPLIT_GAP_S, columns_of, read_trials};
+use palpate_geometry::palette::series_colour;
+use palpate_lab::workers::{Job, JobError, Newer, Wake};
+use palpate_store::Store;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What a column is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Channel,
+    Time,
+    Label,
+    Trial,
+    LeftOut,
+}
+
+impl Role {
+    const ALL: [Self; 5] = [Self::Channel, Self::Time, Self::Label, Self::Trial, Self::LeftOut];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Channel => "channel",
+            Self::Time => "time",
+            Self::Label => "label",
+            Self::Trial => "trial",
+            Self::LeftOut => "left out",
+        }
+    }
+}
+
+/// A column of the file, and what the user says of it.
+#[derive(Clone, Debug, PartialEq)]
+struct ColumnChoice {
+    name: String,
+    role: Role,
+    /// Unit that counts instead of the header's.
+    unit: String,
+}
+
+/// File to read, or to store.
+#[derive(Debug)]
+struct Request {
+    path: PathBuf,
+    mapping: Mapping,
+    /// Store that takes the trials.
+    store: Option<PathBuf>,
+}
+
+/// What came of a request.
+struct Outcome {
+    columns: Vec<String>,
+    import: Result<Import, String>,
+    /// Said once the trials are stored.
+    stored: Option<String>,
+}
+
+/// An open dialog.
+pub(super) struct ImportDialog {
+    path: PathBuf,
+    store: PathBuf,
+    /// Name of the profile; empty without one.
+    profile: &'static str,
+    /// What the columns do not say.
+    base: Mapping,
+    columns: Vec<ColumnChoice>,
+    label: String,
+    split: bool,
+    /// The user has said what the columns are.
+    chosen: bool,
+    job: Job<Request, Outcome>,
+}
+
+/// End of a dialog.
+pub(super) enum Ended {
+    Cancelled,
+    Imported(String),
+}
+
+/// Endings of the files that it reads.
+pub(super) const ENDINGS: &[&str] = &["csv", "tsv", "txt", "mcap", "npz", "parquet"];
+/// Curves and warnings that are shown at most.
+const MOST_CURVES: usize = 8;
+const MOST_WARNINGS: usize = 5;
+
+/// True for a file that holds trials.
+pub(super) fn holds_trials(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ENDINGS.contains(&ending.as_str())
+}
+
+fn read(request: &Request) -> Result<Outcome, JobError> {
+    let Request { path, mapping, store } = request;
+    let columns = columns_of(path, mapping)?;
+    let import = read_trials(path, mapping).map_err(|error| error.to_string());
+    let mut stored = None;
+    if let (Some(store), Ok(import)) = (store, &import) {
+        let collection = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let added = Store::open(store)?.insert_imported(&collection, &import.trials)?;
+        let known = import.trials.len() - added as usize;
+        let known = if known > 0 { format!("; {known} were there already") } else { String::new() };
+        stored = Some(format!("{added} trial(s) imported as collection {collection}{known}."));
+    }
+    Ok(Outcome { columns, import, stored })
+}
+
+impl ImportDialog {
+    /// A dialog for a file whose trials go into a store.
+    pub(super) fn new(path: PathBuf, store: PathBuf, wake: Wake) -> Self {
+        let job = Job::new("import", Newer::Replaces, wake, |request: &Request, _run| read(request).map(Some));
+        let dialog = Self {
+            path,
+            store,
+            profile: "",
+            base: Mapping::default(),
+            columns: Vec::new(),
+            label: String::new(),
+            split: false,
+            chosen: false,
+            job,
+        };
+        dialog.start(None);
+        dialog
+    }
+
+    /// Reads the file anew, and stores its trials where a store is named.
+    fn start(&self, store: Option<PathBuf>) {
+        self.job.start(Request { path: self.path.clone(), mapping: self.mapping(), store });
+    }
+
+    /// The roles as they are now.
+    fn mapping(&self) -> Mapping {
+        let split_gap_s = self.split.then_some(SPLIT_GAP_S);
+        let label = Some(self.label.trim().to_owned()).filter(|label| !label.is_empty());
+        if !self.chosen {
+            return Mapping { split_gap_s, label, ..self.base.clone() };
+        }
+        let named = |column: &ColumnChoice| match column.unit.trim() {
+            "" => column.name.clone(),
+            unit => format!("{} [{unit}]", column.name.split(['[', '(']).next().unwrap_or_default().trim()),
+        };
+        let of = |role: Role| self.columns.iter().find(|column| column.role == role).map(named);
+        let channels = self.columns.iter().filter(|column| column.role == Role::Channel).map(named).collect();
+        let label = of(Role::Label).or(label);
+        Mapping { time: of(Role::Time), trial: of(Role::Trial), label, channels, split_gap_s, ..self.base.clone() }
+    }
+
+    /// Takes in the columns of the file, and a profile that fits.
+    fn take_columns(&mut self, names: &[String]) {
+        if self.columns.len() == names.len() {
+            return;
+        }
+        let header: Vec<&str> = names.iter().map(String::as_str).collect();
+        if let Some((name, profile)) = Mapping::known_for(&header).filter(|_| self.profile.is_empty()) {
+            (self.profile, self.base) = (name, profile);
+        }
+        self.columns = names.iter().map(|name| self.choice_of(name)).collect();
+        let is_time = |name: &str| name == "t" || name.to_ascii_lowercase().contains("time");
+        if !self.columns.iter().any(|column| column.role == Role::Time)
+            && let Some(time) = self.columns.iter_mut().find(|column| is_time(&column.name))
+        {
+            (time.role, self.chosen) = (Role::Time, true);
+        }
+        self.start(None);
+    }
+
+    /// Role of a column by the mapping, or by its name.
+    fn choice_of(&self, name: &str) -> ColumnChoice {
+        let plain = |text: &str| text.split(['[', '(']).next().unwrap_or_default().trim().to_ascii_lowercase();
+        let is = |wanted: Option<&String>| wanted.is_some_and(|wanted| plain(wanted) == plain(name));
+        let base = &self.base;
+        let role = if is(base.time.as_ref()) || (base.time.is_none() && plain(name) == "t_s") {
+            Role::Time
+        } else if is(base.trial.as_ref()) || plain(name) == "trial" {
+            Role::Trial
+        } else if is(base.label_column.as_ref()) || plain(name) == "label" {
+            Role::Label
+        } else if base.ignore.iter().any(|ignored| plain(ignored) == plain(name)) {
+            Role::LeftOut
+        } else {
+            Role::Channel
+        };
+        ColumnChoice { name: name.to_owned(), role, unit: String::new() }
+    }
+
+    /// Draws the dialog; returns its end.
+    pub(super) fn ui(&mut self, ctx: &egui::Context) -> Option<Ended> {
+        let (running, last) = self.job.state();
+        let outcome = last.map(|ended| ended.outcome);
+        if let Some(Ok(outcome)) = &outcome {
+            if let Some(said) = &outcome.stored {
+                return Some(Ended::Imported(said.clone()));
+            }
+            self.take_columns(&outcome.columns);
+        }
+        let mut ended = None;
+        let before = (self.mapping(), self.profile);
+        let modal = Modal::new(Id::unique("import dialog")).show(ctx, |ui| {
+            let room = ui.ctx().content_rect().size();
+            ui.set_width((room.x - 60.0).min(720.0));
+            let name = self.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            ui.heading(format!("Import {name}"));
+            // Of one height, so that buttons stay where they are.
+            let height = (room.y - 150.0).clamp(120.0, 560.0);
+            ScrollArea::vertical().max_height(height).auto_shrink(false).show(ui, |ui| {
+                self.choices_ui(ui);
+                match &outcome {
+                    None => remark_ui(ui, "Reading the file .."),
+                    Some(Err(cause)) => failure_ui(ui, cause),
+                    Some(Ok(outcome)) => match &outcome.import {
+                        Ok(import) => import_ui(ui, import),
+                        Err(cause) => failure_ui(ui, cause),
+                    },
+                }
+            });
+            ui.add_space(4.0);
+            ui.horizontal(|ui| {
+                let trials = match &outcome {
+                    Some(Ok(outcome)) => outcome.import.as_ref().map_or(0, |import| import.trials.len()),
+                    _ => 0,
+                };
+                let is_ready = trials > 0 && running.is_none();
+                if ui.add_enabled(is_ready, Button::new(format!("Import {trials} trial(s)"))).clicked() {
+                    self.start(Some(self.store.clone()));
+                }
+                if ui.button("Cancel").clicked() {
+                    ended = Some(Ended::Cancelled);
+                }
+                if running.is_some() {
+                    ui.spinner();
+                }
+            });
+        });
+        if (self.mapping(), self.profile) != before {
+            self.start(None);
+        }
+        if modal.should_close() { Some(ended.unwrap_or(Ended::Cancelled)) } else { ended }
+    }
+
+    fn choices_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let title = |name: &str| match Mapping::profile(name) {
+                Ok(profile) if !name.is_empty() => profile.title,
+                _ => "its own names".to_owned(),
+            };
+            ui.label("Columns as in");
+            let before = self.profile;
+            ComboBox::from_id_salt("import profile").selected_text(title(before)).show_ui(ui, |ui| {
+                for name in std::iter::once("").chain(PROFILES.iter().map(|(name, _)| *name)) {
+                    ui.selectable_value(&mut self.profile, name, title(name));
+                }
+            });
+            if self.profile != before {
+                self.base = Mapping::profile(self.profile).unwrap_or_default();
+                self.chosen = false;
+                self.columns = self.columns.iter().map(|column| self.choice_of(&column.name)).collect();
+            }
+            ui.checkbox(&mut self.split, "New trial after a pause of 1 s");
+        });
+        ui.horizontal(|ui| {
+            ui.label("Label");
+            let hint = self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            ui.add(
+                text_field(&mut self.label, Id::unique("label of an import")).hint_text(format!("{hint}, or a column")),
+            );
+        });
+        if self.columns.is_empty() {
+            return;
+        }
+        ui.add_space(4.0);
+        ScrollArea::vertical().id_salt("import columns").max_height(170.0).show(ui, |ui| {
+            Grid::new("import columns").num_columns(3).striped(true).show(ui, |ui| {
+                for (number, column) in self.columns.iter_mut().enumerate() {
+                    let before = column.clone();
+                    ui.label(&column.name);
+                    let combo = ComboBox::from_id_salt(("import role", number)).width(96.0);
+                    let combo = combo.selected_text(column.role.name()).show_ui(ui, |ui| {
+                        Role::ALL.iter().for_each(|role| {
+                            ui.selectable_value(&mut column.role, *role, role.name());
+                        });
+                    });
+                    let name = format!("Role of {}", column.name);
+                    combo.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, &name));
+                    let field = text_field(&mut column.unit, Id::unique(("import unit", number)));
+                    let name = format!("Unit of {}", column.name);
+                    let field = ui.add(field.desired_width(70.0).hint_text("unit"));
+                    field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, &name));
+                    ui.end_row();
+                    self.chosen |= *column != before;
+                }
+            });
+        });
+    }
+}
+
+/// What is going to be imported: counts, curves of the first trial, warnings.
+fn import_ui(ui: &mut Ui, import: &Import) {
+    let mut labels: BTreeMap<&str, usize> = BTreeMap::new();
+    import.trials.iter().for_each(|trial| *labels.entry(&trial.label).or_default() += 1);
+    let labels: Vec<String> = labels.iter().take(12).map(|(label, count)| format!("{label} {count}")).collect();
+    ui.add_space(6.0);
+    wrapped(ui, RichText::new(format!("{} trial(s): {}", import.trials.len(), labels.join(", "))).strong());
+    import.warnings.iter().take(MOST_WARNINGS).for_each(|warning| warning_ui(ui, warning));
+    if import.warnings.len() > MOST_WARNINGS {
+        remark_ui(ui, format!("and {} more", import.warnings.len() - MOST_WARNINGS));
+    }
+    if let Some(trial) = import.trials.first() {
+        remark_ui(
+            ui,
+            format!("The first, \"{}\"; each channel is drawn from its least to its largest value.", trial.label),
+        );
+        let theme = theme::of(ui);
+        let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
+        let plot = static_plot(theme, "import preview", 130.0, "", seconds, 0.0).legend(Legend::default());
+        plot.show_axes([true, false]).show(ui, |plot| {
+            let signals = &trial.signals;
+            let width = signals.channels.len();
+            for (channel, name) in signals.channels.iter().enumerate().take(MOST_CURVES) {
+                let values = || signals.values.iter().skip(channel).step_by(width).map(|value| f64::from(*value));
+                let known = || values().filter(|value| value.is_finite());
+                let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+                let points: Vec<[f64; 2]> = signals
+                    .t_s
+                    .iter()
+                    .zip(values())
+                    .map(|(t, value)| [*t, (value - least) / (most - least).max(1e-12)])
+                    .collect();
+                // Gaps stay gaps.
+                for part in points.split(|point| point[1].is_nan()).filter(|part| !part.is_empty()) {
+                    plot.line(
+                        Line::new(name.clone(), part.to_vec()).color(colour(series_colour(channel, theme))).width(1.4),
+                    );
+                }
+            }
+        });
+    }
+}
