@@ -86,7 +86,7 @@ impl Array {
         let is_fortran = value("fortran_order").is_some_and(|rest| rest.starts_with("True"));
         let shape = value("shape").and_then(|rest| rest.strip_prefix('(')?.split_once(')')).ok_or("it has no shape")?.0;
         let sides = shape.split(',').map(str::trim).filter(|side| !side.is_empty());
-        let shape = sides.map(|side| side.parse().map_err(|_| "its shape is no row of numbers"));
+        let shape = sides.map(|side| side.parse().map_err(|_no_number| "its shape is no row of numbers"));
         let shape = shape.collect::<Result<Vec<usize>, _>>()?;
         let count =
             shape.iter().try_fold(1usize, |all, side| all.checked_mul(*side)).ok_or("its shape is too large")?;
@@ -104,7 +104,7 @@ impl Items {
         let kind = kind.trim_start_matches(['<', '>', '|', '=']);
         let unknown = || format!("its type {kind} holds neither numbers nor texts");
         let (letter, size) = kind.split_at_checked(1).ok_or_else(unknown)?;
-        let size: usize = size.parse().map_err(|_| unknown())?;
+        let size: usize = size.parse().map_err(|_no_number| unknown())?;
         let each = if letter == "U" { size.checked_mul(4) } else { Some(size) }.ok_or_else(unknown)?;
         let needed = each.checked_mul(count).filter(|needed| *needed <= data.len()).ok_or("it is cut short")?;
         let items = |item: &dyn Fn(&[u8]) -> f64| -> Vec<f64> {

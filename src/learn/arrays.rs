@@ -47,8 +47,8 @@ impl Numbers {
     /// Index of the first element that is not a number, or so large that no training gives it.
     fn first_absurd(&self) -> Option<usize> {
         match self {
-            Self::F32(values) => values.iter().position(|x| !(x.abs() < LARGEST)),
-            Self::F64(values) => values.iter().position(|x| !(x.abs() < f64::from(LARGEST))),
+            Self::F32(values) => values.iter().position(|x| x.is_nan() || x.abs() >= LARGEST),
+            Self::F64(values) => values.iter().position(|x| x.is_nan() || x.abs() >= f64::from(LARGEST)),
             Self::I64(_) | Self::I16(_) => None,
         }
     }

@@ -63,7 +63,7 @@ fn split_by(text: &str) -> Result<f64, String> {
         "" => Ok(SPLIT_GAP_S),
         seconds => {
             let seconds = seconds.strip_prefix('=').ok_or_else(wrong)?;
-            seconds.trim_end_matches('s').trim().parse().map_err(|_| wrong())
+            seconds.trim_end_matches('s').trim().parse().map_err(|_no_number| wrong())
         }
     }
 }

@@ -67,7 +67,7 @@ fn write_trial(export: &TrialExport<'_>, id: TrialId, out: &Path, is_file: bool)
     match data {
         TrialData::Recorded(_) => drop(export_board_trial(export.store, id, &path)?),
         TrialData::Imported(filled) => {
-            writing::write_signals_csv(&path, &export.store.readings(id)?.unwrap_or(filled))?
+            writing::write_signals_csv(&path, &export.store.readings(id)?.unwrap_or(filled))?;
         }
         TrialData::Simulated(data) => {
             let (trial, view) = (SimulatedTrial { header, data }, &export.options.sensors);
