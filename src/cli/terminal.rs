@@ -194,6 +194,9 @@ pub(super) fn show_log() {
 /// Reports a panic in one sentence, with a backtrace where `RUST_BACKTRACE` asks for one.
 pub(super) fn report_panics() {
     std::panic::set_hook(Box::new(|panic| {
+        if palpate_exchange::is_contained() {
+            return;
+        }
         let place = panic.location().map_or_else(|| "unknown place".to_owned(), ToString::to_string);
         let message = panic.payload_as_str().unwrap_or("no message");
         let text = format!("internal error: {message} ({place}). Stored trials are safe");

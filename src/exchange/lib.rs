@@ -50,6 +50,7 @@ pub use csv_files::{
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
 pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S};
+pub use parquet::is_contained;
 
 use palpate_geometry::{open_regular, other_content};
 use palpate_store::{FileKind, Store, StoreError, TrialQuality};

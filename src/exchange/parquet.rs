@@ -20,6 +20,7 @@ use ::parquet::record::reader::RowIter;
 use ::parquet::record::{Field, Row};
 use ::parquet::schema::types::Type;
 use palpate_store::{FileKind, NewFile};
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::iter::Peekable;
@@ -59,21 +60,33 @@ impl TrialFormat for Parquet {
 
     fn read(&self, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
         let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
-        let damaged = || ImportError::of(path, "it is not a sound Parquet file");
-        // A damaged file may let its library stop anywhere.
-        let read = || read_table(file, path, mapping);
-        catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_panic| Err(damaged()))
+        contained(path, || read_table(file, path, mapping))
     }
 
     fn columns(&self, path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
         let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
-        let read = || {
+        contained(path, || {
             let reader = SerializedFileReader::new(file).map_err(|error| ImportError::of(path, why(&error)))?;
             Ok(names_of(&mut RowIter::from_file_into(Box::new(reader)).peekable()))
-        };
-        let damaged = || ImportError::of(path, "it is not a sound Parquet file");
-        catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_panic| Err(damaged()))
+        })
     }
+}
+
+thread_local! {
+    static CONTAINED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// True while a panic of this thread is the fault of a damaged file, and becomes an error.
+pub fn is_contained() -> bool {
+    CONTAINED.get()
+}
+
+/// Reads a file with a library that panics at some damaged ones.
+fn contained<T>(path: &Path, read: impl FnOnce() -> Result<T, ImportError>) -> Result<T, ImportError> {
+    CONTAINED.set(true);
+    let outcome = catch_unwind(AssertUnwindSafe(read));
+    CONTAINED.set(false);
+    outcome.unwrap_or_else(|_panic| Err(ImportError::of(path, "it is not a sound Parquet file")))
 }
 
 /// Names of the columns of the first row.

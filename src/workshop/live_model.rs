@@ -67,12 +67,12 @@ impl Recipe {
             Shipped::FixedObjects => Self {
                 which,
                 method: "geometry-network",
-                epochs: 100,
+                epochs: 50,
                 trials: [1200, 100, 100],
                 seeds: [7, 2, 11],
                 others: 5000..6000,
                 view: virtual_view,
-                noisy: 2,
+                noisy: 5,
                 build: 0.0,
             },
         }

@@ -76,6 +76,7 @@ mod physics;
 mod pictures;
 mod presenter;
 mod program;
+mod reader_fuzz;
 mod recognition_panel;
 mod scripted;
 mod serial;
