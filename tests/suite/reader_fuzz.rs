@@ -55,7 +55,7 @@ fn mesh(path: &Path) -> Result<(), String> {
 
 fn store(path: &Path) -> Result<(), String> {
     let store = Store::open_to_read(path).map_err(text)?;
-    let rows = store.list(true).map_err(text)?;
+    let rows = store.list(false).map_err(text)?;
     rows.iter().try_for_each(|row| store.load(row.id).map(drop)).map_err(text)
 }
 
