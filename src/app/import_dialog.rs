@@ -10,7 +10,7 @@ use palpate_geometry::palette::series_colour;
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
 use palpate_store::Store;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What a column is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,17 +84,9 @@ pub(super) enum Ended {
     Imported(String),
 }
 
-/// Endings of the files that it reads.
-pub(super) const ENDINGS: &[&str] = &["csv", "tsv", "txt", "mcap", "npz", "parquet"];
 /// Curves and warnings that are shown at most.
 const MOST_CURVES: usize = 8;
 const MOST_WARNINGS: usize = 5;
-
-/// True for a file that holds trials.
-pub(super) fn holds_trials(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    ENDINGS.contains(&ending.as_str())
-}
 
 fn read(request: &Request) -> Result<Outcome, JobError> {
     let Request { path, mapping, store } = request;

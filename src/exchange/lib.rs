@@ -11,12 +11,13 @@
 //! |---|---|---|
 //! | 0 | `mapping` | which columns of a table are which, profiles of other programs |
 //! | 0 | `series` | readings of channels at their own times, and their table |
-//! | 0 | `format` | the trait [`TrialFormat`], what is written and read, errors |
-//! | 1 | `content` | a stored trial as other programs see it |
-//! | 1 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
-//! | 2 | `urdf` | the gripper for viewers of ROS |
-//! | 2 | `npz`, `npz_import`, `parquet` | arrays and tables |
-//! | 3 | `mcap` | messages of ROS 2 |
+//! | 1 | `format` | the trait [`TrialFormat`], what is written and read, errors |
+//! | 2 | `content` | a stored trial as other programs see it |
+//! | 2 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
+//! | 3 | `urdf` | the gripper for viewers of ROS |
+//! | 3 | `npz_import` | arrays of numpy as trials |
+//! | 4 | `npz`, `parquet` | arrays and tables |
+//! | 4 | `mcap` | messages of ROS 2 |
 //!
 //! # Example
 //!

@@ -83,13 +83,13 @@ const HOMES: &[(&str, &[&str])] = &[
     ("strsim", &["src/sim/objects", "src/sim/scene"]),
     ("thiserror", &["src"]),
     ("tobj", &["src/geometry/mesh_files"]),
-    ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs"]),
+    ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs", "src/exchange/mapping.rs"]),
     ("tracing", &["src"]),
     ("tracing_subscriber", &["src/cli/terminal.rs"]),
     ("wgpu", &["src/render", "src/app"]),
     ("wide", &["src/sim/physics/hessian.rs"]),
     ("winit", &["src/app/startup.rs"]),
-    ("zip", &["src/exchange/npz.rs"]),
+    ("zip", &["src/exchange/npz.rs", "src/exchange/npz_import.rs"]),
 ];
 
 /// Where random numbers are drawn, always from a seed.

@@ -2,7 +2,6 @@
 
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
-use crate::app::import_dialog::{ENDINGS, holds_trials};
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{FigureOptions, OpenOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
@@ -78,6 +77,14 @@ impl FileFeature {
         let name = Some(format!("palpate.{}", extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
     }
+}
+
+/// Endings of the files that hold trials.
+const ENDINGS: &[&str] = &["csv", "tsv", "txt", "mcap", "npz", "parquet"];
+
+fn holds_trials(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    ENDINGS.contains(&ending.as_str())
 }
 
 /// Size of exported figures (points).
