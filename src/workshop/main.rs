@@ -6,8 +6,10 @@
 //! | `cargo run --release -p palpate-workshop -- model [--any-gripper] --store FILE` | a recognition model below `models`, with its card |
 //! | `cargo run --release -p palpate-workshop -- encoder [--any-gripper]` | a geometry encoder below `models` |
 //! | `cargo run --release -p palpate-workshop -- touches [--any-gripper] --store FILE` | the grasps in known poses that guide the next grasp, below `models` |
+//! | `cargo run --release -p palpate-workshop -- attack` | nothing; it kills, floods and damages stores, and fails where one loses a trial |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
 
+mod attack;
 mod encoder;
 mod live_model;
 mod thumbnails;
@@ -59,6 +61,18 @@ enum Command {
         #[arg(long, default_value_t = 3)]
         poses: u64,
     },
+    /// Kill programs, flip bits and fill disks, and see that the store loses nothing.
+    Attack {
+        /// The program.
+        #[arg(long, default_value = "target/release/palpate")]
+        program: PathBuf,
+        /// Times that each attack is made.
+        #[arg(long, default_value_t = 30)]
+        rounds: u32,
+        /// Folder on a small disk that may become full, such as a tmpfs of 8 MiB.
+        #[arg(long)]
+        full: Option<PathBuf>,
+    },
     /// Write the tables of the manual and the README, and the picture of the study of accuracy, from stored results.
     Tables,
 }
@@ -95,6 +109,7 @@ fn main() -> Result<(), Failure> {
         Command::Encoder { any_gripper, out, shapes, poses } => {
             encoder::make(shipped(any_gripper, false), &out, shapes, poses)?;
         }
+        Command::Attack { program, rounds, full } => attack::run(&program, rounds, full.as_deref())?,
         Command::Tables => write_tables()?,
     }
     Ok(())
