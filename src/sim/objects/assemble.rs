@@ -7,6 +7,7 @@ use palpate_geometry::{
     BakeError, Bounds, ColouredPart, DistanceField, DistanceGrid, Finish, MassProperties, Pose, Primitive, SolidPart,
     SurfaceMesh, TriMesh, bake, bake_once, choose_cell, mass_properties, repair, support_points, union_mass,
 };
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// A shape as a file declares it, in its own frame.
@@ -56,11 +57,15 @@ const SMALLEST_PLAUSIBLE: f64 = 5e-4;
 const GRASPABLE: std::ops::RangeInclusive<f64> = 2e-3..=0.5;
 /// Thinner things are mistakes (m).
 const THINNEST: f64 = 1e-5;
+/// Nothing that is grasped weighs less (kg).
+const LIGHTEST: f64 = 1e-6;
 /// Densities that solids have, from foams to metals (kg/m³).
 const DENSITIES: std::ops::RangeInclusive<f64> = 1.0..=25_000.0;
 /// Units that files are written in, and their size (m).
 const LENGTHS: [(&str, f64); 4] =
     [("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 0.0254), ("metres, scaled to millimetres twice", 1e3)];
+/// Solids of one object beyond this are refused.
+const MOST_SOLIDS: usize = 1000;
 /// Triangles of one object beyond this are refused, however many meshes they come in.
 const MOST_TRIANGLES: usize = 4_000_000;
 /// Friction coefficient where nothing is known of the surface: plastic and varnished wood.
@@ -156,7 +161,7 @@ impl Blueprint {
             let cause = format!("its meshes have more than {MOST_TRIANGLES} triangles in all");
             return Err(ObjectError::malformed(&self.name, &cause));
         }
-        let (mut solids, links) = match options.collision {
+        let (mut solids, mut links) = match options.collision {
             CollisionShape::File if !self.collision.is_empty() => {
                 (std::mem::take(&mut self.collision), std::mem::take(&mut self.collision_links))
             }
@@ -168,6 +173,17 @@ impl Blueprint {
                 (vec![SolidPart::Mesh(hull_of(all, &self.name)?)], vec![String::new()])
             }
         };
+        // Equal solids in one place are one.
+        let mut seen = BTreeSet::new();
+        let is_first = |solid: &SolidPart| matches!(solid, SolidPart::Mesh(_)) || seen.insert(format!("{solid:?}"));
+        let is_first: Vec<bool> = solids.iter().map(is_first).collect();
+        let [mut of_solid, mut of_link] = [is_first.iter(), is_first.iter()];
+        solids.retain(|_| of_solid.next() == Some(&true));
+        links.retain(|_| of_link.next() == Some(&true));
+        if solids.len() > MOST_SOLIDS {
+            let cause = format!("it has {} solids, more than {MOST_SOLIDS}; join them into a mesh", solids.len());
+            return Err(ObjectError::malformed(&self.name, &cause));
+        }
         // What a message is about: the whole object, or one of its links.
         let names: Vec<String> = match links.len() {
             1 => vec![self.name.clone()],
@@ -325,11 +341,12 @@ impl Blueprint {
             .fold(MassProperties::ZERO, |sum, part| sum.welded_to(&part));
         let missing: Vec<&str> =
             self.inertials.iter().filter(|i| i.declared.is_none()).map(|i| i.link.as_str()).collect();
-        let mut chosen = if declared.mass > 0.0 && !missing.is_empty() {
+        let is_declared = declared.mass >= LIGHTEST;
+        let mut chosen = if is_declared && !missing.is_empty() {
             let links = missing.join("\", \"");
             self.warnings.push(format!("link \"{links}\" has no usable mass; it is counted as weightless"));
             declared
-        } else if declared.mass > 0.0 {
+        } else if is_declared {
             declared
         } else {
             if options.mass.is_none() {
@@ -350,7 +367,7 @@ impl Blueprint {
             bounds.grown(0.5 * bounds.size().max_element()).distance(m.centre) == 0.0
         };
         let density = chosen.mass / from_shape.mass * options.density;
-        let odd_mass = options.mass.is_none() && declared.mass > 0.0 && !DENSITIES.contains(&density);
+        let odd_mass = options.mass.is_none() && is_declared && !DENSITIES.contains(&density);
         if odd_mass {
             let cm3 = from_shape.mass / options.density * 1e6;
             self.warnings.push(format!(

@@ -22,6 +22,9 @@ const MODULI: std::ops::RangeInclusive<f64> = 100.0..=1e12;
 /// Link, joint or material with its name.
 type Named<'a> = (String, &'a Element);
 
+/// Masses that a link may have (kg); frames without a body are often given next to nothing.
+const USABLE_MASS: std::ops::RangeInclusive<f64> = 1e-30..=1e4;
+
 /// Connection of two links.
 struct Joint<'a> {
     name: String,
@@ -89,7 +92,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
         note_friction(&robot, link, element, &mut blueprint);
         let own = inertial_of(link, element, &mut blueprint.warnings).map_err(malformed)?;
         if !(visuals.is_empty() && collisions.is_empty()) || own.is_some_and(|(mass, _)| mass.mass != 0.0) {
-            let possible = own.filter(|(own, _)| own.mass.is_finite() && own.mass > 0.0 && own.mass < 1e4);
+            let possible = own.filter(|(own, _)| USABLE_MASS.contains(&own.mass));
             let declared = possible.map(|(own, place)| own.seen_from(&(*root_from_link * place)));
             blueprint.inertials.push(Inertial { link: link.clone(), declared });
         }
