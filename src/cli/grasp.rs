@@ -112,9 +112,10 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     };
     let overlap = SimRun::new(&scene, object.as_ref()).0.starting_overlap();
     if overlap > DEEPEST_START {
+        let across = object.as_ref().map_or(0.0, |object| 1e3 * object.bounds.size().max_element());
         return Err(format!(
-            "the open fingers start {:.0} mm inside something: check gripper.mount.offset, support.height and the size of the \
-             object",
+            "the open fingers start {:.0} mm inside something: check gripper.mount.offset, support.height, and the object, which \
+             is {across:.0} mm across (object.scale=0.0254 if it is in inches, 0.01 if in centimetres)",
             1e3 * overlap
         )
         .into());

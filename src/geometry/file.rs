@@ -56,8 +56,14 @@ pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
         Some("it is a web page in place of the file; download the file itself (\"raw\")")
     } else if bytes.starts_with(b"glTF") {
         Some("it is a GLB file; export it as OBJ or STL")
+    } else if text.starts_with("iso-10303-21") {
+        Some("it is a STEP file; export it as STL or OBJ")
+    } else if text.starts_with("ply\n") || text.starts_with("ply\r") {
+        Some("it is a PLY file; export it as STL or OBJ")
+    } else if bytes.starts_with(b"PK\x03\x04") && (text.contains("3d/") || text.contains(".model")) {
+        Some("it is a 3MF archive; export it as STL or OBJ")
     } else if text.contains("[content_types].xml") || text.contains("xl/") {
-        Some("it is a spreadsheet; save the sheet as CSV")
+        Some("it is an archive of another program, such as 3MF or a spreadsheet; export a mesh as STL or OBJ, a sheet as CSV")
     } else if bytes.starts_with(b"PK\x03\x04") {
         Some("it is a ZIP archive; unpack it first")
     } else if bytes.starts_with(&[0x1f, 0x8b]) {
@@ -94,6 +100,7 @@ mod tests {
         assert_eq!(text_of(b"\xEF\xBB\xBFa"), "a");
         assert_eq!(text_of(b"\xFF\xFEa\0\xE4\0"), "a\u{e4}");
         assert_eq!(text_of(b"a\xE4"), "a\u{e4}");
+        assert!(other_content(b"ISO-10303-21;\nHEADER;").is_some_and(|text| text.contains("STEP")));
         assert!(other_content(b"PK\x03\x04").is_some() && other_content(b"solid").is_none());
     }
 }

@@ -80,13 +80,20 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
         return Err(MeshError::Empty);
     }
     let before = mesh.points.len();
-    let welded = weld(mesh, diagonal * WELD);
-    let joined = before - welded.points.len();
-    // Two triangles back to back are a wall between two solids, which goes, or a face that is seen from both sides.
-    closed(welded.clone(), diagonal, Sides::Cancel)
-        .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_again| fault))
-        .map(|repaired| Repaired { joined, ..repaired })
+    let attempt = |tolerance: f64| {
+        let welded = weld(mesh, diagonal * tolerance);
+        let joined = before - welded.points.len();
+        // Two triangles back to back are a wall between two solids, which goes, or a face that is seen from both sides.
+        closed(welded.clone(), diagonal, Sides::Cancel)
+            .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_again| fault))
+            .map(|repaired| Repaired { joined, ..repaired })
+    };
+    // Corners that were rounded are further apart; only a mesh that is open otherwise may need them joined.
+    attempt(WELD).or_else(|fault| attempt(WIDE_WELD).map_err(|_again| fault))
 }
+
+/// Distance of corners that are joined where the mesh is open otherwise, in sizes of the mesh.
+const WIDE_WELD: f64 = 2e-4;
 
 /// What is done with two triangles back to back.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -190,13 +190,14 @@ impl Blueprint {
             _ => links.iter().map(|link| format!("{}, link {link}", self.name)).collect(),
         };
         if solids.is_empty() {
+            let why = if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
             return Err(ObjectError(format!(
-                "\"{}\" has no shape: no link has a visual or collision that can be used",
+                "\"{}\" has no shape: no link has a visual or collision that can be used{why}",
                 self.name
             )));
         }
         self.check_numbers(&solids)?;
-        let scale = self.scale(options, &solids);
+        let scale = self.scale(options, &solids, &names)?;
         scale_solids(&mut solids, scale);
         for part in &mut self.visual {
             part.mesh.scale(glam::DVec3::splat(scale));
@@ -259,9 +260,9 @@ impl Blueprint {
     }
 
     /// Factor on lengths: that of the scene, or a guess with a warning.
-    fn scale(&mut self, options: &LoadOptions, solids: &[SolidPart]) -> f64 {
+    fn scale(&mut self, options: &LoadOptions, solids: &[SolidPart], names: &[String]) -> Result<f64, ObjectError> {
         if let Some(scale) = options.scale {
-            return scale;
+            return Ok(scale);
         }
         let size = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union).size().max_element();
         let (scale, guess) = if size > LARGEST_PLAUSIBLE {
@@ -269,8 +270,20 @@ impl Blueprint {
         } else if size > 0.0 && size < SMALLEST_PLAUSIBLE {
             (1e3, "metres scaled to millimetres twice")
         } else {
-            return 1.0;
+            return Ok(1.0);
         };
+        let across = |solid: &SolidPart| solid.bounds().size().max_element();
+        let [mut large, mut small] = [names.iter().zip(solids), names.iter().zip(solids)];
+        if let Some((large, _)) = large.find(|(_, solid)| across(solid) > LARGEST_PLAUSIBLE)
+            && let Some((small, other)) = small.find(|(_, solid)| GRASPABLE.contains(&across(solid)))
+        {
+            return Err(ObjectError(format!(
+                "\"{large}\" is {} m across, but \"{small}\" {} mm: their units differ; write scale=\"0.001 0.001 0.001\" in \
+                 the <mesh> that is in millimetres",
+                three_digits(size),
+                three_digits(across(other) * 1e3)
+            )));
+        }
         let after = size * scale * 1e3;
         self.warnings.push(format!(
             "as given, \"{}\" is {} m across: {guess}? It is used at {} mm; set object.scale to decide",
@@ -278,7 +291,7 @@ impl Blueprint {
             three_digits(size),
             three_digits(after),
         ));
-        scale
+        Ok(scale)
     }
 
     fn check_size(&self, bounds: &Bounds, scale: f64) -> Result<(), ObjectError> {
@@ -381,10 +394,11 @@ impl Blueprint {
         if odd_mass && !fits {
             chosen = from_shape.with_mass(chosen.mass);
         } else if !chosen.is_physical() || !reach(&chosen) || !fits {
-            self.warnings.push(format!(
-                "the inertia that \"{}\" declares is impossible for its shape; it was computed from the shape",
-                self.name
-            ));
+            let (what, fault) = match chosen.is_physical() && !reach(&chosen) {
+                true => ("centre of mass", "lies far outside its shape; it and the inertia were"),
+                false => ("inertia", "is impossible for its shape; it was"),
+            };
+            self.warnings.push(format!("the {what} that \"{}\" declares {fault} computed from the shape", self.name));
             chosen = from_shape.with_mass(chosen.mass);
         }
         match options.mass {

@@ -177,6 +177,13 @@ fn load_built_in(name: &str, options: &LoadOptions) -> Result<ObjectModel, Objec
     Ok(content.stamped(object))
 }
 
+/// True for a path that begins with the letter of a drive.
+fn of_windows(reference: &str) -> bool {
+    let path = reference.trim_start_matches("file:").trim_start_matches('/');
+    let mut letters = path.chars();
+    !cfg!(windows) && letters.next().is_some_and(|c| c.is_ascii_alphabetic()) && letters.next() == Some(':')
+}
+
 fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
     let bytes = content.of(read_file(path)).map_err(|cause| unreadable(path, &cause))?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -189,6 +196,9 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
             None if reference.to_ascii_lowercase().ends_with(".dae") => read_mesh(reference, &read),
             None => {
                 let cause = match places.first() {
+                    _ if of_windows(reference) => {
+                        "it is a path of another computer; write it relative to the URDF, or as package://".to_owned()
+                    }
                     Some(first) if reference.contains("://") && places.len() > 1 => format!(
                         "it is neither at {} nor at {} other places; name the folder above its package in ROS_PACKAGE_PATH, or \
                          an installed workspace in AMENT_PREFIX_PATH",

@@ -143,7 +143,11 @@ fn joints_of<'a>(robot: &'a Element, warnings: &mut Vec<String>) -> Result<Vec<J
             let said = if position == 0.0 { "its zero position".to_owned() } else { format!("{position} ({why})") };
             warnings.push(format!("joint \"{name}\" is {kind}; it was welded at {said}"));
             let axis = element.child("axis").and_then(|axis| axis.attribute("xyz")).and_then(numbers);
-            let axis = axis.map_or(DVec3::X, DVec3::from_array).normalize_or(DVec3::X);
+            let axis = axis.map_or(DVec3::X, DVec3::from_array);
+            if axis.try_normalize().is_none() {
+                warnings.push(format!("joint \"{name}\" has no axis of any length; x is taken"));
+            }
+            let axis = axis.normalize_or(DVec3::X);
             let moved = match kind {
                 "prismatic" => Pose::from_position(axis * position),
                 _ => Pose::new(DVec3::ZERO, DQuat::from_axis_angle(axis, position)),
@@ -229,6 +233,14 @@ fn link_poses<'a>(
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let words = text.split([',', ';', ' ', '\t', '\n', '\r']);
     words.filter_map(|word| word.parse().ok()).collect::<Vec<f64>>().try_into().ok()
+}
+
+/// What stands in place of a number, behind a colon.
+fn instead(text: &str) -> String {
+    match decimal_comma(text) {
+        none if none.is_empty() => format!(": \"{}\"", text.chars().take(40).collect::<String>()),
+        said => said,
+    }
 }
 
 /// What is wrong with numbers that have decimal commas; empty for others.
@@ -342,17 +354,19 @@ fn shape_of(shape: &Element, link: &str, read_mesh: MeshReader<'_>) -> Result<Sh
         let possible = value.is_finite() && value > 0.0;
         if possible { Ok(value) } else { Err(bad(format!("{what} = {value} is not a positive length"))) }
     };
-    let length = |key: &str| match shape.attribute(key).and_then(|text| text.trim().parse().ok()) {
-        Some(value) => positive(value, key),
-        None => {
-            let text = shape.attribute(key).unwrap_or_default();
-            Err(bad(format!("the {key} of its {} is not a number{}", shape.name, decimal_comma(text))))
-        }
+    let missing = |key: &str| bad(format!("its {} has no {key}", shape.name));
+    let length = |key: &str| {
+        let text = shape.attribute(key).ok_or_else(|| missing(key))?;
+        let value = text.trim().parse();
+        value.map_or_else(
+            |_no_number| Err(bad(format!("the {key} of its {} is not a number{}", shape.name, instead(text)))),
+            |value| positive(value, key),
+        )
     };
     let primitive = match shape.name.as_str() {
         "box" => {
-            let text = shape.attribute("size").unwrap_or_default();
-            let none = || bad(format!("the size of its box is not three numbers{}", decimal_comma(text)));
+            let text = shape.attribute("size").ok_or_else(|| missing("size"))?;
+            let none = || bad(format!("the size of its box is not three numbers{}", instead(text)));
             let [x, y, z] = numbers(text).ok_or_else(none)?;
             let size = DVec3::new(positive(x, "size")?, positive(y, "size")?, positive(z, "size")?);
             Primitive::Cuboid { half: 0.5 * size }

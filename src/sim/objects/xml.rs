@@ -37,7 +37,11 @@ pub(super) fn parse(text: &str) -> Result<Element, String> {
     loop {
         let event = reader
             .read_event()
-            .map_err(|e| format!("it is not well-formed XML near byte {}: {e}", reader.error_position()))?;
+            .map_err(|e| {
+                let at = usize::try_from(reader.error_position()).unwrap_or(0).min(text.len());
+                let line = 1 + text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count();
+                format!("line {line}: it is not well-formed XML: {e}")
+            })?;
         match event {
             Event::Start(start) => {
                 count += 1;
@@ -73,8 +77,12 @@ pub(super) fn parse(text: &str) -> Result<Element, String> {
         let unclosed = open.last().map(|element| element.name.clone()).unwrap_or_default();
         return Err(format!("it ends inside <{unclosed}>; the file is cut short"));
     }
-    let outermost = open.pop().and_then(|top| top.children.into_iter().next());
-    outermost.ok_or_else(|| "it holds no XML element".to_owned())
+    let mut outermost = open.pop().map(|top| top.children).unwrap_or_default().into_iter();
+    let first = outermost.next().ok_or("it holds no XML element")?;
+    match outermost.next() {
+        Some(second) => Err(format!("a second <{}> follows the first <{}>; a file holds one", second.name, first.name)),
+        None => Ok(first),
+    }
 }
 
 fn element(start: &BytesStart<'_>) -> Result<Element, String> {
