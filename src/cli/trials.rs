@@ -155,6 +155,7 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
             for other in stores {
                 let merged = store.merge_from(other).map_err(|error| nothing_added(other, &error))?;
                 let (added, known) = (merged.added, merged.known);
+                merged.warnings.iter().for_each(|warning| warn(warning));
                 if !merged.damaged.is_empty() {
                     let (other, damaged) = (other.display(), numbers(&merged.damaged));
                     warn(&format!(

@@ -102,6 +102,12 @@ impl Mapping {
         texts.iter().any(|text| text.is_some()) || split_gap_s.is_some() || !channels.is_empty()
     }
 
+    /// True where the columns are named by their numbers, as in a table without a header.
+    pub(crate) fn is_by_number(&self) -> bool {
+        let plain = |text: &String| named_column(text).1.split(['[', '(']).next().unwrap_or_default().trim().to_owned();
+        self.time.as_ref().is_some_and(|time| plain(time).parse::<usize>().is_ok())
+    }
+
     /// The label of a file whose rows have none.
     pub(crate) fn label_of(&self, path: &Path) -> String {
         if let Some(label) = &self.label {

@@ -56,8 +56,8 @@ impl TrialFormat for Npz {
         read_npz(path, mapping)
     }
 
-    fn columns(&self, path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
-        names_of(path, mapping)
+    fn columns(&self, path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
+        names_of(path)
     }
 }
 

@@ -17,26 +17,34 @@ const MOST_ARRAYS: usize = 1000;
 
 /// Reads the trials of an archive.
 pub(crate) fn read_npz(path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
-    let arrays = arrays(path, mapping).map_err(|fault| ImportError::of(path, fault))?;
+    let (arrays, mut left_out) = arrays(path).map_err(|fault| ImportError::of(path, fault))?;
     let label = mapping.label_of(path);
-    let table = Table::of(&arrays, mapping, &label).map_err(|fault| ImportError::of(path, fault))?;
-    read_made(table.text(), &file_name(path), &table.mapping, &label)
+    let table = Table::of(&arrays, mapping, &label, &left_out).map_err(|fault| ImportError::of(path, fault))?;
+    let mut import = read_made(table.text(), &file_name(path), &table.mapping, &label)?;
+    left_out.extend(table.left_out);
+    if !left_out.is_empty() {
+        import.warnings.insert(0, format!("arrays that are no channels were left out: {}", left_out.join(", ")));
+    }
+    Ok(import)
 }
 
 /// Names of the arrays.
-pub(crate) fn names_of(path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
-    let arrays = arrays(path, mapping).map_err(|fault| ImportError::of(path, fault))?;
+pub(crate) fn names_of(path: &Path) -> Result<Vec<String>, ImportError> {
+    let (arrays, _left_out) = arrays(path).map_err(|fault| ImportError::of(path, fault))?;
     Ok(arrays.into_keys().collect())
 }
 
-fn arrays(path: &Path, mapping: &Mapping) -> Result<BTreeMap<String, Array>, String> {
+/// The arrays that can be read, and the others with the reason.
+type Arrays = (BTreeMap<String, Array>, Vec<String>);
+
+fn arrays(path: &Path) -> Result<Arrays, String> {
     let file = palpate_geometry::open_regular(path).map_err(|cause| cause.to_string())?;
     let no_archive = |cause: &dyn std::fmt::Display| format!("it is not a sound NPZ archive ({cause})");
     let mut archive = zip::ZipArchive::new(file).map_err(|error| no_archive(&error))?;
     if archive.len() > MOST_ARRAYS {
         return Err(format!("it holds more than {MOST_ARRAYS} arrays"));
     }
-    let mut arrays = BTreeMap::new();
+    let (mut arrays, mut left_out) = (BTreeMap::new(), Vec::new());
     let mut left = MOST_BYTES;
     for place in 0..archive.len() {
         let file = archive.by_index(place).map_err(|error| no_archive(&error))?;
@@ -49,14 +57,10 @@ fn arrays(path: &Path, mapping: &Mapping) -> Result<BTreeMap<String, Array>, Str
             .ok_or(format!("its arrays take more than {} MiB", MOST_BYTES >> 20))?;
         match Array::read(&bytes) {
             Ok(array) => drop(arrays.insert(name, array)),
-            // What is not a channel need not be understood.
-            Err(fault) if mapping.channels.iter().any(|channel| channel.contains(&name)) => {
-                return Err(format!("the array \"{name}\" cannot be read: {fault}"));
-            }
-            Err(_) => {}
+            Err(fault) => left_out.push(format!("{name} ({fault})")),
         }
     }
-    Ok(arrays)
+    Ok((arrays, left_out))
 }
 
 /// An array: numbers or texts in rows, the last axis first.
@@ -123,6 +127,7 @@ impl Items {
             };
         }
         let numbers = match (letter, size) {
+            ("f", 2) => items(&|bytes| bytes.try_into().map_or(f64::NAN, |bytes| half(u16::from_le_bytes(bytes)))),
             ("f", 4) => number!(f32),
             ("f", 8) => number!(f64),
             ("i", 1) => number!(i8),
@@ -181,6 +186,17 @@ impl Items {
     }
 }
 
+/// A number of half precision (IEEE 754, binary16).
+fn half(bits: u16) -> f64 {
+    let (sign, exponent, fraction) = (bits >> 15, (bits >> 10) & 31, f64::from(bits & 1023) / 1024.0);
+    let size = match exponent {
+        0 => fraction * 2f64.powi(-14),
+        31 => return f64::NAN,
+        exponent => (1.0 + fraction) * 2f64.powi(i32::from(exponent) - 15),
+    };
+    if sign == 1 { -size } else { size }
+}
+
 /// Columns of a table: the array, and the number of the column in its last axis.
 struct Table<'a> {
     names: Vec<String>,
@@ -192,18 +208,27 @@ struct Table<'a> {
     /// Number or name, and label, of each trial.
     heads: Vec<[String; 2]>,
     mapping: Mapping,
+    /// Arrays of other shapes.
+    left_out: Vec<String>,
 }
 
 impl<'a> Table<'a> {
-    fn of(arrays: &'a BTreeMap<String, Array>, mapping: &Mapping, label: &str) -> Result<Self, String> {
+    fn of(
+        arrays: &'a BTreeMap<String, Array>,
+        mapping: &Mapping,
+        label: &str,
+        unread: &[String],
+    ) -> Result<Self, String> {
         let listed = || {
             let shown = |(name, array): (&String, &Array)| format!("{name} {:?}", array.shape);
             arrays.iter().take(20).map(shown).collect::<Vec<_>>().join(", ")
         };
         let wanted = mapping.time.as_deref().unwrap_or("t_s");
         let base = wanted.split(['[', '(']).next().unwrap_or(wanted).trim();
-        let time = arrays.get(base).ok_or_else(|| {
-            format!("it has no array \"{base}\" of times; name one, as in --time \"t [s]\". It has {}", listed())
+        let unread_one = |name: &str| unread.iter().find(|own| own.starts_with(&format!("{name} (")));
+        let time = arrays.get(base).ok_or_else(|| match unread_one(base) {
+            Some(why) => format!("the times cannot be read: {why}"),
+            None => format!("it has no array \"{base}\" of times; name one, as in --time \"t [s]\". It has {}", listed()),
         })?;
         let (trials, samples) = match time.shape[..] {
             [samples] => (1, samples),
@@ -228,11 +253,22 @@ impl<'a> Table<'a> {
             mapping: Mapping {
                 time: Some(wanted.to_owned()),
                 channels: mapping.channels.clone(),
+                split_gap_s: mapping.split_gap_s,
                 ..Mapping::default()
             },
+            left_out: Vec::new(),
         };
         if let Some(Array { items: Items::Numbers(numbers), .. }) = of_trials("samples") {
             table.lengths = numbers.iter().map(|number| (*number as usize).min(samples)).collect();
+        }
+        // An array of labels that cannot be used must not become a word.
+        let wanted_label = mapping.label.as_deref().unwrap_or("label");
+        if let Some(why) = unread_one(wanted_label) {
+            return Err(format!("the labels cannot be read: {why}"));
+        }
+        if arrays.contains_key(wanted_label) && of_trials(wanted_label).is_none() {
+            let shape = &arrays[wanted_label].shape;
+            return Err(format!("the labels \"{wanted_label}\" have the shape {shape:?}; wanted is one for each trial, ({trials})"));
         }
         let trial = of_trials(mapping.trial.as_deref().unwrap_or("trial"));
         let labels = of_trials(mapping.label.as_deref().unwrap_or("label"));
@@ -244,15 +280,20 @@ impl<'a> Table<'a> {
             })
             .collect();
         for (name, array) in arrays.iter().filter(|(name, _)| *name != base) {
-            let Items::Numbers(_) = &array.items else { continue };
-            let width = match array.shape.strip_prefix(axes) {
-                Some([]) => 1,
-                Some([width]) => *width,
-                _ => continue,
-            };
             if is_own && name != "values" {
                 continue;
             }
+            let role = ["trial", "label", "samples", "channels", "units"].contains(&name.as_str())
+                || [&mapping.trial, &mapping.label].iter().any(|own| own.as_deref() == Some(name));
+            let width = match (&array.items, array.shape.strip_prefix(axes)) {
+                (Items::Numbers(_), Some([])) => 1,
+                (Items::Numbers(_), Some([width])) => *width,
+                _ if role => continue,
+                _ => {
+                    table.left_out.push(format!("{name} {:?}", array.shape));
+                    continue;
+                }
+            };
             let texts = |name: &str| match arrays.get(name) {
                 Some(Array { items: Items::Texts(texts), .. }) if is_own && texts.len() == width => Some(texts),
                 _ => None,

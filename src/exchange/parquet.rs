@@ -21,9 +21,8 @@ use ::parquet::record::{Field, Row};
 use ::parquet::schema::types::Type;
 use palpate_store::{FileKind, NewFile};
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::iter::Peekable;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -66,8 +65,8 @@ impl TrialFormat for Parquet {
     fn columns(&self, path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
         let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
         contained(path, || {
-            let reader = SerializedFileReader::new(file).map_err(|error| ImportError::of(path, why(&error)))?;
-            Ok(names_of(&mut RowIter::from_file_into(Box::new(reader)).peekable()))
+            let reader = SerializedFileReader::new(file);
+            reader.and_then(|reader| names_of(&reader)).map_err(|error| ImportError::of(path, why(&error)))
         })
     }
 }
@@ -89,13 +88,28 @@ fn contained<T>(path: &Path, read: impl FnOnce() -> Result<T, ImportError>) -> R
     outcome.unwrap_or_else(|_panic| Err(ImportError::of(path, "it is not a sound Parquet file")))
 }
 
-/// Names of the columns of the first row.
-fn names_of(rows: &mut Peekable<RowIter<'_>>) -> Vec<String> {
-    let mut names = Vec::new();
-    if let Some(Ok(first)) = rows.peek() {
-        cells(first, &mut |name, _| names.push(name));
+/// Names of the columns of all rows, in their order: later lists may be longer.
+fn names_of(reader: &SerializedFileReader<File>) -> Result<Vec<String>, ParquetError> {
+    let mut names: Vec<String> = Vec::new();
+    let mut known = BTreeSet::new();
+    for row in reader.get_row_iter(None)? {
+        let mut before = 0;
+        cells(&row?, &mut |name, _| {
+            if names.get(before) == Some(&name) {
+                before += 1;
+            } else if known.contains(&name) {
+                before = names.iter().position(|own| *own == name).map_or(before, |at| at + 1);
+            } else {
+                names.insert(before, name.clone());
+                known.insert(name);
+                before += 1;
+            }
+        });
+        if names.len() > MOST_COLUMNS {
+            return Err(ParquetError::General(format!("it has more than {MOST_COLUMNS} columns")));
+        }
     }
-    names
+    Ok(names)
 }
 
 /// Reads a table with a row for each sample. Lists become a column for each of their elements, groups one for each member.
@@ -117,10 +131,16 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
         ..Mapping::default()
     };
     let mapping = if is_own && !mapping.has_roles() { &own } else { mapping };
+    let names = names_of(&reader).map_err(failed)?;
+    let places: BTreeMap<&str, usize> = names.iter().map(String::as_str).zip(0..).collect();
     let mut rows = RowIter::from_file_into(Box::new(reader)).peekable();
-    let names = names_of(&mut rows);
-    if names.len() > MOST_COLUMNS {
-        return Err(ImportError::of(path, format!("it has more than {MOST_COLUMNS} columns")));
+    let wanted = mapping.time.as_deref().unwrap_or("t_s");
+    if let Some(Ok(first)) = rows.peek()
+        && !is_own
+        && first.get_column_iter().any(|(name, cell)| name == wanted && is_whole(cell))
+    {
+        let text = format!("the times \"{wanted}\" are whole numbers of no unit; name it, as in --time \"{wanted} [ns]\"");
+        return Err(ImportError::of(path, text));
     }
     let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let with_unit = |name: &String| match units.get(name).filter(|unit| !unit.is_empty()) {
@@ -129,22 +149,14 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
     };
     let header: Vec<String> = names.iter().map(with_unit).collect();
     let lines = rows.map(|row| {
-        let mut line = b"\n".to_vec();
-        let mut at = 0;
-        let mut first = true;
+        let mut texts = vec![String::new(); names.len()];
         cells(&row.map_err(|error| std::io::Error::other(why(&error)))?, &mut |name, text| {
-            // Later lists may be shorter or longer than the first.
-            while at < names.len() && names[at] != name && names[at..].contains(&name) {
-                line.extend(if first { b"".as_slice() } else { b"," });
-                (first, at) = (false, at + 1);
-            }
-            if names.get(at) == Some(&name) {
-                line.extend(if first { b"".as_slice() } else { b"," });
-                line.extend(field(&text).into_bytes());
-                (first, at) = (false, at + 1);
+            if let Some(place) = places.get(name.as_str()) {
+                texts[*place] = text;
             }
         });
-        line.extend(std::iter::repeat_n(b',', names.len() - at));
+        let line: Vec<String> = texts.iter().map(|text| field(text)).collect();
+        let line = format!("\n{}", line.join(",")).into_bytes();
         Ok(line)
     });
     let text = Lines { rest: header.join(",").into_bytes(), at: 0, lines };
@@ -164,6 +176,14 @@ fn why(error: &ParquetError) -> String {
 const OWN_ROLES: [&str; 3] = ["trial", "label", "t_s"];
 /// Most columns.
 const MOST_COLUMNS: usize = 2000;
+
+/// True for a whole number without a unit of its type.
+fn is_whole(cell: &Field) -> bool {
+    matches!(
+        cell,
+        Field::Byte(_) | Field::Short(_) | Field::Int(_) | Field::Long(_) | Field::UInt(_) | Field::ULong(_) | Field::UShort(_)
+    )
+}
 
 /// Names and texts of the cells of a row.
 fn cells(row: &Row, take: &mut dyn FnMut(String, String)) {

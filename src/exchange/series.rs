@@ -37,6 +37,14 @@ impl Series {
         Ok(())
     }
 
+    /// Channels of a single reading, which it holds at all times.
+    pub(crate) fn singles(&self) -> Vec<&str> {
+        let is_single = |name: &&String| self.runs.iter().filter_map(|run| run.get(*name)).map(Vec::len).sum::<usize>() == 1;
+        let mut names: Vec<&str> = self.runs.iter().flat_map(Run::keys).filter(is_single).map(String::as_str).collect();
+        names.dedup();
+        names
+    }
+
     /// A table of this program: the channel with most readings gives the times of a run, the others are interpolated. None
     /// without two readings of any channel.
     pub(crate) fn into_csv(self, label: &str) -> Option<impl Read + use<>> {
@@ -84,7 +92,8 @@ impl Series {
     }
 }
 
-/// Readings at other times, on straight lines between them; none in a pause, nor long before the first and after the last.
+/// Readings at other times, on straight lines between them; none in a pause, nor more than an interval before the first and
+/// after the last.
 fn at_times(readings: &[(f64, f64)], times: &[f64]) -> Vec<f64> {
     let mut sorted: Vec<(f64, f64)> = readings.iter().copied().filter(|(_, value)| value.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -92,18 +101,19 @@ fn at_times(readings: &[(f64, f64)], times: &[f64]) -> Vec<f64> {
         sorted.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
     let middle = intervals.len() / 2;
     // A single reading holds at all times.
-    let longest = if intervals.is_empty() {
+    let usual = if intervals.is_empty() {
         f64::INFINITY
     } else {
-        LONGEST_PAUSE * *intervals.select_nth_unstable_by(middle, f64::total_cmp).1
+        *intervals.select_nth_unstable_by(middle, f64::total_cmp).1
     };
+    let longest = LONGEST_PAUSE * usual;
     let value = |t: &f64| {
         let after = sorted.partition_point(|(own, _)| own <= t);
         match (after.checked_sub(1).and_then(|before| sorted.get(before)), sorted.get(after)) {
             (Some((t0, value)), _) if t == t0 => *value,
             (Some((t0, v0)), Some((t1, v1))) if t1 - t0 <= longest => v0 + (v1 - v0) * ((t - t0) / (t1 - t0)),
-            (Some((t0, value)), None) if t - t0 <= longest => *value,
-            (None, Some((t1, value))) if t1 - t <= longest => *value,
+            (Some((t0, value)), None) if t - t0 <= usual => *value,
+            (None, Some((t1, value))) if t1 - t <= usual => *value,
             _ => f64::NAN,
         }
     };

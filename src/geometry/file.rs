@@ -66,6 +66,12 @@ pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
         Some("it is an archive of another program, such as 3MF or a spreadsheet; export a mesh as STL or OBJ, a sheet as CSV")
     } else if bytes.starts_with(b"PK\x03\x04") {
         Some("it is a ZIP archive; unpack it first")
+    } else if bytes.starts_with(b"\x89HDF") {
+        Some("it is an HDF5 file; export its arrays as NPZ, or tables as CSV")
+    } else if bytes.starts_with(b"\x93NUMPY") {
+        Some("it is a single array of numpy; save it with its times as NPZ")
+    } else if bytes.starts_with(b"SQLite format 3") {
+        Some("it is an SQLite database; a store of Palpate is joined with `palpate trials merge`")
     } else if bytes.starts_with(&[0x1f, 0x8b]) {
         Some("it is compressed by gzip; unpack it first")
     } else {

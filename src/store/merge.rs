@@ -23,6 +23,8 @@ pub struct Merged {
     pub annotated: u64,
     /// Damaged trials of the other store, which were left out.
     pub damaged: Vec<TrialId>,
+    /// What could not be read of it.
+    pub warnings: Vec<String>,
 }
 
 const CHOOSE_INCOMING: &str = "
@@ -119,7 +121,7 @@ fn copy(transaction: &Transaction<'_>, damaged: &[TrialId]) -> rusqlite::Result<
     let total = transaction.query_row(count, [], |row| row.get::<_, i64>(0))?.cast_unsigned();
     let known = total.saturating_sub(added + damaged.len() as u64);
     transaction.execute_batch("DROP TABLE temp.incoming; DROP TABLE temp.damaged")?;
-    Ok(Merged { added, known, annotated, damaged })
+    Ok(Merged { added, known, annotated, damaged, warnings: Vec::new() })
 }
 
 /// Counts trials that this store already has and for which the other store has journal entries missing here, or a note
@@ -161,7 +163,7 @@ impl Store {
         self.connection.execute("ATTACH DATABASE ?1 AS other", [name]).map_err(fault)?;
         let merged = self.in_transaction(|transaction| copy(transaction, &damaged));
         self.connection.execute("DETACH DATABASE other", []).map_err(fault)?;
-        merged
+        merged.map(|merged| Merged { warnings: theirs.warnings().to_vec(), ..merged })
     }
 }
 
@@ -173,7 +175,7 @@ mod tests {
     use palpate_tactile::trial::{GraspOrigin, SimulatedTrial};
 
     fn merged(added: u64, known: u64, annotated: u64) -> Merged {
-        Merged { added, known, annotated, damaged: Vec::new() }
+        Merged { added, known, annotated, ..Merged::default() }
     }
 
     #[test]

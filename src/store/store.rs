@@ -29,7 +29,8 @@ use std::time::{Duration, Instant};
 
 /// A view or trigger of others, or a table of which a view has the name.
 const FOREIGN_PARTS: &str = "SELECT name FROM sqlite_master WHERE type = 'view' OR type = 'trigger' AND name NOT IN (
-    'tares_are_not_altered', 'tares_are_not_shortened', 'journal_is_not_altered', 'journal_is_not_shortened') LIMIT 1";
+    'tares_are_not_altered', 'tares_are_not_shortened', 'journal_is_not_altered', 'journal_is_not_shortened')
+    OR type = 'index' AND sql LIKE '%UNIQUE%' AND name <> 'trials_by_collection' LIMIT 1";
 
 /// Samples per chunk: about a second.
 const FRAMES_PER_CHUNK: usize = 75;
@@ -93,7 +94,10 @@ impl Store {
         let mut store = Self::connect(path, OpenFlags::empty())?;
         let readable =
             |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
-        if let Err(error) = readable(&store) {
+        // A file that may not be written gets nothing beside it that its owner could not remove.
+        let is_foreign = std::fs::OpenOptions::new().write(true).open(store.file.path()).is_err();
+        let refused = || Err(rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_READONLY), None));
+        if let Err(error) = if is_foreign { refused() } else { readable(&store) } {
             // Without a place for its log SQLite reads only what it may take for unchanging.
             let codes = [ErrorCode::CannotOpen, ErrorCode::ReadOnly, ErrorCode::PermissionDenied];
             if !error.sqlite_error_code().is_some_and(|code| codes.contains(&code)) {
@@ -234,7 +238,7 @@ impl Store {
         }
         match foreign {
             Some(name) => Err(StoreError::Refused(format!(
-                "\"{path}\" holds \"{name}\", a view or trigger that is not of Palpate, which could change what is read or \
+                "\"{path}\" holds \"{name}\", a view, trigger or unique index that is not of Palpate, which could change what is read or \
                  written; take the store from a backup, or choose another file with --store"
             ))),
             None => Ok(()),

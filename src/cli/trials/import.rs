@@ -50,7 +50,7 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "NAME|FILE.toml")]
     profile: Option<String>,
     /// Save the roles as a profile.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[PROFILE]))]
     save_profile: Option<PathBuf>,
 }
 

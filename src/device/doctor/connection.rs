@@ -202,7 +202,17 @@ fn no_line(seen: &Evidence<'_>) -> CheckFinding {
         0 => format!("no line understood in {bytes} byte(s)"),
         _ => format!("none of {bad} line(s) understood{}", example(seen.all)),
     });
+    if seen.link.board.firmware.is_some() && bad == 0 {
+        return finding.because(
+            "The board has said who it is, but sent no samples",
+            "Look whether the sketch waits for something before it prints its first sample",
+        );
+    }
     match seen.all.example.as_ref().map(|line| line.kind) {
+        Some(LineKind::Bad(why)) if why.contains("checksum") => finding.because(
+            "The checksums are computed otherwise than the protocol says",
+            "Compute them as `palpate doctor --wiring` shows, or leave `ck` out",
+        ),
         Some(LineKind::Values) => finding.because(
             "No two lines in a row have the same fields: two devices or two sketches share the port",
             "Give each device a port of its own, and print the values of a sample in one line",

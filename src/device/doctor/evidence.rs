@@ -129,6 +129,14 @@ impl<'a> Evidence<'a> {
         (decimals && most > 0.1 && most < MOST_VOLT).then_some(most)
     }
 
+    /// A strip that falls to zero, as only a pad does, and a pad that never does, as a strip.
+    pub(super) fn swapped_pair(&self) -> Option<[&'a str; 2]> {
+        let strip = self.sensors.iter().find(|own| own.is_flex && own.trace.least <= self.idle() && own.trace.moves())?;
+        let of_strip = |own: &&SensorChannel<'_>| !own.is_flex && own.trace.numbers > 0 && own.trace.least >= self.least_of_a_strip();
+        let pad = self.sensors.iter().find(of_strip)?;
+        Some([strip.name, pad.name])
+    }
+
     /// True where every pad reads as only a strip does, and every strip falls to zero, as only a pad does.
     pub(super) fn is_swapped(&self) -> bool {
         let [mut strips, mut pads] = [true, false].map(|flex| self.traces(flex).peekable());

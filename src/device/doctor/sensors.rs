@@ -7,6 +7,9 @@ use crate::protocol::{AdcRange, Saturation};
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::Sensor;
 
+/// Spikes from which on a contact is loose.
+const FEWEST_SPIKES: u64 = 3;
+
 /// Largest count of ten bits.
 const TEN_BITS: f64 = 1023.0;
 
@@ -25,6 +28,12 @@ pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
         return Failed.seen("strips read as pads do, and pads as strips do").because(
             "The columns, or the wires, are in another order",
             "Print a header line with the names of the columns, or exchange the wires",
+        );
+    }
+    if let Some([strip, pad]) = seen.swapped_pair() {
+        return Failed.seen(format!("{strip} falls to zero, as only a pad does, and {pad} reads as a strip does")).because(
+            "The two are swapped, in the sketch or in the wiring",
+            "Exchange their names in the sketch, or their wires",
         );
     }
     let missing = Sensor::ALL.into_iter().filter(|sensor| board.channel_of(*sensor).is_none());
@@ -58,6 +67,12 @@ pub(super) fn bits(seen: &Evidence<'_>) -> CheckFinding {
     }
     if let Some(missing) = seen.no_counts() {
         return NotChecked.seen(missing);
+    }
+    if let Some(own) = seen.sensors.iter().find(|own| own.trace.numbers > 0 && own.trace.least < 0.0) {
+        return Failed.seen(format!("{} reads down to {:.0}", own.name, own.trace.least)).because(
+            "Counts are never negative: the sketch subtracts a zero, or prints a negative number for a fault",
+            "Print the counts of analogRead() as they are",
+        );
     }
     let (full, stated, most) = (seen.link.board.full_scale, seen.link.board.firmware.is_some(), seen.most());
     let watched = seen.all.traces.seconds();
@@ -130,6 +145,22 @@ pub(super) fn open_circuit(seen: &Evidence<'_>) -> CheckFinding {
             return Failed.seen(format!("{} {what}", names.join(", "))).because(cause, fix);
         }
     }
+    let spikes = seen.named(|own| own.trace.spikes >= FEWEST_SPIKES);
+    if !spikes.is_empty() {
+        let many = seen.sensors.iter().map(|own| own.trace.spikes).max().unwrap_or(0);
+        return Failed.seen(format!("{} jumps there and back within two readings, {many} times", spikes.join(", "))).because(
+            "A loose contact, or a pin that nothing is connected to",
+            "Move the plug and the wires of that sensor while you watch its curve; crimp or solder what is loose",
+        );
+    }
+    let gappy = seen.sensors.iter().filter(|own| own.trace.without > 0).map(|own| format!("{} ({})", own.name, own.trace.without));
+    let gappy: Vec<String> = gappy.collect();
+    if !gappy.is_empty() {
+        return Note.seen(format!("lines without a number: {}", gappy.join(", "))).because(
+            "The sketch had no value to print, or printed a word such as nan",
+            "Check the plug of that sensor; the readings are gaps",
+        );
+    }
     let idle = seen.named(|own| !own.is_flex && own.trace.most <= seen.idle());
     if idle.is_empty() {
         return Passed.seen("every strip is within its range, every pad was pressed");
@@ -150,10 +181,14 @@ pub(super) fn movement(seen: &Evidence<'_>) -> CheckFinding {
             "Compare the sketch's pin with the wiring, and measure the pin while the finger is bent",
         );
     }
+    if seen.traces(true).next().is_none() {
+        return Skipped.seen("no strips");
+    }
     let strips = seen.named(|own| own.is_flex && shows(&own) && own.trace.numbers > 0);
     let still = seen.named(|own| own.is_flex && shows(&own) && !own.trace.moves());
     if still.is_empty() && !strips.is_empty() {
-        let range: Vec<String> = seen.traces(true).map(|trace| format!("{:.0}", trace.range())).collect();
+        let moved = seen.sensors.iter().filter(|own| own.is_flex && shows(own) && own.trace.numbers > 0);
+        let range: Vec<String> = moved.map(|own| format!("{:.0}", own.trace.range())).collect();
         return Passed.seen(format!("{} moved by {} counts", strips.join(" and "), range.join(" and ")));
     }
     let any = seen.all.traces.channels.iter().any(ChannelTrace::moves);

@@ -9,6 +9,9 @@ const MOVES: f64 = 40.0;
 /// Duration of a change (s): a hand takes several times as long to bend a finger.
 const WITHIN_S: f64 = 0.2;
 
+/// Change there and back within two readings that no hand makes (counts).
+const SPIKE: f64 = 1200.0;
+
 /// Changes that are remembered.
 const MOST_CHANGES: usize = 1000;
 
@@ -27,7 +30,10 @@ pub struct ChannelTrace {
     pub decimals: bool,
     /// Each count was larger than the one before.
     pub rises: bool,
+    /// Single counts that were far from those before and after them.
+    pub spikes: u64,
     last: f64,
+    jump: f64,
     /// Newest count, and the time (s) since which it is exactly that.
     still: Option<[f64; 2]>,
     /// Count from which movement is measured, and when it last moved (s).
@@ -50,7 +56,9 @@ impl Default for ChannelTrace {
             most: f64::NEG_INFINITY,
             decimals: false,
             rises: true,
+            spikes: 0,
             last: f64::NEG_INFINITY,
+            jump: 0.0,
             still: None,
             rested: None,
             moved_s: f64::NEG_INFINITY,
@@ -71,7 +79,9 @@ impl ChannelTrace {
         self.numbers += 1;
         self.decimals |= y.fract() != 0.0;
         self.rises &= y > self.last;
-        self.last = y;
+        let jump = if self.last.is_finite() { y - self.last } else { 0.0 };
+        self.spikes += u64::from(jump.abs() > SPIKE && self.jump.abs() > SPIKE && jump * self.jump < 0.0);
+        (self.jump, self.last) = (jump, y);
         if self.still.is_none_or(|[count, _]| count != y) {
             self.still = Some([y, t]);
         }

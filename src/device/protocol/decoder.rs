@@ -216,11 +216,15 @@ impl Reader {
     }
 
     /// Skips the first line, which is most often the rest of one, unless it is a header: a board that restarts on connection
-    /// begins with it. It is complete where its first name is known.
+    /// begins with it. It is complete unless its first name may be the end of a known one.
     fn first(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
-        if names.first().is_some_and(is_known) {
+        let is_rest = |name: &String| {
+            let known = Sensor::ALL.map(Sensor::channel).into_iter().chain(["t_us", "t_ms", "millis", "micros", "seq", "p_bar"]);
+            known.into_iter().any(|known| known.to_ascii_lowercase().ends_with(&name.to_ascii_lowercase()))
+        };
+        if names.first().is_some_and(|name| is_known(name) || !is_rest(name)) {
             self.header(names, line, arrived_s, events);
         }
     }

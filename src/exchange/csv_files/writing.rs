@@ -32,7 +32,8 @@ pub(super) fn write_signals_csv(path: &Path, signals: &Signals) -> Result<(), Ex
     write_file(path, FileKind::Csv, |out| {
         out.write_record(std::iter::once("t_s").chain(signals.channels.iter().map(String::as_str)))?;
         for (sample, t) in signals.t_s.iter().enumerate() {
-            let values = signals.row(sample).iter().map(ToString::to_string);
+            let text = |value: &f32| if value.is_nan() { String::new() } else { value.to_string() };
+            let values = signals.row(sample).iter().map(text);
             out.write_record(std::iter::once(number(*t)).chain(values))?;
         }
         Ok(())

@@ -10,7 +10,7 @@ use crate::mapping::Mapping;
 use crate::series::Series;
 use palpate_sim::objects::catalogue;
 use palpate_store::ImportedTrial;
-use palpate_tactile::Signals;
+use palpate_tactile::{Signals, unit_of_channel};
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -61,7 +61,7 @@ struct Topic {
     /// Its schema and how its messages are written, where they cannot be read.
     type_name: String,
     kind: Option<MessageKind>,
-    /// Names of all channels, in a file of this program.
+    /// Names of all channels with the units that these do not tell, in a file of this program.
     names: Option<Vec<String>>,
 }
 
@@ -137,8 +137,15 @@ impl<'a> Bag<'a> {
                     Some([name, _]) => format!("{} in the encoding {}", clean(name), clean(encoding)),
                     None => format!("the encoding {}", clean(encoding)),
                 };
-                let names = metadata.get("names").filter(|_| topic == CHANNELS);
-                let names = names.and_then(|names| serde_json::from_str(names).ok());
+                let of_metadata = |key: &str| -> Option<Vec<String>> {
+                    serde_json::from_str(metadata.get(key).filter(|_| topic == CHANNELS)?).ok()
+                };
+                let units = of_metadata("units").unwrap_or_default();
+                let with_unit = |(k, name): (usize, String)| match units.get(k).filter(|unit| !unit.is_empty()) {
+                    Some(unit) if unit_of_channel(&name).1.is_empty() && k > 0 => format!("{name} [{unit}]"),
+                    _ => name,
+                };
+                let names = of_metadata("names").map(|names| names.into_iter().enumerate().map(with_unit).collect());
                 self.topics.insert(id, Topic { name: clean(topic), type_name, kind, names });
             }
             Record::Metadata { name: TRIAL, pairs } => {
@@ -231,7 +238,12 @@ impl<'a> Bag<'a> {
             .iter()
             .enumerate()
             .skip(1)
-            .filter_map(|(place, name)| Some((clean(name), filled(name, column(place))?)))
+            .filter_map(|(place, name)| {
+                let values = column(place);
+                // The pressure of a simulated pad is undefined where nothing touches it; other gaps are gaps.
+                let values = if field("source") == "sim" { filled(name, values)? } else { values };
+                values.iter().any(|value| value.is_finite()).then(|| (cleaned(name), values))
+            })
             .collect();
         if columns.is_empty() {
             return Err(problem("has no numbers"));
@@ -267,6 +279,10 @@ impl<'a> Bag<'a> {
                 let run = runs.get(reading.segment).copied().unwrap_or(0);
                 series.push(run, name, t_s, reading.value).map_err(|fault| ImportError::new(self.file, fault))?;
             }
+        }
+        let singles = series.singles().join(", ");
+        if !singles.is_empty() {
+            warnings.push(format!("a single reading, held at all times: {singles}"));
         }
         let Some(text) = series.into_csv(&clean(label)) else {
             return Err(ImportError::new(self.file, self.nothing()));
@@ -356,6 +372,11 @@ fn filled(name: &str, mut values: Vec<f32>) -> Option<Vec<f32>> {
         }
     }
     Some(values)
+}
+
+/// A name of this program's own file, which keeps its unit.
+fn cleaned(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { '_' } else { c }).take(LONGEST_NAME).collect()
 }
 
 /// A name that stands in one field of a table: no separators, brackets and control characters, not too long.

@@ -24,7 +24,7 @@ fn files_without_content() {
     refused("", &["cannot import \"f\": the file has no header"]);
     refused("\n , ,\n", &["no header"]);
     refused("trial,label,t_s,p\n\n,,,\n", &["no row below its header"]);
-    refused("a,x,0,1\n", &["line 1: there is no column \"trial\" and no \"label\" and no \"t_s\"", "has a, x, 0, 1"]);
+    refused("a,x,0,1\n", &["line 1: there is no column \"label\" and no \"t_s\"", "has a, x, 0, 1"]);
     refused(
         "\n\ntrial;class;time;p\n",
         &["line 3: there is no column \"label\" and no \"t_s\"", "has trial, class, time, p"],

@@ -48,6 +48,32 @@ pub(super) struct ChannelColumn {
     pub(super) numeric: bool,
     /// Line and beginning of its first text.
     pub(super) text: Option<(u64, String)>,
+    thousands: Thousands,
+}
+
+/// Whether points may separate thousands: the first number such as 1.002 with its line, and whether others are whole or
+/// have another number of decimals.
+#[derive(Default)]
+struct Thousands {
+    first: Option<(u64, String)>,
+    whole: bool,
+    others: bool,
+}
+
+impl Thousands {
+    fn note(&mut self, line: u64, text: &str) {
+        let text = text.trim_start_matches('-');
+        let Some((before, after)) = text.split_once('.') else {
+            self.whole = true;
+            return;
+        };
+        let is_group = after.split('.').all(|part| part.len() == 3);
+        if is_group && !before.starts_with('0') && (1..=3).contains(&before.len()) {
+            self.first.get_or_insert_with(|| (line, text.to_owned()));
+        } else {
+            self.others = true;
+        }
+    }
 }
 
 /// All rows of a file.
@@ -129,7 +155,9 @@ impl<R: Read> Opened<BufReader<R>> {
             }
         };
         let decimal_comma = separator != b',';
-        let first = holds_numbers(&header, decimal_comma).then(|| header.clone());
+        let is_number = |field: &[u8]| number::<f64>(String::from_utf8_lossy(field).trim(), decimal_comma).is_some();
+        let by_number = mapping.is_by_number() && header.iter().any(is_number);
+        let first = (by_number || holds_numbers(&header, decimal_comma)).then(|| header.clone());
         if first.is_some() {
             header = (1..=header.len()).map(|number| number.to_string().into_bytes()).collect();
         }
@@ -174,17 +202,28 @@ pub(super) fn read_rows(
         rows.add(line, &first)?;
     }
     let mut record = ByteRecord::new();
+    let mut remarks = 0;
     while let Some(line) = next_row(&mut reader, &mut record)? {
-        if !record[0].starts_with(b"#") {
+        if record[0].starts_with(b"#") && !SPREADSHEET_ERRORS.iter().any(|error| record[0].starts_with(error)) {
+            // A whole row may have been meant.
+            remarks += usize::from(record.len() == rows.width);
+        } else {
             rows.add(line, &record)?;
         }
     }
+    if remarks > 0 {
+        warnings.push(format!("{remarks} row(s) that begin with # were taken for remarks and skipped"));
+    }
+    rows.check_thousands()?;
     if rows.trials.is_empty() {
         return Err(empty("row below its header"));
     }
     rows.check_times()?;
     Ok(rows)
 }
+
+/// What spreadsheets write for a value that they cannot compute.
+const SPREADSHEET_ERRORS: [&[u8]; 4] = [b"#N/A", b"#DIV/0", b"#VALUE", b"#NUM"];
 
 /// True for a row in which every field is a number.
 fn holds_numbers(record: &ByteRecord, decimal_comma: bool) -> bool {
@@ -294,7 +333,12 @@ impl<'a> Header<'a> {
     /// Some columns are not there.
     fn lacks(&self, missing: &[&str]) -> String {
         let missing: Vec<String> = missing.iter().map(|name| format!("\"{}\"", brief(name))).collect();
-        format!("there is no column {}; the file has {}", missing.join(" and no "), self.listed())
+        let few = if self.whole.len() > 2 {
+            ""
+        } else {
+            "; --skip N passes over lines above the header, --delimiter C names another character between fields"
+        };
+        format!("there is no column {}; the file has {}{few}", missing.join(" and no "), self.listed())
     }
 
     fn listed(&self) -> String {
@@ -416,7 +460,9 @@ impl Rows {
     ) -> Result<Self, String> {
         let header = Header::read(header)?;
         let place = |wanted: &str| header.column(wanted).map(|(at, _)| at);
-        let missing: Vec<&str> = REQUIRED.into_iter().filter(|wanted| place(wanted).is_none()).collect();
+        // Without a column of trials, each change of the label begins one.
+        let missing: Vec<&str> =
+            REQUIRED.into_iter().filter(|wanted| *wanted != "trial" && place(wanted).is_none()).collect();
         if !mapping.has_roles() && !missing.is_empty() {
             return Err(unmapped(&header, &missing));
         }
@@ -453,7 +499,7 @@ impl Rows {
             if channels.len() == MOST_CHANNELS {
                 return Err(format!("there are more than {MOST_CHANNELS} columns of readings; remove some"));
             }
-            channels.push(ChannelColumn { place: at, name: full, factor, numeric: false, text: None });
+            channels.push(ChannelColumn { place: at, name: full, factor, numeric: false, text: None, thousands: Thousands::default() });
             Ok(())
         };
         for text in &mapping.channels {
@@ -463,7 +509,7 @@ impl Rows {
         }
         let names = &header.names;
         if mapping.channels.is_empty() {
-            let known = [trial, label, Some(time), words[0], words[1]];
+            let known = [trial, label, Some(time), words[0], words[1], place("label"), place("trial")];
             let is_ignored = |at: usize| mapping.ignore.iter().any(|wanted| is_called(header.whole[at], wanted));
             for (at, (name, unit)) in names.iter().enumerate() {
                 if !name.is_empty() && !known.contains(&Some(at)) && !is_ignored(at) {
@@ -514,6 +560,24 @@ impl Rows {
         }
     }
 
+    /// Refuses a column whose points may well separate thousands: it has whole numbers, and others with three decimals alone.
+    fn check_thousands(&self) -> Result<(), Fault> {
+        let doubtful = |channel: &&ChannelColumn| channel.thousands.whole && !channel.thousands.others;
+        let first = |channel: &'_ ChannelColumn| Some((channel.name.clone(), channel.thousands.first.clone()?));
+        match self.channels.iter().filter(doubtful).find_map(first) {
+            None => Ok(()),
+            Some((name, (line, text))) => Err((
+                Some(line),
+                format!(
+                    "\"{text}\" in the column \"{}\" may be a thousand times as large: beside whole numbers, a point before three \
+                     digits separates thousands in many countries; write all numbers without thousands separators, or with \
+                     decimals",
+                    brief(&name)
+                ),
+            )),
+        }
+    }
+
     /// A number of this file. A file that writes some with a point and some with a comma is refused: one of the two may
     /// separate thousands.
     fn number(&mut self, line: u64, field: &str) -> Result<Option<f64>, Fault> {
@@ -561,6 +625,9 @@ impl Rows {
             let missing = ["", "na", "null"].iter().any(|word| field.eq_ignore_ascii_case(word));
             let read = if missing { Some(f64::NAN) } else { self.number(line, field)? };
             let channel = &mut self.channels[at];
+            if self.decimal_comma && !missing {
+                channel.thousands.note(line, field);
+            }
             let value = match read {
                 Some(value) if value.abs() >= OVER_RANGE => {
                     return Err((
@@ -725,7 +792,11 @@ impl Rows {
             Some(t) if t.is_finite() => Err(format!(
                 "the time {t} s is beyond {FARTHEST_TIME_S} s; name the unit in the header if it is another, as in t_s [ms]"
             )),
-            _ => Err(format!("the time \"{}\" is not a number of seconds", brief(field))),
+            _ => Err(format!(
+                "the time \"{}\" is not a number of seconds, nor a date and time such as 2026-03-01 12:00:00.5; --skip N passes \
+                 over lines above the header",
+                brief(field)
+            )),
         }
     }
 }
@@ -764,7 +835,7 @@ fn date_time_s(text: &str) -> Option<f64> {
             parts.iter().filter(|part| is_plain(part)).filter_map(|part| part.parse().ok()).collect();
         if parts.len() == 3 { numbers.try_into().ok() } else { None }
     };
-    let [hour, minute, second] = numbers(&clock.replace(',', "."), &[':'])?;
+    let [hour, minute, second] = numbers(&clock.replace(',', ".").replace("::", "."), &[':'])?;
     if !(hour < 24.0 && minute < 60.0 && second < 61.0 && hour.fract() == 0.0 && minute.fract() == 0.0) {
         return None;
     }
