@@ -228,7 +228,9 @@ impl<'a> Table<'a> {
         let unread_one = |name: &str| unread.iter().find(|own| own.starts_with(&format!("{name} (")));
         let time = arrays.get(base).ok_or_else(|| match unread_one(base) {
             Some(why) => format!("the times cannot be read: {why}"),
-            None => format!("it has no array \"{base}\" of times; name one, as in --time \"t [s]\". It has {}", listed()),
+            None => {
+                format!("it has no array \"{base}\" of times; name one, as in --time \"t [s]\". It has {}", listed())
+            }
         })?;
         let (trials, samples) = match time.shape[..] {
             [samples] => (1, samples),
@@ -268,7 +270,9 @@ impl<'a> Table<'a> {
         }
         if arrays.contains_key(wanted_label) && of_trials(wanted_label).is_none() {
             let shape = &arrays[wanted_label].shape;
-            return Err(format!("the labels \"{wanted_label}\" have the shape {shape:?}; wanted is one for each trial, ({trials})"));
+            return Err(format!(
+                "the labels \"{wanted_label}\" have the shape {shape:?}; wanted is one for each trial, ({trials})"
+            ));
         }
         let trial = of_trials(mapping.trial.as_deref().unwrap_or("trial"));
         let labels = of_trials(mapping.label.as_deref().unwrap_or("label"));

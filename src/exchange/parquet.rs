@@ -139,7 +139,8 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
         && !is_own
         && first.get_column_iter().any(|(name, cell)| name == wanted && is_whole(cell))
     {
-        let text = format!("the times \"{wanted}\" are whole numbers of no unit; name it, as in --time \"{wanted} [ns]\"");
+        let text =
+            format!("the times \"{wanted}\" are whole numbers of no unit; name it, as in --time \"{wanted} [ns]\"");
         return Err(ImportError::of(path, text));
     }
     let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
@@ -181,7 +182,13 @@ const MOST_COLUMNS: usize = 2000;
 fn is_whole(cell: &Field) -> bool {
     matches!(
         cell,
-        Field::Byte(_) | Field::Short(_) | Field::Int(_) | Field::Long(_) | Field::UInt(_) | Field::ULong(_) | Field::UShort(_)
+        Field::Byte(_)
+            | Field::Short(_)
+            | Field::Int(_)
+            | Field::Long(_)
+            | Field::UInt(_)
+            | Field::ULong(_)
+            | Field::UShort(_)
     )
 }
 

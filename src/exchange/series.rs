@@ -39,7 +39,8 @@ impl Series {
 
     /// Channels of a single reading, which it holds at all times.
     pub(crate) fn singles(&self) -> Vec<&str> {
-        let is_single = |name: &&String| self.runs.iter().filter_map(|run| run.get(*name)).map(Vec::len).sum::<usize>() == 1;
+        let is_single =
+            |name: &&String| self.runs.iter().filter_map(|run| run.get(*name)).map(Vec::len).sum::<usize>() == 1;
         let mut names: Vec<&str> = self.runs.iter().flat_map(Run::keys).filter(is_single).map(String::as_str).collect();
         names.dedup();
         names
@@ -101,11 +102,8 @@ fn at_times(readings: &[(f64, f64)], times: &[f64]) -> Vec<f64> {
         sorted.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
     let middle = intervals.len() / 2;
     // A single reading holds at all times.
-    let usual = if intervals.is_empty() {
-        f64::INFINITY
-    } else {
-        *intervals.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
+    let usual =
+        if intervals.is_empty() { f64::INFINITY } else { *intervals.select_nth_unstable_by(middle, f64::total_cmp).1 };
     let longest = LONGEST_PAUSE * usual;
     let value = |t: &f64| {
         let after = sorted.partition_point(|(own, _)| own <= t);

@@ -63,7 +63,9 @@ pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
     } else if bytes.starts_with(b"PK\x03\x04") && (text.contains("3d/") || text.contains(".model")) {
         Some("it is a 3MF archive; export it as STL or OBJ")
     } else if text.contains("[content_types].xml") || text.contains("xl/") {
-        Some("it is an archive of another program, such as 3MF or a spreadsheet; export a mesh as STL or OBJ, a sheet as CSV")
+        Some(
+            "it is an archive of another program, such as 3MF or a spreadsheet; export a mesh as STL or OBJ, a sheet as CSV",
+        )
     } else if bytes.starts_with(b"PK\x03\x04") {
         Some("it is a ZIP archive; unpack it first")
     } else if bytes.starts_with(b"\x89HDF") {

@@ -96,7 +96,8 @@ impl Store {
             |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
         // A file that may not be written gets nothing beside it that its owner could not remove.
         let is_foreign = std::fs::OpenOptions::new().write(true).open(store.file.path()).is_err();
-        let refused = || Err(rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_READONLY), None));
+        let refused =
+            || Err(rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_READONLY), None));
         if let Err(error) = if is_foreign { refused() } else { readable(&store) } {
             // Without a place for its log SQLite reads only what it may take for unchanging.
             let codes = [ErrorCode::CannotOpen, ErrorCode::ReadOnly, ErrorCode::PermissionDenied];

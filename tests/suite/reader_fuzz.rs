@@ -170,8 +170,9 @@ fn changed(random: &mut ChaCha8Rng, sound: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// Memory that any reader may take for its tables and buffers (bytes), besides ten times the file.
-const ROOM: usize = 64 << 20;
+/// Memory that any reader may take for its tables and buffers (bytes), besides ten times the file; a grid of distances takes
+/// most.
+const ROOM: usize = 256 << 20;
 
 #[test]
 fn changed_files_end_in_order() {

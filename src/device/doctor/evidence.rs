@@ -131,8 +131,11 @@ impl<'a> Evidence<'a> {
 
     /// A strip that falls to zero, as only a pad does, and a pad that never does, as a strip.
     pub(super) fn swapped_pair(&self) -> Option<[&'a str; 2]> {
-        let strip = self.sensors.iter().find(|own| own.is_flex && own.trace.least <= self.idle() && own.trace.moves())?;
-        let of_strip = |own: &&SensorChannel<'_>| !own.is_flex && own.trace.numbers > 0 && own.trace.least >= self.least_of_a_strip();
+        let strip =
+            self.sensors.iter().find(|own| own.is_flex && own.trace.least <= self.idle() && own.trace.moves())?;
+        let of_strip = |own: &&SensorChannel<'_>| {
+            !own.is_flex && own.trace.numbers > 0 && own.trace.least >= self.least_of_a_strip()
+        };
         let pad = self.sensors.iter().find(of_strip)?;
         Some([strip.name, pad.name])
     }

@@ -31,10 +31,12 @@ pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
         );
     }
     if let Some([strip, pad]) = seen.swapped_pair() {
-        return Failed.seen(format!("{strip} falls to zero, as only a pad does, and {pad} reads as a strip does")).because(
-            "The two are swapped, in the sketch or in the wiring",
-            "Exchange their names in the sketch, or their wires",
-        );
+        return Failed
+            .seen(format!("{strip} falls to zero, as only a pad does, and {pad} reads as a strip does"))
+            .because(
+                "The two are swapped, in the sketch or in the wiring",
+                "Exchange their names in the sketch, or their wires",
+            );
     }
     let missing = Sensor::ALL.into_iter().filter(|sensor| board.channel_of(*sensor).is_none());
     let missing: Vec<&str> = missing.map(Sensor::channel).collect();
@@ -148,12 +150,18 @@ pub(super) fn open_circuit(seen: &Evidence<'_>) -> CheckFinding {
     let spikes = seen.named(|own| own.trace.spikes >= FEWEST_SPIKES);
     if !spikes.is_empty() {
         let many = seen.sensors.iter().map(|own| own.trace.spikes).max().unwrap_or(0);
-        return Failed.seen(format!("{} jumps there and back within two readings, {many} times", spikes.join(", "))).because(
-            "A loose contact, or a pin that nothing is connected to",
-            "Move the plug and the wires of that sensor while you watch its curve; crimp or solder what is loose",
-        );
+        return Failed
+            .seen(format!("{} jumps there and back within two readings, {many} times", spikes.join(", ")))
+            .because(
+                "A loose contact, or a pin that nothing is connected to",
+                "Move the plug and the wires of that sensor while you watch its curve; crimp or solder what is loose",
+            );
     }
-    let gappy = seen.sensors.iter().filter(|own| own.trace.without > 0).map(|own| format!("{} ({})", own.name, own.trace.without));
+    let gappy = seen
+        .sensors
+        .iter()
+        .filter(|own| own.trace.without > 0)
+        .map(|own| format!("{} ({})", own.name, own.trace.without));
     let gappy: Vec<String> = gappy.collect();
     if !gappy.is_empty() {
         return Note.seen(format!("lines without a number: {}", gappy.join(", "))).because(

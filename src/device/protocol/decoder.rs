@@ -221,7 +221,10 @@ impl Reader {
         let Ok(Parsed::Header(names)) = parse(line) else { return };
         let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
         let is_rest = |name: &String| {
-            let known = Sensor::ALL.map(Sensor::channel).into_iter().chain(["t_us", "t_ms", "millis", "micros", "seq", "p_bar"]);
+            let known = Sensor::ALL
+                .map(Sensor::channel)
+                .into_iter()
+                .chain(["t_us", "t_ms", "millis", "micros", "seq", "p_bar"]);
             known.into_iter().any(|known| known.to_ascii_lowercase().ends_with(&name.to_ascii_lowercase()))
         };
         if names.first().is_some_and(|name| is_known(name) || !is_rest(name)) {

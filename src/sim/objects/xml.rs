@@ -35,13 +35,11 @@ pub(super) fn parse(text: &str) -> Result<Element, String> {
     let mut open = vec![Element::default()];
     let mut count = 0;
     loop {
-        let event = reader
-            .read_event()
-            .map_err(|e| {
-                let at = usize::try_from(reader.error_position()).unwrap_or(0).min(text.len());
-                let line = 1 + text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count();
-                format!("line {line}: it is not well-formed XML: {e}")
-            })?;
+        let event = reader.read_event().map_err(|e| {
+            let at = usize::try_from(reader.error_position()).unwrap_or(0).min(text.len());
+            let line = 1 + text.as_bytes()[..at].iter().filter(|byte| **byte == b'\n').count();
+            format!("line {line}: it is not well-formed XML: {e}")
+        })?;
         match event {
             Event::Start(start) => {
                 count += 1;

@@ -28,7 +28,8 @@ pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<Impor
         ));
     }
     for channel in rows.channels.iter().filter(|channel| !channel.numeric) {
-        let such = channel.text.as_ref().map_or_else(String::new, |(_, text)| format!(" (such as \"{}\")", brief(text)));
+        let such =
+            channel.text.as_ref().map_or_else(String::new, |(_, text)| format!(" (such as \"{}\")", brief(text)));
         warnings.push(format!("the column \"{}\" holds no number{such} and was left out", brief(&channel.name)));
     }
     let names: Vec<String> = rows.channels.into_iter().map(|channel| channel.name).collect();

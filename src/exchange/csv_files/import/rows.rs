@@ -499,7 +499,14 @@ impl Rows {
             if channels.len() == MOST_CHANNELS {
                 return Err(format!("there are more than {MOST_CHANNELS} columns of readings; remove some"));
             }
-            channels.push(ChannelColumn { place: at, name: full, factor, numeric: false, text: None, thousands: Thousands::default() });
+            channels.push(ChannelColumn {
+                place: at,
+                name: full,
+                factor,
+                numeric: false,
+                text: None,
+                thousands: Thousands::default(),
+            });
             Ok(())
         };
         for text in &mapping.channels {
