@@ -81,6 +81,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("statrs", &["src/learn/metrics", "src/tactile/calibration/straight_line.rs"]),
     ("stl_io", &["src/geometry/mesh_files"]),
     ("strsim", &["src/sim/objects", "src/sim/scene"]),
+    ("tempfile", &["src"]),
     ("thiserror", &["src"]),
     ("tobj", &["src/geometry/mesh_files"]),
     ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs", "src/exchange/mapping.rs"]),
@@ -107,6 +108,7 @@ const RANDOM: &[&str] = &[
     "src/sim/physics/resting.rs",
     "src/sim/poses.rs",
     "src/tactile/model/streams.rs",
+    "src/workshop/attack.rs",
 ];
 
 /// One row of the package table in `src/lib.rs`.
