@@ -67,12 +67,12 @@ impl Recipe {
             Shipped::FixedObjects => Self {
                 which,
                 method: "geometry-network",
-                epochs: 50,
+                epochs: 40,
                 trials: [1200, 100, 100],
                 seeds: [7, 2, 11],
                 others: 5000..6000,
                 view: virtual_view,
-                noisy: 5,
+                noisy: 2,
                 build: 0.0,
             },
         }
