@@ -57,10 +57,10 @@ fn unchanging(file: &Path) -> String {
     format!("file:{path}?immutable=1")
 }
 
-/// SQLite's log beside a store.
-fn log_of(file: &Path) -> PathBuf {
+/// SQLite's log beside a store (`-wal`), or the index of it (`-shm`).
+fn beside(file: &Path, ending: &str) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
-    name.push("-wal");
+    name.push(ending);
     name.into()
 }
 
@@ -94,8 +94,10 @@ impl Store {
         let mut store = Self::connect(path, OpenFlags::empty())?;
         let readable =
             |store: &Self| store.connection.query_row("SELECT count(*) FROM sqlite_master", [], |_row| Ok(()));
-        // A file that may not be written gets nothing beside it that its owner could not remove.
-        let is_foreign = std::fs::OpenOptions::new().write(true).open(store.file.path()).is_err();
+        // A file that may not be written gets nothing beside it that its owner could not remove; what another program keeps there
+        // is used.
+        let is_foreign = std::fs::OpenOptions::new().write(true).open(store.file.path()).is_err()
+            && !beside(store.file.path(), "-shm").exists();
         let refused =
             || Err(rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_READONLY), None));
         if let Err(error) = if is_foreign { refused() } else { readable(&store) } {
@@ -108,7 +110,7 @@ impl Store {
             let opened = Connection::open_with_flags(unchanging(store.file.path()), flags);
             store.connection = opened.map_err(|e| StoreError::open(path, plain(&e)))?;
             store.is_unchanging = true;
-            if std::fs::metadata(log_of(store.file.path())).is_ok_and(|log| log.len() > 0) {
+            if std::fs::metadata(beside(store.file.path(), "-wal")).is_ok_and(|log| log.len() > 0) {
                 store.warnings.push(format!(
                     "\"{}\" is read-only and was not closed properly: its newest trials cannot be read; open it once where it \
                      can be written",
