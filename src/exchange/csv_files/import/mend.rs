@@ -22,14 +22,13 @@ pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<Impor
         return Err(first.map_or_else(
             || (None, no_channels()),
             |((line, text), name)| {
-                let (text, name) = (brief(text), brief(name));
+                let name = brief(name);
                 (Some(*line), format!("\"{text}\" in the column \"{name}\" is not a number, and {}", no_channels()))
             },
         ));
     }
     for channel in rows.channels.iter().filter(|channel| !channel.numeric) {
-        let such =
-            channel.text.as_ref().map_or_else(String::new, |(_, text)| format!(" (such as \"{}\")", brief(text)));
+        let such = channel.text.as_ref().map_or_else(String::new, |(_, text)| format!(" (such as \"{text}\")"));
         warnings.push(format!("the column \"{}\" holds no number{such} and was left out", brief(&channel.name)));
     }
     let names: Vec<String> = rows.channels.into_iter().map(|channel| channel.name).collect();

@@ -813,7 +813,8 @@ fn unmapped(header: &Header<'_>, missing: &[&str]) -> String {
     let advice = match Mapping::known_for(&header.whole) {
         Some((name, profile)) => format!("it looks like a file of {}: add --profile {name}", profile.title),
         None => {
-            let like_time = |text: &&&str| text.to_ascii_lowercase().contains("time") || **text == "t";
+            let like_time =
+                |text: &&&str| text.to_ascii_lowercase().contains("time") || **text == "t" || text.starts_with("t_");
             let time = header.whole.iter().find(like_time).map_or("COLUMN [s]", |text| text);
             format!(
                 "say which columns hold them, as in --time \"{}\" --trial COLUMN --label COLUMN (or --label NAME), or name a \
