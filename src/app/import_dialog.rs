@@ -5,7 +5,7 @@ use crate::app::theme::{self, colour};
 use crate::app::widgets::{failure_ui, remark_ui, text_field, warning_ui, wrapped};
 use egui::{Button, ComboBox, Grid, Id, Modal, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Legend, Line};
-use palpate_exchange::{Import, Mapping, PROFILES, SPLIT_GAP_S, columns_of, read_trials};
+use palpate_exchange::{Import, Mapping, PROFILES, SPLIT_GAP_S, columns_of, plain_name, read_trials};
 use palpate_geometry::palette::series_colour;
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
 use palpate_store::Store;
@@ -136,7 +136,7 @@ impl ImportDialog {
         }
         let named = |column: &ColumnChoice| match column.unit.trim() {
             "" => column.name.clone(),
-            unit => format!("{} [{unit}]", column.name.split(['[', '(']).next().unwrap_or_default().trim()),
+            unit => format!("{} [{unit}]", plain_name(&column.name)),
         };
         let of = |role: Role| self.columns.iter().find(|column| column.role == role).map(named);
         let channels = self.columns.iter().filter(|column| column.role == Role::Channel).map(named).collect();
@@ -165,7 +165,7 @@ impl ImportDialog {
 
     /// Role of a column by the mapping, or by its name.
     fn choice_of(&self, name: &str) -> ColumnChoice {
-        let plain = |text: &str| text.split(['[', '(']).next().unwrap_or_default().trim().to_ascii_lowercase();
+        let plain = |text: &str| plain_name(text).to_ascii_lowercase();
         let is = |wanted: Option<&String>| wanted.is_some_and(|wanted| plain(wanted) == plain(name));
         let base = &self.base;
         let role = if is(base.time.as_ref()) || (base.time.is_none() && plain(name) == "t_s") {

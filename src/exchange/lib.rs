@@ -50,7 +50,7 @@ pub use csv_files::{
     write_trial_csv,
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
-pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S};
+pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S, plain_name};
 pub use parquet::is_contained;
 
 use palpate_geometry::{open_regular, other_content};

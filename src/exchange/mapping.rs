@@ -18,25 +18,18 @@ pub struct Mapping {
     /// Lines above the header.
     pub skip: u64,
     /// Character between fields; found where none is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub delimiter: Option<char>,
     /// Column of times, as in `timestamp [ms]`; `t_s` where none is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// Column of labels, or the label of all trials.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
     /// Column of labels, where there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub label_column: Option<String>,
     /// Without a label the file's name is the label, up to this text.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub label_ends_at: Option<String>,
     /// Column that tells trials apart; without it the file is one trial.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub trial: Option<String>,
     /// A pause of this length begins a new trial, and so does a time that falls (s).
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub split_gap_s: Option<f64>,
     /// Channels as `NAME=COLUMN [unit]` or `COLUMN [unit]`; all other columns where there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -45,9 +38,7 @@ pub struct Mapping {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignore: Vec<String>,
     /// In a table with a row for each value: the columns of the channel's name and of the value.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<String>,
 }
 
@@ -104,8 +95,7 @@ impl Mapping {
 
     /// True where the columns are named by their numbers, as in a table without a header.
     pub(crate) fn is_by_number(&self) -> bool {
-        let plain = |text: &String| named_column(text).1.split(['[', '(']).next().unwrap_or_default().trim().to_owned();
-        self.time.as_ref().is_some_and(|time| plain(time).parse::<usize>().is_ok())
+        self.time.as_ref().is_some_and(|time| plain_name(time).parse::<usize>().is_ok())
     }
 
     /// The label of a file whose rows have none.
@@ -133,6 +123,11 @@ impl Mapping {
             _ => Ok(()),
         }
     }
+}
+
+/// Name of a column without the unit that may stand in brackets after it.
+pub fn plain_name(column: &str) -> &str {
+    column.split(['[', '(']).next().unwrap_or(column).trim()
 }
 
 /// A channel of a mapping: its name, if it is given, and its column.

@@ -5,8 +5,8 @@
 
 use crate::csv_files::read_made;
 use crate::format::{Import, ImportError, file_name};
-use crate::mapping::Mapping;
-use crate::series::Lines;
+use crate::mapping::{Mapping, plain_name};
+use crate::series::{Lines, quoted};
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
@@ -127,7 +127,9 @@ impl Items {
             };
         }
         let numbers = match (letter, size) {
-            ("f", 2) => items(&|bytes| bytes.try_into().map_or(f64::NAN, |bytes| half(u16::from_le_bytes(bytes)))),
+            ("f", 2) => {
+                items(&|bytes| bytes.try_into().map_or(f64::NAN, |bytes| half::f16::from_le_bytes(bytes).to_f64()))
+            }
             ("f", 4) => number!(f32),
             ("f", 8) => number!(f64),
             ("i", 1) => number!(i8),
@@ -186,17 +188,6 @@ impl Items {
     }
 }
 
-/// A number of half precision (IEEE 754, binary16).
-fn half(bits: u16) -> f64 {
-    let (sign, exponent, fraction) = (bits >> 15, (bits >> 10) & 31, f64::from(bits & 1023) / 1024.0);
-    let size = match exponent {
-        0 => fraction * 2f64.powi(-14),
-        31 => return f64::NAN,
-        exponent => (1.0 + fraction) * 2f64.powi(i32::from(exponent) - 15),
-    };
-    if sign == 1 { -size } else { size }
-}
-
 /// Columns of a table: the array, and the number of the column in its last axis.
 struct Table<'a> {
     names: Vec<String>,
@@ -224,7 +215,7 @@ impl<'a> Table<'a> {
             arrays.iter().take(20).map(shown).collect::<Vec<_>>().join(", ")
         };
         let wanted = mapping.time.as_deref().unwrap_or("t_s");
-        let base = wanted.split(['[', '(']).next().unwrap_or(wanted).trim();
+        let base = plain_name(wanted);
         let unread_one = |name: &str| unread.iter().find(|own| own.starts_with(&format!("{name} (")));
         let time = arrays.get(base).ok_or_else(|| match unread_one(base) {
             Some(why) => format!("the times cannot be read: {why}"),
@@ -321,11 +312,10 @@ impl<'a> Table<'a> {
 
     /// The table as text.
     fn text(&self) -> impl std::io::Read + '_ {
-        let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let names: Vec<String> =
-            ["trial", "label"].into_iter().chain(self.names.iter().map(String::as_str)).map(field).collect();
+            ["trial", "label"].into_iter().chain(self.names.iter().map(String::as_str)).map(quoted).collect();
         let lines = (0..self.trials).flat_map(move |trial| {
-            let head: Vec<String> = self.heads[trial].iter().map(|text| field(text)).collect();
+            let head: Vec<String> = self.heads[trial].iter().map(|text| quoted(text)).collect();
             let head = head.join(",");
             (0..self.lengths[trial]).map(move |sample| {
                 let row = trial * self.samples + sample;

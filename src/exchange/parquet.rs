@@ -7,7 +7,7 @@ use crate::content::{TrialContent, channels_of};
 use crate::csv_files::read_made;
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, file_name, new_file};
 use crate::mapping::Mapping;
-use crate::series::Lines;
+use crate::series::{Lines, quoted};
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
 use ::parquet::errors::ParquetError;
@@ -143,10 +143,9 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
             format!("the times \"{wanted}\" are whole numbers of no unit; name it, as in --time \"{wanted} [ns]\"");
         return Err(ImportError::of(path, text));
     }
-    let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let with_unit = |name: &String| match units.get(name).filter(|unit| !unit.is_empty()) {
-        Some(unit) => field(&format!("{name} [{unit}]")),
-        None => field(name),
+        Some(unit) => quoted(&format!("{name} [{unit}]")),
+        None => quoted(name),
     };
     let header: Vec<String> = names.iter().map(with_unit).collect();
     let lines = rows.map(|row| {
@@ -156,7 +155,7 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
                 texts[*place] = text;
             }
         });
-        let line: Vec<String> = texts.iter().map(|text| field(text)).collect();
+        let line: Vec<String> = texts.iter().map(|text| quoted(text)).collect();
         let line = format!("\n{}", line.join(",")).into_bytes();
         Ok(line)
     });

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 
 /// Most channels, and most numbers in all.
-const MOST_CHANNELS: usize = 200;
-const MOST_NUMBERS: usize = 50_000_000;
+pub(crate) const MOST_CHANNELS: usize = 200;
+pub(crate) const MOST_NUMBERS: usize = 50_000_000;
 /// Longest pause between readings of a channel that a line bridges, in usual intervals: three readings are missing.
-const LONGEST_PAUSE: f64 = 4.5;
+pub(crate) const LONGEST_PAUSE: f64 = 4.5;
 
 /// Readings of one run by name: time (s) and value.
 type Run = BTreeMap<String, Vec<(f64, f64)>>;
@@ -70,11 +70,10 @@ impl Series {
         if tables.is_empty() {
             return None;
         }
-        let field = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let header: Vec<String> =
-            ["trial", "label", "t_s"].into_iter().chain(names.iter().map(String::as_str)).map(field).collect();
+            ["trial", "label", "t_s"].into_iter().chain(names.iter().map(String::as_str)).map(quoted).collect();
         let header = header.join(",");
-        let label = field(label);
+        let label = quoted(label);
         let lines = tables.into_iter().enumerate().flat_map(move |(run, (times, columns))| {
             let label = label.clone();
             let origin = times[0];
@@ -116,6 +115,11 @@ fn at_times(readings: &[(f64, f64)], times: &[f64]) -> Vec<f64> {
         }
     };
     times.iter().map(value).collect()
+}
+
+/// A text as one field of a table.
+pub(crate) fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
 }
 
 /// Lines of text as bytes.

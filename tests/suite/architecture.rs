@@ -47,6 +47,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("glam", &["src"]),
     ("image", &["src/render/picture.rs"]),
     ("include_dir", &["src/sim/objects"]),
+    ("half", &["src/exchange/npz_import.rs"]),
     ("indicatif", &["src/cli"]),
     ("libloading", &["src/app/startup.rs"]),
     ("lz4_flex", &["src/exchange/mcap"]),

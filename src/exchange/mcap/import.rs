@@ -7,7 +7,7 @@ use super::{CHANNELS, TRIAL};
 use crate::csv_files::read_made;
 use crate::format::{Import, ImportError, file_name};
 use crate::mapping::Mapping;
-use crate::series::Series;
+use crate::series::{MOST_CHANNELS, MOST_NUMBERS, Series};
 use palpate_sim::objects::catalogue;
 use palpate_store::ImportedTrial;
 use palpate_tactile::{Signals, unit_of_channel};
@@ -15,9 +15,6 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-/// Most channels, and most numbers in all.
-const MOST_CHANNELS: usize = 200;
-const MOST_NUMBERS: usize = 50_000_000;
 /// Most trials of a file.
 const MOST_TRIALS: usize = 100_000;
 /// Longest name of a channel or label (characters).

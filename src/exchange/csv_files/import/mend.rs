@@ -2,7 +2,8 @@
 //! warning.
 
 use super::resample::{self, three_digits};
-use super::rows::{Fault, RawTrial, Rows, no_channels, too_many_values};
+use super::rows::{RawTrial, Rows, no_channels, too_many_values};
+use super::table::Fault;
 use super::{MOST_SAMPLES, MOST_VALUES, brief};
 use palpate_store::{ImportedTrial, interruptions};
 use palpate_tactile::Signals;

@@ -19,9 +19,11 @@
 //! [`Import::warnings`] lists every change; an invalid file is an [`ImportError`] with its line. The limits below bound the
 //! memory that any file can ask for.
 
+mod date_time;
 mod mend;
 mod resample;
 mod rows;
+mod table;
 
 #[cfg(test)]
 mod error_tests;
@@ -63,7 +65,7 @@ const FARTHEST_TIME_S: f64 = 1e11;
 pub(super) fn read_file(path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
     let opened = palpate_geometry::open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let fault = match opened {
-        Ok((length, _)) if length > LARGEST_FILE => rows::file_too_large(),
+        Ok((length, _)) if length > LARGEST_FILE => table::file_too_large(),
         Ok((_, file)) => return read_csv(file, &file_name(path), mapping, &mapping.label_of(path)),
         Err(cause) => cause.to_string(),
     };
@@ -73,7 +75,7 @@ pub(super) fn read_file(path: &Path, mapping: &Mapping) -> Result<Import, Import
 /// Names of the columns of a file.
 pub(super) fn columns_of(path: &Path, mapping: &Mapping) -> Result<Vec<String>, ImportError> {
     let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
-    rows::columns(file, mapping).map_err(|(line, fault)| ImportError { name: file_name(path), line, fault })
+    table::columns(file, mapping).map_err(|(line, fault)| ImportError { name: file_name(path), line, fault })
 }
 
 /// Reads grasps from any source; `name` stands in error messages, `label` is that of rows without one.

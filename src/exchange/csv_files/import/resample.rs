@@ -4,6 +4,8 @@
 //! its place than [`EVEN`] of a step, which forgives times rounded to milliseconds at 100 Hz. Reducing a rate drops
 //! what lies above half of the new one without a filter; grasps are slow enough for that.
 
+use crate::series::LONGEST_PAUSE;
+
 /// Largest distance of a sample from its even place, in steps. Tuned: at a tenth, interpolation would change a reading
 /// by less than a tenth of its step to the next.
 const EVEN: f64 = 0.1;
@@ -94,8 +96,6 @@ pub(super) fn resample(t_s: &[f64], values: &[f32], samples: usize, rate_hz: f64
 
 /// Times this close are one, in steps.
 const SAME_TIME: f64 = 1e-6;
-/// Longest pause that a line bridges, in usual intervals: three readings are missing.
-const LONGEST_PAUSE: f64 = 4.5;
 
 fn mix(before: f32, after: f32, part: f64) -> f32 {
     if part <= 0.0 {
