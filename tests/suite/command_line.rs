@@ -153,7 +153,7 @@ fn wrong_use_exits_with_2() {
     }
 }
 
-/// Every command: what succeeds, and what fails. `--help` succeeds and an option that is not there is wrong use for all.
+/// Every command: what succeeds, and what fails. `--help` succeeds and an unknown option is wrong use for all.
 const EXIT_CODES: [(&str, &str, &str); 22] = [
     ("grasp", "ball --no-store", "nothing.urdf"),
     ("demo", "--object ball --grasps 1 --no-store", "--object nothing"),

@@ -2,7 +2,7 @@
 //! panic, and no reader asks for memory out of proportion.
 //!
 //! A few changes of each run with every test. `PALPATE_FUZZ_S=900 cargo test --release --test suite reader_fuzz` changes the
-//! files of each reader for a quarter of an hour, and tells what took long or much.
+//! files of each reader for a quarter of an hour, and lists the slowest and the largest.
 
 use crate::allocations::peak_of;
 use palpate_exchange::{Mapping, read_points_csv, read_trials};
