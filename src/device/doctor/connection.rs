@@ -36,6 +36,9 @@ const TEXT: f64 = 0.9;
 const BAD_SHARE: f64 = 0.02;
 const BAD_LINES: u64 = 2;
 
+/// Letters of a word that is no remainder of a damaged one.
+const SHORTEST_WORD: usize = 4;
+
 /// Characters of a line that are shown.
 const SHOWN: usize = 60;
 
@@ -187,12 +190,27 @@ pub(super) fn baud(seen: &Evidence<'_>) -> CheckFinding {
 /// A line that could not be read, and why, to be shown behind a number of such lines.
 fn example(all: &Observations) -> String {
     let Some(line) = &all.example else { return String::new() };
-    let cut = if line.text.chars().count() > SHOWN { ".." } else { "" };
-    let shown: String = line.text.chars().take(SHOWN).collect();
+    let shown = beginning(&line.text);
     match line.kind {
-        LineKind::Bad(why) => format!(", such as `{shown}{cut}` ({why})"),
-        LineKind::Values | LineKind::Remark => format!(", such as `{shown}{cut}`"),
+        LineKind::Bad(why) => format!(", such as `{shown}` ({why})"),
+        LineKind::Values | LineKind::Remark => format!(", such as `{shown}`"),
     }
+}
+
+/// As much of a line as is shown.
+fn beginning(text: &str) -> String {
+    let cut = if text.chars().count() > SHOWN { ".." } else { "" };
+    text.chars().take(SHOWN).chain(cut.chars()).collect()
+}
+
+/// The beginning of an unreadable line that is whole words, none of them a channel's name: no damage makes such a line.
+fn words(seen: &Evidence<'_>) -> Option<String> {
+    let line = seen.all.example.as_ref().filter(|line| matches!(line.kind, LineKind::Bad(_)))?;
+    let of_channel = |name: &String| line.text.contains(name.as_str());
+    let is_text = line.text.chars().all(|c| c.is_alphanumeric() || c.is_ascii_graphic() || c == ' ' || c == '\t');
+    let mut words = line.text.split(|c: char| !c.is_alphabetic());
+    let has_word = words.any(|word| word.chars().count() >= SHORTEST_WORD);
+    (has_word && is_text && !seen.link.board.channels.iter().any(of_channel)).then(|| beginning(&line.text))
 }
 
 /// Finding where no line was understood.
@@ -234,6 +252,13 @@ pub(super) fn lines(seen: &Evidence<'_>) -> CheckFinding {
     }
     let all = bad + cadence.samples;
     let found = format!("{bad} of {all} lines unreadable");
+    if let Some(text) = words(seen).filter(|_| bad > BAD_LINES) {
+        return Note.seen(format!("{bad} of {all} lines are no samples, such as `{text}`")).because(
+            "Something else is printed between the samples: the messages of a board that starts, or of a library",
+            "Take those prints out of the sketch, or begin their lines with #; if the board starts again and again, look at its \
+             supply",
+        );
+    }
     if bad as f64 > BAD_SHARE * all as f64 {
         return Failed.seen(found + &example(seen.all)).because(
             "Bytes are lost or damaged: a long or bad cable, a hub, a floating ground, or two programs on one port",

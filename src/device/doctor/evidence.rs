@@ -2,7 +2,7 @@
 
 use super::CheckStatus::NotChecked;
 use super::{ChannelTrace, CheckFinding, CheckStatus, Observations};
-use crate::protocol::Saturation;
+use crate::protocol::{AdcRange, Saturation};
 use crate::serial::LinkStatus;
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::Sensor;
@@ -107,7 +107,8 @@ impl<'a> Evidence<'a> {
     pub(super) fn no_counts(&self) -> Option<String> {
         let missing = [
             (self.sensors.is_empty(), "none of the channels is known to be a sensor"),
-            (self.volts().is_some(), "the values are not counts"),
+            (self.volts().or(self.scaled()).is_some(), "the values are not counts"),
+            (self.link.adc_range == AdcRange::Exceeded, "the values exceed the converter's range"),
             (self.is_swapped(), "strips and pads are swapped"),
         ];
         missing.into_iter().find(|(is_missing, _)| *is_missing).map(|(_, what)| what.to_owned())
@@ -127,6 +128,13 @@ impl<'a> Evidence<'a> {
     pub(super) fn volts(&self) -> Option<f64> {
         let (most, decimals) = (self.most(), self.sensors.iter().any(|own| own.trace.decimals));
         (decimals && most > 0.1 && most < MOST_VOLT).then_some(most)
+    }
+
+    /// Largest value of the strips, where it is below what a strip reads however it is bent.
+    pub(super) fn scaled(&self) -> Option<f64> {
+        let most = self.traces(true).map(|trace| trace.most).reduce(f64::max)?;
+        let fits = self.link.adc_range == AdcRange::Fits && !self.is_swapped();
+        (fits && most > self.idle() && most < self.least_of_a_strip()).then_some(most)
     }
 
     /// A strip that falls to zero, as only a pad does, and a pad that never does, as a strip.

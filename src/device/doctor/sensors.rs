@@ -13,6 +13,9 @@ const FEWEST_SPIKES: u64 = 3;
 /// Largest count of ten bits.
 const TEN_BITS: f64 = 1023.0;
 
+/// Largest count of the widest converter that is usual on a board, of 16 bits.
+const MOST_COUNTS: f64 = 65_535.0;
+
 /// Time of readings after which their largest count shows that the converter has ten bits (s).
 const BITS_S: f64 = 5.0;
 
@@ -67,7 +70,20 @@ pub(super) fn bits(seen: &Evidence<'_>) -> CheckFinding {
             .seen(format!("no value above {}, with decimals", three_digits(most)))
             .because("The sketch prints volts", "Print the counts of analogRead() instead");
     }
-    if let Some(missing) = seen.no_counts() {
+    let (full, stated, most) = (seen.link.board.full_scale, seen.link.board.firmware.is_some(), seen.most());
+    if let Some(most) = seen.scaled() {
+        return Failed.seen(format!("no strip above {most:.0} of {full}")).because(
+            "The sketch scales the values, to 8 bits or percent: counts of a strip never fall so low",
+            "Print the counts of analogRead() as they are, after analogReadResolution(12)",
+        );
+    }
+    if most > MOST_COUNTS && seen.link.adc_range == AdcRange::Exceeded {
+        return Failed.seen(format!("values up to {most:.0}, which no usual converter has")).because(
+            "The sketch prints computed values, such as ohms",
+            "Print the counts of analogRead() instead; a wider converter states its bits in the handshake",
+        );
+    }
+    if let Some(missing) = seen.no_counts().filter(|_| seen.link.adc_range != AdcRange::Exceeded) {
         return NotChecked.seen(missing);
     }
     if let Some(own) = seen.sensors.iter().find(|own| own.trace.numbers > 0 && own.trace.least < 0.0) {
@@ -76,7 +92,6 @@ pub(super) fn bits(seen: &Evidence<'_>) -> CheckFinding {
             "Print the counts of analogRead() as they are",
         );
     }
-    let (full, stated, most) = (seen.link.board.full_scale, seen.link.board.firmware.is_some(), seen.most());
     let watched = seen.all.traces.seconds();
     match seen.link.adc_range {
         AdcRange::Exceeded => Failed.seen(format!("counts exceed {full}")).because(

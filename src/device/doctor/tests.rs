@@ -159,6 +159,17 @@ fn each_trouble_is_found_by_its_own_check() {
     let unreadable = |link: &mut LinkStatus| (link.cadence.lost, link.cadence.bad_lines) = (40, 40);
     assert_eq!(complaints(&changed(unreadable)), [("lines", CheckStatus::Failed), ("rate", CheckStatus::Note)]);
     assert_eq!(complaints(&changed(|link| link.cadence.bad_lines = 40)), wrong("lines"));
+    for (text, verdict) in [
+        ("entry 0x400805e4", CheckStatus::Note),
+        ("WiFi reconnecting..., rssi=-71", CheckStatus::Note),
+        ("flexL:14\u{fffd}2,flexR:1500", CheckStatus::Failed),
+        ("exL:1433,flexR:15 0", CheckStatus::Failed),
+        ("14 2,15", CheckStatus::Failed),
+    ] {
+        let example = Some(ConsoleLine { arrived_ms: 0, text: text.to_owned(), kind: LineKind::Bad("why") });
+        let seen = Observations { example, ..changed(|link| link.cadence.bad_lines = 40) };
+        assert_eq!(complaints(&seen), [("lines", verdict)], "{text}");
+    }
     assert_eq!(complaints(&changed(|link| link.cadence.drift_ppm = Some(-1e6))), wrong("clock"));
     let silent = |link: &mut LinkStatus| link.state = LinkState::Silent { hint: String::new() };
     assert_eq!(complaints(&changed(silent)), wrong("silence"));
@@ -244,6 +255,17 @@ fn other_boards_are_told_by_what_they_print() {
     let found: Vec<&str> =
         findings(&volts).iter().filter(|f| f.verdict >= CheckStatus::Note).map(|f| f.check).collect();
     assert_eq!((found, said(&volts, "bits").1), (vec!["bits"], "no value above 1.53, with decimals".to_owned()));
+    let complains = |counts: &dyn Fn(f32) -> [f32; 4], range: AdcRange, essence: &str| {
+        let mut seen = Observations { traces: moving(counts), ..sound() };
+        seen.link.iter_mut().for_each(|link| link.adc_range = range);
+        let found: Vec<&str> =
+            findings(&seen).iter().filter(|f| f.verdict >= CheckStatus::Note).map(|f| f.check).collect();
+        assert!(found == ["bits"] && said(&seen, "bits").1.contains(essence), "{found:?}");
+    };
+    let bytes = |bend: f32| [1400.0 + bend, 1500.0 + bend, 3.0 * bend, bend].map(|count| (count / 16.0).floor());
+    complains(&bytes, AdcRange::Fits, "no strip above 118 of 4095");
+    let ohms = |bend: f32| [25e3 + bend, 24e3 + bend, 1e6 / (1.0 + bend), 1e6 - bend];
+    complains(&ohms, AdcRange::Exceeded, "values up to 1000000, which no usual converter has");
     // Limits of a plot are no sensors.
     let mut limits = sound();
     limits.link.iter_mut().for_each(|link| {

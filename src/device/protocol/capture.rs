@@ -4,7 +4,9 @@
 //! - raw bytes, as any terminal program saves them. They get times of arrival from the board's clock where its lines have
 //!   one, else 50 lines per second.
 
+use super::columns::Columns;
 use super::fields::{Parsed, parse};
+use super::shape::Role;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured, LONGEST_RECORD, read_record};
 use std::io::{self, Read};
 
@@ -31,6 +33,7 @@ enum Form {
 struct Pace {
     now_s: f64,
     clock: Option<f64>,
+    columns: Columns,
 }
 
 impl<R: Read> CaptureReader<R> {
@@ -68,12 +71,13 @@ impl<R: Read> CaptureReader<R> {
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
         let clock = match parse(line) {
-            Ok(Parsed::Named(_, fields)) => fields.iter().find_map(|field| match field.name.as_str() {
-                "t_us" => field.value.map(|us| us * 1e-6),
-                "ms" => field.value.map(|ms| ms * 1e-3),
-                _ => None,
-            }),
-            _ => None,
+            Ok(Parsed::Named(_, fields)) => Role::time_s(&fields),
+            Ok(Parsed::Columns(values)) => Role::time_s(&self.columns.name(values, None)),
+            Ok(Parsed::Header(names)) => {
+                self.columns.set_header(names);
+                None
+            }
+            Err(_) => None,
         };
         let step = clock.zip(self.clock).map(|(now, before)| now - before);
         self.now_s += step.filter(|step| (0.0..FARTHEST_S).contains(step)).unwrap_or(PACE_S);
@@ -106,6 +110,10 @@ mod tests {
         assert!(close(&times("1,2\n3,4\r\n5,6")?, &[0.02, 0.04, 0.06]));
         let clocked = times("t_us:1000,a:1\nt_us:6000,a:1\nt_us:16000,a:1\n")?;
         assert!(clocked.len() == 3 && close(&clocked, &[0.02, 0.025, 0.035]), "{clocked:?}");
+        for slow in ["millis:500,a:1\nmillis:700,a:2\n", "9,9\n9,9\nmillis,a\n500,1\n700,2\n"] {
+            let found = times(slow)?;
+            assert!((found[found.len() - 1] - found[found.len() - 2] - 0.2).abs() < 1e-9, "{slow}: {found:?}");
+        }
         assert!(times("")?.is_empty());
         Ok(())
     }

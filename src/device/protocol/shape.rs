@@ -38,14 +38,24 @@ impl Role {
     fn named(name: &str) -> Option<Self> {
         let is = |other: &str| name.eq_ignore_ascii_case(other);
         match () {
-            () if is("t_us") || is("micros") => Some(Self::Micros),
-            () if is("ms") || is("t_ms") || is("millis") => Some(Self::Millis),
+            () if ["t_us", "micros", "time_us"].into_iter().any(is) => Some(Self::Micros),
+            () if ["ms", "t_ms", "millis", "time_ms"].into_iter().any(is) => Some(Self::Millis),
             () if is("seq") => Some(Self::Sequence),
             () if is("p_bar") => Some(Self::LineBar),
             () if is(KEY) => Some(Self::Checksum),
             () if name.starts_with(NAMELESS) => Some(Self::Ignored),
             () => None,
         }
+    }
+
+    /// The board's time in a line, where it has one (s).
+    pub(super) fn time_s(fields: &[Field]) -> Option<f64> {
+        let time = |field: &Field| match Self::named(&field.name)? {
+            Self::Micros => Some(1e-6 * field.value?),
+            Self::Millis => Some(1e-3 * field.value?),
+            _ => None,
+        };
+        fields.iter().find_map(time)
     }
 
     /// True where a field of this name is a channel.

@@ -96,6 +96,8 @@ fn numbers_that_are_none() {
 
 #[test]
 fn trials_that_contradict_themselves() {
+    rows_refused("a,x,23:59:59.9,,,1\na,x,0:00:00.1,,,1\n", &["line 3: in trial \"a\" the time falls", "midnight"]);
+    rows_refused("a,x,3/4/2026 1:00:00 PM,,,1\n", &["line 2: the time \"3/4/2026", "the year must come first"]);
     rows_refused("a,x,1,,,1\na,x,0.5,,,1\n", &["line 3: in trial \"a\" the time falls from 1 s to 0.5 s"]);
     rows_refused(
         "a,x,0,,,1\nb,y,0,,,1\na,y,1,,,1\n",

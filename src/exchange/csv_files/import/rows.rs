@@ -426,11 +426,16 @@ impl Rows {
         let name = || brief(&trial.name);
         match trial.t_s.last() {
             Some(before) if *before > now => {
-                let wrapped = (4294.0..4296.0).contains(before) && now < 1.0;
-                let advice = if wrapped {
-                    "a counter of microseconds starts again after 4294.97 s; add that to the times from here on"
-                } else {
-                    "sort its rows, and give every grasp a trial name of its own, or split the file with --split-by gap"
+                let advice = match before {
+                    4294.0..4296.0 if now < 1.0 => {
+                        "a counter of microseconds starts again after 4294.97 s; add that to the times from here on"
+                    }
+                    86_390.0..86_400.0 if now < 10.0 => {
+                        "the clock passes midnight; add the date, as in 2026-03-01 23:59:59.5, or split the file with --split-by gap"
+                    }
+                    _ => {
+                        "sort its rows, and give every grasp a trial name of its own, or split the file with --split-by gap"
+                    }
                 };
                 return Err(format!("in trial \"{}\" the time falls from {before} s to {now} s; {advice}", name()));
             }
@@ -540,8 +545,8 @@ impl Rows {
                 "the time {t} s is beyond {FARTHEST_TIME_S} s; name the unit in the header if it is another, as in t_s [ms]"
             )),
             _ => Err(format!(
-                "the time \"{}\" is not a number of seconds, nor a date and time such as 2026-03-01 12:00:00.5; --skip N passes \
-                 over lines above the header",
+                "the time \"{}\" is not a number of seconds, nor a date and time such as 2026-03-01 12:00:00.5 (where day and \
+                 month can be exchanged, the year must come first); --skip N passes over lines above the header",
                 brief(field)
             )),
         }
