@@ -1,7 +1,7 @@
 //! Checking a mesh before physics trusts it, and mending what can be mended safely.
 //!
-//! Mended, with a note: corners that coincide, triangles that repeat or have two equal corners, winding that is
-//! mixed or inside out, small holes. Refused, with a reason: nothing to hold, numbers that are not finite, no
+//! Mended, with a note: corners that coincide, corners on an edge of a neighbour (T-junctions), triangles that repeat or
+//! have two equal corners, winding that is mixed or inside out, small holes. Refused, with a reason: nothing to hold, numbers that are not finite, no
 //! volume, holes too wide to guess, surfaces with no consistent inside.
 //!
 //! A mesh leaves here *balanced*: every edge is walked as often one way as the other, so that the winding number
@@ -9,8 +9,8 @@
 
 use super::TriMesh;
 use glam::DVec3;
-use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Reason why a mesh is no solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -38,6 +38,14 @@ pub enum MeshError {
         holes: usize,
         /// Width of the widest (mm).
         widest_mm: f64,
+    },
+    #[error(
+        "three faces or more meet at {edges} edge(s) of the mesh: a wall inside the solid, or a fin on it; delete that in a \
+         modelling tool, or set object.collision = \"hull\""
+    )]
+    InnerWall {
+        /// Number of such edges.
+        edges: usize,
     },
     #[error(
         "the mesh has no consistent inside (one-sided or tangled surface); repair it in a modelling tool, \
@@ -85,7 +93,10 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
         let joined = before - welded.points.len();
         // Two triangles back to back are a wall between two solids, which goes, or a face that is seen from both sides.
         closed(welded.clone(), diagonal, Sides::Cancel)
-            .or_else(|fault| closed(welded, diagonal, Sides::Collapse).map_err(|_again| fault))
+            .or_else(|fault| closed(welded.clone(), diagonal, Sides::Collapse).map_err(|_again| fault))
+            .or_else(|fault| {
+                closed(split_at_corners(welded, diagonal * tolerance), diagonal, Sides::Cancel).map_err(|_| fault)
+            })
             .map(|repaired| Repaired { joined, ..repaired })
     };
     // Corners that were rounded are further apart; only a mesh that is open otherwise may need them joined.
@@ -188,6 +199,46 @@ fn drop_degenerate(mesh: &mut TriMesh, sides: Sides, notes: &mut Vec<String>) {
     if dropped > 0 {
         notes.push(format!("{dropped} degenerate or repeated triangles were dropped"));
     }
+}
+
+/// Most pairs of a loose edge and a corner that are compared.
+const MOST_PAIRS: usize = 20_000_000;
+
+/// Splits triangles where the edge of one goes past corners of others, which modelling tools leave (T-junctions).
+fn split_at_corners(mut mesh: TriMesh, tolerance: f64) -> TriMesh {
+    mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+    let edges = edges_of(&mesh.triangles);
+    let mut loose: FxHashSet<[u32; 2]> =
+        edges.chunk_by(same_corners).filter(|sides| sides.len() == 1).map(|sides| sides[0].0).collect();
+    let corners: BTreeSet<u32> = loose.iter().flatten().copied().collect();
+    if loose.len() * corners.len() > MOST_PAIRS {
+        return mesh;
+    }
+    let between = |points: &[DVec3], [a, b]: [u32; 2]| {
+        let [from, to] = [a, b].map(|i| points[i as usize]);
+        let (along, length) = ((to - from).normalize_or_zero(), from.distance(to));
+        let is_inside = |corner: &u32| {
+            let offset = points[*corner as usize] - from;
+            let s = offset.dot(along);
+            s > tolerance && s < length - tolerance && (offset - s * along).length() <= tolerance
+        };
+        corners.iter().copied().find(is_inside)
+    };
+    let mut index = 0;
+    while let Some(&t) = mesh.triangles.get(index) {
+        let split = [t, [t[1], t[2], t[0]], [t[2], t[0], t[1]]].into_iter().find_map(|[a, b, c]| {
+            let corner = loose.contains(&[a.min(b), a.max(b)]).then(|| between(&mesh.points, [a, b]))??;
+            (corner != c).then_some(([a, b, c], corner))
+        });
+        let Some(([a, b, c], corner)) = split else {
+            index += 1;
+            continue;
+        };
+        mesh.triangles[index] = [a, corner, c];
+        mesh.triangles.push([corner, b, c]);
+        loose.extend([a, b].map(|end| [end.min(corner), end.max(corner)]));
+    }
+    mesh
 }
 
 /// The corners in rising order, and whether the triangle walks them in that order (+1) or against it (-1).
@@ -345,6 +396,11 @@ fn fill_holes(mesh: &mut TriMesh, widest_allowed: f64, notes: &mut Vec<String>) 
     let widest = loops.iter().map(|hole| width(hole)).fold(0.0, f64::max);
     let wide = loops.iter().filter(|hole| width(hole) > widest_allowed).count();
     if wide > 0 {
+        let edges = edges_of(&mesh.triangles);
+        let crowded = edges.chunk_by(same_corners).filter(|sides| sides.len() > 2).count();
+        if crowded > 0 && edges.chunk_by(same_corners).all(|sides| sides.len() > 1) {
+            return Err(MeshError::InnerWall { edges: crowded });
+        }
         return Err(MeshError::Open { holes: wide, widest_mm: widest * 1e3 });
     }
     for hole in &loops {
@@ -409,6 +465,38 @@ mod tests {
         let repaired = repair(&cube()).expect("sound");
         assert_eq!(repaired.mesh, cube());
         assert!(repaired.notes.is_empty());
+    }
+
+    #[test]
+    fn corners_on_the_edge_of_a_neighbour_leave_no_gap() {
+        // One side of a cube has two more corners on an edge that it shares.
+        let mut mesh = cube();
+        let place =
+            mesh.triangles.iter().position(|t| t.iter().all(|i| mesh.points[*i as usize].x > 0.0)).expect("a side");
+        let side = mesh.triangles.remove(place);
+        let [a, b, c] = side;
+        let (from, to) = (mesh.points[a as usize], mesh.points[b as usize]);
+        let first = mesh.points.len() as u32;
+        mesh.points.extend([from.lerp(to, 0.3), from.lerp(to, 0.7)]);
+        mesh.triangles.extend([[a, first, c], [first, first + 1, c], [first + 1, b, c]]);
+        let repaired = repair(&mesh).expect("mendable");
+        assert!((repaired.mesh.signed_volume() - 1.0).abs() < 1e-12);
+        assert!(edges_of(&repaired.mesh.triangles).chunk_by(same_corners).all(|sides| sides.len() == 2));
+    }
+
+    #[test]
+    fn a_wall_inside_a_solid_is_no_hole() {
+        let mut mesh = cube();
+        let corner = |x: f64, y: f64, z: f64| {
+            mesh.points.iter().position(|p| *p == 0.5 * DVec3::new(x, y, z)).expect("a corner") as u32
+        };
+        let wall = [corner(-1.0, -1.0, -1.0), corner(1.0, 1.0, -1.0), corner(1.0, 1.0, 1.0), corner(-1.0, -1.0, 1.0)];
+        mesh.triangles.extend([[wall[0], wall[1], wall[2]], [wall[0], wall[2], wall[3]]]);
+        assert!(
+            matches!(repair(&mesh), Err(MeshError::InnerWall { .. } | MeshError::NotOrientable)),
+            "{:?}",
+            repair(&mesh)
+        );
     }
 
     #[test]

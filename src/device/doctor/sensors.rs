@@ -68,7 +68,7 @@ pub(super) fn bits(seen: &Evidence<'_>) -> CheckFinding {
     if let Some(most) = seen.volts() {
         return Failed
             .seen(format!("no value above {}, with decimals", three_digits(most)))
-            .because("The sketch prints volts", "Print the counts of analogRead() instead");
+            .because("The sketch prints volts, or shares of the range", "Print the counts of analogRead() instead");
     }
     let (full, stated, most) = (seen.link.board.full_scale, seen.link.board.firmware.is_some(), seen.most());
     if let Some(most) = seen.scaled() {

@@ -12,7 +12,7 @@ use super::lines::{Line, LineSplitter};
 use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, LineVerdict, Role, Shapes};
-use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor};
+use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor, TimeSource};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
 
@@ -77,6 +77,9 @@ struct Reader {
 
 /// Divider resistor up to which a strip, which has at least 17.5 kOhm (data sheet), stays above a quarter of the range (ohm).
 const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
+
+/// Parts of the line in which an ESP32 and an ESP8266 give the reason of a restart.
+const START_MESSAGES: [&str; 2] = ["rst:0x", ",rst cause:"];
 
 /// Largest valid counter: beyond it an `f64` no longer separates whole numbers.
 const LARGEST_COUNTER: f64 = 9.0e15;
@@ -174,6 +177,12 @@ impl Reader {
 
     fn bad(&mut self, line: &[u8], why: &'static str, arrived_s: f64) {
         self.line_log.add(line, arrived_s, LineKind::Bad(why));
+        // Opening the port may restart the board, before its first reading; a counter shows restarts by itself.
+        let text = String::from_utf8_lossy(line);
+        let counts = self.clock.source() != TimeSource::Arrival;
+        if self.last_s.is_some() && !counts && START_MESSAGES.iter().any(|part| text.contains(part)) {
+            self.meter.restart();
+        }
         self.give_up(arrived_s);
         self.unreadable += 1;
         self.meter.bad_line(arrived_s);

@@ -414,3 +414,16 @@ fn names_that_are_the_first_line_are_read_where_they_are_whole() {
         assert!(!channels.contains(&"flexR".to_owned()) && read >= 18, "{cut}: {channels:?}, {read}");
     }
 }
+
+#[test]
+fn the_message_of_a_board_that_starts_is_a_restart() {
+    let lines = "flexL:1,flexR:2\n".repeat(20);
+    for message in [
+        "rst:0xf (RTCWDT_BROWN_OUT_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)\n",
+        " ets Jan  8 2013,rst cause:4, boot mode:(3,7)\n",
+    ] {
+        let text = format!("{message}{lines}{message}{lines}");
+        let (decoder, _) = hear([(0.0, text.as_bytes())]);
+        assert_eq!(decoder.cadence().restarts, 1, "the first came with the connection: {message}");
+    }
+}

@@ -293,6 +293,8 @@ mod tests {
             TETRAHEDRON.replace("f 1 3 2", "f 1 3 2 # the bottom, m\u{fc}de"),
             TETRAHEDRON.replace("v 1 0 0", "v 1 0 0 0.5 0.5 0.5 # red"),
             TETRAHEDRON.replace("f 1 3 2", "f 1/ 3/ 2/"),
+            TETRAHEDRON.replace("f 1 3 2", "fo 1 3 2"),
+            TETRAHEDRON.to_uppercase(),
             TETRAHEDRON.replace("f 1 3 2", "f -4//-1 -2 -3"),
             format!("usemtl\nl 1 2 3 4 1\np 1\nvn nan 0 0\ng\n{TETRAHEDRON}s off\ncstype bezier\n"),
         ];
@@ -312,6 +314,8 @@ mod tests {
             ("a.obj", "v 1 0\n", "line 1: \"v 1 0\" is not the place of a corner"),
             ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "line 4: the face names corner 9, but the file has 3"),
             ("a.obj", "v 0 0 0\nf 1 x 1\n", "line 2: \"x\" is no corner of a face"),
+            ("a.obj", "v 0 0 0\nv 1 0 0\n", "the file has 2 corners and no face"),
+            ("a.obj", "v 0 0 0\ncstype bspline\nsurf 0 1 0 1 1\n", "line 3: \"surf 0 1 0 1 1\" is a curved surface"),
             (
                 "a.stl",
                 "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0,5\n",

@@ -8,10 +8,11 @@ pub(super) fn cleaned(bytes: &[u8]) -> Result<String, String> {
     let text = crate::file::text_of(bytes);
     let mut out = String::with_capacity(text.len());
     let (mut corners, mut highest) = (0_i64, (0_i64, 0));
+    let (mut faces, mut other) = (0, None);
     for (number, line) in whole_lines(&text) {
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((&line, ""));
         let rest = rest.trim();
-        match word {
+        match word.to_ascii_lowercase().as_str() {
             "v" => {
                 let values = without_remark(rest);
                 let place: Vec<&str> = values.split_whitespace().take(3).collect();
@@ -29,7 +30,7 @@ pub(super) fn cleaned(bytes: &[u8]) -> Result<String, String> {
                 corners += 1;
                 out.push_str(&format!("v {}\n", place.join(" ")));
             }
-            "f" => {
+            "f" | "fo" => {
                 let mut face = String::from("f");
                 let mut count = 0;
                 for corner in without_remark(rest).split_whitespace() {
@@ -54,13 +55,21 @@ pub(super) fn cleaned(bytes: &[u8]) -> Result<String, String> {
                 if count > 2 {
                     out.push_str(&face);
                     out.push('\n');
+                    faces += 1;
                 }
             }
-            "usemtl" | "mtllib" if !rest.is_empty() => out.push_str(&format!("{word} {rest}\n")),
+            "surf" | "curv" | "l" | "p" => other = other.or(Some((number, brief(&line)))),
+            word @ ("usemtl" | "mtllib") if !rest.is_empty() => out.push_str(&format!("{word} {rest}\n")),
             _ => {}
         }
     }
     match highest {
+        _ if faces == 0 && corners > 0 => Err(match other {
+            None => format!("the file has {corners} corners and no face (lines that begin with f)"),
+            Some((number, line)) => format!(
+                "line {number}: \"{line}\" is a curved surface or a line, and no face (f) is in the file; export it as a mesh"
+            ),
+        }),
         (index, number) if index > corners => {
             Err(format!("line {number}: the face names corner {index}, but the file has {corners}"))
         }
