@@ -10,7 +10,7 @@ use palpate_geometry::palette::series_colour;
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
 use palpate_store::Store;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a column is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,8 +66,10 @@ struct Outcome {
 pub(super) struct ImportDialog {
     path: PathBuf,
     store: PathBuf,
-    /// Name of the profile; empty without one.
-    profile: &'static str,
+    /// Name of the profile, or its file; empty without one.
+    profile: String,
+    /// Why a profile cannot be used.
+    refused: Option<String>,
     /// What the columns do not say.
     base: Mapping,
     columns: Vec<ColumnChoice>,
@@ -78,10 +80,12 @@ pub(super) struct ImportDialog {
     job: Job<Request, Outcome>,
 }
 
-/// End of a dialog.
-pub(super) enum Ended {
-    Cancelled,
+/// What a dialog asks for.
+pub(super) enum Asked {
+    Cancel,
     Imported(String),
+    OpenProfile,
+    SaveProfile(Box<Mapping>),
 }
 
 /// Curves and warnings that are shown at most.
@@ -110,7 +114,8 @@ impl ImportDialog {
         let dialog = Self {
             path,
             store,
-            profile: "",
+            profile: String::new(),
+            refused: None,
             base: Mapping::default(),
             columns: Vec::new(),
             label: String::new(),
@@ -127,10 +132,16 @@ impl ImportDialog {
         self.job.start(Request { path: self.path.clone(), mapping: self.mapping(), store });
     }
 
+    /// Pause that begins a new trial (s).
+    fn gap_s(&self) -> f64 {
+        self.base.split_gap_s.unwrap_or(SPLIT_GAP_S)
+    }
+
     /// The roles as they are now.
     fn mapping(&self) -> Mapping {
-        let split_gap_s = self.split.then_some(SPLIT_GAP_S);
+        let split_gap_s = self.split.then_some(self.gap_s());
         let label = Some(self.label.trim().to_owned()).filter(|label| !label.is_empty());
+        let label = label.or_else(|| self.base.label.clone());
         if !self.chosen {
             return Mapping { split_gap_s, label, ..self.base.clone() };
         }
@@ -139,9 +150,21 @@ impl ImportDialog {
             unit => format!("{} [{unit}]", plain_name(&column.name)),
         };
         let of = |role: Role| self.columns.iter().find(|column| column.role == role).map(named);
-        let channels = self.columns.iter().filter(|column| column.role == Role::Channel).map(named).collect();
+        let channel = |column: &ColumnChoice| match self.base.channel_of(&column.name) {
+            Some((Some(own), _)) => format!("{own}={}", named(column)),
+            _ => named(column),
+        };
+        let channels = self.columns.iter().filter(|column| column.role == Role::Channel).map(channel).collect();
         let label = of(Role::Label).or(label);
         Mapping { time: of(Role::Time), trial: of(Role::Trial), label, channels, split_gap_s, ..self.base.clone() }
+    }
+
+    /// The roles for other files: a label that is no column is that of this file.
+    fn profile_to_save(&self) -> Mapping {
+        let mapping = self.mapping();
+        let is_column =
+            |label: &String| self.columns.iter().any(|column| plain_name(&column.name) == plain_name(label));
+        Mapping { label: mapping.label.clone().filter(is_column), ..mapping }
     }
 
     /// Takes in the columns of the file, and a profile that fits.
@@ -151,7 +174,8 @@ impl ImportDialog {
         }
         let header: Vec<&str> = names.iter().map(String::as_str).collect();
         if let Some((name, profile)) = Mapping::known_for(&header).filter(|_| self.profile.is_empty()) {
-            (self.profile, self.base) = (name, profile);
+            self.split = profile.split_gap_s.is_some();
+            (self.profile, self.base) = (name.to_owned(), profile);
         }
         self.columns = names.iter().map(|name| self.choice_of(name)).collect();
         let is_time = |name: &str| name == "t" || name.to_ascii_lowercase().contains("time");
@@ -174,26 +198,52 @@ impl ImportDialog {
             Role::Trial
         } else if is(base.label_column.as_ref()) || plain(name) == "label" {
             Role::Label
-        } else if base.ignore.iter().any(|ignored| plain(ignored) == plain(name)) {
+        } else if base.ignore.iter().any(|ignored| plain(ignored) == plain(name))
+            || (base.channel_of(name).is_none() && !base.channels.is_empty())
+        {
             Role::LeftOut
         } else {
             Role::Channel
         };
-        ColumnChoice { name: name.to_owned(), role, unit: String::new() }
+        let mapped = match role {
+            Role::Time => base.time.as_deref(),
+            Role::Channel => base.channel_of(name).map(|(_, column)| column),
+            Role::Label | Role::Trial | Role::LeftOut => None,
+        };
+        let unit = mapped.and_then(|column| column.split_once('[')).map(|(_, unit)| unit.trim_end_matches(']'));
+        ColumnChoice { name: name.to_owned(), role, unit: unit.unwrap_or_default().to_owned() }
     }
 
-    /// Draws the dialog; returns its end.
-    pub(super) fn ui(&mut self, ctx: &egui::Context) -> Option<Ended> {
+    /// Uses a profile by its name, or of a file.
+    fn use_profile(&mut self, name: String) {
+        match Mapping::profile(&name) {
+            _ if name.is_empty() => self.base = Mapping::default(),
+            Ok(base) => self.base = base,
+            Err(cause) => return self.refused = Some(cause),
+        }
+        self.split = self.base.split_gap_s.is_some();
+        (self.profile, self.refused, self.chosen) = (name, None, false);
+        self.columns = self.columns.iter().map(|column| self.choice_of(&column.name)).collect();
+        self.start(None);
+    }
+
+    /// Uses the profile of a file.
+    pub(super) fn open_profile(&mut self, path: &Path) {
+        self.use_profile(path.to_string_lossy().into_owned());
+    }
+
+    /// Draws the dialog; returns what it asks for.
+    pub(super) fn ui(&mut self, ctx: &egui::Context) -> Option<Asked> {
         let (running, last) = self.job.state();
         let outcome = last.map(|ended| ended.outcome);
         if let Some(Ok(outcome)) = &outcome {
             if let Some(said) = &outcome.stored {
-                return Some(Ended::Imported(said.clone()));
+                return Some(Asked::Imported(said.clone()));
             }
             self.take_columns(&outcome.columns);
         }
-        let mut ended = None;
-        let before = (self.mapping(), self.profile);
+        let mut asked = None;
+        let before = self.mapping();
         let modal = Modal::new(Id::unique("import dialog")).show(ctx, |ui| {
             let room = ui.ctx().content_rect().size();
             ui.set_width((room.x - 60.0).min(720.0));
@@ -202,7 +252,10 @@ impl ImportDialog {
             // Of one height, so that buttons stay where they are.
             let height = (room.y - 150.0).clamp(120.0, 560.0);
             ScrollArea::vertical().max_height(height).auto_shrink(false).show(ui, |ui| {
-                self.choices_ui(ui);
+                self.choices_ui(ui, &mut asked);
+                if let Some(cause) = &self.refused {
+                    failure_ui(ui, cause);
+                }
                 match &outcome {
                     None => remark_ui(ui, "Reading the file .."),
                     Some(Err(cause)) => failure_ui(ui, cause),
@@ -223,38 +276,48 @@ impl ImportDialog {
                     self.start(Some(self.store.clone()));
                 }
                 if ui.button("Cancel").clicked() {
-                    ended = Some(Ended::Cancelled);
+                    asked = Some(Asked::Cancel);
                 }
                 if running.is_some() {
                     ui.spinner();
                 }
             });
         });
-        if (self.mapping(), self.profile) != before {
+        if self.mapping() != before {
             self.start(None);
         }
-        if modal.should_close() { Some(ended.unwrap_or(Ended::Cancelled)) } else { ended }
+        if modal.should_close() { Some(asked.unwrap_or(Asked::Cancel)) } else { asked }
     }
 
-    fn choices_ui(&mut self, ui: &mut Ui) {
+    fn choices_ui(&mut self, ui: &mut Ui, asked: &mut Option<Asked>) {
         ui.horizontal_wrapped(|ui| {
-            let title = |name: &str| match Mapping::profile(name) {
-                Ok(profile) if !name.is_empty() => profile.title,
-                _ => "its own names".to_owned(),
+            let title = |name: &str| match PROFILES.iter().find(|(own, _)| *own == name) {
+                Some(_) => Mapping::profile(name).unwrap_or_default().title,
+                None if name.is_empty() => "its own names".to_owned(),
+                None => Path::new(name).file_name().unwrap_or_default().to_string_lossy().into_owned(),
             };
             ui.label("Columns as in");
-            let before = self.profile;
-            ComboBox::from_id_salt("import profile").selected_text(title(before)).show_ui(ui, |ui| {
+            let mut profile = self.profile.clone();
+            ComboBox::from_id_salt("import profile").selected_text(title(&profile)).show_ui(ui, |ui| {
                 for name in std::iter::once("").chain(PROFILES.iter().map(|(name, _)| *name)) {
-                    ui.selectable_value(&mut self.profile, name, title(name));
+                    ui.selectable_value(&mut profile, name.to_owned(), title(name));
+                }
+                if ui.selectable_label(false, "a profile of yours ..").clicked() {
+                    *asked = Some(Asked::OpenProfile);
                 }
             });
-            if self.profile != before {
-                self.base = Mapping::profile(self.profile).unwrap_or_default();
-                self.chosen = false;
-                self.columns = self.columns.iter().map(|column| self.choice_of(&column.name)).collect();
+            if self.profile != profile {
+                self.use_profile(profile);
             }
-            ui.checkbox(&mut self.split, "New trial after a pause of 1 s");
+            if ui
+                .button("Save profile ..")
+                .on_hover_text("Keep these roles for other files of this kind, as TOML")
+                .clicked()
+            {
+                *asked = Some(Asked::SaveProfile(Box::new(self.profile_to_save())));
+            }
+            let pause = format!("New trial after a pause of {} s", self.gap_s());
+            ui.checkbox(&mut self.split, pause);
         });
         ui.horizontal(|ui| {
             ui.label("Label");
@@ -309,7 +372,8 @@ fn import_ui(ui: &mut Ui, import: &Import) {
             format!("The first, \"{}\"; each channel is drawn from its least to its largest value.", trial.label),
         );
         let theme = theme::of(ui);
-        let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
+        let seconds = AxisHints::new_x()
+            .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", (mark.value * 1e9).round() / 1e9));
         let plot = static_plot(theme, "import preview", 130.0, "", seconds, 0.0).legend(Legend::default());
         plot.show_axes([true, false]).show(ui, |plot| {
             let signals = &trial.signals;

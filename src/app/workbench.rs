@@ -15,7 +15,7 @@ use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
 use crate::app::features::view::ViewState;
 use crate::app::frame_rate::FrameRate;
-use crate::app::import_dialog::{Ended, ImportDialog};
+use crate::app::import_dialog::{Asked, ImportDialog};
 use crate::app::panels::PanelKind;
 use crate::app::path_dialog::{Closed, PathDialog};
 use crate::app::shown::Inspected;
@@ -307,10 +307,20 @@ impl Workbench {
         if let Some((path, wake)) = self.app.files.import.take() {
             self.import_dialog = Some(ImportDialog::new(path, self.app.store.clone(), wake));
         }
-        if let Some(ended) = self.import_dialog.as_mut().and_then(|dialog| dialog.ui(&self.app.ctx)) {
-            self.import_dialog = None;
-            if let Ended::Imported(said) = ended {
-                self.app.notices.info(said);
+        // A file dialog that it asked for stands in its place.
+        let Some(dialog) = self.import_dialog.as_mut().filter(|_| self.path_dialog.is_none()) else { return };
+        if let Some(path) = self.app.files.profile.take() {
+            dialog.open_profile(&path);
+        }
+        if let Some(asked) = dialog.ui(&self.app.ctx) {
+            match asked {
+                Asked::OpenProfile => self.app.open_profile(),
+                Asked::SaveProfile(mapping) => self.app.save_profile(&mapping),
+                Asked::Cancel => self.import_dialog = None,
+                Asked::Imported(said) => {
+                    self.import_dialog = None;
+                    self.app.notices.info(said);
+                }
             }
             self.app.ctx.request_repaint();
         }

@@ -2,6 +2,7 @@
 //! and which ones are channels. A mapping is given by options, or read from a profile (TOML).
 
 use palpate_geometry::read_text;
+use palpate_store::FileKind;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -57,6 +58,9 @@ const LARGEST: u64 = 1 << 20;
 pub const SPLIT_GAP_S: f64 = 1.0;
 
 impl Mapping {
+    /// Kind of a file of a profile.
+    pub const FILE: FileKind = FileKind::Other { title: "import profile", endings: &["toml"], begin: b"title = " };
+
     /// A profile that comes with the program, or one of a file, whose name ends in `.toml`.
     pub fn profile(name: &str) -> Result<Self, String> {
         let path = Path::new(name);
@@ -91,6 +95,12 @@ impl Mapping {
         let Self { time, label, label_ends_at, trial, split_gap_s, channels, name, .. } = self;
         let texts = [time, label, label_ends_at, trial, name];
         texts.iter().any(|text| text.is_some()) || split_gap_s.is_some() || !channels.is_empty()
+    }
+
+    /// The channel of a column, if it is one of those listed: the name that it is given, and the column with its unit.
+    pub fn channel_of(&self, column: &str) -> Option<(Option<&str>, &str)> {
+        let is_it = |(_, own): &(Option<&str>, &str)| plain_name(own).eq_ignore_ascii_case(plain_name(column));
+        self.channels.iter().map(|text| named_column(text)).find(is_it)
     }
 
     /// True where the columns are named by their numbers, as in a table without a header.

@@ -198,6 +198,28 @@ fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
         bench.harness.get_by_label("New trial after a pause of 1 s").click();
         bench.until_shown(true, "2 trial(s): mug 2");
         let picture = bench.picture();
+        // The roles are kept for other files, and read from their profile.
+        let profile = folder.path().join(format!("{theme:?}.toml"));
+        bench.harness.get_by_label("Save profile ..").click();
+        bench.harness.run_steps(3);
+        press(&mut bench, Modifiers::COMMAND, Key::A);
+        type_text(&mut bench, profile.to_str().unwrap());
+        press(&mut bench, Modifiers::NONE, Key::Enter);
+        bench.until_told("Import profile saved as");
+        let saved = palpate_exchange::Mapping::profile(profile.to_str().unwrap()).unwrap();
+        assert_eq!((saved.time.as_deref(), saved.label, saved.split_gap_s), (Some("timestamp [ms]"), None, Some(1.0)));
+        bench.harness.get_by_label("Cancel").click();
+        bench.harness.run_steps(2);
+        bench.tell(|app| app.open_file(&log));
+        bench.until_shown(true, "samples per second");
+        bench.harness.get_by_value("its own names").click();
+        bench.harness.run_steps(2);
+        bench.harness.get_by_label("a profile of yours ..").click();
+        bench.harness.run_steps(3);
+        press(&mut bench, Modifiers::COMMAND, Key::A);
+        type_text(&mut bench, profile.to_str().unwrap());
+        press(&mut bench, Modifiers::NONE, Key::Enter);
+        bench.until_shown(true, "2 trial(s): mug 2");
         bench.harness.get_by_label("Import 2 trial(s)").click();
         bench.harness.run_steps(2);
         bench.until_told("2 trial(s) imported as collection mug");

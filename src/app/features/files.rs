@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
+use palpate_exchange::Mapping;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{FigureOptions, OpenOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
@@ -40,6 +41,8 @@ pub(in crate::app) struct FileFeature {
     exports: Job<(PathBuf, ExportRequest), String>,
     /// File whose trials are to be imported now.
     pub(in crate::app) import: Option<(PathBuf, Wake)>,
+    /// Profile that the import dialog is to use now.
+    pub(in crate::app) profile: Option<PathBuf>,
     wake: Wake,
     /// All labelled trials are exported as soon as the store has their labels.
     labelled: bool,
@@ -48,7 +51,7 @@ pub(in crate::app) struct FileFeature {
 impl FileFeature {
     pub(in crate::app) fn new(wake: Wake) -> Self {
         let exports = export_job(Arc::clone(&wake));
-        Self { question: None, folder: None, exports, import: None, wake, labelled: false }
+        Self { question: None, folder: None, exports, import: None, profile: None, wake, labelled: false }
     }
 
     /// Folder that a dialog begins in: that of the file chosen last, or the working folder.
@@ -146,6 +149,24 @@ impl App {
             match write_whole(&path, FileKind::Scene, scene.to_toml().as_bytes()) {
                 Ok(()) => app.notices.info(format!("Scene saved as {}.", path.display())),
                 Err(error) => app.notices.error(format!("Cannot write {}: {error}", path.display())),
+            }
+        });
+    }
+
+    /// Asks for a profile of an import.
+    pub(in crate::app) fn open_profile(&mut self) {
+        self.files.ask("Open import profile", &["toml"], None, |app, path| app.files.profile = Some(path));
+    }
+
+    /// Asks where to save the roles of columns as a profile.
+    pub(in crate::app) fn save_profile(&mut self, mapping: &Mapping) {
+        let text = mapping.to_toml();
+        self.files.ask("Save import profile", &["toml"], Some("profile.toml".to_owned()), move |app, path| {
+            let write =
+                |text: String| write_whole(&path, Mapping::FILE, text.as_bytes()).map_err(|error| error.to_string());
+            match text.and_then(write) {
+                Ok(()) => app.notices.info(format!("Import profile saved as {}.", path.display())),
+                Err(cause) => app.notices.error(format!("Cannot write {}: {cause}", path.display())),
             }
         });
     }

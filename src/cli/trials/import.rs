@@ -4,8 +4,7 @@ use super::super::output::cannot;
 use super::super::prelude::*;
 use super::nothing_added;
 use palpate_exchange::{Mapping, SPLIT_GAP_S, read_trials};
-use palpate_store::{FileKind, NewFile};
-use std::io::Write as _;
+use palpate_store::write_whole;
 
 pub(super) const EXAMPLES: &str = "Examples:
   palpate trials import grasps.csv bag.mcap
@@ -50,12 +49,9 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "NAME|FILE.toml")]
     profile: Option<String>,
     /// Save the roles as a profile.
-    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[PROFILE]))]
+    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[Mapping::FILE]))]
     save_profile: Option<PathBuf>,
 }
-
-/// Kind of a file of a profile.
-const PROFILE: FileKind = FileKind::Other { title: "import profile", endings: &["toml"], begin: b"title = " };
 
 fn split_by(text: &str) -> Result<f64, String> {
     let wrong = || format!("\"{text}\" is neither gap nor gap=SECONDS");
@@ -109,12 +105,7 @@ pub(super) fn run(arguments: &ImportArguments, store: &mut Store) -> Result<(), 
     }
     if let Some(path) = &arguments.save_profile {
         let text = mapping.to_toml()?;
-        let write = || -> std::io::Result<()> {
-            let mut file = NewFile::create(path, PROFILE)?;
-            file.write_all(text.as_bytes())?;
-            file.finish()
-        };
-        write().map_err(|cause| cannot(path, &cause))?;
+        write_whole(path, Mapping::FILE, text.as_bytes()).map_err(|cause| cannot(path, &cause))?;
         say(format!("profile saved as {}", path.display()))?;
     }
     Ok(())
