@@ -13,7 +13,7 @@ use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int6
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
-use ::parquet::file::reader::FileReader as _;
+use ::parquet::file::reader::{ChunkReader, FileReader as _, Length};
 use ::parquet::file::serialized_reader::SerializedFileReader;
 use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::record::reader::RowIter;
@@ -65,7 +65,7 @@ impl TrialFormat for Parquet {
     fn columns(&self, path: &Path, _mapping: &Mapping) -> Result<Vec<String>, ImportError> {
         let file = palpate_geometry::open_regular(path).map_err(|cause| ImportError::of(path, cause))?;
         contained(path, || {
-            let reader = SerializedFileReader::new(file);
+            let reader = SerializedFileReader::new(Bounded(file));
             reader.and_then(|reader| names_of(&reader)).map_err(|error| ImportError::of(path, why(&error)))
         })
     }
@@ -88,8 +88,53 @@ fn contained<T>(path: &Path, read: impl FnOnce() -> Result<T, ImportError>) -> R
     outcome.unwrap_or_else(|_panic| Err(ImportError::of(path, "it is not a sound Parquet file")))
 }
 
+/// Largest page, unpacked (bytes). Programs write pages of about a megabyte.
+const MOST_OF_A_PAGE: u64 = 16 << 20;
+
+/// A file in which no page may claim to unpack to more than that: the library would take the memory before it looks.
+struct Bounded(File);
+
+impl Length for Bounded {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl ChunkReader for Bounded {
+    type T = <File as ChunkReader>::T;
+
+    fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        let head = self.0.get_bytes(start, self.len().saturating_sub(start).min(16) as usize)?;
+        match unpacked_size(&head) {
+            Some(claimed) if claimed > MOST_OF_A_PAGE => Err(ParquetError::General(format!(
+                "a page claims to unpack to {claimed} bytes; write it with pages of at most {MOST_OF_A_PAGE}"
+            ))),
+            _ => self.0.get_read(start),
+        }
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<bytes::Bytes, ParquetError> {
+        match start.checked_add(length as u64) {
+            Some(end) if end <= self.len() => self.0.get_bytes(start, length),
+            _ => Err(ParquetError::EOF(format!("{length} bytes at {start}, beyond the end"))),
+        }
+    }
+}
+
+/// The size at the head of a page: its second number, in Thrift's compact form (parquet.thrift, `PageHeader`).
+fn unpacked_size(head: &[u8]) -> Option<u64> {
+    const NUMBER_OF_THE_NEXT_FIELD: u8 = 0x15;
+    let number = |bytes: &[u8]| {
+        let end = bytes.iter().position(|byte| byte & 0x80 == 0)? + 1;
+        let bits = |sum: u64, (place, byte): (u32, &u8)| sum | u64::from(byte & 0x7f) << (7 * place).min(57);
+        Some(((0..).zip(&bytes[..end]).fold(0, bits) >> 1, end))
+    };
+    let (_, end) = number(head.strip_prefix(&[NUMBER_OF_THE_NEXT_FIELD])?)?;
+    number(head[1 + end..].strip_prefix(&[NUMBER_OF_THE_NEXT_FIELD])?).map(|(size, _)| size)
+}
+
 /// Names of the columns of all rows, in their order: later lists may be longer.
-fn names_of(reader: &SerializedFileReader<File>) -> Result<Vec<String>, ParquetError> {
+fn names_of(reader: &SerializedFileReader<Bounded>) -> Result<Vec<String>, ParquetError> {
     let mut names: Vec<String> = Vec::new();
     let mut known = BTreeSet::new();
     for row in reader.get_row_iter(None)? {
@@ -115,7 +160,7 @@ fn names_of(reader: &SerializedFileReader<File>) -> Result<Vec<String>, ParquetE
 /// Reads a table with a row for each sample. Lists become a column for each of their elements, groups one for each member.
 fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, ImportError> {
     let failed = |error: ParquetError| ImportError::of(path, why(&error));
-    let reader = SerializedFileReader::new(file).map_err(failed)?;
+    let reader = SerializedFileReader::new(Bounded(file)).map_err(failed)?;
     let pairs = reader.metadata().file_metadata().key_value_metadata();
     let of_metadata = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.as_deref();
     let is_own = of_metadata("palpate").is_some();
@@ -286,4 +331,20 @@ fn fixed_column(column: &mut SerializedColumnWriter<'_>, name: &str, trial: &Tri
         _ => column.typed::<Int64Type>().write_batch(&whole(&|_, _| open.id), None, None),
     }
     .map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unpacked_size;
+
+    #[test]
+    fn the_size_of_a_page_is_read_from_its_head() {
+        // By pyarrow: a page of 406 bytes, and one whose size was replaced by 200 000 000.
+        assert_eq!(unpacked_size(&[0x15, 0x00, 0x15, 0xac, 0x06, 0x15, 0xbc, 0x04]), Some(406));
+        assert_eq!(unpacked_size(&[0x15, 0x00, 0x15, 0x80, 0x88, 0xde, 0xbe, 0x01, 0x15]), Some(200_000_000));
+        for head in [&[][..], &[0x15], &[0x15, 0x80], &[0x15, 0, 0x15, 0xff], &[0x25, 0, 0x15, 2], &[0x15, 0]] {
+            assert_eq!(unpacked_size(head), None, "{head:x?}");
+        }
+        assert!(unpacked_size(&[&[0x15, 0, 0x15][..], &[0xff; 9], &[1]].concat()).is_some_and(|size| size > 1 << 40));
+    }
 }

@@ -52,6 +52,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("libloading", &["src/app/startup.rs"]),
     ("lz4_flex", &["src/exchange/mcap"]),
     ("matrixmultiply", &["src/learn/network/gemm.rs"]),
+    ("bytes", &["src/exchange"]),
     ("parquet", &["src/exchange"]),
     ("parry3d", &["src/geometry"]),
     ("plotters", &["src/render/figure"]),

@@ -242,3 +242,21 @@ fn changed_files_end_in_order() {
         assert!(refused > 0, "{name} refuses nothing");
     }
 }
+
+#[test]
+fn a_page_of_parquet_that_claims_gigabytes_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let sound = exported().into_iter().find(|(ending, _)| *ending == "parquet").unwrap().1;
+    // The first page begins behind the mark of four bytes: its kind, its size unpacked (0x15, then seven bits to a byte), and
+    // its size packed, which gives way so that the page keeps its place.
+    let number = |from: usize| from + 1 + sound[from + 1..].iter().position(|byte| byte & 0x80 == 0).unwrap() + 1;
+    let (unpacked, packed) = (number(4), number(number(4)));
+    assert!([4, unpacked, packed].iter().all(|at| sound[*at] == 0x15));
+    let claim = [0x15, 0x80, 0xa8, 0xd6, 0xb9, 0x0f, 0x15, 0x02];
+    let changed = [&sound[..unpacked], &claim, &sound[number(packed)..]].concat();
+    let path = folder.path().join("claim.parquet");
+    std::fs::write(&path, &changed).unwrap();
+    let (peak, outcome) = peak_of(|| trials(&path));
+    let why = outcome.unwrap_err();
+    assert!(peak < 4 << 20 && why.contains("a page claims to unpack to 2073741824 bytes"), "{peak}: {why}");
+}
