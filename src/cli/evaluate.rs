@@ -1,10 +1,11 @@
 //! `palpate evaluate`: compares methods on stored trials, or evaluates a saved model on trials it has not seen.
 
-use super::learning::{DataArguments, known_method, parts};
+use super::learning::{DataArguments, known_method, leak_checks, parts};
 use super::prelude::*;
 use super::terminal::Column;
 use palpate_learn::comparison::{ComparisonRow, Controls, in_table_order};
-use palpate_learn::{Dataset, METHODS, Method, Model, SplitPlan};
+use palpate_learn::{Dataset, LeakCheck, METHODS, Method, Model, SplitPlan};
+use std::collections::BTreeSet;
 
 /// Arguments of `palpate evaluate`.
 #[derive(Debug, clap::Args)]
@@ -23,8 +24,9 @@ pub(super) struct EvaluateArguments {
     #[command(flatten)]
     data: DataArguments,
     /// Split into training and test trials: 40/40/20 (shares; the second for stage two), folds:5 (cross-validation),
-    /// first:50 or first:50:100 (the oldest of each object for training, those after them for testing), or
-    /// leave-a-pose-out (default: first:50 where there are more, else folds:5).
+    /// first:50 or first:50:100 (the oldest of each object for training, those after them for testing),
+    /// leave-a-pose-out or leave-a-session-out (a session ends with the day, after ten minutes without a trial, and with an
+    /// imported file) (default: first:50 where there are more, else folds:5).
     #[arg(long, value_name = "PLAN", conflicts_with_all = ["train_trials", "test_trials"])]
     split: Option<SplitPlan>,
     /// Repeat a random split N times, each with new draws.
@@ -36,6 +38,9 @@ pub(super) struct EvaluateArguments {
     /// Test on at most N trials of each object.
     #[arg(long, value_name = "N")]
     test_trials: Option<usize>,
+    /// Subtract the mean of the first half of each trial's rest; for trials of a real gripper and imported ones.
+    #[arg(long)]
+    rezero: bool,
     /// Include the empty hand as a class.
     #[arg(long)]
     with_empty: bool,
@@ -73,6 +78,8 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     for (_, model) in &models {
         model.check_channels(&data.channels)?;
     }
+    let data = if arguments.rezero { data.rezeroed() } else { data };
+    let checks = leak_checks(&data, arguments.data.seed);
     let plan = arguments.plan(&data);
     let splits = match methods.is_empty() {
         true => Vec::new(),
@@ -105,13 +112,25 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     if arguments.json && controls.is_none() {
         return say_json(&rows);
     }
+    let sessions: BTreeSet<u32> = data.examples.iter().map(|example| example.session).collect();
+    let is_bound =
+        sessions.len() > 1 && !splits.is_empty() && matches!(plan, SplitPlan::Shares(_) | SplitPlan::Folds { .. });
     let plan = if splits.is_empty() { "trials that the models have not learned".to_owned() } else { plan.described() };
     let fits = if splits.len() > 1 { format!(", {} fits", splits.len()) } else { String::new() };
     let (trials, tested) = (data.examples.len(), rows.first().map_or(0, |row| row.evaluation.trials));
     let (seed, quick) = (arguments.data.seed, arguments.data.quick);
     let quick = if quick { "; quick training, do not quote" } else { "" };
     let mut heading = data.about.lines();
-    heading.push(format!("split: {plan}{fits}; {trials} trials, {tested} of them tested; seed {seed}{quick}\n"));
+    heading.push(format!("split: {plan}{fits}; {trials} trials, {tested} of them tested; seed {seed}{quick}"));
+    heading.extend(is_bound.then(|| {
+        format!(
+            "random parts of {} sessions are an upper bound: new sessions do worse (--split leave-a-session-out)",
+            sessions.len()
+        )
+    }));
+    heading.extend(arguments.rezero.then(|| "re-zeroed by the first half of each rest".to_owned()));
+    heading.extend(checks.iter().filter(|check| !check.leaks).map(LeakCheck::to_string));
+    heading.push(String::new());
     EvaluateReport { rows, controls, heading }.print(arguments.json)
 }
 

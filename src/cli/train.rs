@@ -1,6 +1,6 @@
 //! `palpate train`: trains a recogniser on stored trials and saves it.
 
-use super::learning::{DataArguments, known_method, model_file};
+use super::learning::{DataArguments, known_method, leak_checks, model_file};
 use super::prelude::*;
 use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
 use palpate_learn::evaluation::Evaluation;
@@ -100,6 +100,10 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan)).transpose()?;
     if let Some((test, evaluation)) = &judged {
         model.card.metrics = evaluation.metrics(test);
+    }
+    let checks = leak_checks(&data, arguments.data.seed);
+    if !checks.is_empty() {
+        model.card.metrics["leak_checks"] = serde_json::json!(checks);
     }
     save_model(&model, &out)?;
     let labels = &model.card.labels;

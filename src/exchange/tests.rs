@@ -50,6 +50,7 @@ fn channels_come_back_from_mcap_bit_by_bit() -> Result<(), Box<dyn std::error::E
         label: "mug".to_owned(),
         size: None,
         shape: None,
+        session: None,
         signals: awkward.clone(),
     };
     store.insert_imported("mine", &[imported])?;
@@ -106,7 +107,14 @@ fn arrays_and_tables_come_back_with_times_labels_units_and_gaps() -> Result<(), 
     let mut trials: Vec<ImportedTrial> = Vec::new();
     for (name, signals) in ["lemon", "ball"].iter().zip(&stored) {
         let label = (*name).to_owned();
-        trials.push(ImportedTrial { name: label.clone(), label, size: None, shape: None, signals: signals.clone() });
+        trials.push(ImportedTrial {
+            name: label.clone(),
+            label,
+            size: None,
+            shape: None,
+            session: None,
+            signals: signals.clone(),
+        });
     }
     // A gap of a channel, and one of all.
     let width = stored[0].channels.len();

@@ -23,6 +23,7 @@
 //! | 2 | `features` | a grasp as a row of features |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
+//! | 3 | `leaks` | whether labels can be told by something else than touch |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
 //! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution. The geometry encoder |
@@ -70,6 +71,7 @@ mod features;
 mod fitting;
 mod forest;
 mod gaps;
+mod leaks;
 mod learned;
 mod methods;
 pub mod metrics;
@@ -95,6 +97,7 @@ pub use baselines::{
 pub use belief::{Belief, Rejection, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
+pub use leaks::{LeakCheck, Telltale};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;

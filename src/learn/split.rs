@@ -71,6 +71,8 @@ pub enum SplitPlan {
     },
     /// Each pose ([`Example::pose`]) is tested once, by training on the other poses.
     LeavePoseOut,
+    /// Each session ([`Example::session`]) is tested once, by training on the other sessions.
+    LeaveSessionOut,
 }
 
 /// Refuses to test on grasps of the training.
@@ -142,7 +144,8 @@ impl SplitPlan {
                 Ok(all)
             })?),
             Self::FirstOfEach { train, test } => Ok(vec![first_of_each(&grasps, *train, *test)]),
-            Self::LeavePoseOut => by_pose(data, &grasps),
+            Self::LeavePoseOut => by_group(data, &grasps, "pose", |example| example.pose),
+            Self::LeaveSessionOut => by_group(data, &grasps, "session", |example| example.session),
         }
     }
 
@@ -150,7 +153,7 @@ impl SplitPlan {
     fn needed(&self) -> usize {
         match self {
             Self::Shares(shares) => shares.iter().filter(|share| **share > 0.0).count(),
-            Self::Folds { .. } | Self::LeavePoseOut => 2,
+            Self::Folds { .. } | Self::LeavePoseOut | Self::LeaveSessionOut => 2,
             Self::FirstOfEach { train, .. } => train.saturating_add(1),
         }
     }
@@ -168,6 +171,7 @@ impl SplitPlan {
                 format!("first {train} of each object for training, the next {test} for testing")
             }
             Self::LeavePoseOut => "one pose left out at a time".to_owned(),
+            Self::LeaveSessionOut => "one session left out at a time".to_owned(),
         }
     }
 }
@@ -184,6 +188,7 @@ impl std::fmt::Display for SplitPlan {
             Self::FirstOfEach { train, test: None } => write!(f, "first:{train}"),
             Self::FirstOfEach { train, test: Some(test) } => write!(f, "first:{train}:{test}"),
             Self::LeavePoseOut => write!(f, "leave-a-pose-out"),
+            Self::LeaveSessionOut => write!(f, "leave-a-session-out"),
         }
     }
 }
@@ -194,12 +199,16 @@ impl FromStr for SplitPlan {
     fn from_str(text: &str) -> Result<Self, SplitError> {
         let unknown = || {
             SplitError(format!(
-                "unknown split \"{text}\"; write 40/40/20, folds:5, first:50, first:50:100 or leave-a-pose-out"
+                "unknown split \"{text}\"; write 40/40/20, folds:5, first:50, first:50:100, leave-a-pose-out or \
+                 leave-a-session-out"
             ))
         };
         let count = |text: &str| text.parse::<usize>().map_err(|_no_number| unknown());
         if text == "leave-a-pose-out" {
             return Ok(Self::LeavePoseOut);
+        }
+        if text == "leave-a-session-out" {
+            return Ok(Self::LeaveSessionOut);
         }
         match text.split(':').collect::<Vec<_>>()[..] {
             ["folds", folds] => match count(folds)? {
@@ -331,23 +340,28 @@ fn first_of_each(grasps: &[Vec<usize>], train: usize, test: Option<usize>) -> Sp
     split
 }
 
-fn by_pose(data: &Dataset, grasps: &[Vec<usize>]) -> Result<Vec<Split>, SplitError> {
-    let pose = |k: usize| data.examples[k].pose;
-    let one_pose = |members: &&Vec<usize>| members.windows(2).all(|pair| pose(pair[0]) == pose(pair[1]));
-    if let Some(members) = grasps.iter().filter(|members| !members.is_empty()).find(one_pose) {
+fn by_group(
+    data: &Dataset,
+    grasps: &[Vec<usize>],
+    what: &str,
+    group: impl Fn(&Example) -> u32,
+) -> Result<Vec<Split>, SplitError> {
+    let group = |k: usize| group(&data.examples[k]);
+    let one_group = |members: &&Vec<usize>| members.windows(2).all(|pair| group(pair[0]) == group(pair[1]));
+    if let Some(members) = grasps.iter().filter(|members| !members.is_empty()).find(one_group) {
         let class = data.examples[members[0]].class;
         let class = &data.labels.classes[class].name;
         return Err(SplitError(format!(
-            "all trials of \"{class}\" have the same pose; leaving a pose out needs at least two"
+            "all trials of \"{class}\" are of the same {what}; leaving a {what} out needs at least two"
         )));
     }
-    let poses: BTreeSet<u32> = grasps.iter().flatten().map(|k| pose(*k)).collect();
+    let groups: BTreeSet<u32> = grasps.iter().flatten().map(|k| group(*k)).collect();
     let split_of = |left_out: u32| {
-        let (mut test, train) = grasps.iter().flatten().partition::<Vec<usize>, _>(|k| pose(**k) == left_out);
+        let (mut test, train) = grasps.iter().flatten().partition::<Vec<usize>, _>(|k| group(**k) == left_out);
         test.sort_unstable();
         Split { train, second: Vec::new(), test }
     };
-    Ok(poses.into_iter().map(split_of).collect())
+    Ok(groups.into_iter().map(split_of).collect())
 }
 
 impl Dataset {

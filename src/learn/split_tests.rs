@@ -80,7 +80,7 @@ fn a_pose_is_never_on_both_sides() {
     let mut same = data;
     same.examples.iter_mut().for_each(|example| example.pose = 1);
     let refused = SplitPlan::LeavePoseOut.splits(&same, 1, 1).unwrap_err();
-    assert!(refused.to_string().starts_with("all trials of \"ball\" have the same pose"), "{refused}");
+    assert!(refused.to_string().starts_with("all trials of \"ball\" are of the same pose"), "{refused}");
 }
 
 #[test]

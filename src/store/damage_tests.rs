@@ -69,7 +69,7 @@ fn a_flipped_byte_is_found_in_frames_readings_bytes_and_channels() -> Outcome {
 
     let signals = Signals { channels: vec!["p".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
     let (name, label) = ("1".to_owned(), "mug".to_owned());
-    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }])?;
     let imported = board + 1;
     every_flip_is_found(&store, ["readings", "samples"], imported, |store| store.readings(imported))?;
     every_flip_is_found(&store, ["readings", "channels"], imported, |store| store.readings(imported))?;

@@ -25,6 +25,8 @@ pub struct ImportedTrial {
     pub size: Option<String>,
     /// Shape of the object, where the file states it for the label: `cubic`, `cylindrical` or `spherical`.
     pub shape: Option<String>,
+    /// Session in the file, which becomes a collection of its own.
+    pub session: Option<String>,
     /// Readings: at least two samples, times as in the file or even from its first one on; NaN where there are none.
     pub signals: Signals,
 }
@@ -90,6 +92,7 @@ impl Store {
         self.in_transaction(|transaction| {
             let mut added = 0;
             for (number, trial) in trials.iter().enumerate() {
+                let session = trial.session.as_ref().map(|session| format!("{collection} {session}"));
                 let values = params![
                     trial.label,
                     number as i64 + 1,
@@ -97,7 +100,7 @@ impl Store {
                     json(&palpate_sim::frame::Quality::default()),
                     env!("CARGO_PKG_VERSION"),
                     trial.signals.len() as i64,
-                    collection,
+                    session.as_deref().unwrap_or(collection),
                     trial.size,
                     trial.shape,
                     TrialSource::Imported.name(),
@@ -149,7 +152,7 @@ mod tests {
             values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.5],
         };
         let (size, shape) = (Some("tiny".to_owned()), Some("cubic".to_owned()));
-        ImportedTrial { name: "first".to_owned(), label: label.to_owned(), size, shape, signals }
+        ImportedTrial { name: "first".to_owned(), label: label.to_owned(), size, shape, session: None, signals }
     }
 
     #[test]

@@ -49,7 +49,7 @@ fn copy(store: &mut Store) -> Result<TrialId, StoreError> {
 fn import(store: &mut Store, label: &str) -> Result<u32, StoreError> {
     let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0], values: vec![1.0] };
     let (name, label) = ("first".to_owned(), label.to_owned());
-    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])
+    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }])
 }
 
 fn ids(library: &Library, store: &Store, query: &TrialQuery) -> Result<Vec<TrialId>, StoreError> {

@@ -259,3 +259,38 @@ fn grasps_of_the_demo_log_are_counted_and_left_out() {
     store.labels().edit(&[2], &TrialEdit::Keep).unwrap();
     assert_eq!(read(&store, &[]).unwrap().examples.len(), 2);
 }
+
+#[test]
+fn labels_that_can_be_told_before_the_touch_are_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // Two sessions of two objects. The baseline of the pad rises from trial to trial, and each object has its block.
+    let mut text = "session,trial,label,t_s,pad [N],flex [1/m]\n".to_owned();
+    for k in 0..40 {
+        let (session, label) = (k / 20, if k / 10 % 2 == 0 { "mug" } else { "key" });
+        let grip = if label == "mug" { 2.0 } else { 1.0 };
+        for n in 0..50 {
+            let t = 0.02 * f64::from(n);
+            let noise = f64::from((n * 7919 + k * 104_729) % 101) * 1e-4;
+            let touch = (t - 0.5).max(0.0);
+            let [pad, flex] = [0.05 * f64::from(k % 20) + noise + grip * touch, 3.0 + noise - touch];
+            writeln!(text, "{session},{k},{label},{t},{pad},{flex}").unwrap();
+        }
+    }
+    std::fs::write(at.join("lab.csv"), text).unwrap();
+    run(at, &["trials", "import", "lab.csv"]);
+    let evaluate = ["evaluate", "--models", "knn", "--collection", "lab"];
+    let said = run(at, &evaluate);
+    assert!(said.err.contains("can be told before it is touched (") && said.err.contains("; by pad [N])"), "{said:?}");
+    assert!(said.out.contains("length check: ") && said.out.contains("random parts of 2 sessions are an upper bound"));
+    let said = run(at, &[&evaluate[..], &["--rezero", "--split", "leave-a-session-out"]].concat());
+    assert!(!said.err.contains("before it is touched"), "{said:?}");
+    assert!(
+        said.out.contains("leak check: ") && said.out.contains("one session left out at a time, 2 fits"),
+        "{said:?}"
+    );
+    let said = run(at, &["train", "knn", "--collection", "lab", "--out", "lab.safetensors"]);
+    assert!(said.err.contains("can be told before it is touched"), "{said:?}");
+    let card = std::fs::read_to_string(at.join("lab.json")).unwrap();
+    assert!(card.contains("leak_checks") && card.contains("\"leaks\": true"), "{card}");
+}

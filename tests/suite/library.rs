@@ -31,7 +31,9 @@ fn fill(store: &mut Store) {
     }
     let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 1.0], values: vec![1.0, 2.0] };
     let (name, label) = ("first".to_owned(), "mug".to_owned());
-    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }]).unwrap();
+    store
+        .insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }])
+        .unwrap();
     store.labels().set_note(3, "slipped at the end").unwrap();
 }
 

@@ -295,7 +295,9 @@ fn captured_bytes_replay_as_the_trial_that_is_recorded_from_them() {
     // An imported trial has channels of its own.
     let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
     let (name, label) = ("1".to_owned(), "mug".to_owned());
-    store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }]).unwrap();
+    store
+        .insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }])
+        .unwrap();
     let mut imported = Replay::of_trial(&store, 2, Some(model)).unwrap();
     assert!(imported.why_off().is_some_and(|cause| cause.to_string().contains("curvature_left")));
     assert_eq!(imported.next_row().unwrap().map(|row| row.values[0]), Some(1.0));

@@ -101,6 +101,7 @@ fn finished_ui(ui: &mut Ui, chosen: Option<&Path>, finished: &FinishedTraining, 
     for mixed in &data.mixed {
         warning_ui(ui, format!("Mixed {mixed}"));
     }
+    judged.leak_checks.iter().filter(|check| check.leaks).for_each(|check| warning_ui(ui, check.to_string()));
     if trained.model.card.rejection.is_none() {
         let text = "This model cannot answer \"unknown\": that takes more trials.";
         remark_ui(ui, text);

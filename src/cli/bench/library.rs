@@ -248,6 +248,7 @@ fn fill(path: &Path, trials: u32) -> Result<(), Failure> {
             label: name(k).to_owned(),
             size: None,
             shape: None,
+            session: None,
             signals: signals.clone(),
         })
         .collect();

@@ -253,7 +253,8 @@ impl<'a> Bag<'a> {
         let label: String = field("object").chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect();
         let class = catalogue().iter().find(|built_in| built_in.name == label).map(|built_in| built_in.class());
         let (size, shape) = (class.as_ref().map(|c| c.size.name()), class.as_ref().map(|c| c.shape.name()));
-        Ok(ImportedTrial { name: id, label, size: size.map(str::to_owned), shape: shape.map(str::to_owned), signals })
+        let [size, shape] = [size, shape].map(|word| word.map(str::to_owned));
+        Ok(ImportedTrial { name: id, label, size, shape, session: None, signals })
     }
 
     /// Trials of another program: one for each run of its clock.

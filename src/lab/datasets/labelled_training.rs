@@ -4,7 +4,9 @@
 use super::{DatasetError, DatasetQuery, SensorView};
 use palpate_learn::comparison::{Comparison, ComparisonError};
 use palpate_learn::evaluation::Evaluation;
-use palpate_learn::{Dataset, Fitting, LearnError, Method, Model, ModelError, SplitError, SplitPlan, StopRule};
+use palpate_learn::{
+    Dataset, Fitting, LeakCheck, LearnError, Method, Model, ModelError, SplitError, SplitPlan, StopRule,
+};
 use palpate_store::labels::Classes;
 use palpate_store::{Store, StoreError};
 use palpate_tactile::trial::TrialSource;
@@ -87,6 +89,8 @@ pub struct JudgedModel {
     pub too_few: Vec<LabelledClass>,
     /// Unusable trials: without calibration, or unsound.
     pub left_out: usize,
+    /// Whether the labels can be told by something else than touch.
+    pub leak_checks: [LeakCheck; 2],
 }
 
 /// Error of a training.
@@ -153,7 +157,9 @@ impl LabelledTraining<'_> {
         let test = format!("{tested} trials held back of {all_used}: {}", data.about.lines().join("; "));
         model.card.metrics = evaluation.metrics(&test);
         model.card.metrics["confusion"] = serde_json::json!(evaluation.confusion);
-        Ok(JudgedModel { model, evaluation, trials, too_few, left_out: all - data.examples.len() })
+        let leak_checks = data.leak_checks(self.seed);
+        model.card.metrics["leak_checks"] = serde_json::json!(leak_checks);
+        Ok(JudgedModel { model, evaluation, trials, too_few, left_out: all - data.examples.len(), leak_checks })
     }
 
     fn fitted(&self, data: &Dataset) -> Result<Model, LearnError> {

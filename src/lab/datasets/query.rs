@@ -245,6 +245,8 @@ pub struct TrialSignals {
     pub further: Vec<Signals>,
     /// Start of the hold, on the clock of the signals (s), where known.
     pub hold_s: Option<f64>,
+    /// Signals of a real gripper before it began to close, where that is known; they may be none.
+    pub rest: Option<Signals>,
 }
 
 /// Reads the signals of a trial: its own channels if imported, calibrated ones if recorded, those of the view if
@@ -278,14 +280,16 @@ pub(super) fn signals_of(
         TrialData::Simulated(data) => SimulatedTrial { header, data },
         TrialData::Imported(signals) => {
             let signals = resampled(signals.until(view.cut.end(f64::INFINITY)), view.rate_hz);
-            return Ok((TrialSignals { signals, further: Vec::new(), hold_s: None }, TrialOrigin::default()));
+            let signals = TrialSignals { signals, further: Vec::new(), hold_s: None, rest: None };
+            return Ok((signals, TrialOrigin::default()));
         }
         TrialData::Recorded(_) => return of_board(),
     };
     let mut readings = view.readings(&trial)?.into_iter();
     let signals = readings.next().unwrap_or_default();
     let hold_s = trial.frames().iter().find(|frame| frame.phase == Phase::Hold).map(|frame| frame.t);
-    Ok((TrialSignals { signals, further: readings.collect(), hold_s }, TrialOrigin::simulated(&trial.header)))
+    let signals = TrialSignals { signals, further: readings.collect(), hold_s, rest: None };
+    Ok((signals, TrialOrigin::simulated(&trial.header)))
 }
 
 /// Trials of the real gripper, none of which can be derived, for what the first one lacks.
@@ -323,7 +327,9 @@ fn board_signals(
     })?;
     let hold_s = read.hold_s.map(|hold_s| hold_s - read.closing_s.unwrap_or(0.0));
     let signals = resampled(signals, view.rate_hz);
-    Ok((TrialSignals { signals, further: Vec::new(), hold_s }, read.serving.ids))
+    let before = |closing_s: f64| Some(resampled(read.derived.signals.chosen(&wanted)?.until(closing_s), view.rate_hz));
+    let rest = read.closing_s.and_then(before);
+    Ok((TrialSignals { signals, further: Vec::new(), hold_s, rest }, read.serving.ids))
 }
 
 impl SensorView {

@@ -9,7 +9,7 @@ use palpate_learn::{Dataset, Example, OTHER, Sequence};
 use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
 use palpate_store::labels::{Classes, Flag, compared};
 use palpate_store::{Library, Store, TrialPlace, TrialRow};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -136,7 +136,7 @@ impl DatasetQuery {
         let (mut uncalibrated, mut missing) = (0, String::new());
         for (k, row) in rows.iter().enumerate() {
             progress(k, rows.len());
-            let (TrialSignals { signals, further, .. }, origin) =
+            let (TrialSignals { signals, further, rest, .. }, origin) =
                 match signals_of(store, row.id, row.source, view, &self.calibrations) {
                     // Skip boards without a calibration, unless it is the only trial.
                     Err(DatasetError::Uncalibrated { why, .. }) if rows.len() > 1 => {
@@ -180,7 +180,8 @@ impl DatasetQuery {
                     }
                     named.entry(class.clone()).or_insert_with(|| known_properties(row, &class));
                     let further: Vec<_> = further.iter().map(|signals| Arc::new(sequence_of(signals))).collect();
-                    read.push((*row, (grasp, further), before.of_trial(row, &origin)));
+                    let rest = rest.map(|rest| Arc::new(sequence_of(&rest)));
+                    read.push((*row, (grasp, further, rest), before.of_trial(row, &origin)));
                     origins.push(origin);
                 }
             }
@@ -201,8 +202,10 @@ impl DatasetQuery {
             .mixed
             .extend(classes.several().iter().map(|all| format!("spellings of one class ({all}); it is one here")));
         let poses: Vec<u32> = origins.iter().map(|origin| origin.pose).collect();
-        type Read<'r> = (&'r TrialRow, (Sequence, Vec<Arc<Sequence>>), Option<TrialId>);
-        let mut example = |((row, (grasp, further), after), pose): (Read<'_>, u32)| {
+        type Readings = (Sequence, Vec<Arc<Sequence>>, Option<Arc<Sequence>>);
+        type Read<'r> = (&'r TrialRow, Readings, Option<TrialId>);
+        let mut sessions = Sessions::default();
+        let mut example = |((row, (grasp, further, rest), after), pose): (Read<'_>, u32)| {
             let content = content_of(row, &grasp);
             Some(Example {
                 id: row.id,
@@ -211,6 +214,8 @@ impl DatasetQuery {
                 content,
                 after,
                 pose,
+                session: sessions.of(row),
+                rest,
                 further,
             })
         };
@@ -228,6 +233,36 @@ const NOT_SOUND: &str = "not sound";
 const DAMAGED: &str = "damaged";
 /// Reason: another trial holds the same grasp.
 const COPIES: &str = "copies of other trials";
+
+/// A pause of this length begins a new session (s).
+const PAUSE_S: f64 = 600.0;
+
+/// Numbers of the sessions of trials that were not simulated, in the order in which they were made: another day, ten minutes
+/// without a trial, another imported file.
+#[derive(Default)]
+struct Sessions {
+    newest: u32,
+    last: Option<(Option<String>, String, f64)>,
+}
+
+impl Sessions {
+    fn of(&mut self, row: &TrialRow) -> u32 {
+        if row.source == TrialSource::Simulated {
+            return 0;
+        }
+        let (day, time) = row.created.split_once('T').unwrap_or((&row.created, ""));
+        let parts = time.trim_end_matches('Z').split(':').zip([3600.0, 60.0, 1.0]);
+        let time_s: f64 = parts.map(|(part, unit)| unit * part.parse::<f64>().unwrap_or(0.0)).sum();
+        // Imported trials are all made at once.
+        let file = row.collection.clone().filter(|_| row.source == TrialSource::Imported);
+        let goes_on = self.last.as_ref().is_some_and(|(own, on, at_s)| {
+            *own == file && (file.is_some() || (on == day && (time_s - at_s).abs() < PAUSE_S))
+        });
+        self.newest += u32::from(!goes_on);
+        self.last = Some((file, day.to_owned(), time_s));
+        self.newest
+    }
+}
 
 /// Hash of a grasp: of its identity where it is known, else of its readings.
 fn content_of(row: &TrialRow, grasp: &Sequence) -> u64 {

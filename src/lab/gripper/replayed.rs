@@ -115,7 +115,10 @@ mod tests {
 
         let signals = Signals { channels: vec!["p".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
         let (name, label) = ("1".to_owned(), "mug".to_owned());
-        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        store.insert_imported(
+            "mine",
+            &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }],
+        )?;
         let sample = |t_s: f64, value: f32| (t_s, GripperEvent::Signals { t_s, values: vec![value] });
         assert_eq!(events(store.load(id + 1)?), [sample(0.0, 1.0), sample(0.1, 2.0)]);
         Ok(())

@@ -538,7 +538,10 @@ mod tests {
         let values = t_s.iter().map(|t| if *t < 1.0 { 0.0 } else { 10.0 * (t - 1.0) } as f32).collect();
         let signals = Signals { channels: vec!["pressure_left".to_owned()], t_s, values };
         let (name, label) = ("1".to_owned(), "mug".to_owned());
-        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        store.insert_imported(
+            "mine",
+            &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }],
+        )?;
         let open = |store: &Store| OpenTrial::open(store, 1, &OpenOptions::default());
         let measured = open(&store)?;
         let contact = measured.phase_from(TouchPhase::Contact).expect("the pressure rises");

@@ -142,7 +142,10 @@ mod tests {
         let channels = ["grip", "pressure_right", "pressure_left"].map(str::to_owned).to_vec();
         let signals = Signals { channels, t_s: vec![0.0, 1.0], values: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
         let (name, label) = (String::new(), "mug".to_owned());
-        store.insert_imported("mine", &[ImportedTrial { name, label, size: None, shape: None, signals }])?;
+        store.insert_imported(
+            "mine",
+            &[ImportedTrial { name, label, size: None, shape: None, session: None, signals }],
+        )?;
         let [left, right] = stored_sparkline(&store, simulated + 1)?;
         assert_eq!((left[0], left[47], right[0], right[47]), (Some(3.0), Some(6.0), Some(2.0), Some(5.0)));
         assert!(stored_sparkline(&store, 99).is_err());

@@ -47,7 +47,7 @@ pub(super) fn finish(rows: Rows, warnings: &mut Vec<String>) -> Result<Vec<Impor
     let with_words = |trial: RawTrial| {
         let [size, shape] = labels.get(&trial.label).copied().unwrap_or_default().map(|word| word.map(str::to_owned));
         let signals = Signals { channels: channels.clone(), t_s: trial.t_s, values: trial.values };
-        ImportedTrial { name: trial.name, label: trial.label, size, shape, signals }
+        ImportedTrial { name: trial.name, label: trial.label, size, shape, session: trial.session, signals }
     };
     let trials: Vec<ImportedTrial> = series.into_iter().map(with_words).collect();
     warn_of_gaps(&trials, warnings);

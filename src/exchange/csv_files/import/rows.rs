@@ -10,6 +10,7 @@ use crate::mapping::{Mapping, named_column};
 use crate::series::Series;
 use csv::ByteRecord;
 use palpate_tactile::channel_with_unit;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Read;
 
@@ -25,6 +26,8 @@ const SHAPES: [&str; 3] = ["cubic", "cylindrical", "spherical"];
 pub(super) struct RawTrial {
     pub(super) name: String,
     pub(super) label: String,
+    /// Session of its first row.
+    pub(super) session: Option<String>,
     /// Line of its first row.
     pub(super) line: u64,
     /// Rising times (s).
@@ -99,6 +102,7 @@ struct Roles {
     /// Without it the file is one trial, or one for each change of the label.
     trial: Option<usize>,
     label: Label,
+    session: Option<usize>,
     time: usize,
     /// Factor of times to seconds; none where no unit is named.
     time_factor: Option<f64>,
@@ -218,7 +222,8 @@ impl Rows {
         if let (Label::Fixed(name), None) = (&label, &mapping.label) {
             warnings.push(format!("no label is given: the trials are called \"{}\" after the file", brief(name)));
         }
-        let roles = Roles { trial, label, time, time_factor: time_factor(unit)? };
+        let session = place("session");
+        let roles = Roles { trial, label, session, time, time_factor: time_factor(unit)? };
         let label = match roles.label {
             Label::Column(at) => Some(at),
             Label::Fixed(_) => None,
@@ -256,7 +261,7 @@ impl Rows {
         }
         let names = &header.names;
         if mapping.channels.is_empty() {
-            let known = [trial, label, Some(time), words[0], words[1], place("label"), place("trial")];
+            let known = [trial, label, session, Some(time), words[0], words[1], place("label"), place("trial")];
             let is_ignored = |at: usize| mapping.ignore.iter().any(|wanted| is_called(header.whole[at], wanted));
             for (at, (name, unit)) in names.iter().enumerate() {
                 if !name.is_empty() && !known.contains(&Some(at)) && !is_ignored(at) {
@@ -473,7 +478,9 @@ impl Rows {
             None => "",
         };
         let label = self.label(record)?;
-        let known = self.by_name.get(name).copied();
+        let session = self.roles.session.map(|at| name_of_session(&record[at])).transpose()?.flatten();
+        let key = session.as_ref().map_or(Cow::Borrowed(name), |session| format!("{session} {name}").into());
+        let known = self.by_name.get(key.as_ref()).copied();
         let splits = |trial: &RawTrial| {
             let falls = |gap: f64| trial.t_s.last().is_some_and(|before| now < *before || now - before >= gap);
             self.split_gap_s.is_some_and(falls) || (self.roles.trial.is_none() && trial.label != label)
@@ -493,13 +500,13 @@ impl Rows {
         if count == MOST_TRIALS {
             return Err(format!("there are more than {MOST_TRIALS} trials; split the file"));
         }
-        self.by_name.insert(name.to_owned(), count);
+        self.by_name.insert(key.into_owned(), count);
         let name = match (name, known) {
             ("", _) => (count + 1).to_string(),
             (name, None) => name.to_owned(),
             (name, Some(_)) => format!("{name}, row {line}"),
         };
-        self.trials.push(RawTrial { name, label, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
+        self.trials.push(RawTrial { name, label, session, line, t_s: Vec::new(), values: Vec::new(), repeated: 0 });
         Ok(count)
     }
 
@@ -551,6 +558,11 @@ impl Rows {
             )),
         }
     }
+}
+
+/// A session; none where the field is empty.
+fn name_of_session(field: &[u8]) -> Result<Option<String>, String> {
+    Ok(Some(name(field, "session")?.to_owned()).filter(|name| !name.is_empty()))
 }
 
 pub(super) fn no_channels() -> String {

@@ -330,3 +330,14 @@ fn a_pause_is_a_gap() {
         import.warnings.iter().any(|text| text.contains("flagged: no readings from 0.38 s to 1.00 s (30 missing)"))
     );
 }
+
+#[test]
+fn sessions_are_told_apart() {
+    let rows =
+        |session: &str| (0..3).map(|k| format!("{session},1,mug,{},{k}\n", 0.1 * f64::from(k))).collect::<String>();
+    let text = format!("session,trial,label,t_s,p\n{}{}{}", rows("monday"), rows("tuesday"), rows(""));
+    let import = read(&text);
+    let sessions: Vec<Option<&str>> = import.trials.iter().map(|trial| trial.session.as_deref()).collect();
+    assert_eq!(sessions, [Some("monday"), Some("tuesday"), None]);
+    assert!(import.trials.iter().all(|trial| trial.signals.channels == ["p"] && trial.signals.len() == 3));
+}
