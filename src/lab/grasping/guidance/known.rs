@@ -5,8 +5,10 @@ use super::stance::Stance;
 use palpate_learn::{Arrays, Model, Sequence, Shipped, TensorFile, encode};
 use serde::{Deserialize, Serialize};
 
-/// Readings of a grasp that are kept: means over equal times.
+/// Readings of a grasp that are kept: means over equal times, two for each step of the networks.
 const KEPT: usize = 60;
+/// Time by which rounding may put a reading behind a border (s).
+const BORDER_S: f32 = 1e-4;
 /// Kept readings are shares of the largest of their channel, in this unit.
 const UNIT: f32 = 1.0 / 32_000.0;
 /// Numbers that describe a stance.
@@ -137,29 +139,44 @@ impl KnownTouches {
 }
 
 impl Card {
-    /// Times of the kept readings (s): the middle of each averaged interval.
+    /// Times of the kept readings (s): the ends of equal parts, as a reading stands for the time before it.
     fn times(&self) -> Vec<f32> {
-        (0..KEPT).map(|k| self.duration_s * (k as f32 + 0.5) / KEPT as f32).collect()
+        (1..=KEPT).map(|k| self.duration_s * k as f32 / KEPT as f32).collect()
     }
 
-    /// Means over equal times; if one has no reading, the mean before it.
+    /// Means over equal times; if one has no reading, the mean before it. Two of them have the mean of all readings in both, as
+    /// networks read them: one that is a few milliseconds off is another grasp to them.
     fn means(&self, grasp: &Sequence) -> Sequence {
         let width = self.channels.len();
-        let mut values = vec![0.0; KEPT * width];
+        let mut values = Vec::with_capacity(KEPT * width);
         let (mut row, mut last) = (0, vec![0.0; width]);
-        for (k, mean) in values.chunks_exact_mut(width.max(1)).enumerate() {
-            let until_s = self.duration_s * (k + 1) as f32 / KEPT as f32;
-            let from = row;
-            while grasp.t_s.get(row).is_some_and(|t_s| *t_s < until_s) {
-                row += 1;
-            }
-            if row > from {
-                for (channel, last) in last.iter_mut().enumerate() {
-                    let sum: f32 = (from..row).map(|row| grasp.values[row * width + channel]).sum();
-                    *last = sum / (row - from) as f32;
-                }
-            }
-            mean.copy_from_slice(&last);
+        for ends in self.times().chunks_exact(2) {
+            let parts: Vec<&[f32]> = ends
+                .iter()
+                .map(|end_s| {
+                    let from = row;
+                    // A reading on the border belongs to the time before.
+                    while grasp.t_s.get(row).is_some_and(|t_s| *t_s < end_s + BORDER_S) {
+                        row += 1;
+                    }
+                    &grasp.values[from * width..row * width]
+                })
+                .collect();
+            let mean = |part: &[f32], channel: usize| {
+                let count = part.len() / width;
+                (count > 0).then(|| part.iter().skip(channel).step_by(width).sum::<f32>() / count as f32)
+            };
+            let both = parts.concat();
+            let pair: Vec<[f32; 2]> = (0..width)
+                .map(|channel| {
+                    let first = mean(parts[0], channel).unwrap_or(last[channel]);
+                    let second = mean(parts[1], channel).unwrap_or(first);
+                    let shift = mean(&both, channel).map_or(0.0, |mean| mean - 0.5 * (first + second));
+                    last[channel] = second + shift;
+                    [first + shift, second + shift]
+                })
+                .collect();
+            (0..2).for_each(|part| values.extend(pair.iter().map(|own| own[part])));
         }
         Sequence { t_s: self.times(), values }
     }
@@ -182,9 +199,10 @@ mod tests {
         let (class, own, kept) = &read.grasps[0];
         assert_eq!((*class, kept.t_s.len()), (0, KEPT));
         assert!(own.to_array().iter().zip(stance.to_array()).all(|(a, b)| (a - b).abs() < 1e-6));
-        // Means over equal times of a line are its values in their middle, or half a reading later.
         for (t, row) in kept.t_s.iter().zip(kept.values.chunks_exact(2)) {
-            assert!((row[0] - 2.0 * t).abs() < 0.02 && (row[1] + 100.0 * t).abs() < 1.0, "{t}: {row:?}");
+            // A reading stands for the time before it: the mean of those up to the end is half a part earlier.
+            let middle = t - 0.5 * 4.0 / KEPT as f32 + 0.5 / 75.0;
+            assert!((row[0] - 2.0 * middle).abs() < 1e-3 && (row[1] + 100.0 * middle).abs() < 0.02, "{t}: {row:?}");
         }
         let mut bytes = read.to_bytes().expect("encodes");
         bytes.pop();
@@ -201,16 +219,13 @@ mod tests {
             // Both views of a hundred grasps of fixed objects, of two hundred of free ones.
             let least = if which == Shipped::FixedObjects { 150 } else { 300 };
             assert!((0..counts.len()).all(|class| (counts[class] >= least) == (Some(class) != other)), "{counts:?}");
-            // Most answers are right; those to fixed objects of physics 2 are the hardest, 53 % of them.
+            // They are those to the grasps as they were read: seven in ten, nine in ten by perfect sensors of free objects.
             let right = |(class, own): (usize, &Vec<super::super::library::KnownTouch>)| {
                 own.iter().filter(|touch| touch.answer.top().0 == class).count()
             };
             let right: usize = library.touches.iter().enumerate().map(right).sum();
             let all: usize = counts.iter().sum();
-            assert!(
-                right as f64 > if which == Shipped::FixedObjects { 0.5 } else { 0.55 } * all as f64,
-                "{right} of {all}"
-            );
+            assert!(right as f64 > 0.65 * all as f64, "{which:?}: {right} of {all}");
         }
     }
 }
