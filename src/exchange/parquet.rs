@@ -91,6 +91,9 @@ fn contained<T>(path: &Path, read: impl FnOnce() -> Result<T, ImportError>) -> R
 /// Largest page, unpacked (bytes). Programs write pages of about a megabyte.
 const MOST_OF_A_PAGE: u64 = 16 << 20;
 
+/// Part of a page in which its head is sought (bytes).
+const LONGEST_HEAD: u64 = 8192;
+
 /// A file in which no page may claim to unpack to more than that: the library would take the memory before it looks.
 struct Bounded(File);
 
@@ -104,7 +107,7 @@ impl ChunkReader for Bounded {
     type T = <File as ChunkReader>::T;
 
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
-        let head = self.0.get_bytes(start, self.len().saturating_sub(start).min(16) as usize)?;
+        let head = self.0.get_bytes(start, self.len().saturating_sub(start).min(LONGEST_HEAD) as usize)?;
         match unpacked_size(&head) {
             Some(claimed) if claimed > MOST_OF_A_PAGE => Err(ParquetError::General(format!(
                 "a page claims to unpack to {claimed} bytes; write it with pages of at most {MOST_OF_A_PAGE}"
@@ -121,16 +124,72 @@ impl ChunkReader for Bounded {
     }
 }
 
-/// The size at the head of a page: its second number, in Thrift's compact form (parquet.thrift, `PageHeader`).
+/// The largest unpacked size that the head of a page claims: field 2 of `PageHeader` (parquet.thrift), in Thrift's compact
+/// form, in which fields may come in any order and more than once. None where there is none, or the head is damaged before it.
 fn unpacked_size(head: &[u8]) -> Option<u64> {
-    const NUMBER_OF_THE_NEXT_FIELD: u8 = 0x15;
-    let number = |bytes: &[u8]| {
-        let end = bytes.iter().position(|byte| byte & 0x80 == 0)? + 1;
-        let bits = |sum: u64, (place, byte): (u32, &u8)| sum | u64::from(byte & 0x7f) << (7 * place).min(57);
-        Some(((0..).zip(&bytes[..end]).fold(0, bits) >> 1, end))
+    const SIZE: i64 = 2;
+    let (mut rest, mut field, mut claimed) = (head, 0, None);
+    while let Some(kind) = field_of(&mut rest, &mut field) {
+        let before = rest;
+        if skipped(&mut rest, kind, 0).is_none() {
+            break;
+        }
+        if field == SIZE && (4..=6).contains(&kind) {
+            claimed = claimed.max(varint(&mut { before }).map(|number| number >> 1));
+        }
+    }
+    claimed
+}
+
+/// Deepest nesting of a head that is followed.
+const DEEPEST: usize = 8;
+
+/// Kind of the next field, whose number is put into `field`; none at the end.
+fn field_of(rest: &mut &[u8], field: &mut i64) -> Option<u8> {
+    let byte = *rest.split_off_first().filter(|byte| **byte & 15 != 0)?;
+    *field = match byte >> 4 {
+        0 => varint(rest).map(|number| (number >> 1) as i64 ^ -((number & 1) as i64))?,
+        step => field.wrapping_add(i64::from(step)),
     };
-    let (_, end) = number(head.strip_prefix(&[NUMBER_OF_THE_NEXT_FIELD])?)?;
-    number(head[1 + end..].strip_prefix(&[NUMBER_OF_THE_NEXT_FIELD])?).map(|(size, _)| size)
+    Some(byte & 15)
+}
+
+/// Passes over a value of some kind.
+fn skipped(rest: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
+    let over = |rest: &mut &[u8], count: u64| rest.split_off(..usize::try_from(count).ok()?).map(|_| ());
+    match kind {
+        // Truth values are part of their kind.
+        1 | 2 => Some(()),
+        3 => over(rest, 1),
+        4..=6 => varint(rest).map(|_| ()),
+        7 => over(rest, 8),
+        8 => {
+            let length = varint(rest)?;
+            over(rest, length)
+        }
+        12 if depth < DEEPEST => {
+            let mut field = 0;
+            while let Some(kind) = field_of(rest, &mut field) {
+                skipped(rest, kind, depth + 1)?;
+            }
+            Some(())
+        }
+        // Heads have no lists and maps.
+        _ => None,
+    }
+}
+
+/// A number of seven bits to a byte.
+fn varint(rest: &mut &[u8]) -> Option<u64> {
+    let mut number = 0;
+    for place in 0.. {
+        let byte = *rest.split_off_first()?;
+        number |= u64::from(byte & 0x7f).checked_shl(7 * place).unwrap_or(0);
+        if byte & 0x80 == 0 {
+            break;
+        }
+    }
+    Some(number)
 }
 
 /// Names of the columns of all rows, in their order: later lists may be longer.
@@ -342,9 +401,15 @@ mod tests {
         // By pyarrow: a page of 406 bytes, and one whose size was replaced by 200 000 000.
         assert_eq!(unpacked_size(&[0x15, 0x00, 0x15, 0xac, 0x06, 0x15, 0xbc, 0x04]), Some(406));
         assert_eq!(unpacked_size(&[0x15, 0x00, 0x15, 0x80, 0x88, 0xde, 0xbe, 0x01, 0x15]), Some(200_000_000));
-        for head in [&[][..], &[0x15], &[0x15, 0x80], &[0x15, 0, 0x15, 0xff], &[0x25, 0, 0x15, 2], &[0x15, 0]] {
+        for head in
+            [&[][..], &[0x15], &[0x15, 0x80], &[0x15, 0, 0x15, 0xff], &[0x15, 0, 0x25, 2], &[0x15, 0], &[0x2c, 1]]
+        {
             assert_eq!(unpacked_size(head), None, "{head:x?}");
         }
+        // Its number in full, another order, and twice with a struct in between.
+        assert_eq!(unpacked_size(&[0x05, 0x04, 0x80, 0x01]), Some(64));
+        assert_eq!(unpacked_size(&[0x35, 0x06, 0x05, 0x04, 0x80, 0x01, 0x00]), Some(64));
+        assert_eq!(unpacked_size(&[0x25, 0x02, 0x3c, 0x18, 0x01, 0x78, 0x00, 0x05, 0x04, 0x80, 0x01]), Some(64));
         assert!(unpacked_size(&[&[0x15, 0, 0x15][..], &[0xff; 9], &[1]].concat()).is_some_and(|size| size > 1 << 40));
     }
 }
