@@ -1,7 +1,7 @@
 //! Labelled grasps, and their splits into training and test sets.
 
+use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -314,19 +314,6 @@ impl Dataset {
         }
     }
 
-    /// The same readings, each by a clock that is up to so much early or late (s).
-    pub fn shifted(mut self, most_s: f32, seed: u64) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        for example in &mut self.examples {
-            for grasp in std::iter::once(&mut example.grasp).chain(&mut example.further) {
-                let shift_s = random.random_range(-most_s..=most_s);
-                let t_s = grasp.t_s.iter().map(|t| t + shift_s).collect();
-                *grasp = Arc::new(Sequence { t_s, values: grasp.values.clone() });
-            }
-        }
-        self
-    }
-
     /// Shuffles the labels among the grasps, as a control.
     pub fn with_shuffled_labels(&self, seed: u64) -> Self {
         let mut truth = self.truth();
@@ -432,20 +419,6 @@ mod tests {
         let wanted = [example(1, &[1.0, 1.1]), example(2, &[2.0]), example(3, &[3.0, 3.1, 3.2])];
         assert_eq!(data.examples, wanted);
         assert_eq!(data.with_further().examples.len(), 6);
-    }
-
-    #[test]
-    fn clocks_are_shifted_within_their_bound() {
-        let grasp = Arc::new(Sequence { t_s: vec![0.1, 0.2], values: vec![1.0, 2.0] });
-        let example = Example { further: vec![grasp.clone(); 40], grasp, ..Example::default() };
-        let data = Dataset { examples: vec![example], ..Dataset::default() };
-        assert_eq!(data.clone().shifted(0.0, 1), data);
-        let shifted = data.clone().shifted(0.02, 1);
-        let shifts: Vec<f32> = shifted.examples[0].further.iter().map(|grasp| grasp.t_s[0] - 0.1).collect();
-        let [least, most] =
-            [f32::min, f32::max].map(|of: fn(f32, f32) -> f32| shifts.iter().copied().reduce(of).expect("many"));
-        assert!((-0.021..-0.015).contains(&least) && (0.015..0.021).contains(&most), "{shifts:?}");
-        assert!(shifted.examples[0].further.iter().all(|grasp| (grasp.t_s[1] - grasp.t_s[0] - 0.1).abs() < 1e-6));
     }
 
     #[test]
