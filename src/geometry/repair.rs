@@ -95,7 +95,7 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
         closed(welded.clone(), diagonal, Sides::Cancel)
             .or_else(|fault| closed(welded.clone(), diagonal, Sides::Collapse).map_err(|_again| fault))
             .or_else(|fault| {
-                closed(split_at_corners(welded, diagonal * tolerance), diagonal, Sides::Cancel).map_err(|_| fault)
+                closed(split_at_corners(welded, diagonal * tolerance), diagonal, Sides::Cancel).map_err(|_again| fault)
             })
             .map(|repaired| Repaired { joined, ..repaired })
     };

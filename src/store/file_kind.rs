@@ -165,7 +165,7 @@ fn is_store(path: &Path) -> io::Result<bool> {
 }
 
 /// Suffixes of the files that SQLite keeps beside a store.
-const PARTS: [&str; 3] = ["-wal", "-shm", "-journal"];
+pub(super) const PARTS: [&str; 3] = ["-wal", "-shm", "-journal"];
 
 /// The store beside which SQLite keeps a file of this name.
 fn store_with_part(path: &Path) -> Option<PathBuf> {

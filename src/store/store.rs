@@ -8,6 +8,7 @@
 
 use super::checksum::{add_functions, add_triggers, is_intact};
 use super::demo_log::{TrialPlace, keep, log, place_of};
+use super::file_kind::PARTS;
 use super::frame_blob::encode_frames;
 use super::identity::{Stored, add_to, known};
 use super::open_file::OpenFile;
@@ -129,6 +130,14 @@ impl Store {
     fn connect(path: &Path, flags: OpenFlags) -> Result<Self, StoreError> {
         // SQLite takes relative names such as `:memory:` and `file:a` for something else than files.
         let file = std::path::absolute(path).map_err(|e| StoreError::open(path, e))?;
+        // SQLite waits for ever for a pipe that has the name of its log.
+        let parts = PARTS.map(|ending| beside(&file, ending));
+        if let Some(part) = parts.iter().find(|part| std::fs::metadata(part).is_ok_and(|own| !own.is_file())) {
+            let part = part.display();
+            return Err(StoreError::Refused(format!(
+                "\"{part}\" beside the store is not a regular file; move it away"
+            )));
+        }
         let flags =
             flags | OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX | OpenFlags::SQLITE_OPEN_URI;
         let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;

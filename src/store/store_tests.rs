@@ -154,3 +154,21 @@ fn sources_and_scenes_of_newer_programs_are_named_only_when_they_are_needed() ->
     assert_eq!(damaged, [true, true], "written past the program");
     Ok(())
 }
+
+#[test]
+fn what_stands_in_the_place_of_a_log_is_refused() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("a.sqlite");
+    drop(Store::open(&path)?);
+    for ending in ["-wal", "-shm", "-journal"] {
+        let part = folder.path().join(format!("a.sqlite{ending}"));
+        std::fs::create_dir(&part)?;
+        for outcome in [Store::open(&path), Store::open_to_read(&path)] {
+            let said = outcome.map(drop).expect_err(ending).to_string();
+            assert!(said.contains(ending) && said.contains("is not a regular file"), "{said}");
+        }
+        std::fs::remove_dir(&part)?;
+    }
+    Store::open(&path)?;
+    Ok(())
+}
