@@ -18,7 +18,7 @@
 //! | 1 | `new_file` | the one way to write a file or folder that a person names |
 //! | 1 | `store_error` | errors, with cause and fix |
 //! | 1 | `identity`, `demo_log` | which trials are the same grasp; which are in the demo log |
-//! | 2 | `schema`, `free_space`, `open_file` | tables; free space on the disk; whether the open file is still there |
+//! | 2 | `schema`, `free_space`, `open_file`, `log_file` | tables; free space on the disk; whether the open file is still there; damage of its log |
 //! | 3 | `store` | open, begin, append, finish and load trials ([`Store`]) |
 //! | 4 | `chunks` | chunks of a trial, checked |
 //! | 4 | `trial_rows` | the list of trials |
@@ -70,6 +70,7 @@ pub mod labels;
 mod library;
 #[cfg(test)]
 mod library_tests;
+mod log_file;
 mod merge;
 mod new_file;
 mod open_file;

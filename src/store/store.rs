@@ -11,6 +11,7 @@ use super::demo_log::{TrialPlace, keep, log, place_of};
 use super::file_kind::PARTS;
 use super::frame_blob::encode_frames;
 use super::identity::{Stored, add_to, known};
+use super::log_file::has_lost_changes;
 use super::open_file::OpenFile;
 use super::schema::{APPLICATION_ID, SCHEMA_VERSION, make_tables};
 use super::store_error::{BUSY_TIMEOUT, StoreError, fault, plain, row_fault};
@@ -140,9 +141,16 @@ impl Store {
         }
         let flags =
             flags | OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX | OpenFlags::SQLITE_OPEN_URI;
+        let lost = has_lost_changes(&beside(&file, "-wal")).then(|| {
+            format!(
+                "the log of \"{}\" is damaged: what was stored last, behind the damage, is lost; compare it with a backup",
+                path.display()
+            )
+        });
         let connection = Connection::open_with_flags(&file, flags).map_err(|e| StoreError::open(path, plain(&e)))?;
         let file = OpenFile::at(file)?;
-        Ok(Self { connection, path: path.to_owned(), file, warnings: Vec::new(), is_unchanging: false })
+        let warnings = lost.into_iter().collect();
+        Ok(Self { connection, path: path.to_owned(), file, warnings, is_unchanging: false })
     }
 
     /// Name of the file for SQLite, byte for byte.
