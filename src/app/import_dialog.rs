@@ -224,12 +224,12 @@ impl ImportDialog {
         self.split = self.base.split_gap_s.is_some();
         (self.profile, self.refused, self.chosen) = (name, None, false);
         self.columns = self.columns.iter().map(|column| self.choice_of(&column.name)).collect();
-        self.start(None);
     }
 
-    /// Uses the profile of a file.
+    /// Uses the profile of a file, and reads anew.
     pub(super) fn open_profile(&mut self, path: &Path) {
         self.use_profile(path.to_string_lossy().into_owned());
+        self.start(None);
     }
 
     /// Draws the dialog; returns what it asks for.

@@ -78,6 +78,9 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     for (_, model) in &models {
         model.check_channels(&data.channels)?;
     }
+    if arguments.rezero && !data.about.is_recorded() {
+        return Err("--rezero is for trials of a real gripper and imported ones; choose them with --source".into());
+    }
     let data = if arguments.rezero { data.rezeroed() } else { data };
     let checks = leak_checks(&data, arguments.data.seed);
     let plan = arguments.plan(&data);

@@ -11,16 +11,13 @@ use palpate_tactile::model::SensorModel;
 
 /// Whether trials that were not simulated can be told apart by something else than touch; a leak is a warning.
 pub(super) fn leak_checks(data: &Dataset, seed: u64) -> Vec<LeakCheck> {
-    if data.about.object != RECORDED {
+    if !data.about.is_recorded() {
         return Vec::new();
     }
     let checks = data.leak_checks(seed);
     checks.iter().filter(|check| check.leaks).for_each(|check| warn(&check.to_string()));
     checks.into()
 }
-
-/// What a card says of trials that were not simulated.
-const RECORDED: &str = "recorded";
 
 /// Selection of trials.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,8 +1,8 @@
 //! Checking a mesh before physics trusts it, and mending what can be mended safely.
 //!
 //! Mended, with a note: corners that coincide, corners on an edge of a neighbour (T-junctions), triangles that repeat or
-//! have two equal corners, winding that is mixed or inside out, small holes. Refused, with a reason: nothing to hold, numbers that are not finite, no
-//! volume, holes too wide to guess, surfaces with no consistent inside.
+//! have two equal corners, winding that is mixed or inside out, small holes. Refused, with a reason: nothing to hold,
+//! numbers that are not finite, no volume, holes too wide to guess, surfaces with no consistent inside.
 //!
 //! A mesh leaves here *balanced*: every edge is walked as often one way as the other, so that the winding number
 //! is defined everywhere (Jacobson et al. 2013), which is what the distance bake relies on for its sign.
@@ -95,7 +95,10 @@ pub fn repair(mesh: &TriMesh) -> Result<Repaired, MeshError> {
         closed(welded.clone(), diagonal, Sides::Cancel)
             .or_else(|fault| closed(welded.clone(), diagonal, Sides::Collapse).map_err(|_again| fault))
             .or_else(|fault| {
-                closed(split_at_corners(welded, diagonal * tolerance), diagonal, Sides::Cancel).map_err(|_again| fault)
+                let (split, edges) = split_at_corners(welded, diagonal * tolerance);
+                let mut repaired = closed(split, diagonal, Sides::Cancel).map_err(|_again| fault)?;
+                repaired.notes.push(format!("{edges} edge(s) were split at corners of their neighbours"));
+                Ok(repaired)
             })
             .map(|repaired| Repaired { joined, ..repaired })
     };
@@ -180,7 +183,7 @@ fn cells_near(p: DVec3, tolerance: f64) -> impl Iterator<Item = [i64; 3]> {
 /// Removes triangles with two equal corners, repeats, and those that lie back to back with another.
 fn drop_degenerate(mesh: &mut TriMesh, sides: Sides, notes: &mut Vec<String>) {
     let before = mesh.triangles.len();
-    mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+    mesh.triangles.retain(has_three_corners);
     // Per set of corners: how often it is wound one way and how often the other.
     let mut windings: FxHashMap<[u32; 3], i32> = FxHashMap::default();
     for t in &mesh.triangles {
@@ -203,17 +206,26 @@ fn drop_degenerate(mesh: &mut TriMesh, sides: Sides, notes: &mut Vec<String>) {
 
 /// Most pairs of a loose edge and a corner that are compared.
 const MOST_PAIRS: usize = 20_000_000;
+/// Most edges that are split, for each corner.
+const MOST_SPLITS: usize = 3;
 
-/// Splits triangles where the edge of one goes past corners of others, which modelling tools leave (T-junctions).
-fn split_at_corners(mut mesh: TriMesh, tolerance: f64) -> TriMesh {
-    mesh.triangles.retain(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+/// True for a triangle with three different corners.
+fn has_three_corners(t: &[u32; 3]) -> bool {
+    t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
+}
+
+/// Splits triangles where the edge of one goes past corners of others, which modelling tools leave (T-junctions); returns how
+/// often. Each corner splits the edges of few neighbours, else it is no such mesh.
+fn split_at_corners(mut mesh: TriMesh, tolerance: f64) -> (TriMesh, usize) {
+    mesh.triangles.retain(has_three_corners);
     let edges = edges_of(&mesh.triangles);
     let mut loose: FxHashSet<[u32; 2]> =
         edges.chunk_by(same_corners).filter(|sides| sides.len() == 1).map(|sides| sides[0].0).collect();
     let corners: BTreeSet<u32> = loose.iter().flatten().copied().collect();
     if loose.len() * corners.len() > MOST_PAIRS {
-        return mesh;
+        return (mesh, 0);
     }
+    let (before, most) = (mesh.triangles.len(), MOST_SPLITS * corners.len());
     let between = |points: &[DVec3], [a, b]: [u32; 2]| {
         let [from, to] = [a, b].map(|i| points[i as usize]);
         let (along, length) = ((to - from).normalize_or_zero(), from.distance(to));
@@ -225,7 +237,7 @@ fn split_at_corners(mut mesh: TriMesh, tolerance: f64) -> TriMesh {
         corners.iter().copied().find(is_inside)
     };
     let mut index = 0;
-    while let Some(&t) = mesh.triangles.get(index) {
+    while let Some(&t) = mesh.triangles.get(index).filter(|_| mesh.triangles.len() - before <= most) {
         let split = [t, [t[1], t[2], t[0]], [t[2], t[0], t[1]]].into_iter().find_map(|[a, b, c]| {
             let corner = loose.contains(&[a.min(b), a.max(b)]).then(|| between(&mesh.points, [a, b]))??;
             (corner != c).then_some(([a, b, c], corner))
@@ -238,7 +250,8 @@ fn split_at_corners(mut mesh: TriMesh, tolerance: f64) -> TriMesh {
         mesh.triangles.push([corner, b, c]);
         loose.extend([a, b].map(|end| [end.min(corner), end.max(corner)]));
     }
-    mesh
+    let splits = mesh.triangles.len() - before;
+    (mesh, splits)
 }
 
 /// The corners in rising order, and whether the triangle walks them in that order (+1) or against it (-1).
@@ -482,6 +495,20 @@ mod tests {
         let repaired = repair(&mesh).expect("mendable");
         assert!((repaired.mesh.signed_volume() - 1.0).abs() < 1e-12);
         assert!(edges_of(&repaired.mesh.triangles).chunk_by(same_corners).all(|sides| sides.len() == 2));
+        assert_eq!(repaired.notes, ["2 edge(s) were split at corners of their neighbours"]);
+    }
+
+    #[test]
+    fn a_heap_of_triangles_on_one_line_is_given_up_soon() {
+        // Every edge passes the corners of all triangles within it.
+        let count = 1000;
+        let along = (0..2 * count).map(|k| DVec3::new(f64::from(k), 0.0, 0.0));
+        let mut mesh = TriMesh { points: along.collect(), ..TriMesh::default() };
+        mesh.points.push(DVec3::new(0.0, 900.0, 0.0));
+        let apex = 2 * count as u32;
+        mesh.triangles = (0..count as u32).map(|k| [k, apex - 1 - k, apex]).collect();
+        let (split, times) = split_at_corners(mesh, 1e-6);
+        assert!(times <= MOST_SPLITS * (apex as usize + 1) + 1 && split.triangles.len() == times + count as usize);
     }
 
     #[test]

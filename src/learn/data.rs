@@ -184,6 +184,11 @@ pub struct DataCard {
 }
 
 impl DataCard {
+    /// True where no grasp was simulated.
+    pub fn is_recorded(&self) -> bool {
+        self.object == "recorded"
+    }
+
     /// True for simulated grasps read through perfect sensors.
     pub fn from_perfect_sensors(&self) -> bool {
         self.sensors.as_deref() == Some("virtual")
@@ -202,11 +207,7 @@ impl DataCard {
     pub fn described(&self) -> String {
         let mut parts = Vec::new();
         parts.extend(self.preset.as_ref().map(|preset| format!("preset {preset}")));
-        parts.push(if self.object == "recorded" {
-            "recorded grasps".to_owned()
-        } else {
-            format!("object {}", self.object)
-        });
+        parts.push(if self.is_recorded() { "recorded grasps".to_owned() } else { format!("object {}", self.object) });
         parts.extend(self.sensors.as_ref().map(|sensors| match self.draws {
             Some(draws) => format!("{draws} times {sensors} sensors"),
             None => format!("{sensors} sensors"),

@@ -1,5 +1,5 @@
-//! Whether a data set tells its labels by something else than touch: by its readings before anything is touched, or by the
-//! length of its trials.
+//! Leakage: whether a data set gives its labels away by something else than touch, by its readings before anything is touched or
+//! by the length of its trials.
 //!
 //! Both are asked of two learners that find different things, extra-trees and the nearest neighbour, by cross-validated
 //! balanced accuracy; the larger of the two counts. Under permuted labels the same is repeated (a permutation test: Good,
@@ -22,8 +22,8 @@ const FEWEST: [usize; 2] = [5, 20];
 const FOLDS: usize = 5;
 /// Permutations of the labels: with all of them worse, p is one in a thousand.
 const PERMUTATIONS: usize = 999;
-/// Share of what is left above chance that has to be told for a warning.
-const TOLD: f64 = 0.1;
+/// Part of the way from chance to certainty that an accuracy has to exceed for a warning.
+const EXCESS: f64 = 0.1;
 /// The same is known after so many permutations where the accuracy is so many of their deviations above their mean.
 const SOON: (usize, f64) = (99, 6.0);
 /// Trees of a forest.
@@ -31,10 +31,10 @@ const TREES: usize = 10;
 /// Channels that are named at most.
 const NAMED: usize = 5;
 
-/// What tells the labels.
+/// What gives the labels away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Telltale {
+pub enum LeakSource {
     /// Readings of the rest before the touch.
     Rest,
     /// Duration and number of samples.
@@ -44,7 +44,7 @@ pub enum Telltale {
 /// Outcome of one check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeakCheck {
-    pub telltale: Telltale,
+    pub source: LeakSource,
     /// Balanced accuracy of the better learner; none where there were too few trials.
     pub accuracy: Option<f64>,
     /// That of guessing.
@@ -62,12 +62,12 @@ impl std::fmt::Display for LeakCheck {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let percent = |share: f64| format!("{:.0} %", 100.0 * share);
         let chance = percent(self.chance);
-        match (self.telltale, self.accuracy) {
-            (Telltale::Rest, None) => {
+        match (self.source, self.accuracy) {
+            (LeakSource::Rest, None) => {
                 write!(f, "leak check: not checked, too few trials or no readings before the touch")
             }
-            (Telltale::Length, None) => write!(f, "length check: not checked, too few trials"),
-            (Telltale::Rest, Some(share)) if self.leaks => write!(
+            (LeakSource::Length, None) => write!(f, "length check: not checked, too few trials"),
+            (LeakSource::Rest, Some(share)) if self.leaks => write!(
                 f,
                 "The object can be told before it is touched ({}, chance {chance}; by {}): the recordings differ in something \
                  else than touch. Record the objects in turn and tare before each; `palpate evaluate --rezero` takes out what \
@@ -79,16 +79,16 @@ impl std::fmt::Display for LeakCheck {
                     self.channels.join(", ")
                 }
             ),
-            (Telltale::Length, Some(share)) if self.leaks => write!(
+            (LeakSource::Length, Some(share)) if self.leaks => write!(
                 f,
                 "The object can be told by the length of its trials alone ({}, chance {chance}): cut all trials alike, as \
                  `palpate evaluate --cut` does",
                 percent(share)
             ),
-            (Telltale::Rest, Some(share)) => {
+            (LeakSource::Rest, Some(share)) => {
                 write!(f, "leak check: {} before the touch, chance {chance}: no sign of a leak", percent(share))
             }
-            (Telltale::Length, Some(share)) => {
+            (LeakSource::Length, Some(share)) => {
                 write!(f, "length check: {} by the length alone, chance {chance}: no sign of a leak", percent(share))
             }
         }
@@ -109,10 +109,10 @@ impl Dataset {
             rests.iter().filter_map(|rest| Some(rest.t_s[..samples].last()? - rest.t_s[0])).collect();
         seconds.sort_by(f32::total_cmp);
         let seconds = seconds.get(seconds.len() / 2).copied().unwrap_or(0.0);
-        let mut rest = Question::new(&rows, &truth, seed).answered(Telltale::Rest);
+        let mut rest = Question::new(&rows, &truth, seed).answered(LeakSource::Rest);
         (rest.samples, rest.seconds) = (samples, seconds);
         if rest.leaks {
-            let least = rest.chance + TOLD * (1.0 - rest.chance);
+            let least = rest.chance + EXCESS * (1.0 - rest.chance);
             let alone = |channel: usize| {
                 let own = |row: &Vec<f32>| row.iter().skip(channel).step_by(width).copied().collect::<Vec<f32>>();
                 Question::new(&rows.iter().map(own).collect::<Vec<_>>(), &truth, seed).accuracy(&truth)
@@ -128,7 +128,7 @@ impl Dataset {
             vec![lasts, grasp.len() as f32]
         };
         let lengths: Vec<Vec<f32>> = kept.iter().map(length).collect();
-        [rest, Question::new(&lengths, &truth, seed).answered(Telltale::Length)]
+        [rest, Question::new(&lengths, &truth, seed).answered(LeakSource::Length)]
     }
 
     /// Subtracts the mean of the first half of each trial's rest, and leaves the second half to be checked.
@@ -211,15 +211,15 @@ impl<'a> Question<'a> {
     }
 
     /// The check, without its channels.
-    fn answered(&self, telltale: Telltale) -> LeakCheck {
+    fn answered(&self, source: LeakSource) -> LeakCheck {
         let mut present = vec![false; self.classes];
         self.truth.iter().for_each(|class| present[*class] = true);
         let different = present.iter().filter(|own| **own).count();
         let chance = 1.0 / different.max(1) as f64;
         let few = different < 2 || self.truth.len() < FEWEST[1] || self.columns == 0;
         let accuracy = (!few).then(|| self.accuracy(self.truth));
-        let leaks = accuracy.is_some_and(|own| own > chance + TOLD * (1.0 - chance) && self.is_unlikely(own));
-        LeakCheck { telltale, accuracy, chance, leaks, samples: 0, seconds: 0.0, channels: Vec::new() }
+        let leaks = accuracy.is_some_and(|own| own > chance + EXCESS * (1.0 - chance) && self.is_unlikely(own));
+        LeakCheck { source, accuracy, chance, leaks, samples: 0, seconds: 0.0, channels: Vec::new() }
     }
 
     /// True where no permutation of the labels does as well.

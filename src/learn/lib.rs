@@ -97,7 +97,7 @@ pub use baselines::{
 pub use belief::{Belief, Rejection, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
-pub use leaks::{LeakCheck, Telltale};
+pub use leaks::{LeakCheck, LeakSource};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;

@@ -289,6 +289,8 @@ fn labels_that_can_be_told_before_the_touch_are_a_warning() {
         said.out.contains("leak check: ") && said.out.contains("one session left out at a time, 2 fits"),
         "{said:?}"
     );
+    json(at, &["collect", "--objects", "ball,box", "--trials", "6", "--json"]);
+    refused(at, &["evaluate", "--models", "knn", "--source", "sim", "--rezero"], &["--rezero", "imported"]);
     let said = run(at, &["train", "knn", "--collection", "lab", "--out", "lab.safetensors"]);
     assert!(said.err.contains("can be told before it is touched"), "{said:?}");
     let card = std::fs::read_to_string(at.join("lab.json")).unwrap();

@@ -479,7 +479,8 @@ impl Rows {
         };
         let label = self.label(record)?;
         let session = self.roles.session.map(|at| name_of_session(&record[at])).transpose()?.flatten();
-        let key = session.as_ref().map_or(Cow::Borrowed(name), |session| format!("{session} {name}").into());
+        // No name has a line break in it.
+        let key = session.as_ref().map_or(Cow::Borrowed(name), |session| format!("{session}\n{name}").into());
         let known = self.by_name.get(key.as_ref()).copied();
         let splits = |trial: &RawTrial| {
             let falls = |gap: f64| trial.t_s.last().is_some_and(|before| now < *before || now - before >= gap);

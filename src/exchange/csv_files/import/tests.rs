@@ -340,4 +340,7 @@ fn sessions_are_told_apart() {
     let sessions: Vec<Option<&str>> = import.trials.iter().map(|trial| trial.session.as_deref()).collect();
     assert_eq!(sessions, [Some("monday"), Some("tuesday"), None]);
     assert!(import.trials.iter().all(|trial| trial.signals.channels == ["p"] && trial.signals.len() == 3));
+    // A blank may stand in either name.
+    let text = "session,trial,label,t_s,p\na b,c,mug,0,1\na b,c,mug,0.1,1\na,b c,mug,0,1\na,b c,mug,0.1,2\n";
+    assert_eq!(read(text).trials.len(), 2);
 }
