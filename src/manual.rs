@@ -43,6 +43,7 @@ topics! {
     stability
     engines
     datasets
+    recordings
     recognition
     paper
     studies

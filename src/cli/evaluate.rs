@@ -115,9 +115,8 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     if arguments.json && controls.is_none() {
         return say_json(&rows);
     }
-    let sessions: BTreeSet<u32> = data.examples.iter().map(|example| example.session).collect();
-    let is_bound =
-        sessions.len() > 1 && !splits.is_empty() && matches!(plan, SplitPlan::Shares(_) | SplitPlan::Folds { .. });
+    let sessions = data.sessions().into_iter().collect::<BTreeSet<u32>>().len();
+    let is_bound = sessions > 1 && !splits.is_empty() && matches!(plan, SplitPlan::Shares(_) | SplitPlan::Folds { .. });
     let plan = if splits.is_empty() { "trials that the models have not learned".to_owned() } else { plan.described() };
     let fits = if splits.len() > 1 { format!(", {} fits", splits.len()) } else { String::new() };
     let (trials, tested) = (data.examples.len(), rows.first().map_or(0, |row| row.evaluation.trials));
@@ -127,10 +126,10 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
     heading.push(format!("split: {plan}{fits}; {trials} trials, {tested} of them tested; seed {seed}{quick}"));
     heading.extend(is_bound.then(|| {
         format!(
-            "random parts of {} sessions are an upper bound: new sessions do worse (--split leave-a-session-out)",
-            sessions.len()
+            "random parts of {sessions} sessions are an upper bound: new sessions do worse (--split leave-a-session-out)"
         )
     }));
+    heading.extend((sessions > 1).then(|| "intervals are over whole sessions".to_owned()));
     heading.extend(arguments.rezero.then(|| "re-zeroed by the first half of each rest".to_owned()));
     heading.extend(checks.iter().filter(|check| !check.leaks).map(LeakCheck::to_string));
     heading.push(String::new());

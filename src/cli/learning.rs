@@ -19,6 +19,21 @@ pub(super) fn leak_checks(data: &Dataset, seed: u64) -> Vec<LeakCheck> {
     checks.into()
 }
 
+/// Reads grasps under a progress bar, and warns of what they mix and lack.
+pub(super) fn read_dataset(query: &DatasetQuery, store: &Store, view: &SensorView) -> Result<Dataset, Failure> {
+    let bar = Progress::of("reading trials");
+    let data = query.read(store, view, &mut |done, of| bar.show(done, of));
+    drop(bar);
+    let data = data?;
+    for mixed in &data.about.mixed {
+        warn(&format!("the trials mix {mixed}"));
+    }
+    if data.about.left_out > 0 {
+        warn(&format!("{} trial(s) left out: {}", data.about.left_out, counted(&data.about.left_out_for)));
+    }
+    Ok(data)
+}
+
 /// Selection of trials.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct QueryArguments {
@@ -106,18 +121,7 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        let source = self.trials.query(without_empty, most_of_each);
-        let bar = Progress::of("reading trials");
-        let data = source.read(store, &self.view(), &mut |done, of| bar.show(done, of));
-        drop(bar);
-        let data = data?;
-        for mixed in &data.about.mixed {
-            warn(&format!("the trials mix {mixed}"));
-        }
-        if data.about.left_out > 0 {
-            warn(&format!("{} trial(s) left out: {}", data.about.left_out, counted(&data.about.left_out_for)));
-        }
-        Ok(data)
+        read_dataset(&self.trials.query(without_empty, most_of_each), store, &self.view())
     }
 
     /// Fits and tests methods on all splits, on this many threads, or one per core. Of several methods, each has a line on

@@ -7,6 +7,7 @@ mod show;
 
 use super::output::trials_target;
 use super::prelude::*;
+pub(super) use import::{MappingArguments, import_all};
 use labels::LabelCommand;
 use palpate_exchange::{CSV, TrialExport, format_of};
 use palpate_lab::inspection::OpenOptions;

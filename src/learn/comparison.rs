@@ -291,9 +291,10 @@ impl Comparison<'_> {
             once.iter().map(|k| Some(tested.answers.verdicts[*k].pmf.top().0)).collect()
         };
         let truth: Vec<usize> = once.iter().map(|k| first.answers.truth[*k]).collect();
+        let sessions: Vec<u32> = once.iter().map(|k| first.data.examples[*k].session).collect();
         let classes = first.data.labels.classes.len();
         let f1 = |decided: &[Option<usize>], trials: &[usize]| {
-            Confusion::from_pairs(classes, trials.iter().map(|k| (truth[*k], decided[*k])))?.macro_f1()
+            Confusion::from_pairs(classes, trials.iter().map(|k| (truth[*k], decided[*k])))?.f1_over_occurring()
         };
         let of_first = decided(first);
         let of_others: Vec<Vec<Option<usize>>> = others.iter().map(decided).collect();
@@ -304,7 +305,8 @@ impl Comparison<'_> {
         for (((row, own), mcnemar_p), mcnemar_p_holm) in
             rows[1..].iter_mut().zip(&of_others).zip(p_values).zip(adjusted)
         {
-            let difference = bootstrap.difference(&truth, |trials| f1(own, trials), |trials| f1(&of_first, trials));
+            let difference =
+                bootstrap.difference((&truth, &sessions), |trials| f1(own, trials), |trials| f1(&of_first, trials));
             row.against_first = difference.map(|f1| Difference { f1, mcnemar_p, mcnemar_p_holm });
         }
         Ok(rows)
@@ -388,7 +390,9 @@ fn fed_back_against_independent(classes: usize, fed_back: &[Round], independent:
     };
     let bootstrap = Bootstrap { resamples: 500, seed: 0 };
     (0..most)
-        .filter_map(|grasps| bootstrap.difference(&truth, |t| f1(fed_back, grasps, t), |t| f1(independent, grasps, t)))
+        .filter_map(|grasps| {
+            bootstrap.difference((&truth, &[]), |t| f1(fed_back, grasps, t), |t| f1(independent, grasps, t))
+        })
         .collect()
 }
 

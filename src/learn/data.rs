@@ -345,6 +345,12 @@ impl Dataset {
         ends.get(ends.len() / 2).copied().unwrap_or(1.0)
     }
 
+    /// Session of each grasp; empty where all are of one.
+    pub fn sessions(&self) -> Vec<u32> {
+        let own: Vec<u32> = self.examples.iter().map(|example| example.session).collect();
+        if own.windows(2).all(|pair| pair[0] == pair[1]) { Vec::new() } else { own }
+    }
+
     /// Class of each grasp.
     pub fn truth(&self) -> Vec<usize> {
         self.examples.iter().map(|example| example.class).collect()

@@ -31,7 +31,7 @@ pub struct Evaluation {
     pub precision: f64,
     /// Mean F1 over classes.
     pub f1_macro: f64,
-    /// 95 % interval of the macro F1, by bootstrap over trials within objects.
+    /// 95 % interval of the macro F1, by bootstrap over sessions where there are several, else over trials within objects.
     pub ci95: [f64; 2],
     /// Expected calibration error over ten bins of equal mass.
     pub ece: f64,
@@ -214,11 +214,12 @@ pub fn evaluate_stopped(
     let probabilities: Vec<Vec<f64>> = answers.verdicts.iter().map(|v| v.pmf.probabilities().to_vec()).collect();
     let forecasts = Forecasts::new(truth, &probabilities)?;
     let (of_trial, truth_of_trial) = trials(data);
+    let sessions: Vec<u32> = of_trial.iter().map(|tests| data.examples[tests[0]].session).collect();
     let of_trials = |trials: &[usize]| {
         let tests = trials.iter().flat_map(|trial| &of_trial[*trial]);
         Confusion::from_pairs(classes, tests.map(|k| (truth[*k], decided[*k])))?.f1_over_occurring()
     };
-    let Interval { low, high, .. } = bootstrap.interval(&truth_of_trial, of_trials)?;
+    let Interval { low, high, .. } = bootstrap.over_sessions(&truth_of_trial, &sessions, of_trials)?;
     let confident = forecasts.confident(stop.threshold);
     Some(Evaluation {
         macro_accuracy: scores.macro_accuracy,

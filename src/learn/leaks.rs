@@ -12,7 +12,7 @@ use crate::rows::RowModel as _;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Longest part of a rest that is read (s).
 const REST_S: f32 = 0.3;
@@ -32,7 +32,7 @@ const TREES: usize = 10;
 const NAMED: usize = 5;
 
 /// What gives the labels away.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LeakSource {
     /// Readings of the rest before the touch.
@@ -42,7 +42,7 @@ pub enum LeakSource {
 }
 
 /// Outcome of one check.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeakCheck {
     pub source: LeakSource,
     /// Balanced accuracy of the better learner; none where there were too few trials.

@@ -2,7 +2,7 @@
 
 use super::frame::{GeneratedSection, ListedStudy, ShownStudy, grouped};
 use super::shipped::shipped_text;
-use super::{accuracy, effects, paper, stability};
+use super::{accuracy, effects, paper, public, stability};
 use palpate_learn::{METHODS, Method};
 
 /// All generated sections; a test checks that the documents hold them, and
@@ -19,6 +19,7 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
         stability::sections()?,
         paper::sections()?,
         paper::sections_in_short()?,
+        public::sections()?,
     ]
     .concat())
 }

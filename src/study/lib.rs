@@ -17,6 +17,7 @@
 //! | 1 | [`stability`] | hard cases, holds that chatter, random scenes |
 //! | 1 | [`paper`] | the studies of the paper |
 //! | 2 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
+//! | 2 | `public` | recordings of others |
 //! | 3 | `generated` | sections of manual and README, written from stored results |
 //! | 3 | `all` | the list of all studies |
 //! | 4 | [`jobs`] | background tasks of the window |
@@ -31,10 +32,11 @@ pub mod jobs;
 mod network_cost;
 pub mod paper;
 mod physics_cost;
+mod public;
 mod shipped;
 pub mod stability;
 
-pub use all::{all_studies, listed_study};
+pub use all::{all_studies, listed_study, study_title};
 pub use effects::{
     AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectChange, EffectSize, ExplainedEffect,
     Explanation, SEEN, SceneNumber, explain_effects,
@@ -54,3 +56,4 @@ pub use network_cost::{
     LiveCost, NetworkCost, StepSizes, answer_cost, candle_step_cost, kernel_step_cost, live_step_cost,
 };
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
+pub use public::{PUBLIC, PublicData, PublishedResult, PublishedResults, public_study};

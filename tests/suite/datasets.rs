@@ -296,3 +296,51 @@ fn labels_that_can_be_told_before_the_touch_are_a_warning() {
     let card = std::fs::read_to_string(at.join("lab.json")).unwrap();
     assert!(card.contains("leak_checks") && card.contains("\"leaks\": true"), "{card}");
 }
+
+#[test]
+fn recordings_of_others_are_judged_beside_what_is_told_without_touch() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // Three sessions of two objects, whose force differs, and whose baseline does in the first file.
+    let mut text = "session,trial,label,t_s,pad [N],flex [1/m]\n".to_owned();
+    for k in 0..36 {
+        let (session, label) = (k / 12, if k % 2 == 0 { "mug" } else { "key" });
+        let [grip, baseline] = if label == "mug" { [2.0, 0.4] } else { [1.0, 0.0] };
+        for n in 0..25 {
+            let t = 0.04 * f64::from(n);
+            let noise = f64::from((n * 7919 + k * 104_729) % 101) * 1e-4;
+            let touch = (t - 0.5).max(0.0);
+            let [pad, flex] = [baseline + noise + grip * touch, 3.0 + noise - touch];
+            writeln!(text, "{session},{k},{label},{t},{pad},{flex}").unwrap();
+        }
+    }
+    std::fs::write(at.join("glove.csv"), text).unwrap();
+    let published =
+        "[[published]]\nmethod = \"SVM\"\nresult = \"93 %\"\nprotocol = \"ten folds\"\nsource = \"a journal\"\n";
+    std::fs::write(at.join("glove.toml"), published).unwrap();
+    std::fs::write(at.join("wrong.toml"), published.replace("result", "score")).unwrap();
+    let study = ["study", "public", "--data", "glove.csv", "--quick", "--out", "found"];
+    refused(at, &[&study[..], &["--published", "wrong.toml"]].concat(), &["wrong.toml", "score", "line 3"]);
+    refused(at, &["study", "public", "--data", "no.csv"], &["no.csv"]);
+    let found = json(at, &[&study[..], &["--published", "glove.toml", "--json"]].concat());
+    let lines: Vec<&str> =
+        found["result"]["data"].as_array().unwrap().iter().filter_map(|line| line.as_str()).collect();
+    assert_eq!(lines[0], "glove.csv: 36 grasps of 2 objects, 2 channels");
+    assert!(lines[1].starts_with("3 sessions: one session left out at a time; intervals"), "{lines:?}");
+    let csv = |name: &str| std::fs::read_to_string(at.join("found").join(format!("{name}.csv"))).unwrap();
+    let (methods, leaks) = (csv("public"), csv("public-leaks"));
+    let f1 = |readings: &str, model: &str| -> f64 {
+        let line = methods.lines().find(|line| line.starts_with(&format!("{readings},{model},"))).expect(model);
+        line.split(',').nth(3).unwrap().parse().unwrap()
+    };
+    assert!(f1("as recorded", "extra-trees") > 0.9 && f1("re-zeroed", "extra-trees") > 0.9, "{methods}");
+    let told = |form: &str| leaks.lines().find(|line| line.starts_with(&format!("{form},readings before"))).unwrap();
+    assert!(told("as recorded").contains(",the object is told,pad"), "{leaks}");
+    assert!(told("re-zeroed").contains(",no sign of a leak,"), "{leaks}");
+    assert!(csv("public-published").contains("SVM,93 %,ten folds,a journal"));
+    let left_out = csv("public-left-out");
+    assert!(left_out.contains("ds-lstm") && left_out.contains("geometry-trees"), "{left_out}");
+    assert!(
+        !at.join("store.sqlite").exists() || json(at, &["trials", "list", "--json"]).as_array().unwrap().is_empty()
+    );
+}

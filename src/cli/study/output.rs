@@ -8,7 +8,7 @@ use palpate_lab::grasping::Shard;
 use palpate_render::figure_svg;
 use palpate_study::{
     Cell, Experiment, Finding, LinkedFigure, Measuring, StoredStudy, StudyFolder, StudyOutcome, StudyProgress,
-    StudyReport, StudyTable, listed_study, run_experiment,
+    StudyReport, StudyTable, run_experiment, study_title,
 };
 use serde::de::DeserializeOwned;
 
@@ -55,7 +55,7 @@ impl StudyOutput {
         drop(bar);
         let Some(stored) = whole(key, &part, outcome) else { return Ok(None) };
         let (shown, figures) = (E::shown(&stored.result), E::figures(&stored.result));
-        let title = listed_study(key).map_or(key, |study| study.card().title);
+        let title = study_title(key).unwrap_or(key);
         self.show(&folder, (key, title, quick), &stored, &shown, figures)?;
         Ok(Some(stored))
     }

@@ -5,6 +5,7 @@ use super::super::prelude::*;
 use super::nothing_added;
 use palpate_exchange::{Mapping, SPLIT_GAP_S, read_trials};
 use palpate_store::write_whole;
+use palpate_study::StudyCommand;
 
 pub(super) const EXAMPLES: &str = "Examples:
   palpate trials import grasps.csv bag.mcap
@@ -23,6 +24,16 @@ pub(super) struct ImportArguments {
     /// spherical).
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    mapping: MappingArguments,
+    /// Save the roles as a profile.
+    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[Mapping::FILE]))]
+    save_profile: Option<PathBuf>,
+}
+
+/// Roles of the columns of tables of other programs.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct MappingArguments {
     /// Column of the label, or the label of all trials (default: the column label, or else the name of the file).
     #[arg(long, value_name = "COLUMN|NAME")]
     label: Option<String>,
@@ -48,9 +59,6 @@ pub(super) struct ImportArguments {
     /// --save-profile wrote. Other options count before it.
     #[arg(long, value_name = "NAME|FILE.toml")]
     profile: Option<String>,
-    /// Save the roles as a profile.
-    #[arg(long, value_name = "FILE.toml", value_parser = file_of(&[Mapping::FILE]))]
-    save_profile: Option<PathBuf>,
 }
 
 fn split_by(text: &str) -> Result<f64, String> {
@@ -72,8 +80,8 @@ fn delimiter(text: &str) -> Result<char, String> {
     }
 }
 
-impl ImportArguments {
-    fn mapping(&self) -> Result<Mapping, String> {
+impl MappingArguments {
+    pub(in crate::cli) fn mapping(&self) -> Result<Mapping, String> {
         let profile = self.profile.as_deref().map(Mapping::profile).transpose()?.unwrap_or_default();
         let mapping = Mapping {
             skip: self.skip.unwrap_or(profile.skip),
@@ -88,19 +96,26 @@ impl ImportArguments {
         mapping.check()?;
         Ok(mapping)
     }
+
+    /// The command with these options.
+    pub(in crate::cli) fn repeated(&self, command: StudyCommand) -> StudyCommand {
+        let quoted = |text: &Option<String>| text.as_ref().map(|text| format!("'{text}'"));
+        let command = command
+            .option("label", quoted(&self.label))
+            .option("time", quoted(&self.time))
+            .option("trial", quoted(&self.trial))
+            .option("split-by", self.split_by.map(|seconds| format!("gap={seconds}")))
+            .option("skip", self.skip)
+            .option("delimiter", quoted(&self.delimiter.map(String::from)))
+            .option("profile", quoted(&self.profile));
+        self.channel.iter().fold(command, |command, channel| command.option("channel", Some(format!("'{channel}'"))))
+    }
 }
 
 pub(super) fn run(arguments: &ImportArguments, store: &mut Store) -> Result<(), Failure> {
-    let mapping = arguments.mapping()?;
+    let mapping = arguments.mapping.mapping()?;
     for file in &arguments.files {
-        let import = read_trials(file, &mapping)?;
-        for warning in &import.warnings {
-            warn(warning);
-        }
-        let collection =
-            file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
-        let added = store.insert_imported(&collection, &import.trials).map_err(|error| nothing_added(file, &error))?;
-        let known = import.trials.len() - added as usize;
+        let Imported { collection, added, known } = import(file, &mapping, store)?;
         say(format!("{}: {added} trial(s) added as collection {collection}, {known} already there", file.display()))?;
     }
     if let Some(path) = &arguments.save_profile {
@@ -109,6 +124,30 @@ pub(super) fn run(arguments: &ImportArguments, store: &mut Store) -> Result<(), 
         say(format!("profile saved as {}", path.display()))?;
     }
     Ok(())
+}
+
+/// What came of a file.
+struct Imported {
+    collection: String,
+    added: u32,
+    /// Trials that were there already.
+    known: usize,
+}
+
+fn import(file: &Path, mapping: &Mapping, store: &mut Store) -> Result<Imported, Failure> {
+    let import = read_trials(file, mapping)?;
+    for warning in &import.warnings {
+        warn(warning);
+    }
+    let collection = file.file_stem().map_or_else(|| "import".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let added = store.insert_imported(&collection, &import.trials).map_err(|error| nothing_added(file, &error))?;
+    let known = import.trials.len() - added as usize;
+    Ok(Imported { collection, added, known })
+}
+
+/// Adds the trials of files to a store, where they are not there already.
+pub(in crate::cli) fn import_all(files: &[PathBuf], mapping: &Mapping, store: &mut Store) -> Result<(), Failure> {
+    files.iter().try_for_each(|file| import(file, mapping, store).map(|_| ()))
 }
 
 #[cfg(test)]

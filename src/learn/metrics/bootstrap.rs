@@ -6,6 +6,10 @@
 //! nor other training runs are in it. With n trials per object it is too narrow by about sqrt((n - 1) / n), 5 % at
 //! n = 10, and an object with a single trial adds nothing to its width.
 //!
+//! Trials of one session resemble each other, too. Where there are several sessions, whole sessions are drawn instead of trials
+//! (Davison and Hinkley, *Bootstrap methods and their application*, section 3.8); sessions with a single object each are drawn
+//! within that object. The interval then speaks for new sessions; with few of them it is too narrow by the same formula.
+//!
 //! Two models are compared on the same resamples. What makes a trial hard for both then cancels in the difference,
 //! which is settled by fewer trials than two separate intervals that do not overlap would take.
 
@@ -39,23 +43,38 @@ impl Bootstrap {
     /// `objects` holds the object of each trial. `None` without trials or resamples, or where the statistic is
     /// undefined (`None` or not finite) on the trials as they are or on more than 5 % of the resamples.
     pub fn interval(&self, objects: &[usize], statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<Interval> {
+        self.over_sessions(objects, &[], statistic)
+    }
+
+    /// The same with whole sessions drawn. `sessions` holds the session of each trial. Trials are drawn where it is empty, or
+    /// where there are no two sessions to draw from.
+    pub fn over_sessions(
+        &self,
+        objects: &[usize],
+        sessions: &[u32],
+        statistic: impl Fn(&[usize]) -> Option<f64>,
+    ) -> Option<Interval> {
         let statistic = |trials: &[usize]| statistic(trials).filter(|value| value.is_finite());
         if objects.is_empty() {
             return None;
         }
         let mut trials: Vec<usize> = (0..objects.len()).collect();
         let estimate = statistic(&trials)?;
-
-        let mut strata: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (trial, &object) in objects.iter().enumerate() {
-            strata.entry(object).or_default().push(trial);
-        }
+        let strata = of_sessions(objects, sessions).unwrap_or_else(|| {
+            let mut strata: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
+            for (trial, &object) in objects.iter().enumerate() {
+                strata.entry(object).or_default().push(vec![trial]);
+            }
+            strata.into_values().collect()
+        });
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let mut values = Vec::new();
         for _ in 0..self.resamples {
             trials.clear();
-            for stratum in strata.values() {
-                trials.extend(stratum.iter().map(|_| stratum[rng.random_range(0..stratum.len())]));
+            for stratum in &strata {
+                for _ in stratum {
+                    trials.extend(&stratum[rng.random_range(0..stratum.len())]);
+                }
             }
             values.extend(statistic(&trials));
         }
@@ -70,12 +89,28 @@ impl Bootstrap {
     /// Interval of the first model's statistic minus the second's, both on the same trials in every resample.
     pub fn difference(
         &self,
-        objects: &[usize],
+        (objects, sessions): (&[usize], &[u32]),
         first: impl Fn(&[usize]) -> Option<f64>,
         second: impl Fn(&[usize]) -> Option<f64>,
     ) -> Option<Interval> {
-        self.interval(objects, |trials| Some(first(trials)? - second(trials)?))
+        self.over_sessions(objects, sessions, |trials| Some(first(trials)? - second(trials)?))
     }
+}
+
+/// The trials of each session: strata of sessions with a single object each, by object, and of those with several. None where
+/// each stratum has one session.
+fn of_sessions(objects: &[usize], sessions: &[u32]) -> Option<Vec<Vec<Vec<usize>>>> {
+    let mut by_session: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (trial, &session) in sessions.iter().enumerate() {
+        by_session.entry(session).or_default().push(trial);
+    }
+    let mut strata: BTreeMap<Option<usize>, Vec<Vec<usize>>> = BTreeMap::new();
+    for trials in by_session.into_values() {
+        let first = objects[trials[0]];
+        let only = trials.iter().all(|trial| objects[*trial] == first).then_some(first);
+        strata.entry(only).or_default().push(trials);
+    }
+    strata.values().any(|sessions| sessions.len() > 1).then(|| strata.into_values().collect())
 }
 
 /// The value below which a share of the sorted values lies, linear between them (`numpy.quantile`).
@@ -123,12 +158,30 @@ mod tests {
         let first: Vec<f64> = (0..200).map(|trial| if trial % 2 == 0 { 0.0 } else { 1.0 }).collect();
         let second: Vec<f64> = (0..200).map(|trial| if trial % 20 == 1 { 0.0 } else { first[trial] }).collect();
         let (bootstrap, objects) = (Bootstrap::default(), [0; 200]);
-        let difference = bootstrap.difference(&objects, mean_of(&first), mean_of(&second)).expect("defined");
+        let difference = bootstrap.difference((&objects, &[]), mean_of(&first), mean_of(&second)).expect("defined");
         assert!((difference.estimate - 0.05).abs() < 1e-12 && !difference.holds(0.0), "{difference:?}");
         let alone = bootstrap.interval(&objects, mean_of(&first)).expect("defined");
         assert!(alone.high - alone.low > 2.0 * (difference.high - difference.low));
-        let same = bootstrap.difference(&objects, mean_of(&first), mean_of(&first)).expect("defined");
+        let same = bootstrap.difference((&objects, &[]), mean_of(&first), mean_of(&first)).expect("defined");
         assert_eq!(same, Interval { estimate: 0.0, low: 0.0, high: 0.0 });
+    }
+
+    #[test]
+    fn sessions_that_differ_widen_the_interval() {
+        // Ten sessions of twenty trials; all trials of a session are alike, so that ten draws are all that is known.
+        let (objects, sessions): (Vec<usize>, Vec<u32>) = (0..200).map(|trial| (trial % 4, trial as u32 / 20)).unzip();
+        let hits: Vec<f64> = sessions.iter().map(|session| f64::from(session % 2)).collect();
+        let bootstrap = Bootstrap { resamples: 20_000, seed: 1 };
+        let width = |sessions: &[u32]| {
+            let interval = bootstrap.over_sessions(&objects, sessions, mean_of(&hits)).expect("defined");
+            assert_eq!(interval.estimate, 0.5);
+            interval.high - interval.low
+        };
+        // 2 * 1.96 * sqrt(0.25 / n), in steps of a tenth for sessions.
+        assert!((width(&[]) - 0.139).abs() < 0.01 && (width(&sessions) - 0.6).abs() < 0.05, "{}", width(&sessions));
+        // A session for each object, or one for all, tells nothing of sessions.
+        let by_object: Vec<u32> = objects.iter().map(|object| *object as u32).collect();
+        assert_eq!([width(&by_object), width(&[3; 200])], [width(&[]); 2]);
     }
 
     #[test]

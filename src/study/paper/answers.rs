@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// Answers of a model to test grasps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct ModelAnswers {
+pub(crate) struct ModelAnswers {
     /// Description of the data.
     pub(super) data: String,
     /// Names of the classes.
@@ -24,6 +24,9 @@ pub(super) struct ModelAnswers {
     pub(super) truth: Vec<usize>,
     /// The model's decisions.
     pub(super) decided: Vec<usize>,
+    /// Session of each grasp; empty where all are of one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) sessions: Vec<u32>,
     /// Expected calibration error.
     pub(super) ece: f64,
     pub(super) cost: ModelCost,
@@ -31,7 +34,7 @@ pub(super) struct ModelAnswers {
 
 /// Cost of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct ModelCost {
+pub(crate) struct ModelCost {
     /// CPU time of the fit (s).
     pub(super) train_cpu_s: f64,
     /// CPU time of the answer to a whole grasp (ms).
@@ -47,7 +50,7 @@ pub(super) struct ModelCost {
 /// A model's answers, or the reason why it could not be fitted to these data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum TestAnswers {
+pub(crate) enum TestAnswers {
     Answers(ModelAnswers),
     /// It could not be fitted.
     NotFitted(String),
@@ -59,6 +62,14 @@ impl TestAnswers {
         match self {
             Self::Answers(answers) => Some(answers),
             Self::NotFitted(_) => None,
+        }
+    }
+
+    /// Reason why it could not be fitted, where it could not.
+    pub(crate) fn reason(&self) -> Option<&str> {
+        match self {
+            Self::NotFitted(reason) => Some(reason),
+            Self::Answers(_) => None,
         }
     }
 }
@@ -150,7 +161,7 @@ fn file_size(model: &Model) -> usize {
 }
 
 /// A model's answers to test grasps.
-pub(super) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
+pub(crate) fn judge(model: &Model, test: &Dataset) -> ModelAnswers {
     judge_answers(model, test, &answer(model.recogniser.as_ref(), test))
 }
 
@@ -173,6 +184,7 @@ pub(super) fn judge_answers(model: &Model, test: &Dataset, answers: &Answers) ->
             parameters: model.card.parameters,
         },
         truth: answers.truth.clone(),
+        sessions: test.sessions(),
     }
 }
 
@@ -199,6 +211,8 @@ pub(crate) struct Pool {
     pub(super) classes: Vec<String>,
     /// Class and decisions of each trial.
     trials: BTreeMap<TrialId, (usize, Vec<usize>)>,
+    /// Session of each trial; empty where all are of one.
+    sessions: BTreeMap<TrialId, u32>,
 }
 
 /// Resamples of an interval: its ends vary between seeds by 2 % of its width.
@@ -216,7 +230,7 @@ pub(crate) struct PairedDifference {
 impl Pool {
     /// Decisions on trials: number, class and decision of each.
     pub(crate) fn of_decisions(classes: &[String], all: impl IntoIterator<Item = (TrialId, usize, usize)>) -> Self {
-        let mut pool = Self { classes: classes.to_vec(), trials: BTreeMap::new() };
+        let mut pool = Self { classes: classes.to_vec(), ..Self::default() };
         for (trial, truth, decided) in all {
             pool.trials.entry(trial).or_insert((truth, Vec::new())).1.push(decided);
         }
@@ -234,13 +248,19 @@ impl Pool {
                 for ((trial, truth), decided) in part.trials.iter().zip(&part.truth).zip(&part.decided) {
                     pool.trials.entry(*trial).or_insert((*truth, Vec::new())).1.push(*decided);
                 }
+                pool.sessions.extend(part.trials.iter().copied().zip(part.sessions.iter().copied()));
             }
         }
         pool
     }
 
+    /// Pools what could be fitted of several parts.
+    pub(crate) fn of_parts(parts: &[TestAnswers]) -> Self {
+        Self::of(parts.iter().filter_map(TestAnswers::answers))
+    }
+
     /// Number of trials.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.trials.len()
     }
 
@@ -250,14 +270,23 @@ impl Pool {
     }
 
     /// Macro-accuracy with its interval.
-    pub(super) fn accuracy(&self) -> Option<Interval> {
+    pub(crate) fn accuracy(&self) -> Option<Interval> {
         self.scored(Confusion::macro_accuracy)
     }
 
     fn scored(&self, score: impl Fn(&Confusion) -> Option<f64>) -> Option<Interval> {
         let all: Vec<&(usize, Vec<usize>)> = self.trials.values().collect();
         let objects: Vec<usize> = all.iter().map(|(truth, _)| *truth).collect();
-        BOOTSTRAP.interval(&objects, |trials| score(&confusion(self.classes.len(), &all, trials)?))
+        let sessions = self.sessions_of(self.trials.keys());
+        BOOTSTRAP.over_sessions(&objects, &sessions, |trials| score(&confusion(self.classes.len(), &all, trials)?))
+    }
+
+    /// Sessions of trials; empty where all are of one.
+    fn sessions_of<'a>(&self, trials: impl Iterator<Item = &'a TrialId>) -> Vec<u32> {
+        if self.sessions.is_empty() {
+            return Vec::new();
+        }
+        trials.map(|id| self.sessions.get(id).copied().unwrap_or_default()).collect()
     }
 
     /// This kind of model against another on the trials that both answered.
@@ -269,8 +298,12 @@ impl Pool {
         let objects: Vec<usize> = both.iter().map(|(own, _)| own.0).collect();
         let [own, others]: [Vec<_>; 2] =
             [both.iter().map(|pair| pair.0).collect(), both.iter().map(|pair| pair.1).collect()];
-        let f1 = |of: &[&(usize, Vec<usize>)], trials: &[usize]| confusion(self.classes.len(), of, trials)?.macro_f1();
-        let f1 = BOOTSTRAP.difference(&objects, |trials| f1(&own, trials), |trials| f1(&others, trials))?;
+        let f1 = |of: &[&(usize, Vec<usize>)], trials: &[usize]| {
+            confusion(self.classes.len(), of, trials)?.f1_over_occurring()
+        };
+        let sessions = self.sessions_of(self.trials.keys().filter(|id| other.trials.contains_key(id)));
+        let f1 =
+            BOOTSTRAP.difference((&objects, &sessions), |trials| f1(&own, trials), |trials| f1(&others, trials))?;
         let (mut truth, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
         for (own, other) in &both {
             for (a, b) in own.1.iter().zip(&other.1) {
@@ -368,6 +401,7 @@ mod tests {
             data: String::new(),
             classes: ["ball", "cube"].map(str::to_owned).to_vec(),
             trials: (0..20).collect(),
+            sessions: Vec::new(),
             decided: truth.iter().enumerate().map(|(k, t)| if k % wrong == 0 { 1 - t } else { *t }).collect(),
             truth,
             ece: 0.0,

@@ -8,6 +8,7 @@ use palpate_learn::{Dataset, Fitting, LearnError, Method, Model};
 use palpate_sim::fingerprint;
 use palpate_sim::scene::{PosePreset, Scene};
 use palpate_store::Store;
+use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialId};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
@@ -88,6 +89,14 @@ impl<'a> StudyData<'a> {
         }
         read.push((wanted.clone(), Arc::clone(&data)));
         Ok(data)
+    }
+
+    /// What can be told of recorded grasps without touch, a line for each check; nothing of simulated ones.
+    pub(super) fn leaks(&self) -> Vec<String> {
+        let wanted = self.plan.wanted(usize::MAX, SensorModel::Virtual);
+        let recorded = self.plan.query.is_some().then(|| self.data(&wanted).ok()).flatten();
+        let recorded = recorded.filter(|data| data.about.is_recorded());
+        recorded.map_or_else(Vec::new, |data| data.leak_checks(self.plan.seed).map(|check| check.to_string()).into())
     }
 
     /// A simulated trial of the store; none for others.

@@ -21,6 +21,7 @@ mod models;
 mod plan;
 mod prelude;
 mod recognition;
+mod region;
 mod rows;
 mod shaking;
 mod signatures;
@@ -29,7 +30,7 @@ mod stored;
 mod study;
 mod training_size;
 
-pub(crate) use answers::Pool;
+pub(crate) use answers::{Pool, TestAnswers, judge};
 pub use bench::StudyData;
 pub(crate) use in_short::sections_in_short;
 pub use plan::{DataWanted, STUDY_PRESET, StudyPlan};
@@ -44,6 +45,7 @@ pub const PAPER_STUDIES: &[&dyn PaperStudy] = &[
     &stages::Stages,
     &training_size::TrainingSize,
     &models::Models,
+    &region::Region,
     &grasps::Grasps,
     &drift::Drift,
     &shaking::Shaken,

@@ -4,7 +4,7 @@ pub(super) use super::answers::{
     ModelAnswers, PARTS, Pool, SHOWN, TRAIN, TestAnswers, TestPart, confusion_table, judge, usual_grasps,
 };
 pub(super) use super::bench::StudyData;
-pub(super) use super::plan::{DataWanted, StudyPlan};
+pub(super) use super::plan::{DataWanted, STUDY_PRESET, StudyPlan};
 pub(super) use super::rows::{
     Crossing, Factor, Fit, Kind, Row, by_model, compare, crossed, described, find, gains_over, pooled,
 };

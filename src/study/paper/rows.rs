@@ -237,18 +237,14 @@ impl<F> Row<F> {
 
     /// Reason why it could not be fitted, where it could not.
     pub(super) fn remark(&self) -> &str {
-        let mut reasons = self.parts.iter().filter_map(|part| match part {
-            TestAnswers::NotFitted(reason) => Some(reason.as_str()),
-            TestAnswers::Answers(_) => None,
-        });
-        reasons.next().unwrap_or_default()
+        self.parts.iter().find_map(TestAnswers::reason).unwrap_or_default()
     }
 }
 
 /// The answers of all kinds of fits, in the order in which the kinds first came.
 pub(super) fn pooled<F: PartialEq>(answers: impl IntoIterator<Item = (Kind<F>, TestAnswers)>) -> Vec<Row<F>> {
     let row = |(kind, parts): (Kind<F>, Vec<TestAnswers>)| {
-        let pool = Pool::of(parts.iter().filter_map(TestAnswers::answers));
+        let pool = Pool::of_parts(&parts);
         Row { parts, ..Row::of_pool(kind, pool) }
     };
     grouped(answers).into_iter().map(row).collect()

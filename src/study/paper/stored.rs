@@ -29,7 +29,7 @@ pub(crate) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
     }
     let claims = GeneratedSection { document: "assets/help/paper.md", name: "claims", text: parts.join("\n\n") };
     let studies = GeneratedSection { document: "assets/help/studies.md", name: "studies", text: overview() };
-    Ok(vec![claims, studies])
+    Ok([vec![claims, studies], super::region::sections()?].concat())
 }
 
 /// Table of the studies and of what they cost.

@@ -75,7 +75,9 @@ impl<S: Study> Experiment for OnBench<'_, S> {
 
     fn report(&self, found: Vec<(S::Cell, S::Found)>) -> StudyReport {
         let plan = self.bench.plan();
-        StudyReport { fingerprint: study_fingerprint(self.study, plan), ..S::report(plan, found) }
+        let mut report = StudyReport { fingerprint: study_fingerprint(self.study, plan), ..S::report(plan, found) };
+        report.data.extend(self.bench.leaks());
+        report
     }
 
     fn shown(report: &StudyReport) -> StudyReport {
