@@ -5,7 +5,7 @@ mod real;
 mod simulated;
 
 use super::prelude::*;
-use super::recognise::{StageOne, named};
+use super::recognise::{StageOne, left_in_words, named};
 use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{GraspSummary, Identification, SHAPES};
 use palpate_learn::{Measure, Model, OTHER, StopReason, StopRule};
@@ -40,9 +40,9 @@ pub(super) struct DemoArguments {
     /// Grasp limit.
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     grasps: u32,
-    /// Probability at which to stop; 1 grasps up to the limit.
-    #[arg(long, value_name = "P", default_value_t = StopRule::default().threshold, value_parser = within(0.0..=1.0))]
-    threshold: f64,
+    /// Probability at which to stop; 1 grasps up to the limit (default: that of the model).
+    #[arg(long, value_name = "P", value_parser = within(0.0..=1.0))]
+    threshold: Option<f64>,
     /// Recognition model (default: the shipped one for free or fixed objects; with --port, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
@@ -97,6 +97,9 @@ struct GraspReport {
     touch: Option<Touched>,
     /// Belief after this grasp and those before it.
     pmf: BTreeMap<String, f64>,
+    /// Classes that are left, of a model whose answers are calibrated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left: Option<Vec<String>>,
     #[serde(flatten)]
     summary: Option<GraspSummary>,
     #[serde(skip)]
@@ -137,7 +140,8 @@ fn grasp_until_recognised(
     truth: Option<String>,
     seed: Option<u64>,
 ) -> Result<(), Failure> {
-    let rule = StopRule { threshold: arguments.threshold, most_grasps: arguments.grasps as usize };
+    let threshold = arguments.threshold.unwrap_or(model.card.stop.threshold);
+    let rule = StopRule { threshold, most_grasps: arguments.grasps as usize };
     let mut identification = Identification::new(Arc::clone(model), rule);
     let stage_one = |identification: &Identification| {
         seed.map(|_| identification.verdict().and_then(|v| StageOne::of(v, &model.card.labels)))
@@ -148,6 +152,9 @@ fn grasp_until_recognised(
         (grasp.number, grasp.stage_one) = (grasps.len() + 1, stage_one(&identification));
         grasp.touch = Touched::of(&identification);
         grasp.pmf = identification.belief().now().map(|pmf| named(model, pmf)).unwrap_or_default();
+        // The promise is for an object that is put down anew.
+        let is_anew = !arguments.guided && !arguments.as_released;
+        grasp.left = model.card.left(identification.belief()).filter(|_| is_anew);
         let decision = identification.decision();
         if !arguments.json {
             let mut page = Page::default();
@@ -202,6 +209,7 @@ impl Report for GraspReport {
         }
         self.touch.iter().for_each(|touch| page.line(format!("  Felt: {touch}.")));
         page.line(format!("  Most likely: {}.", likely(&self.pmf)));
+        self.left.iter().for_each(|left| page.line(format!("  Left: {}.", left_in_words(left))));
     }
 }
 

@@ -20,6 +20,7 @@ mod output;
 mod plan;
 mod plot;
 mod prelude;
+mod promise;
 mod recognise;
 mod record;
 mod replay;
@@ -76,6 +77,8 @@ enum Command {
     Collect(collect::CollectArguments),
     /// Train a recogniser on stored trials and save it.
     Train(train::TrainArguments),
+    /// Calibrate a model, so that its answers are wrong no more often than promised.
+    Promise(promise::PromiseArguments),
     /// Teach a model new objects in seconds, from their files or from recorded grasps.
     Teach(teach::TeachArguments),
     /// Evaluate recognisers on held-back trials: F1, calibration, successive grasps, cost.
@@ -219,6 +222,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Demo(demo)) => demo::run(demo, store)?,
         Some(Command::Collect(collect)) => collect::run(collect, store)?,
         Some(Command::Train(train)) => train::run(train, store)?,
+        Some(Command::Promise(promise)) => promise::run(promise)?,
         Some(Command::Teach(teach)) => teach::run(teach, store)?,
         Some(Command::Evaluate(evaluate)) => evaluate::run(evaluate, store)?,
         Some(Command::Recognise(recognise)) => recognise::run(recognise, store)?,

@@ -49,6 +49,9 @@ struct TrialReport {
     probability: f64,
     stage_one: Option<StageOne>,
     pmf: BTreeMap<String, f64>,
+    /// Classes that are left, of a model whose answers are calibrated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left: Option<Vec<String>>,
     /// With `--why`.
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<WhyReport>,
@@ -86,6 +89,18 @@ struct Together {
     decided: String,
     probability: f64,
     pmf: BTreeMap<String, f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left: Option<Vec<String>>,
+}
+
+/// The classes that are left, in words: `lemon or tomato`.
+pub(super) fn left_in_words(left: &[String]) -> String {
+    let names: Vec<String> = left.iter().map(|name| shown_title(name)).collect();
+    match names.as_slice() {
+        [] => "none of the known objects".to_owned(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
 }
 
 /// Loads the named model, or the shipped one for a kind of sensors.
@@ -156,10 +171,10 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         let alone = after(None);
         let with = belief.now().map_or_else(|| alone.pmf.clone(), |before| after(Some(before)).pmf);
         belief.add(with, alone.pmf.clone());
+        let mut single = Belief::default();
+        single.add(alone.pmf.clone(), alone.pmf.clone());
         let why = match &mut explanations {
             Some(explanations) => {
-                let mut single = Belief::default();
-                single.add(alone.pmf.clone(), alone.pmf.clone());
                 let explained = if arguments.together { &belief } else { &single };
                 Some(explanations.of(&store, *id, grasp, explained)?)
             }
@@ -174,6 +189,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             probability,
             stage_one,
             pmf: named(&model, &alone.pmf),
+            left: model.card.left(&single),
             why,
         });
     }
@@ -181,6 +197,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         decided: labels.classes[pmf.top().0].name.clone(),
         probability: pmf.top().1,
         pmf: named(&model, pmf),
+        left: model.card.left(&belief),
     });
     if is_real {
         warn_of_perfect_sensors(&model);
@@ -200,8 +217,15 @@ impl Report for RecogniseReport {
         };
         let header = ["trial", "label", "stage one", "recognised as", "probability"];
         page.table(&header, self.trials.iter().map(row));
+        for trial in &self.trials {
+            trial
+                .left
+                .iter()
+                .for_each(|left| page.line(format!("trial {}, left: {}", trial.trial, left_in_words(left))));
+        }
         if let Some(all) = &self.together {
             page.line(format!("together: {} ({})", shown_title(&all.decided), percent(all.probability)));
+            all.left.iter().for_each(|left| page.line(format!("left: {}", left_in_words(left))));
         }
         let explained = || self.trials.iter().filter_map(|trial| Some((trial.trial, trial.why.as_ref()?)));
         explained().for_each(|(id, why)| why.text(page, id, self.together.is_some()));

@@ -69,6 +69,14 @@ pub(crate) fn agreement(belief: Option<&Pmf>, alone: &[Pmf]) -> f64 {
     alone.iter().map(explained).sum::<f64>() / alone.len() as f64
 }
 
+/// Successive grasps of one object, with the belief after each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Round {
+    /// True class.
+    pub truth: usize,
+    pub belief: Belief,
+}
+
 /// Smallest agreement of known objects, calibrated on held-out grasps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rejection {

@@ -1,11 +1,10 @@
 //! Comparison of methods: all fitted to the same training grasps and evaluated on the same test grasps, in one split of
 //! the data or in several.
 
-use crate::belief::StopRule;
+use crate::belief::{Round, StopRule};
 use crate::data::{DataCard, Dataset};
 use crate::evaluation::{
-    Answers, Evaluation, Round, Stop, answer, evaluate_stopped, f1_by_grasps, most_grasps, product_of_experts, rounds,
-    stops,
+    Answers, Evaluation, Stop, answer, evaluate_stopped, f1_by_grasps, most_grasps, product_of_experts, rounds, stops,
 };
 use crate::fitting::{Fitting, LearnError};
 use crate::methods::{METHODS, Method, MethodKind, method};

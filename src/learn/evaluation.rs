@@ -1,6 +1,6 @@
 //! Evaluation of a recogniser on test grasps: single and successive grasps, stage one, calibration, cost.
 
-use crate::belief::{Belief, StopReason, StopRule};
+use crate::belief::{Belief, Round, StopReason, StopRule};
 use crate::data::{Class, Dataset, Example};
 use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
 use crate::pmf::Pmf;
@@ -108,14 +108,6 @@ pub fn answer(recogniser: &dyn Recogniser, data: &Dataset) -> Answers {
     let samples: usize = data.examples.iter().map(|e| e.grasp.len()).sum();
     let step_us = start.elapsed().as_secs_f64() * 1e6 / samples.max(1) as f64;
     Answers { truth: data.truth(), verdicts, step_us }
-}
-
-/// Successive grasps of one object, with the belief after each.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Round {
-    /// True class.
-    pub truth: usize,
-    pub belief: Belief,
 }
 
 /// Finds for each test grasp those of the same object that follow it, as indices; the same for every recogniser. Where

@@ -23,6 +23,7 @@
 //! | 2 | `features` | a grasp as a row of features |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
+//! | 2 | `answer_sets` | classes that are left, with a promise |
 //! | 3 | `leaks` | whether labels can be told by something else than touch |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
@@ -59,6 +60,7 @@
 //! # Ok::<(), palpate_learn::LearnError>(())
 //! ```
 
+mod answer_sets;
 mod arrays;
 mod baselines;
 mod belief;
@@ -90,11 +92,12 @@ mod split_tests;
 mod temperature;
 mod tensor_file;
 
+pub use answer_sets::{AnswerSets, CalibratedBy, ROUNDS_OF_A_CLASS, StopLevel};
 pub use arrays::{Array, Arrays, ModelError, Numbers};
 pub use baselines::{
     Geometry, GeometryEncoder, GeometryScores, Measure, MeasureEstimate, MeasureScore, Measured, Shipped, Touch,
 };
-pub use belief::{Belief, Rejection, StopReason, StopRule};
+pub use belief::{Belief, Rejection, Round, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
 pub use leaks::{LeakCheck, LeakSource};

@@ -140,6 +140,7 @@ impl Method {
             deviations: deviations.unwrap_or_default(),
             stop: StopRule::default(),
             rejection: recogniser.rejection().cloned(),
+            answer_sets: None,
             seed: fitting.seed,
             quick: fitting.quick,
             parameters: recogniser.parameters(),
@@ -214,6 +215,8 @@ impl Model {
         card.parameters = recogniser.parameters();
         card.train_cpu_s += train_cpu_s;
         card.metrics = serde_json::Value::Null;
+        // They were calibrated for other classes.
+        card.answer_sets = None;
         Ok(Self { card, recogniser: Arc::from(recogniser), signatures: None }.with_signatures(signatures))
     }
 }

@@ -1,7 +1,8 @@
 //! A trained model: a recogniser and its card.
 
+use crate::answer_sets::AnswerSets;
 use crate::arrays::ModelError;
-use crate::belief::{Rejection, StopRule};
+use crate::belief::{Belief, Rejection, StopRule};
 use crate::data::{DataCard, Labels};
 use crate::learned::LearnedGrasps;
 use crate::pmf::Pmf;
@@ -47,6 +48,9 @@ pub struct ModelCard {
     pub stop: StopRule,
     /// Threshold that separates known from unknown objects.
     pub rejection: Option<Rejection>,
+    /// Sets of classes with a promise, where they have been calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer_sets: Option<AnswerSets>,
     /// Seed of the fit.
     pub seed: u64,
     /// True after a quick fit.
@@ -149,6 +153,13 @@ impl ModelCard {
         let (other, rest) = (self.labels.other()?, classes.saturating_sub(1).max(1) as f64);
         let share = |class| if class == other { 1.0 / 3.0 } else { 2.0 / 3.0 / rest };
         Some(Pmf::from_weights((0..classes).map(share)))
+    }
+
+    /// Names of the classes that are left after grasps, where the sets are calibrated.
+    pub fn left(&self, belief: &Belief) -> Option<Vec<String>> {
+        let left = self.answer_sets.as_ref()?.left(belief);
+        let classes = self.labels.classes.iter().zip(left);
+        Some(classes.filter(|(_, left)| *left).map(|(class, _)| class.name.clone()).collect())
     }
 
     /// True where it learned from simulated grasps through perfect sensors: on a real gripper most of its answers are wrong.

@@ -70,6 +70,7 @@ const HOMES: &[(&str, &[&str])] = &[
             "src/lab/grasping/error_band.rs",
             "src/lab/grasping/known_geometry.rs",
             "src/lab/grasping/lessons.rs",
+            "src/lab/grasping/promise.rs",
             "src/study",
         ],
     ),

@@ -358,3 +358,34 @@ fn a_model_is_taught_an_object_by_its_file() {
         &["cannot learn new objects", "geometry-network"],
     );
 }
+
+#[test]
+fn a_promise_is_calibrated_kept_in_the_model_and_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    json(at, &["collect", "--objects", "ball,bigball", "--trials", "12", "--json"]);
+    run(at, &["train", "knn", "--out", "mine.safetensors"]);
+    let promise = ["promise", "mine.safetensors", "--rounds", "150", "--grasps", "2", "--json"];
+    refused(at, &["promise", "mine.safetensors", "--rounds", "20"], &["40 rounds are too few", "300 in all"]);
+    refused(at, &["promise", "no.safetensors"], &["no.safetensors"]);
+    let plain = std::fs::read(at.join("mine.safetensors")).unwrap();
+    let found = json(at, &[&promise[..], &["--out", "promised.safetensors"]].concat());
+    assert_eq!(std::fs::read(at.join("mine.safetensors")).unwrap(), plain, "the model itself stays as it is");
+    compare_numbers("json_promise", &pretty(found.clone()));
+    let sets = &found["sets"];
+    assert_eq!((&sets["rounds"], &sets["risk"]), (&300.into(), &0.1.into()));
+    assert_eq!(sets["by"], serde_json::json!(["shape", "shape"]));
+    assert!(sets["stop"]["at_most"].as_f64().unwrap() <= 0.1, "{sets}");
+    // Balls of 40 and 65 mm are told apart at once.
+    let demo = ["demo", "--object", "bigball", "--seed", "4", "--grasps", "2", "--no-pictures", "--no-store"];
+    let with = |model: &'static str| [&demo[..], &["--model", model]].concat();
+    let said = json(at, &[&with("promised.safetensors")[..], &["--json"]].concat());
+    assert_eq!(said["grasps"][0]["left"], serde_json::json!(["bigball"]), "{said}");
+    assert_eq!(said["threshold"], sets["stop"]["level"]);
+    assert!(run(at, &with("promised.safetensors")).out.contains("  Left: Tennis ball (bigball)."), "in words");
+    let plain = json(at, &[&with("mine.safetensors")[..], &["--json"]].concat());
+    assert!(plain["grasps"][0].get("left").is_none());
+    // Poses that a guide chooses are not those of the promise.
+    let guided = json(at, &[&with("promised.safetensors")[..], &["--as-released", "--json"]].concat());
+    assert!(guided["grasps"][0].get("left").is_none());
+}

@@ -25,6 +25,7 @@ pub(crate) fn model() -> Arc<Model> {
         deviations: Vec::new(),
         stop: StopRule::default(),
         rejection: None,
+        answer_sets: None,
         seed: 0,
         quick: true,
         parameters: 0,

@@ -394,13 +394,26 @@ impl SensorView {
         Ok(once.readings(trial)?.swap_remove(0))
     }
 
-    /// The same as often as the view reads a grasp; once at least.
-    pub fn readings(&self, trial: &SimulatedTrial) -> Result<Vec<Signals>, LayoutError> {
+    /// The same on the gripper of a number, where the view draws grippers.
+    pub fn signals_on(&self, trial: &SimulatedTrial, gripper: u64) -> Result<Signals, LayoutError> {
+        let (clean, end) = self.clean(trial)?;
+        let read = self.sensors.apply_on(&clean, gripper, noise_seed(&trial.header));
+        Ok(resampled(read.until(self.cut.end(end)), self.rate_hz))
+    }
+
+    /// Signals of perfect sensors, and the end of the hold (s).
+    fn clean(&self, trial: &SimulatedTrial) -> Result<(Signals, f64), LayoutError> {
         self.check_parts()?;
         let layout = SensorLayout::named(&self.layout)?;
         let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.signals)?;
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
+        Ok((clean, end))
+    }
+
+    /// The same as often as the view reads a grasp; once at least.
+    pub fn readings(&self, trial: &SimulatedTrial) -> Result<Vec<Signals>, LayoutError> {
+        let (clean, end) = self.clean(trial)?;
         let seed = noise_seed(&trial.header);
         let read = |draw: u32| {
             let seed = seed.wrapping_add(u64::from(draw).wrapping_mul(NEXT_DRAW));

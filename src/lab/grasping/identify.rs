@@ -90,6 +90,8 @@ pub struct Identification {
     decision: Option<StopReason>,
     /// Threshold at the decision.
     decided_at: f64,
+    /// The object is put down anew for each grasp, as in the rounds that calibrated the model's sets.
+    is_anew: bool,
 }
 
 impl std::fmt::Debug for Identification {
@@ -119,6 +121,8 @@ pub struct IdentificationView {
     pub beliefs: Vec<Pmf>,
     /// Reason to stop, once there is one.
     pub decision: Option<StopReason>,
+    /// Classes that are left after the finished grasps, where the model's sets are calibrated for such grasps.
+    pub left: Option<Vec<bool>>,
     /// The threshold has since been raised above the probability reached: one more grasp may decide anew.
     pub asks_for_more: bool,
     /// True where the model learned from perfect sensors, which no real gripper has.
@@ -172,6 +176,7 @@ impl Identification {
             closed: true,
             decision: None,
             decided_at: 0.0,
+            is_anew: true,
         }
     }
 
@@ -203,6 +208,11 @@ impl Identification {
     pub fn earlier(&self) -> Option<EarlierGrasps> {
         let judged = self.belief.judged();
         (!judged.is_empty()).then(|| EarlierGrasps { model: self.model.card.described(), judged })
+    }
+
+    /// Sets whether the object is put down anew for each grasp.
+    pub fn set_anew(&mut self, is_anew: bool) {
+        self.is_anew = is_anew;
     }
 
     /// Sets the stop rule. A decision is kept; between two grasps the new rule may end the round.
@@ -345,6 +355,7 @@ impl Identification {
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
+            left: self.model.card.answer_sets.as_ref().filter(|_| self.is_anew).map(|sets| sets.left(&self.belief)),
             asks_for_more: self.asks_for_more(),
             from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
             signatures: self.model.signatures.clone(),

@@ -209,7 +209,7 @@ fn recorded(name: &str, store: &Store, view: &SensorView, simulated: usize) -> R
 }
 
 /// The scene in which a model's training grasps were made, as far as its card says.
-fn scene_of(card: &ModelCard) -> Scene {
+pub(super) fn scene_of(card: &ModelCard) -> Scene {
     let preset = card.data.preset.as_deref().and_then(PosePreset::named).or_else(|| PosePreset::named(PRESET));
     let mut scene = Scene::default();
     if let Some(preset) = preset {
@@ -223,7 +223,7 @@ fn scene_of(card: &ModelCard) -> Scene {
 }
 
 /// How simulated grasps are read for a model: as its own were, or, where it learned from a real gripper, as any gripper reads.
-fn view_of(card: &ModelCard) -> SensorView {
+pub(super) fn view_of(card: &ModelCard) -> SensorView {
     let view = SensorView::of_model(card);
     let sensors = if card.data.sensors.is_none() { SensorModel::Drawn } else { view.sensors };
     SensorView { draws: DRAWS, sensors, ..view }

@@ -1,6 +1,6 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, identification of
 //! an object by successive grasps, and advice on the next one. Adapting to a real gripper by one close of its empty hand.
-//! Lessons: grasps by which a model learns new objects. Presentations: the objects and poses of a demo.
+//! Lessons: grasps by which a model learns new objects. Promises: rounds by which its answers are calibrated. Presentations: the objects and poses of a demo.
 
 mod accuracy_cost;
 mod adaptation;
@@ -15,6 +15,7 @@ mod known_geometry;
 mod lessons;
 mod presentation;
 mod pressure_watch;
+mod promise;
 mod row;
 mod run;
 mod shuffled_objects;
@@ -40,6 +41,7 @@ pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, r
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 pub use presentation::Presentation;
 pub(crate) use pressure_watch::PressureFault;
+pub use promise::{PromiseError, PromisedRounds};
 pub use row::Row;
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

@@ -72,6 +72,7 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         deviations: Vec::new(),
         stop: StopRule::default(),
         rejection: None,
+        answer_sets: None,
         seed: 0,
         quick: true,
         parameters: 3,

@@ -65,6 +65,11 @@ impl LiveRecognition {
         self.identification.channels_on(gripper).unwrap_or_default()
     }
 
+    /// Sets whether the object is put down anew for each grasp.
+    pub(super) fn set_anew(&mut self, is_anew: bool) {
+        self.identification.set_anew(is_anew);
+    }
+
     /// Begins a grasp whose rows have these channels in these columns. Returns once per scene the
     /// reason why nothing is recognised; `place` names the scene or gripper in it.
     pub(super) fn begin_grasp(

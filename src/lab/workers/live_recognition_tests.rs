@@ -56,6 +56,7 @@ impl Parrot {
             deviations: Vec::new(),
             stop: StopRule::default(),
             rejection: None,
+            answer_sets: None,
             seed: 0,
             quick: true,
             parameters: 0,

@@ -1,6 +1,7 @@
 //! An estimate with its confidence interval.
 
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{Beta, ContinuousCDF};
 
 /// Coverage of every interval here: 95 %.
 pub const LEVEL: f64 = 0.95;
@@ -38,9 +39,31 @@ impl Interval {
     }
 }
 
+/// Largest share that `count` of `of` are compatible with at an error rate: the one-sided upper bound of Clopper and Pearson
+/// (1934).
+pub fn largest_share(count: usize, of: usize, error: f64) -> f64 {
+    if count >= of {
+        return 1.0;
+    }
+    let bound = Beta::new(count as f64 + 1.0, (of - count) as f64);
+    bound.map_or(1.0, |beta| beta.inverse_cdf(1.0 - error))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Expected: `scipy.stats.beta.ppf(1 - error, count + 1, of - count)`.
+    #[test]
+    fn upper_bounds_agree_with_scipy() {
+        for (count, of, error, bound) in
+            [(0, 50, 0.05, 0.058_155_1), (3, 100, 0.05, 0.075_710_8), (5, 400, 0.005, 0.034_971_7)]
+        {
+            let own = largest_share(count, of, error);
+            assert!((own - bound).abs() < 1e-6, "{count} of {of}: {own}");
+        }
+        assert_eq!([largest_share(0, 0, 0.05), largest_share(7, 7, 0.05)], [1.0; 2]);
+    }
 
     /// Expected: `statsmodels.stats.proportion.proportion_confint(count, of, method="wilson")`.
     #[test]

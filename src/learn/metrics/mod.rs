@@ -18,4 +18,4 @@ pub use bootstrap::Bootstrap;
 pub use calibration::{CALIBRATION_BINS, Confident, Forecasts, PROBABILITY_FLOOR, ReliabilityPoint};
 pub use confusion::{ClassScores, Confusion, Scores};
 pub use difference::{McNemar, holm};
-pub use interval::{Interval, LEVEL};
+pub use interval::{Interval, LEVEL, largest_share};

@@ -86,12 +86,17 @@ impl SensorModel {
     /// Readings of a grasp from its clean signals. `seed` determines the grasp's noise, drift, jitter
     /// and slip; the parts of the gripper are the same for every seed.
     pub fn apply(self, clean: &Signals, seed: u64) -> Signals {
+        self.apply_on(clean, seed, seed)
+    }
+
+    /// The same on the gripper of a number; only [`Self::Drawn`] has several.
+    pub fn apply_on(self, clean: &Signals, gripper: u64, seed: u64) -> Signals {
         match self {
             Self::Virtual => clean.clone(),
             Self::Noisy => PhysicalLike::MILD.apply(clean, seed),
             Self::PhysicalLike => PhysicalLike::default().apply(clean, seed),
             Self::Adapted => PhysicalLike { closed_empty: true, ..PhysicalLike::default() }.apply(clean, seed),
-            Self::Drawn => PhysicalLike::any(seed).apply(clean, seed),
+            Self::Drawn => PhysicalLike::any(gripper).apply(clean, seed),
         }
     }
 }

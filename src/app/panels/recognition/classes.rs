@@ -78,9 +78,11 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     let p = pmf.map_or(0.0, |pmf| pmf.probabilities()[class]);
     let leads = pmf.is_some_and(|pmf| pmf.top().0 == class);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), columns.line), Sense::hover());
-    let spoken = format!("{name} {}", percent(p));
+    let is_gone = part.view.left.as_ref().is_some_and(|left| !left[class]) && !part.view.beliefs.is_empty();
+    let spoken = format!("{name} {}{}", percent(p), if is_gone { ", ruled out" } else { "" });
     response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
-    let ink = colour(if leads { colours.text } else { colours.quiet_text });
+    let quiet = if is_gone { colours.background.mix(colours.quiet_text, 0.6) } else { colours.quiet_text };
+    let ink = colour(if leads { colours.text } else { quiet });
     let [from, to] = columns.bars;
     put(
         ui,

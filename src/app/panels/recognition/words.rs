@@ -54,8 +54,29 @@ pub(in crate::app) fn newest(view: &IdentificationView) -> Option<&Pmf> {
     view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())
 }
 
-/// Reason for another grasp, or for the decision.
+/// Most classes that are named as left.
+const NAMED: usize = 3;
+
+/// Reason for another grasp, or for the decision, and the classes that are left.
 pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
+    let why = why(view, recognised);
+    left(view).map_or_else(|| why.clone(), |left| format!("{left}; {why}"))
+}
+
+/// Classes that are left after finished grasps, where the model's sets are calibrated.
+fn left(view: &IdentificationView) -> Option<String> {
+    let left = view.left.as_ref().filter(|_| !view.beliefs.is_empty())?;
+    let classes = (0..left.len()).filter(|class| left[*class]);
+    let names: Vec<String> = classes.map(|class| title(&view.labels, class).to_lowercase()).collect();
+    Some(match names.as_slice() {
+        [] => "like no known object".to_owned(),
+        [only] => format!("only {only} left"),
+        [first @ .., last] if names.len() <= NAMED => format!("{} or {last}", first.join(", ")),
+        _ => format!("{} objects left", names.len()),
+    })
+}
+
+fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
         let failed = "grasp failed: no answer";
@@ -73,6 +94,7 @@ pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<
         Some(StopReason::Unknown) => "the grasps agree on no known object".to_owned(),
         None if view.listening => match view.beliefs.last() {
             Some(before) => format!("{grasp}; before: {}", leaders(&view.labels, before)),
+            None if view.rule.threshold >= 1.0 => format!("{grasp}; no automatic stop"),
             None => format!("{grasp}; threshold {threshold}"),
         },
         None if recognised.finished => format!("stopped below the threshold: {}", leaders(&view.labels, now)),
@@ -141,6 +163,7 @@ mod tests {
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),
             decision,
+            left: None,
             asks_for_more: false,
             from_perfect_sensors: false,
             signatures: None,
@@ -179,6 +202,25 @@ mod tests {
             ..listening(0.5, &[])
         };
         assert_eq!(Headline::of(&torn), Headline::Sensing);
+    }
+
+    #[test]
+    fn classes_that_are_left_are_named_or_counted() {
+        let labels = labels_of_catalogue();
+        let of = |names: &[&str]| {
+            let left = labels.classes.iter().map(|class| names.contains(&class.name.as_str())).collect();
+            said(&IdentificationView { left: Some(left), ..view(Some(0.61), &[0.61], None) }).1
+        };
+        let why = "grasping again: lemon 61 %, tomato 35 %";
+        assert_eq!(of(&["lemon", "tomato"]), format!("lemon or tomato; {why}"));
+        assert_eq!(of(&["lemon"]), format!("only lemon left; {why}"));
+        assert_eq!(of(&[]), format!("like no known object; {why}"));
+        assert_eq!(of(&["lemon", "tomato", "ball", "cube"]), format!("4 objects left; {why}"));
+        let first = IdentificationView { left: Some(vec![true; 17]), ..view(Some(0.3), &[], None) };
+        assert!(!said(&first).1.contains("left"), "before the first grasp ends");
+        let rule = StopRule { threshold: 1.0, most_grasps: 4 };
+        let never = IdentificationView { rule, listening: true, ..view(Some(0.5), &[], None) };
+        assert_eq!(said(&never).1, "grasp 1 of at most 4; no automatic stop");
     }
 
     #[test]

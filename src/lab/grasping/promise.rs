@@ -1,0 +1,143 @@
+//! Whole rounds of simulated grasps, by which a model's sets of classes and its automatic stops are calibrated.
+//!
+//! In each round the object is put down anew for every grasp, on one gripper: where the gripper varies, it varies from round to
+//! round.
+
+use super::agreement::{Recompute, grasp_soundly};
+use super::lessons::{scene_of, view_of};
+use crate::datasets::{SensorView, sequence_of};
+use palpate_learn::{AnswerSets, Belief, Class, Model, OTHER, ROUNDS_OF_A_CLASS, Round, Sequence, StopRule};
+use palpate_sim::gripper::GripperModel;
+use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
+use palpate_sim::poses::PoseSampler;
+use palpate_sim::scene::Scene;
+use palpate_tactile::LayoutError;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Rounds to calibrate on.
+pub struct PromisedRounds<'a> {
+    /// Rounds of each class.
+    pub rounds: usize,
+    /// Grasps of a round.
+    pub grasps: usize,
+    /// Random seed of the poses.
+    pub seed: u64,
+    /// Receives the number of finished rounds, and of all.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+    /// Flag that cancels the work.
+    pub stop: &'a AtomicBool,
+}
+
+/// Reason why nothing was calibrated.
+#[derive(Debug, thiserror::Error)]
+pub enum PromiseError {
+    #[error("stopped; the model was not changed")]
+    Stopped,
+    #[error(transparent)]
+    Object(#[from] ObjectError),
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    #[error("{0} rounds are too few: take at least {least} in all, and {least} of each class for a promise of its own", least = 3 * ROUNDS_OF_A_CLASS)]
+    TooFew(usize),
+}
+
+/// Seeds of the rounds of a class, and of the grasps of a round: far apart.
+const NEXT_CLASS: u64 = 0x9e37_79b9_7f4a_7c15;
+const NEXT_GRASP: u64 = 0xd1b5_4a32_d192_ed03;
+
+impl PromisedRounds<'_> {
+    /// The model with sets of classes that lose the true one in at most a share of rounds, and with a stop rule whose automatic
+    /// stops are wrong in at most as many; it never stops by itself where no confidence keeps that.
+    pub fn promised(&self, model: &Model, risk: f64) -> Result<Model, PromiseError> {
+        let rounds = self.rounds(model)?;
+        let card = &model.card;
+        let sets = AnswerSets::calibrate(&card.labels, &rounds, card.rejection.as_ref(), risk, self.seed);
+        let sets = sets.ok_or(PromiseError::TooFew(rounds.len()))?;
+        let mut promised = model.clone();
+        promised.card.stop = StopRule { threshold: sets.stop.level.unwrap_or(1.0), most_grasps: sets.most_grasps() };
+        promised.card.answer_sets = Some(sets);
+        Ok(promised)
+    }
+
+    /// Rounds of all classes that can be simulated: built-in objects, taught ones and the empty hand.
+    pub fn rounds(&self, model: &Model) -> Result<Vec<Round>, PromiseError> {
+        let (scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
+        let mut known = Vec::new();
+        for (number, class) in model.card.labels.classes.iter().enumerate() {
+            if let Some(scene) = scene_with(&scene, class, model) {
+                let object = scene.load_object()?;
+                known.push((number, scene, object));
+            }
+        }
+        let (done, of) = (AtomicUsize::new(0), known.len() * self.rounds);
+        let mut all = Vec::new();
+        for (class, scene, object) in &known {
+            let sampler = PoseSampler::new(scene, object.as_ref());
+            let of_class = ObjectRounds { view: &view, sampler, object: object.as_ref() };
+            let first = self.seed.wrapping_add((*class as u64 + 1).wrapping_mul(NEXT_CLASS));
+            let round = |number: usize| {
+                let grasps = of_class.grasps(first.wrapping_add(number as u64), self.grasps, self.stop)?;
+                (self.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, of);
+                Ok(Round { truth: *class, belief: belief_after(model, &grasps) })
+            };
+            all.extend((0..self.rounds).into_par_iter().map(round).collect::<Result<Vec<_>, PromiseError>>()?);
+        }
+        Ok(all)
+    }
+}
+
+/// The scene with the object of a class; none for a class without files.
+fn scene_with(scene: &Scene, class: &Class, model: &Model) -> Option<Scene> {
+    let mut own = scene.clone();
+    let taught = model.card.taught_from.get(&class.name).map(|(_, path)| path.as_str());
+    let built_in = catalogue().iter().any(|built_in| built_in.name == class.name) || class.name == EMPTY;
+    own.object.source = taught.or((built_in && class.name != OTHER).then_some(class.name.as_str()))?.to_owned();
+    Some(own)
+}
+
+/// Rounds of one object.
+struct ObjectRounds<'a> {
+    view: &'a SensorView,
+    sampler: PoseSampler,
+    object: Option<&'a ObjectModel>,
+}
+
+impl ObjectRounds<'_> {
+    /// Readings of the grasps of a round. The seed names the gripper, too.
+    fn grasps(&self, seed: u64, count: usize, stop: &AtomicBool) -> Result<Vec<Sequence>, PromiseError> {
+        let nominal = self.sampler.scene();
+        let (first, _) = self.sampler.draw(self.object, seed);
+        let same_gripper = (nominal.pose.build > 0.0).then(|| {
+            let mut nominal = nominal.clone();
+            nominal.gripper = GripperModel { mount: nominal.gripper.mount.clone(), ..first.gripper.clone() };
+            nominal.pose.build = 0.0;
+            PoseSampler::new(&nominal, self.object)
+        });
+        let sampler = same_gripper.as_ref().unwrap_or(&self.sampler);
+        let mut grasps = Vec::new();
+        for number in 0..count as u64 {
+            if stop.load(Ordering::Relaxed) {
+                return Err(PromiseError::Stopped);
+            }
+            let own = seed.wrapping_add(number.wrapping_mul(NEXT_GRASP));
+            let scene = if number == 0 { first.clone() } else { sampler.draw(self.object, own).0 };
+            let trial = grasp_soundly(&scene, self.object, own, Recompute::Unsettled);
+            grasps.push(sequence_of(&self.view.signals_on(&trial, seed)?));
+        }
+        Ok(grasps)
+    }
+}
+
+/// Belief of a model after grasps of one object.
+fn belief_after(model: &Model, grasps: &[Sequence]) -> Belief {
+    let (recogniser, prior) = (&model.recogniser, model.card.prior());
+    let mut belief = Belief::default();
+    for grasp in grasps {
+        let before = belief.now().or(prior.as_ref());
+        let with = recogniser.recognise(grasp, before).pmf;
+        let alone = if before.is_some() { recogniser.recognise(grasp, None).pmf } else { with.clone() };
+        belief.add(with, alone);
+    }
+    belief
+}
