@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use palpate_lab::datasets::{check_model_path, save_model};
-use palpate_lab::grasping::PromisedRounds;
+use palpate_lab::grasping::GraspRounds;
 use palpate_learn::{AnswerSets, CalibratedBy, Model};
 use palpate_store::labels::shown_title;
 
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &PromiseArguments) -> Result<(), Failure> {
     let progress = |done: usize, of: usize| bar.show(done, of);
     let PromiseArguments { rounds, grasps, seed, wrong, .. } = *arguments;
     let promised =
-        PromisedRounds { rounds, grasps, seed, progress: &progress, stop: &stop }.promised(&model, 0.01 * wrong);
+        GraspRounds { rounds, grasps, seed, progress: &progress, stop: &stop }.promised(&model, 0.01 * wrong);
     drop(bar);
     let promised = promised?;
     save_model(&promised, out)?;

@@ -5,6 +5,7 @@ mod effects;
 mod merge;
 mod output;
 mod paper;
+mod promises;
 mod public;
 mod stability;
 
@@ -20,6 +21,7 @@ use std::path::Path;
   palpate study effects --quick
   palpate study effects --out studies/
   palpate study stability --quick
+  palpate study promises --quick
   palpate study public --data icub.csv
   palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
@@ -35,6 +37,8 @@ enum Study {
     Effects(effects::EffectsArguments),
     /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
+    /// Measure whether sets of classes and automatic stops keep their promise, on rounds of simulated grasps; resumes.
+    Promises(promises::PromisesArguments),
     /// Fit and test all methods on recordings of others, beside what can be told without touch; resumes.
     Public(public::PublicArguments),
     /// Join the parts of a study that `--shard` measured on several machines.
@@ -49,6 +53,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Accuracy(arguments) => accuracy::run(arguments),
         Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
+        Study::Promises(arguments) => promises::run(arguments),
         Study::Public(arguments) => public::run(arguments),
         Study::Merge(arguments) => merge::run(arguments),
         Study::Paper(command) => paper::run(command, store),

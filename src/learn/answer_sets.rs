@@ -194,16 +194,10 @@ impl StopLevel {
 
 /// Whether a round that stops by itself is right; none where it does not.
 fn stopped(round: &Round, rule: StopRule, rejection: Option<&Rejection>) -> Option<bool> {
-    let mut belief = Belief::default();
-    for (with, alone) in round.belief.pairs() {
-        belief.add(with.clone(), alone.clone());
-        match rule.judge(&belief, rejection) {
-            Some(StopReason::Sure) => return Some(with.top().0 == round.truth),
-            Some(StopReason::GraspLimit | StopReason::Unknown) => return None,
-            None => {}
-        }
-    }
-    None
+    let mut beliefs = (1..=round.belief.grasps()).map(|grasps| round.belief.first(grasps));
+    let end = beliefs.find_map(|belief| Some((rule.judge(&belief, rejection)?, belief)));
+    let (_, belief) = end.filter(|(reason, _)| *reason == StopReason::Sure)?;
+    belief.now().map(|pmf| pmf.top().0 == round.truth)
 }
 
 #[cfg(test)]
@@ -241,13 +235,6 @@ mod tests {
         (0..of_each * CLASSES).map(|k| round(k, &mut random)).collect()
     }
 
-    /// The belief after the first grasps.
-    fn first(belief: &Belief, grasps: usize) -> Belief {
-        let mut own = Belief::default();
-        belief.pairs().take(grasps).for_each(|(with, alone)| own.add(with.clone(), alone.clone()));
-        own
-    }
-
     #[test]
     fn sets_hold_the_true_class_as_often_as_they_promise_whenever_it_stops() {
         let sets = AnswerSets::calibrate(&labels(), &rounds(900, 4, 1), None, 0.1, 1).expect("enough rounds");
@@ -262,7 +249,7 @@ mod tests {
             assert!((0.03..0.1 + 3.0 * 0.018).contains(&share), "class {class}: {share}");
         }
         let size = |grasps: usize| {
-            let all = test.iter().map(|round| sets.left(&first(&round.belief, grasps)));
+            let all = test.iter().map(|round| sets.left(&round.belief.first(grasps)));
             all.map(|left| left.iter().filter(|own| **own).count()).sum::<usize>() as f64 / test.len() as f64
         };
         let sizes = [1, 2, 3, 4].map(size);

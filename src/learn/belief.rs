@@ -53,6 +53,13 @@ impl Belief {
         self.steps.len()
     }
 
+    /// The belief after the first grasps.
+    #[must_use]
+    pub fn first(&self, grasps: usize) -> Self {
+        let own = |all: &[Pmf]| all[..grasps.min(all.len())].to_vec();
+        Self { steps: own(&self.steps), alone: own(&self.alone) }
+    }
+
     /// Agreement of the grasps with the belief (nat, at most 0): mean logarithm of the probability that each grasp alone
     /// gives to it. Grasps of an unknown object contradict each other or are uncertain.
     pub fn agreement(&self) -> f64 {

@@ -265,9 +265,11 @@ fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
 /// End of a round by the stop rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stop {
-    grasps: usize,
-    reason: StopReason,
-    correct: bool,
+    /// Number of grasps.
+    pub grasps: usize,
+    pub reason: StopReason,
+    /// The most likely class is the true one.
+    pub correct: bool,
 }
 
 /// Stops each round as the rule says.
@@ -296,14 +298,9 @@ fn stopping(stops: &[Stop]) -> Stopping {
 
 /// Belief at which the rule stops, and the reason.
 fn stopped(whole: &Belief, recogniser: &dyn Recogniser, stop: StopRule) -> (Belief, StopReason) {
-    let mut belief = Belief::default();
-    for (with, alone) in whole.pairs() {
-        belief.add(with.clone(), alone.clone());
-        if let Some(reason) = stop.judge(&belief, recogniser.rejection()) {
-            return (belief, reason);
-        }
-    }
-    (belief, StopReason::GraspLimit)
+    let mut beliefs = (1..=whole.grasps()).map(|grasps| whole.first(grasps));
+    let end = beliefs.find_map(|belief| stop.judge(&belief, recogniser.rejection()).map(|reason| (belief, reason)));
+    end.unwrap_or_else(|| (whole.clone(), StopReason::GraspLimit))
 }
 
 /// Computes the calibration error after a share of each grasp, 0 to 1; `None` without grasps.

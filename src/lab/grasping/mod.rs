@@ -41,7 +41,7 @@ pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, r
 pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
 pub use presentation::Presentation;
 pub(crate) use pressure_watch::PressureFault;
-pub use promise::{PromiseError, PromisedRounds};
+pub use promise::{GraspRounds, GraspedRound, PromiseError};
 pub use row::Row;
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;

@@ -1,4 +1,4 @@
-//! Whole rounds of simulated grasps, by which a model's sets of classes and its automatic stops are calibrated.
+//! Whole rounds of simulated grasps, by which a model's sets of classes and its automatic stops are calibrated and tested.
 //!
 //! In each round the object is put down anew for every grasp, on one gripper: where the gripper varies, it varies from round to
 //! round.
@@ -15,8 +15,8 @@ use palpate_tactile::LayoutError;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Rounds to calibrate on.
-pub struct PromisedRounds<'a> {
+/// Rounds to simulate.
+pub struct GraspRounds<'a> {
     /// Rounds of each class.
     pub rounds: usize,
     /// Grasps of a round.
@@ -27,6 +27,15 @@ pub struct PromisedRounds<'a> {
     pub progress: &'a (dyn Fn(usize, usize) + Sync),
     /// Flag that cancels the work.
     pub stop: &'a AtomicBool,
+}
+
+/// Grasps of one round.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GraspedRound {
+    /// Number of the class.
+    pub class: usize,
+    /// Readings of each grasp through each view.
+    pub grasps: Vec<Vec<Sequence>>,
 }
 
 /// Reason why nothing was calibrated.
@@ -46,11 +55,16 @@ pub enum PromiseError {
 const NEXT_CLASS: u64 = 0x9e37_79b9_7f4a_7c15;
 const NEXT_GRASP: u64 = 0xd1b5_4a32_d192_ed03;
 
-impl PromisedRounds<'_> {
+impl GraspRounds<'_> {
     /// The model with sets of classes that lose the true one in at most a share of rounds, and with a stop rule whose automatic
     /// stops are wrong in at most as many; it never stops by itself where no confidence keeps that.
     pub fn promised(&self, model: &Model, risk: f64) -> Result<Model, PromiseError> {
-        let rounds = self.rounds(model)?;
+        let (scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
+        let classes = model.card.labels.classes.iter().enumerate();
+        let known: Vec<(usize, String)> =
+            classes.filter_map(|(number, class)| Some((number, source_of(class, model)?))).collect();
+        let rounds: Vec<Round> =
+            self.simulated(&scene, &[view], &known)?.iter().map(|round| round.judged(model, 0)).collect();
         let card = &model.card;
         let sets = AnswerSets::calibrate(&card.labels, &rounds, card.rejection.as_ref(), risk, self.seed);
         let sets = sets.ok_or(PromiseError::TooFew(rounds.len()))?;
@@ -60,26 +74,27 @@ impl PromisedRounds<'_> {
         Ok(promised)
     }
 
-    /// Rounds of all classes that can be simulated: built-in objects, taught ones and the empty hand.
-    pub fn rounds(&self, model: &Model) -> Result<Vec<Round>, PromiseError> {
-        let (scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
-        let mut known = Vec::new();
-        for (number, class) in model.card.labels.classes.iter().enumerate() {
-            if let Some(scene) = scene_with(&scene, class, model) {
-                let object = scene.load_object()?;
-                known.push((number, scene, object));
-            }
-        }
-        let (done, of) = (AtomicUsize::new(0), known.len() * self.rounds);
+    /// Rounds of objects, each with the number of its class and its source, in poses of a scene, each grasp read through all
+    /// views. Those of a class follow each other.
+    pub fn simulated(
+        &self,
+        scene: &Scene,
+        views: &[SensorView],
+        objects: &[(usize, String)],
+    ) -> Result<Vec<GraspedRound>, PromiseError> {
+        let (done, of) = (AtomicUsize::new(0), objects.len() * self.rounds);
         let mut all = Vec::new();
-        for (class, scene, object) in &known {
-            let sampler = PoseSampler::new(scene, object.as_ref());
-            let of_class = ObjectRounds { view: &view, sampler, object: object.as_ref() };
+        for (class, source) in objects {
+            let mut scene = scene.clone();
+            scene.object.source.clone_from(source);
+            let object = scene.load_object()?;
+            let sampler = PoseSampler::new(&scene, object.as_ref());
+            let own = ObjectRounds { views, sampler, object: object.as_ref() };
             let first = self.seed.wrapping_add((*class as u64 + 1).wrapping_mul(NEXT_CLASS));
             let round = |number: usize| {
-                let grasps = of_class.grasps(first.wrapping_add(number as u64), self.grasps, self.stop)?;
+                let grasps = own.grasps(first.wrapping_add(number as u64), self.grasps, self.stop)?;
                 (self.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, of);
-                Ok(Round { truth: *class, belief: belief_after(model, &grasps) })
+                Ok(GraspedRound { class: *class, grasps })
             };
             all.extend((0..self.rounds).into_par_iter().map(round).collect::<Result<Vec<_>, PromiseError>>()?);
         }
@@ -87,28 +102,41 @@ impl PromisedRounds<'_> {
     }
 }
 
-/// The scene with the object of a class; none for a class without files.
-fn scene_with(scene: &Scene, class: &Class, model: &Model) -> Option<Scene> {
-    let mut own = scene.clone();
+/// Source of the object of a class: a built-in one, the empty hand or a taught file; none of others.
+fn source_of(class: &Class, model: &Model) -> Option<String> {
     let taught = model.card.taught_from.get(&class.name).map(|(_, path)| path.as_str());
     let built_in = catalogue().iter().any(|built_in| built_in.name == class.name) || class.name == EMPTY;
-    own.object.source = taught.or((built_in && class.name != OTHER).then_some(class.name.as_str()))?.to_owned();
-    Some(own)
+    Some(taught.or((built_in && class.name != OTHER).then_some(class.name.as_str()))?.to_owned())
+}
+
+impl GraspedRound {
+    /// Answers of a model to its grasps through one of the views, each fed with the belief before.
+    pub fn judged(&self, model: &Model, view: usize) -> Round {
+        let (recogniser, prior) = (&model.recogniser, model.card.prior());
+        let mut belief = Belief::default();
+        for grasp in &self.grasps {
+            let (grasp, before) = (&grasp[view], belief.now().or(prior.as_ref()));
+            let with = recogniser.recognise(grasp, before).pmf;
+            let alone = if before.is_some() { recogniser.recognise(grasp, None).pmf } else { with.clone() };
+            belief.add(with, alone);
+        }
+        Round { truth: self.class, belief }
+    }
 }
 
 /// Rounds of one object.
 struct ObjectRounds<'a> {
-    view: &'a SensorView,
+    views: &'a [SensorView],
     sampler: PoseSampler,
     object: Option<&'a ObjectModel>,
 }
 
 impl ObjectRounds<'_> {
     /// Readings of the grasps of a round. The seed names the gripper, too.
-    fn grasps(&self, seed: u64, count: usize, stop: &AtomicBool) -> Result<Vec<Sequence>, PromiseError> {
+    fn grasps(&self, seed: u64, count: usize, stop: &AtomicBool) -> Result<Vec<Vec<Sequence>>, PromiseError> {
         let nominal = self.sampler.scene();
         let (first, _) = self.sampler.draw(self.object, seed);
-        let same_gripper = (nominal.pose.build > 0.0).then(|| {
+        let same_gripper = (nominal.pose.build > 0.0 && count > 1).then(|| {
             let mut nominal = nominal.clone();
             nominal.gripper = GripperModel { mount: nominal.gripper.mount.clone(), ..first.gripper.clone() };
             nominal.pose.build = 0.0;
@@ -123,21 +151,9 @@ impl ObjectRounds<'_> {
             let own = seed.wrapping_add(number.wrapping_mul(NEXT_GRASP));
             let scene = if number == 0 { first.clone() } else { sampler.draw(self.object, own).0 };
             let trial = grasp_soundly(&scene, self.object, own, Recompute::Unsettled);
-            grasps.push(sequence_of(&self.view.signals_on(&trial, seed)?));
+            let read = |view: &SensorView| view.signals_on(&trial, seed).map(|signals| sequence_of(&signals));
+            grasps.push(self.views.iter().map(read).collect::<Result<_, LayoutError>>()?);
         }
         Ok(grasps)
     }
-}
-
-/// Belief of a model after grasps of one object.
-fn belief_after(model: &Model, grasps: &[Sequence]) -> Belief {
-    let (recogniser, prior) = (&model.recogniser, model.card.prior());
-    let mut belief = Belief::default();
-    for grasp in grasps {
-        let before = belief.now().or(prior.as_ref());
-        let with = recogniser.recognise(grasp, before).pmf;
-        let alone = if before.is_some() { recogniser.recognise(grasp, None).pmf } else { with.clone() };
-        belief.add(with, alone);
-    }
-    belief
 }

@@ -8,8 +8,6 @@ use palpate_geometry::drawing::{
 
 /// Heading of columns of shares in plots.
 pub(crate) const F1_PERCENT: &str = "macro F1 (%)";
-/// Column of shares that facets show.
-const F1: &str = "F1";
 
 /// Row of a table.
 #[derive(Clone, Copy)]
@@ -75,12 +73,14 @@ pub(crate) enum Along<'a> {
     Axis(&'a dyn Fn(&[TableLine<'_>]) -> PlotAxis, &'a dyn Fn(TableLine<'_>) -> f64),
 }
 
-/// Figure of the macro F1 of the rows of a table, by facets.
+/// Figure of shares, mostly the macro F1, of the rows of a table, by facets.
 pub(crate) struct Facets<'a> {
     /// Title of the plot of a row.
     pub(crate) plot: &'a dyn Fn(TableLine<'_>) -> String,
     /// Name of the series of a row.
     pub(crate) series: &'a dyn Fn(TableLine<'_>) -> String,
+    /// Column of shares, and the heading of its axis.
+    pub(crate) value: (&'a str, &'a str),
     /// Its place.
     pub(crate) along: Along<'a>,
     /// Shift of the first series, and from one to the next.
@@ -103,6 +103,7 @@ impl Facets<'_> {
     pub(crate) const USUAL: Facets<'static> = Facets {
         plot: &|line| format!("{} sensors", line.text("sensors")),
         series: &|line| line.text("model").to_owned(),
+        value: ("F1", F1_PERCENT),
         along: Along::Rows(&|line| line.text("model").to_owned()),
         shift: [0.0; 2],
         look: &|_, colour| dots(colour),
@@ -198,7 +199,8 @@ impl<'a> LinkedPlots<'a> {
                 Along::Rows(name) | Along::Columns(_, name) => unique(lines.iter().map(|line| name(*line))),
                 Along::Axis(..) => Vec::new(),
             };
-            let share = PlotAxis::linear(F1_PERCENT);
+            let (column, heading) = facets.value;
+            let share = PlotAxis::linear(heading);
             let (x, y, sideways) = match facets.along {
                 Along::Rows(_) => (share, named_rows(&names), true),
                 Along::Columns(title, _) => (named_columns(title, &names), share, false),
@@ -211,9 +213,9 @@ impl<'a> LinkedPlots<'a> {
                 let shift = facets.shift[0] + facets.shift[1] * number as f64;
                 let own = lines.iter().filter(|line| (facets.series)(**line) == *name);
                 let points = own.map(|line| match facets.along {
-                    Along::Rows(name) => (*line, line.percent_row(F1, shift - place(name(*line)))),
-                    Along::Columns(_, name) => (*line, line.percent(F1, shift + place(name(*line)))),
-                    Along::Axis(_, value) => (*line, line.percent(F1, shift + value(*line))),
+                    Along::Rows(name) => (*line, line.percent_row(column, shift - place(name(*line)))),
+                    Along::Columns(_, name) => (*line, line.percent(column, shift + place(name(*line)))),
+                    Along::Axis(_, value) => (*line, line.percent(column, shift + value(*line))),
                 });
                 self.series(DataSeries { name: name.clone(), ..(facets.look)(name, number) }, points);
             }
