@@ -9,6 +9,7 @@ mod doctor;
 mod emulate;
 mod evaluate;
 mod fit;
+mod gap;
 mod grasp;
 mod help;
 mod interrupt;
@@ -107,6 +108,8 @@ enum Command {
     Calibrate(calibrate::CalibrateArguments),
     /// Fit the simulated finger to recorded grasps of the real one.
     Fit(fit::FitArguments),
+    /// Measure how far simulation and recordings are apart, per channel, and which constant would close most of it.
+    Gap(gap::GapArguments),
     /// Diagnose the connection to the real gripper: what is wrong, why, and what to do.
     Doctor(doctor::DoctorArguments),
     /// Emulate the gripper on a serial port, with random sensors and optional faults (Unix).
@@ -237,6 +240,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Adapt(adapt)) => adapt::run(adapt, store)?,
         Some(Command::Calibrate(calibrate)) => calibrate::run(calibrate, store)?,
         Some(Command::Fit(fit)) => fit::run(fit, store)?,
+        Some(Command::Gap(gap)) => gap::run(gap, store)?,
         Some(Command::Doctor(doctor)) => return doctor::run(doctor),
         Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,

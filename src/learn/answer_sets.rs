@@ -9,6 +9,7 @@
 //! An automatic stop promises more: few wrong among the stopped. Its confidence is chosen on further rounds, by the upper
 //! Clopper-Pearson bound with Bonferroni's correction over the levels that were tried.
 
+use crate::arrays::ModelError;
 use crate::belief::{Belief, Rejection, Round, StopReason, StopRule};
 use crate::data::Labels;
 use crate::metrics::largest_share;
@@ -95,6 +96,18 @@ impl AnswerSets {
         }
         let stop = StopLevel::chosen(&further, grasps, rejection, risk);
         Some(Self { risk, by, rounds: rounds.len(), least, stop })
+    }
+
+    /// Refuses sets from a file that do not fit a number of classes, or hold numbers that are no probabilities.
+    pub(crate) fn check(&self, classes: usize) -> Result<(), ModelError> {
+        let is_share = |p: &f64| (0.0..=1.0).contains(p);
+        let fits = |least: &Vec<f64>| least.len() == classes && least.iter().all(is_share);
+        let sound = self.by.len() == classes
+            && !self.least.is_empty()
+            && self.least.iter().all(fits)
+            && is_share(&self.risk)
+            && self.stop.level.iter().all(is_share);
+        if sound { Ok(()) } else { Err(ModelError::card("the sets of classes with a promise")) }
     }
 
     /// Largest number of grasps of the promise.
@@ -281,6 +294,20 @@ mod tests {
         assert_eq!(by(90), Some(vec![CalibratedBy::All; CLASSES]));
         assert_eq!(by(74), None);
         assert_eq!(AnswerSets::calibrate(&labels(), &[], None, 0.1, 1), None);
+    }
+
+    #[test]
+    fn sets_from_a_file_are_checked() {
+        let sets = AnswerSets::calibrate(&labels(), &rounds(90, 2, 1), None, 0.1, 1).expect("enough rounds");
+        assert!(sets.check(CLASSES).is_ok() && sets.check(CLASSES + 1).is_err());
+        let damaged = |damage: &dyn Fn(&mut AnswerSets)| {
+            let mut own = sets.clone();
+            damage(&mut own);
+            own.check(CLASSES).is_err()
+        };
+        assert!(damaged(&|own| own.least[1].truncate(2)) && damaged(&|own| own.least.clear()));
+        assert!(damaged(&|own| own.least[0][1] = f64::NAN) && damaged(&|own| own.risk = -1.0));
+        assert!(damaged(&|own| own.by.clear()) && damaged(&|own| own.stop.level = Some(7.0)));
     }
 
     #[test]

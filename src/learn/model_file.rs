@@ -135,6 +135,7 @@ impl Model {
         };
         let load = || -> Result<_, ModelError> {
             card.labels.check()?;
+            card.answer_sets.iter().try_for_each(|sets| sets.check(card.labels.classes.len()))?;
             let mut arrays = file.arrays()?;
             let signatures = match &card.signature_grasps {
                 Some(grasps) if grasps.len() != card.labels.classes.len() => {

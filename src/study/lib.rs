@@ -44,8 +44,9 @@ pub use effects::{
     Explanation, SEEN, SceneNumber, explain_effects,
 };
 pub use finger_fit::{
-    Certainty, Estimate, FingerFit, FingerFitError, FingerMotion, FitWatch, MOST_STEPS, Observation,
-    RecordedGraspError, RecordedGrasps, Remainder, Trust, fit_finger, fit_finger_watched,
+    Certainty, ChannelGap, ConstantGap, Estimate, FingerFit, FingerFitError, FingerMotion, FitWatch, MOST_STEPS,
+    Observation, RecordedGraspError, RecordedGrasps, Remainder, SimulationGap, Trust, fit_finger, fit_finger_watched,
+    simulation_gap,
 };
 pub use frame::{
     Agreement, Cell, ClaimNumber, Draw, Experiment, FigureLink, FigureMark, Finding, GeneratedSection, IntervalStrip,

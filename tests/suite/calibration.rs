@@ -450,6 +450,18 @@ fn stored_trials_of_the_board_are_fitted_and_recognised_and_derived_anew() {
     let fit = json(at, &["fit", "1", "2", "3", "--pad-gain", "0.5", "--json", "--out", "twin.toml"]);
     let stiffness = fit["estimates"][0]["value"].as_f64().unwrap();
     assert!((stiffness / hidden.gripper.finger.bending_stiffness - 1.0).abs() < 0.03, "{stiffness} {fit}");
+    let gap = json(at, &["gap", "1", "2", "3", "--json"]);
+    crate::frozen::compare_numbers("json_gap", &crate::frozen::pretty(gap.clone()));
+    let channels = gap["channels"].as_array().unwrap();
+    assert_eq!(channels.len(), 4, "{gap}");
+    for channel in channels {
+        let [before, after] = [0, 1].map(|which| channel["rmse"][which].as_f64().unwrap());
+        assert!(after < before, "{channel}");
+    }
+    let left = |k: usize| gap["constants"][k]["left"].as_f64().unwrap();
+    assert!(left(0) < left(7) && left(7) <= 1.0 + 1e-6, "{gap}");
+    let said = run(at, &["gap", "1", "2", "3"]).out;
+    assert!(said.contains("curvature_left") && said.contains("squared difference left"), "{said}");
     let twin = Scene::from_file(&at.join("twin.toml")).unwrap();
     assert_eq!(twin.gripper.finger.bending_stiffness, stiffness);
     let found = run(at, &["recognise", "1", "2", "--model", &model]);

@@ -154,11 +154,12 @@ fn wrong_use_exits_with_2() {
 }
 
 /// Every command: what succeeds, and what fails. `--help` succeeds and an unknown option is wrong use for all.
-const EXIT_CODES: [(&str, &str, &str); 22] = [
+const EXIT_CODES: [(&str, &str, &str); 24] = [
     ("grasp", "ball --no-store", "nothing.urdf"),
     ("demo", "--object ball --grasps 1 --no-store", "--object nothing"),
     ("collect", "--objects empty --trials 1", "--objects nothing"),
     ("train", "", "knn --out m.safetensors --collection nothing"),
+    ("promise", "", "nothing.safetensors"),
     ("teach", "", "nothing.urdf"),
     ("evaluate", "", "--models nothing.safetensors"),
     ("recognise", "1", "99"),
@@ -173,6 +174,7 @@ const EXIT_CODES: [(&str, &str, &str); 22] = [
     ("adapt", "", "--port nothing"),
     ("calibrate", "list", "flexL --points nothing.csv"),
     ("fit", "", "99"),
+    ("gap", "", "99"),
     ("doctor", "--wiring", "nothing"),
     ("emulate", "--print-secrets", "--link l --secrets nothing.json"),
     ("study", "", "merge nothing --out x"),

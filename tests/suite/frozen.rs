@@ -292,9 +292,9 @@ fn npz(bytes: &[u8]) -> String {
 /// Texts with JSON.
 const JSON: [&str; 5] = ["json_simulated", "json_real", "json_learning", "json_bench", "studies_physics"];
 
-/// Commands whose JSON is in none of them: the tests of `teach`, of `promise` and of the studies of the paper freeze theirs where they
+/// Commands whose JSON is in none of them: the tests of `teach`, `promise`, `gap` and of the studies of the paper freeze theirs where they
 /// run them; the others need a renderer, seconds of CPU time or a real clock.
-const NOT_PLAYED: [&str; 6] = ["teach", "promise", "study ", "bench frame", "bench training", "emulate"];
+const NOT_PLAYED: [&str; 7] = ["teach", "promise", "gap", "study ", "bench frame", "bench training", "emulate"];
 
 #[test]
 fn help_pages_are_as_they_were() {

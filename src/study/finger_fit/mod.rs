@@ -13,6 +13,7 @@
 
 mod course;
 mod fitted_model;
+mod gap;
 mod least_squares;
 mod observation;
 mod recorded;
@@ -21,6 +22,7 @@ mod tests;
 mod watched;
 
 pub use course::FingerMotion;
+pub use gap::{ChannelGap, ConstantGap, SimulationGap, simulation_gap};
 pub use least_squares::MOST_STEPS;
 pub use observation::Observation;
 pub use recorded::{RecordedGraspError, RecordedGrasps};
@@ -197,9 +199,7 @@ pub fn fit_finger_watched(
 ) -> Result<FingerFit, FingerFitError> {
     let first = observations.first().ok_or(FingerFitError::Nothing)?;
     observations.iter().try_for_each(usable)?;
-    let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
-    let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
-    let knots: Vec<f64> = (1..=count as u32).map(|k| peak * f64::from(k) / count).collect();
+    let knots = knots_of(observations);
     let mut fitted = FittedModel::new(observations, knots.clone());
     let (start, priors) = beginning(&first.scene.gripper, &knots, observations.len(), trust);
     let minimum = minimise(&mut Watched::new(&mut fitted, watch), &start, &priors)?;
@@ -211,6 +211,13 @@ pub fn fit_finger_watched(
     let courses = course::courses(observations, &fitted, &minimum.residuals);
     let Minimum { widened, steps, .. } = minimum;
     Ok(FingerFit { gripper, estimates, remainders, widened, steps, remarks, courses })
+}
+
+/// Pressures of the torque curve's points (bar).
+fn knots_of(observations: &[Observation]) -> Vec<f64> {
+    let peak = observations.iter().map(Observation::peak_bar).fold(0.0, f64::max);
+    let count = (peak / KNOT_BAR - 1e-6).ceil().clamp(KNOTS[0], KNOTS[1]);
+    (1..=count as u32).map(|k| peak * f64::from(k) / count).collect()
 }
 
 fn usable(seen: &Observation) -> Result<(), FingerFitError> {

@@ -222,3 +222,28 @@ fn unusable_recordings_are_refused_with_the_reason() {
     let still = Signals { values: vec![0.0; signals.values.len()], ..signals };
     assert!(fault(still).contains("hardly moves"));
 }
+
+#[test]
+fn the_gap_is_measured_and_the_constant_behind_it_named() {
+    // A finger that differs in its stiffness alone, and strips that are perfect.
+    let mut gripper = GripperModel::default();
+    gripper.actuation.curve = hidden().actuation.curve;
+    let known = scene(&gripper);
+    gripper.finger.bending_stiffness *= 1.2;
+    let signals = clean(&scene(&gripper), None);
+    let line = Observation::line_of(&known);
+    let seen = Observation { name: "a close".to_owned(), signals, line, scene: known, object: None };
+    let watch = FitWatch { progress: &|share| assert!((0.0..=1.0).contains(&share)), stop: &AtomicBool::new(false) };
+    let gap = simulation_gap(&[seen], &Trust::default(), &watch).expect("measures");
+    let names: Vec<&str> = gap.channels.iter().map(|channel| channel.name.as_str()).collect();
+    assert_eq!(names, ["curvature_left", "curvature_right"]);
+    for channel in &gap.channels {
+        let ChannelGap { bias, rmse, lag_s, told_apart, .. } = channel;
+        // A softer finger bends more.
+        assert!(bias[0] > 0.5 && rmse[0] > bias[0] && rmse[1] < 0.1 * rmse[0], "{channel:?}");
+        assert!(lag_s.iter().all(|lag| lag.abs() <= 0.05) && *told_apart == [None; 2], "{channel:?}");
+    }
+    let first = &gap.constants[0];
+    assert!(first.name == "gripper.finger.bending_stiffness" && first.left < 0.01, "{:?}", gap.constants);
+    assert!(gap.constants[3].left > 0.2, "others do not replace it: {:?}", gap.constants);
+}

@@ -1,0 +1,64 @@
+//! `palpate gap`: how far simulation and recordings are apart.
+
+use super::prelude::*;
+use palpate_geometry::units::three_digits;
+use palpate_store::CalibrationId;
+use palpate_study::{FitWatch, RecordedGrasps, SimulationGap, simulation_gap};
+
+/// Arguments of `palpate gap`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  palpate gap 12 13
+  palpate gap 12 13 14 --scene fitted.toml --json
+
+Each recording is simulated under its own line pressure, with the finger as the scene has it and as a fit to these recordings \
+makes it. Then each constant is fitted alone: the best closes most of the difference by itself.
+
+See also: palpate help gripper")]
+pub(super) struct GapArguments {
+    /// Trial numbers: empty closes, presses against a fixed object, grasps.
+    #[arg(required = true)]
+    trials: Vec<TrialId>,
+    #[command(flatten)]
+    scene: Option<SceneArguments>,
+    /// Calibration numbers to use instead of the newest of each part.
+    #[arg(long, value_name = "ID,..", value_delimiter = ',')]
+    calibrations: Vec<CalibrationId>,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &GapArguments, store: Option<&Path>) -> Result<(), Failure> {
+    let store = read_store(store)?;
+    // Only the gripper of the scene is used.
+    let scene = arguments.scene.as_ref().map(|scene| scene.scene(None)).transpose()?;
+    let mut recorded = RecordedGrasps::default();
+    for id in &arguments.trials {
+        recorded.add(&store, *id, scene.as_ref().map(|scene| &scene.gripper), &arguments.calibrations)?;
+    }
+    recorded.warnings.iter().for_each(|warning| warn(warning));
+    let (stop, bar) = (stop_flag()?, Progress::of("simulating"));
+    let watch = FitWatch { progress: &|share| bar.share(share), stop: &stop };
+    let gap = simulation_gap(&recorded.observations, &recorded.trust, &watch);
+    drop(bar);
+    gap?.print(arguments.json)
+}
+
+impl Report for SimulationGap {
+    fn text(&self, page: &mut Page) {
+        let pair = |[before, after]: [f64; 2]| format!("{} -> {}", three_digits(before), three_digits(after));
+        let percent =
+            |share: Option<f64>| share.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        let rows = self.channels.iter().map(|own| {
+            let [before, after] = own.told_apart.map(percent);
+            let lag = own.lag_s.map(|lag| format!("{:+.0}", 1e3 * lag)).join(" -> ");
+            [own.name.clone(), own.unit.to_owned(), pair(own.bias), pair(own.rmse), lag, format!("{before} -> {after}")]
+        });
+        page.line("Simulated minus recorded, with the finger as it is -> fitted:");
+        page.table(&["channel", "unit", "bias", "RMSE", "late (ms)", "told apart"], rows);
+        page.line("");
+        let constants = self.constants.iter().map(|own| [own.name.to_owned(), format!("{:.0} %", 100.0 * own.left)]);
+        page.table(&["fitted alone", "squared difference left"], constants);
+    }
+}
