@@ -4,6 +4,7 @@ use super::learning::{DataArguments, known_method, leak_checks, parts};
 use super::prelude::*;
 use super::terminal::Column;
 use palpate_learn::comparison::{ComparisonRow, Controls, in_table_order};
+use palpate_learn::evaluation::interval_words;
 use palpate_learn::{Dataset, LeakCheck, METHODS, Method, Model, SplitPlan};
 use std::collections::BTreeSet;
 
@@ -129,7 +130,7 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
             "random parts of {sessions} sessions are an upper bound: new sessions do worse (--split leave-a-session-out)"
         )
     }));
-    heading.extend((sessions > 1).then(|| "intervals are over whole sessions".to_owned()));
+    heading.extend((sessions > 1).then(|| interval_words(&data).to_owned()));
     heading.extend(arguments.rezero.then(|| "re-zeroed by the first half of each rest".to_owned()));
     heading.extend(checks.iter().filter(|check| !check.leaks).map(LeakCheck::to_string));
     heading.push(String::new());

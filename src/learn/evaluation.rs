@@ -2,7 +2,7 @@
 
 use crate::belief::{Belief, Round, StopReason, StopRule};
 use crate::data::{Class, Dataset, Example};
-use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval};
+use crate::metrics::{Bootstrap, CALIBRATION_BINS, Confusion, Forecasts, Interval, draws_sessions};
 use crate::pmf::Pmf;
 use crate::recogniser::{Recogniser, Verdict};
 use rand::SeedableRng;
@@ -260,6 +260,14 @@ fn stage_one(data: &Dataset, verdicts: &[Verdict]) -> Option<StageOneScores> {
         size_f1: f1(labels.sizes.len(), &|c| c.size, &|v| v.properties.as_ref().map(|p| &p.size))?,
         shape_f1: f1(labels.shapes.len(), &|c| c.shape, &|v| v.properties.as_ref().map(|p| &p.shape))?,
     })
+}
+
+/// What intervals are over, where there are several sessions.
+pub fn interval_words(data: &Dataset) -> &'static str {
+    match draws_sessions(&data.truth(), &data.sessions()) {
+        true => "intervals are over whole sessions",
+        false => "each object has a session of its own: intervals are over trials, and too narrow for new sessions",
+    }
 }
 
 /// End of a round by the stop rule.

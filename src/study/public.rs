@@ -8,6 +8,7 @@ use crate::frame::{
 use crate::paper::{Pool, TestAnswers, judge};
 use palpate_geometry::drawing::ReferenceLine;
 use palpate_learn::comparison::in_table_order;
+use palpate_learn::evaluation::interval_words;
 use palpate_learn::{Dataset, Fitting, LeakCheck, LeakSource, LearnError, Method, SplitPlan};
 use palpate_sim::fingerprint;
 use serde::{Deserialize, Serialize};
@@ -155,7 +156,7 @@ impl Public {
         let split = self.split.described();
         let protocol = match sessions {
             0 => format!("no sessions: {split}, an upper bound of what a new session gives"),
-            _ => format!("{sessions} sessions: {split}; intervals are over whole sessions"),
+            _ => format!("{sessions} sessions: {split}; {}", interval_words(data)),
         };
         vec![format!("{}: {grasps} grasps of {objects} objects, {channels} channels", self.of.about), protocol]
     }

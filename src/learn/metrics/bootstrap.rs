@@ -97,6 +97,11 @@ impl Bootstrap {
     }
 }
 
+/// True where [`Bootstrap::over_sessions`] draws sessions, and not trials.
+pub fn draws_sessions(objects: &[usize], sessions: &[u32]) -> bool {
+    of_sessions(objects, sessions).is_some()
+}
+
 /// The trials of each session: strata of sessions with a single object each, by object, and of those with several. None where
 /// each stratum has one session.
 fn of_sessions(objects: &[usize], sessions: &[u32]) -> Option<Vec<Vec<Vec<usize>>>> {
@@ -182,6 +187,8 @@ mod tests {
         // A session for each object, or one for all, tells nothing of sessions.
         let by_object: Vec<u32> = objects.iter().map(|object| *object as u32).collect();
         assert_eq!([width(&by_object), width(&[3; 200])], [width(&[]); 2]);
+        let drawn = [&sessions, &by_object, &vec![]].map(|sessions| draws_sessions(&objects, sessions));
+        assert_eq!(drawn, [true, false, false]);
     }
 
     #[test]

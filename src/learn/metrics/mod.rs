@@ -14,7 +14,7 @@ mod confusion;
 mod difference;
 mod interval;
 
-pub use bootstrap::Bootstrap;
+pub use bootstrap::{Bootstrap, draws_sessions};
 pub use calibration::{CALIBRATION_BINS, Confident, Forecasts, PROBABILITY_FLOOR, ReliabilityPoint};
 pub use confusion::{ClassScores, Confusion, Scores};
 pub use difference::{McNemar, holm};

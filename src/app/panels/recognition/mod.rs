@@ -264,7 +264,9 @@ impl Part<'_, '_> {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
         let distrust = self.distrust();
+        let by_simulation = self.view.left.is_some() && self.data.board().is_some();
         let why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
+        let why = if by_simulation { format!("{why} (calibrated in simulation)") } else { why };
         let ink = colour(if distrust.is_some() { colours.warning } else { colours.quiet_text });
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
         let font = FontId::proportional(measures.reason_letters);
