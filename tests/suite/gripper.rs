@@ -266,7 +266,9 @@ fn trials_are_ended_begun_anew_and_given_up() {
     desk.connect();
     desk.command(GripperCommand::Begin(request()));
     let first = desk.until(numbered).trial.clone().unwrap();
-    assert_eq!((first.stage, first.length_s.map(|s| (s * 10.0).round())), (GraspStage::Lead, Some(44.0)));
+    assert_eq!(first.length_s.map(|s| (s * 10.0).round()), Some(44.0));
+    // A busy machine may see it only after its lead.
+    assert_eq!(first.stage == GraspStage::Lead, first.t_s < 0.0, "{first:?}");
     // Another begins: the first ends there and is kept.
     desk.command(GripperCommand::Begin(request()));
     let second = desk.until(|view| numbered(view) && view.trial.as_ref().is_some_and(|trial| trial.id != first.id));
