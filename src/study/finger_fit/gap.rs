@@ -162,6 +162,9 @@ impl<P: Problem> Problem for Only<'_, P> {
 /// Kind and finger of a channel: force, else curvature.
 type Place = (bool, usize);
 
+/// Samples of a channel of a recording: time (s), then the recorded and the simulated reading.
+type Samples = Vec<(f64, [f64; 2])>;
+
 /// Differences of one channel in all recordings.
 #[derive(Clone, Debug, Default)]
 struct Differences {
@@ -180,7 +183,7 @@ fn differences(
 ) -> Result<BTreeMap<Place, Differences>, FingerFitError> {
     let residuals = model.residuals(x)?;
     let mut found: BTreeMap<Place, Differences> = BTreeMap::new();
-    let mut series: BTreeMap<(Place, usize), Vec<(f64, [f64; 2])>> = BTreeMap::new();
+    let mut series: BTreeMap<(Place, usize), Samples> = BTreeMap::new();
     for ((number, track, k), residual) in model.places().zip(&residuals) {
         let seen = &observations[number].signals;
         let value = f64::from(seen.row(k)[track.column]);
