@@ -11,14 +11,8 @@ use palpate_study::{Certainty, FingerFit, RecordedGrasps, fit_finger};
   palpate fit 12 13 --out fitted.toml
   palpate fit 12 13 14 --strip-gain 3 --pad-gain 5 --json")]
 pub(super) struct FitArguments {
-    /// Trial numbers: a few empty closes, and presses against a fixed object.
-    #[arg(required = true)]
-    trials: Vec<TrialId>,
     #[command(flatten)]
-    scene: Option<SceneArguments>,
-    /// Calibration numbers to use instead of the newest of each part.
-    #[arg(long, value_name = "ID,..", value_delimiter = ',')]
-    calibrations: Vec<CalibrationId>,
+    recorded: RecordedArguments,
     /// Standard deviation of the strips' gain (%).
     #[arg(long, value_name = "PERCENT")]
     strip_gain: Option<f64>,
@@ -31,6 +25,35 @@ pub(super) struct FitArguments {
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
+}
+
+/// Recorded grasps beside which the finger is simulated.
+#[derive(Debug, clap::Args)]
+pub(super) struct RecordedArguments {
+    /// Trial numbers: a few empty closes, and presses against a fixed object.
+    #[arg(required = true)]
+    trials: Vec<TrialId>,
+    #[command(flatten)]
+    scene: Option<SceneArguments>,
+    /// Calibration numbers to use instead of the newest of each part.
+    #[arg(long, value_name = "ID,..", value_delimiter = ',')]
+    calibrations: Vec<CalibrationId>,
+}
+
+impl RecordedArguments {
+    /// Reads them, and warns of what is doubtful.
+    pub(super) fn read(&self, store: Option<&Path>) -> Result<RecordedGrasps, Failure> {
+        let store = read_store(store)?;
+        // Only the gripper of the scene is used.
+        let scene = self.scene.as_ref().map(|scene| scene.scene(None)).transpose()?;
+        let gripper = scene.as_ref().map(|scene| &scene.gripper);
+        let mut recorded = RecordedGrasps::default();
+        for id in &self.trials {
+            recorded.add(&store, *id, gripper, &self.calibrations)?;
+        }
+        recorded.warnings.iter().for_each(|warning| warn(warning));
+        Ok(recorded)
+    }
 }
 
 /// Output of `--json`.
@@ -47,16 +70,7 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
     if let Some(path) = &arguments.out {
         check_new(path, FileKind::Scene)?;
     }
-    let store = read_store(store)?;
-    // Only the gripper of the scene is used.
-    let scene = arguments.scene.as_ref().map(|scene| scene.scene(None)).transpose()?;
-    let gripper = scene.as_ref().map(|scene| &scene.gripper);
-    let mut recorded = RecordedGrasps::default();
-    for id in &arguments.trials {
-        recorded.add(&store, *id, gripper, &arguments.calibrations)?;
-    }
-    let RecordedGrasps { observations, mut trust, warnings } = recorded;
-    warnings.iter().for_each(|warning| warn(warning));
+    let RecordedGrasps { observations, mut trust, .. } = arguments.recorded.read(store)?;
     for (given, gains) in [(arguments.strip_gain, &mut trust.strip_gain), (arguments.pad_gain, &mut trust.pad_gain)] {
         if let Some(percent) = given {
             if !(0.01..=100.0).contains(&percent) {
@@ -71,7 +85,7 @@ pub(super) fn run(arguments: &FitArguments, store: Option<&Path>) -> Result<(), 
         scene.gripper = fit.gripper.clone();
         write_new(path, FileKind::Scene, scene.to_toml().as_bytes())?;
     }
-    FitReport { fit, trials: arguments.trials.clone(), out: arguments.out.clone() }.print(arguments.json)
+    FitReport { fit, trials: arguments.recorded.trials.clone(), out: arguments.out.clone() }.print(arguments.json)
 }
 
 impl Report for FitReport {

@@ -1,9 +1,9 @@
 //! `palpate gap`: how far simulation and recordings are apart.
 
+use super::fit::RecordedArguments;
 use super::prelude::*;
 use palpate_geometry::units::three_digits;
-use palpate_store::CalibrationId;
-use palpate_study::{FitWatch, RecordedGrasps, SimulationGap, simulation_gap};
+use palpate_study::{FitWatch, SimulationGap, simulation_gap};
 
 /// Arguments of `palpate gap`.
 #[derive(Debug, clap::Args)]
@@ -16,28 +16,15 @@ makes it. Then each constant is fitted alone: the best closes most of the differ
 
 See also: palpate help gripper")]
 pub(super) struct GapArguments {
-    /// Trial numbers: empty closes, presses against a fixed object, grasps.
-    #[arg(required = true)]
-    trials: Vec<TrialId>,
     #[command(flatten)]
-    scene: Option<SceneArguments>,
-    /// Calibration numbers to use instead of the newest of each part.
-    #[arg(long, value_name = "ID,..", value_delimiter = ',')]
-    calibrations: Vec<CalibrationId>,
+    recorded: RecordedArguments,
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(arguments: &GapArguments, store: Option<&Path>) -> Result<(), Failure> {
-    let store = read_store(store)?;
-    // Only the gripper of the scene is used.
-    let scene = arguments.scene.as_ref().map(|scene| scene.scene(None)).transpose()?;
-    let mut recorded = RecordedGrasps::default();
-    for id in &arguments.trials {
-        recorded.add(&store, *id, scene.as_ref().map(|scene| &scene.gripper), &arguments.calibrations)?;
-    }
-    recorded.warnings.iter().for_each(|warning| warn(warning));
+    let recorded = arguments.recorded.read(store)?;
     let (stop, bar) = (stop_flag()?, Progress::of("simulating"));
     let watch = FitWatch { progress: &|share| bar.share(share), stop: &stop };
     let gap = simulation_gap(&recorded.observations, &recorded.trust, &watch);

@@ -1,6 +1,7 @@
 //! Grasping: the controller of every grasp, runs and their summaries, collections of simulated grasps, identification of
 //! an object by successive grasps, and advice on the next one. Adapting to a real gripper by one close of its empty hand.
-//! Lessons: grasps by which a model learns new objects. Promises: rounds by which its answers are calibrated. Presentations: the objects and poses of a demo.
+//! Lessons: grasps by which a model learns new objects. Promises: rounds by which its answers are calibrated.
+//! Presentations: the objects and poses of a demo.
 
 mod accuracy_cost;
 mod adaptation;

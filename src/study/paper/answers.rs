@@ -24,7 +24,7 @@ pub(crate) struct ModelAnswers {
     pub(super) truth: Vec<usize>,
     /// The model's decisions.
     pub(super) decided: Vec<usize>,
-    /// Session of each grasp; empty where all are of one.
+    /// Session of each grasp; empty where all are of the first. A part may be a session by itself.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) sessions: Vec<u32>,
     /// Expected calibration error.
@@ -184,7 +184,11 @@ pub(super) fn judge_answers(model: &Model, test: &Dataset, answers: &Answers) ->
             parameters: model.card.parameters,
         },
         truth: answers.truth.clone(),
-        sessions: test.sessions(),
+        sessions: if test.examples.iter().any(|example| example.session > 0) {
+            test.examples.iter().map(|example| example.session).collect()
+        } else {
+            Vec::new()
+        },
     }
 }
 
@@ -211,7 +215,7 @@ pub(crate) struct Pool {
     pub(super) classes: Vec<String>,
     /// Class and decisions of each trial.
     trials: BTreeMap<TrialId, (usize, Vec<usize>)>,
-    /// Session of each trial; empty where all are of one.
+    /// Session of each trial that is not of the first; empty where all are.
     sessions: BTreeMap<TrialId, u32>,
 }
 
@@ -407,6 +411,24 @@ mod tests {
             ece: 0.0,
             cost: ModelCost { train_cpu_s: 0.0, answer_ms: 0.0, step_us: None, bytes: 0, parameters: 0 },
         }
+    }
+
+    #[test]
+    fn parts_that_are_sessions_give_intervals_over_sessions() {
+        // Four sessions, each tested by itself: two without a mistake, two with nothing but mistakes.
+        let part = |session: u32| {
+            let own = answers(if session.is_multiple_of(2) { 1 } else { 99 });
+            let trials = (0..20).map(|k| TrialId::from(session) * 20 + k).collect();
+            let sessions = if session == 0 { Vec::new() } else { vec![session; 20] };
+            ModelAnswers { trials, sessions, ..own }
+        };
+        let parts: Vec<ModelAnswers> = (0..4).map(part).collect();
+        let by_sessions = Pool::of(&parts).f1().expect("defined");
+        let plain: Vec<ModelAnswers> =
+            parts.iter().map(|part| ModelAnswers { sessions: Vec::new(), ..part.clone() }).collect();
+        let by_trials = Pool::of(&plain).f1().expect("defined");
+        assert_eq!(by_sessions.estimate, by_trials.estimate);
+        assert!(by_sessions.high - by_sessions.low > 2.0 * (by_trials.high - by_trials.low), "{by_sessions:?}");
     }
 
     #[test]
