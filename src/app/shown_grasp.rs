@@ -72,7 +72,7 @@ impl<'a> ShownGrasp<'a> {
             return None;
         }
         let column = |(k, channel): (usize, Option<&palpate_tactile::Channel>)| {
-            channel.map(|channel| (k, channel.quantity, channel.side))
+            channel.and_then(|channel| Some((k, channel.quantity, channel.side()?)))
         };
         let span_s = data.time_span();
         let full_scale = match frames.as_slice() {

@@ -9,7 +9,7 @@ use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::SensorKind;
 use palpate_tactile::calibration::{Curve, KnownWeight};
 use palpate_tactile::trial::Control;
 
@@ -72,7 +72,7 @@ struct AdaptReport {
 struct SensorReport {
     channel: &'static str,
     #[serde(skip)]
-    label: &'static str,
+    label: String,
     part: Option<String>,
     /// `kept`, `adapted` or `failed`.
     outcome: &'static str,
@@ -86,18 +86,19 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
         None => Scene::default(),
     };
     let mut store = open_store(store)?;
-    let mut weights = [None; 2];
+    let sensors = store.calibrations().sensors()?;
+    let mut weights = Vec::new();
     if let Some(kg) = arguments.weight {
-        for (weight, sensor) in weights.iter_mut().zip([Sensor::PadLeft, Sensor::PadRight]) {
+        for sensor in sensors.of_kind(SensorKind::Pad) {
             let point = weigh(arguments.port.as_deref(), sensor, kg, arguments.auto)?;
-            *weight = Some(KnownWeight { force: point.stimulus, counts: point.counts });
+            weights.push((sensor, KnownWeight { force: point.stimulus, counts: point.counts }));
         }
     }
     let (trial, adaptation) = match arguments.trial {
-        Some(id) => (id, Adaptation::from_trial(&store, id, &scene, weights, arguments.replace)?),
+        Some(id) => (id, Adaptation::from_trial(&store, id, &scene, &weights, arguments.replace)?),
         None => {
-            let id = close_empty(arguments, &scene, store.path())?;
-            (id, Adaptation::from_close(&mut store, id, &scene, weights, arguments.replace)?)
+            let id = close_empty(arguments, &scene, &store)?;
+            (id, Adaptation::from_close(&mut store, id, &scene, &weights, arguments.replace)?)
         }
     };
     if !arguments.dry_run {
@@ -108,10 +109,10 @@ pub(super) fn run(arguments: &AdaptArguments, store: Option<&Path>) -> Result<()
 }
 
 /// Records a close of the empty hand.
-fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Path) -> Result<TrialId, Failure> {
+fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Store) -> Result<TrialId, Failure> {
     let stop = stop_flag()?;
     let port = arguments.port.as_deref();
-    let link = link::open(&link::options(port, true), link::USUAL_WAIT_S, &stop)?;
+    let link = link::open(&link::options(port, true, store.calibrations().sensors()?), link::USUAL_WAIT_S, &stop)?;
     note("take everything out of the hand: it closes empty, without touching anything");
     let control = match (port.is_some_and(Path::is_file), arguments.by_hand) {
         (true, _) => Control::Free,
@@ -120,7 +121,7 @@ fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Path) -> Resul
     };
     let request = TrialRequest { object: Some(EMPTY.to_owned()), control, length_s: None, adds: false };
     let mut gripper = SerialGripper::new(Box::new(link));
-    let recording = record(&mut gripper, scene, request, store.to_owned(), &stop, &mut |_progress| ())?;
+    let recording = record(&mut gripper, scene, request, store.path().to_owned(), &stop, &mut |_progress| ())?;
     if stop.load(Ordering::Relaxed) {
         return Err("stopped; no calibration was stored".into());
     }
@@ -153,7 +154,7 @@ fn about(sensor: &AdaptedSensor) -> String {
 }
 
 fn report(adaptation: &Adaptation, trial: TrialId, arguments: &AdaptArguments) -> AdaptReport {
-    let sensors = Sensor::ALL.into_iter().zip(&adaptation.sensors).map(|(sensor, adapted)| SensorReport {
+    let sensors = adaptation.sensors.iter().map(|(sensor, adapted)| SensorReport {
         channel: sensor.channel(),
         label: sensor.label(),
         part: adapted.calibration().map(|own| own.record.part.clone()),
@@ -180,7 +181,7 @@ fn report(adaptation: &Adaptation, trial: TrialId, arguments: &AdaptArguments) -
 
 impl Report for AdaptReport {
     fn text(&self, page: &mut Page) {
-        let row = |sensor: &SensorReport| [sensor.label, sensor.outcome, &sensor.about].map(str::to_owned);
+        let row = |sensor: &SensorReport| [&sensor.label, sensor.outcome, &sensor.about].map(str::to_owned);
         page.table(&["sensor", "", "calibration"], self.sensors.iter().map(row));
         self.warnings.iter().for_each(|warning| page.warn(warning));
         page.line(format!("assumed: {}", self.assumed));

@@ -30,9 +30,9 @@ See also: palpate help gripper"
 pub(super) struct CalibrateArguments {
     #[command(subcommand)]
     command: Option<manage::CalibrateCommand>,
-    /// Sensor: flexL, flexR, fsrL or fsrR.
-    #[arg(required = true, value_parser = one_of(Sensor::ALL.map(|sensor| (sensor.channel(), sensor))))]
-    sensor: Option<Sensor>,
+    /// Sensor: flexL, flexR, fsrL or fsrR, or another strip or pad of the gripper file.
+    #[arg(required = true)]
+    sensor: Option<String>,
     /// Name of the mounted part, such as the number written on it (default: the known one). Calibrations belong to parts,
     /// because parts get swapped.
     #[arg(long, value_name = "NAME")]
@@ -70,7 +70,9 @@ pub(super) fn run(arguments: &CalibrateArguments, store: Option<&Path>) -> Resul
     }
     // Made only where there is a calibration to keep.
     let known = existing_store_to_change(store)?;
-    let sensor = arguments.sensor.ok_or("name the sensor: flexL, flexR, fsrL or fsrR")?;
+    let sensors = known.as_ref().map(|store| store.calibrations().sensors()).transpose()?.unwrap_or_default();
+    let name = arguments.sensor.as_deref().ok_or_else(|| format!("name the sensor: {}", sensors.names()))?;
+    let sensor = sensor_called(sensors, name)?;
     let part = part_name(arguments, sensor, known.as_ref())?;
     if arguments.points.is_some() && arguments.live.empty_close.is_none() {
         arguments.live.refuse_beside_points()?;
@@ -123,7 +125,7 @@ impl Report for CalibrateReport {
 fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: Option<&Store>) -> Result<String, Failure> {
     let mounted = || -> Result<Option<String>, Failure> {
         let Some(store) = store else { return Ok(None) };
-        Ok(store.calibrations().mounted()?[sensor as usize].clone())
+        Ok(store.calibrations().mounted()?.get(sensor.index()).cloned().flatten())
     };
     let name = match &arguments.part {
         Some(name) => Some(name.trim().to_owned()),
@@ -136,7 +138,7 @@ fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: Option<&Stor
 }
 
 fn record_of_file(arguments: &CalibrateArguments, sensor: Sensor, part: &str, file: &Path) -> Result<Record, Failure> {
-    let kind = SensorKind::of(sensor);
+    let kind = sensor.kind();
     let board = Board { full_scale: arguments.full_scale, ..Board::default() };
     let mut input = Input::on(&board, sensor);
     input.divider.fixed_ohm = arguments.resistor.unwrap_or(input.divider.fixed_ohm);
@@ -149,11 +151,11 @@ fn points_text(calibration: &Calibration, page: &mut Page) {
     let Record { kind, input, points, .. } = &calibration.record;
     let (stimulus, off) = match kind {
         SensorKind::Flex => ("angle [deg]", "residual [deg]"),
-        SensorKind::Pad => ("load [kg]", "residual [%]"),
+        SensorKind::Pad | SensorKind::Raw => ("load [kg]", "residual [%]"),
     };
     let residual = |off: f64| match kind {
         SensorKind::Flex => format!("{:+.2}", off.to_degrees()),
-        SensorKind::Pad => format!("{:+.1}", 100.0 * off),
+        SensorKind::Pad | SensorKind::Raw => format!("{:+.1}", 100.0 * off),
     };
     let rows = points.iter().zip(calibration.residuals()).map(|(point, off)| {
         let ohm = input.ohm(point.counts);

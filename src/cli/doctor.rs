@@ -5,9 +5,10 @@ use super::prelude::*;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use palpate_device::doctor::{
     Bleed, CheckFinding, CheckStatus, CrosstalkTest, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings, is_sound,
-    not_checked, summary, write_sketch,
+    not_checked, summary, write_header, write_sketch,
 };
 use palpate_device::serial::{Baud, LinkOptions};
+use palpate_tactile::board::SensorList;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -41,6 +42,13 @@ pub(super) struct DoctorArguments {
     /// Write the Arduino sketch to a folder, which must be named due_gripper, then exit.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"], value_parser = sketch_folder())]
     sketch: Option<PathBuf>,
+    /// Print the sensors of the gripper as a gripper file, to begin one's own with, then exit.
+    #[arg(long, conflicts_with_all = ["crosstalk", "json", "wiring", "sketch"])]
+    gripper_file: bool,
+    /// Write the table of channels of the Arduino sketch for this gripper, then exit: gripper_channels.h, beside
+    /// due_gripper.ino.
+    #[arg(long, value_name = "FILE.h", conflicts_with_all = ["crosstalk", "json", "wiring", "sketch", "gripper_file"])]
+    firmware_header: Option<PathBuf>,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -69,7 +77,16 @@ struct DoctorReport<'a> {
     heard: Option<String>,
 }
 
-pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
+pub(super) fn run(arguments: &DoctorArguments, sensors: SensorList) -> Result<ExitCode, Failure> {
+    if arguments.gripper_file {
+        say(sensors.to_toml().trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(path) = &arguments.firmware_header {
+        write_header(path, sensors)?;
+        say(path.display().to_string())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     if arguments.wiring {
         say(WIRING_PAGE.trim_end())?;
         return Ok(ExitCode::SUCCESS);
@@ -81,7 +98,7 @@ pub(super) fn run(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     // Captured bytes need no real time.
     let replay_speed = f64::INFINITY;
     let path = arguments.port.clone();
-    let options = LinkOptions { path, baud: arguments.baud, replay_speed, ..LinkOptions::default() };
+    let options = LinkOptions { path, baud: arguments.baud, replay_speed, sensors, ..LinkOptions::default() };
     let stop = stop_flag()?;
     if arguments.crosstalk {
         return crosstalk(&options, &stop, arguments.json);

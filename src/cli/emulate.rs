@@ -8,6 +8,7 @@ use palpate_device::emulator::{
 use palpate_device::emulator::{EmulatorEvent, EmulatorEventKind, PortSetup, serve};
 use palpate_geometry::read_text;
 use palpate_sim::objects::anchored;
+use palpate_tactile::board::SensorList;
 
 /// Arguments of `palpate emulate`.
 #[derive(Debug, clap::Args)]
@@ -28,9 +29,9 @@ pub(super) struct EmulateArguments {
     /// Samples per second.
     #[arg(long, value_name = "HZ", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rate: u32,
-    /// Number of channels: the four sensors, then spare inputs that swing slowly.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
-    channels: u8,
+    /// Number of channels: the sensors of the gripper, then spare inputs that swing slowly (default: the sensors).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
+    channels: Option<u8>,
     /// Period of automatic grasps (s); 0: only a host drives the fingers.
     #[arg(long, value_name = "S", default_value_t = 6.0, value_parser = within(0.0..=3600.0))]
     grasp_every: f64,
@@ -98,13 +99,18 @@ fn after_help() -> String {
     )
 }
 
-pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &EmulateArguments, sensors: SensorList) -> Result<(), Failure> {
     let parts = parts(arguments)?;
+    let longest = sensors.iter().map(|sensor| sensor.channel().len()).max().unwrap_or_default();
+    if sensors.len() > 16 || longest > 15 {
+        return Err("the board's firmware reads at most 16 channels with names of at most 15 letters".into());
+    }
     if arguments.print_secrets {
         return say_json(&parts);
     }
     let script = script(arguments)?;
     let hand = HandPlan {
+        sensors,
         scene: arguments.scene.scene(None)?,
         objects: arguments.objects.iter().map(|name| anchored(name)).collect(),
         seed: arguments.seed,
@@ -115,7 +121,7 @@ pub(super) fn run(arguments: &EmulateArguments) -> Result<(), Failure> {
         hand,
         parts,
         rate_hz: arguments.rate,
-        channels: usize::from(arguments.channels),
+        channels: arguments.channels.map_or(sensors.len(), usize::from),
         most_steps: (arguments.max_bar * 20.0).round() as u8,
         clock_start_us: arguments.clock_start,
         faults: arguments.faults.0.clone(),

@@ -94,7 +94,12 @@ pub(super) fn run(arguments: &GraspArguments, store: Option<&Path>) -> Result<()
     if arguments.print_scene {
         return say(nominal.to_toml().trim_end());
     }
-    let layout = arguments.signals.view().shown()?;
+    let view = arguments.signals.view();
+    let view = match existing_store(store)? {
+        Some(store) => arguments.signals.of_store(view, &store)?,
+        None => view,
+    };
+    let layout = view.shown()?;
     let sensors = Sensors::new(&layout, &nominal.gripper, arguments.signals.signals)?;
     if let Some(path) = &arguments.out {
         check_replaced(path, FileKind::Csv)?;

@@ -104,14 +104,15 @@ impl QueryArguments {
 }
 
 impl DataArguments {
-    pub(super) fn view(&self) -> SensorView {
-        SensorView {
+    pub(super) fn view(&self, store: &Store) -> Result<SensorView, Failure> {
+        let view = SensorView {
             sensors: self.sensors,
             draws: self.draws,
             rate_hz: self.rate,
             cut: self.cut,
             ..self.signals.view()
-        }
+        };
+        self.signals.of_store(view, store)
     }
 
     /// Reads the grasps from the store.
@@ -121,7 +122,7 @@ impl DataArguments {
         without_empty: bool,
         most_of_each: Option<usize>,
     ) -> Result<Dataset, Failure> {
-        read_dataset(&self.trials.query(without_empty, most_of_each), store, &self.view())
+        read_dataset(&self.trials.query(without_empty, most_of_each), store, &self.view(store)?)
     }
 
     /// Fits and tests methods on all splits, on this many threads, or one per core. Of several methods, each has a line on

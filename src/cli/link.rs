@@ -4,7 +4,7 @@ use super::Failure;
 use super::terminal::note;
 use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::{LinkOptions, LinkState, PortTrouble, SerialLink};
-use palpate_tactile::board::{Board, Reading};
+use palpate_tactile::board::{Board, Reading, SensorList};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -45,9 +45,9 @@ pub(super) fn open(options: &LinkOptions, wait_s: f64, stop: &AtomicBool) -> Res
 }
 
 /// Options of a link to the board: captured bytes come as they were captured, or without a pause.
-pub(super) fn options(port: Option<&Path>, at_once: bool) -> LinkOptions {
+pub(super) fn options(port: Option<&Path>, at_once: bool, sensors: SensorList) -> LinkOptions {
     let replay_speed = if at_once && port.is_some_and(Path::is_file) { f64::INFINITY } else { 1.0 };
-    LinkOptions { path: port.map(Path::to_owned), replay_speed, ..LinkOptions::default() }
+    LinkOptions { path: port.map(Path::to_owned), replay_speed, sensors, ..LinkOptions::default() }
 }
 
 /// Readings of a board, for a command that guides the user. It prints changes of the state of the link.

@@ -41,6 +41,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use palpate_learn::Model;
 use palpate_sim::objects::{EMPTY, RandomShape, anchored, catalogue};
 use palpate_sim::scene::Scene;
+use palpate_tactile::board::SensorList;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -66,7 +67,20 @@ struct Arguments {
     /// Store of trials, an SQLite file (default: in the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
     store: Option<PathBuf>,
+    /// Sensors of the real gripper, a TOML file; the store remembers them (default: as remembered, else two strips and two
+    /// pads).
+    #[arg(long, global = true, value_name = "FILE.toml", value_parser = parse_gripper)]
+    gripper: Option<SensorList>,
 }
+
+/// Reads a gripper file.
+fn parse_gripper(path: &str) -> Result<SensorList, String> {
+    let text = palpate_geometry::read_text(Path::new(path), LARGEST_GRIPPER).map_err(|error| error.to_string())?;
+    SensorList::parse(&text)
+}
+
+/// Largest gripper file (bytes).
+const LARGEST_GRIPPER: u64 = 1 << 20;
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -173,7 +187,7 @@ fn first_word() -> Option<String> {
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         match word.as_str() {
-            "--store" | "--port" | "--model" => drop(words.next()),
+            "--store" | "--port" | "--model" | "--gripper" => drop(words.next()),
             option if option.starts_with('-') => {}
             _ => return Some(word),
         }
@@ -220,6 +234,12 @@ pub fn run() -> ExitCode {
 
 fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let store = arguments.store.as_deref();
+    // The emulator and the doctor take the file as it is; all others work with a store.
+    let direct = matches!(arguments.command, Some(Command::Doctor(_) | Command::Emulate(_)));
+    if let Some(sensors) = arguments.gripper.filter(|_| !direct) {
+        setup::open_store(store)?.calibrations().set_sensors(sensors)?;
+    }
+    let sensors = || arguments.gripper.map_or_else(|| setup::sensors(store), Ok);
     match &arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
         Some(Command::Demo(demo)) => demo::run(demo, store)?,
@@ -241,8 +261,8 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Calibrate(calibrate)) => calibrate::run(calibrate, store)?,
         Some(Command::Fit(fit)) => fit::run(fit, store)?,
         Some(Command::Gap(gap)) => gap::run(gap, store)?,
-        Some(Command::Doctor(doctor)) => return doctor::run(doctor),
-        Some(Command::Emulate(emulate)) => emulate::run(emulate)?,
+        Some(Command::Doctor(doctor)) => return doctor::run(doctor, sensors()?),
+        Some(Command::Emulate(emulate)) => emulate::run(emulate, sensors()?)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study, store)?,
         Some(Command::Help(help)) => help::run(help)?,

@@ -54,9 +54,9 @@ const KINDS: &[FileKind] = &[FileKind::Svg, FileKind::Png];
 pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(), Failure> {
     let out = &arguments.out;
     check_new(out, FileKind::of(out, KINDS).unwrap_or(FileKind::Svg))?;
-    let sensors = arguments.signals.view();
-    sensors.learnt()?;
+    arguments.signals.view().learnt()?;
     let store = read_store(store)?;
+    let sensors = arguments.signals.of_store(arguments.signals.view(), &store)?;
     let options = OpenOptions {
         sensors,
         keep: if arguments.heat.is_some() { Keep::Frames } else { Keep::Channels },

@@ -104,12 +104,15 @@ pub(super) fn run(arguments: &RecordArguments, store: Option<&Path>) -> Result<(
     };
     let object = arguments.object.as_deref().map(|name| class_name(class_of(name))).transpose()?;
     // Opened once here: a store that cannot be used is reported before the board is.
-    let store = open_store(store)?.path().to_owned();
+    let store = open_store(store)?;
+    let sensors = store.calibrations().sensors()?;
+    let store = store.path().to_owned();
     let stop = stop_flag()?;
     let options = LinkOptions {
         path: arguments.port.clone(),
         baud: arguments.baud,
         reconnect: !arguments.no_reconnect,
+        sensors,
         replay_speed: if arguments.speed > 0.0 { arguments.speed } else { f64::INFINITY },
     };
     let link = link::open(&options, arguments.wait, &stop)?;

@@ -67,7 +67,12 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
         }
         None => {
             let replay_speed = f64::INFINITY;
-            let options = LinkOptions { path: Some(arguments.source.clone()), replay_speed, ..LinkOptions::default() };
+            let options = LinkOptions {
+                path: Some(arguments.source.clone()),
+                replay_speed,
+                sensors: sensors(store)?,
+                ..LinkOptions::default()
+            };
             if !arguments.source.is_file() {
                 let name = arguments.source.display();
                 return Err(format!("\"{name}\" is neither the number of a trial nor a file of captured bytes").into());

@@ -1,14 +1,15 @@
 //! Arguments shared by commands, of scenes and of sensors, and opening the store.
 
 use super::Failure;
-use super::terminal::Progress;
+use super::terminal::{Progress, warn};
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::{ObjectModel, anchored};
 use palpate_sim::scene::{Accuracy, EngineKind, PRESETS, PosePreset, Scene};
 use palpate_store::labels::class_name;
 use palpate_store::{Store, StoreError};
-use palpate_tactile::SignalDefinition;
+use palpate_tactile::board::{Sensor, SensorKind, SensorList};
+use palpate_tactile::{SensorLayout, SignalDefinition};
 use std::fmt::Display;
 use std::io::ErrorKind;
 use std::ops::RangeInclusive;
@@ -43,9 +44,10 @@ pub(super) struct SceneArguments {
 /// Channels through which simulated trials are read.
 #[derive(Debug, clap::Args)]
 pub(super) struct SignalArguments {
-    /// Sensor layout of simulated trials: C1 to C8; with --signals contact or hull each also with force, as C1+F.
-    #[arg(long, value_name = "NAME", default_value = "C1")]
-    pub(super) layout: String,
+    /// Sensor layout: C1 to C8, with --signals contact or hull each also with force, as C1+F; or gripper, the sensors of the
+    /// gripper file that the store remembers (default: C1, or gripper where the store remembers a file).
+    #[arg(long, value_name = "NAME")]
+    pub(super) layout: Option<String>,
     /// Signals of simulated trials: parts (what strips and pads measure, as on a real gripper), contact (circle through
     /// all joints, force over participation area) or hull (force over the convex hull of the contacts, as in the paper).
     #[arg(long, value_name = "NAME", default_value = "parts", value_parser = one_of(SignalDefinition::ALL.map(|own| (own.name(), own))))]
@@ -55,7 +57,22 @@ pub(super) struct SignalArguments {
 impl SignalArguments {
     /// The view through perfect sensors.
     pub(super) fn view(&self) -> SensorView {
-        SensorView { layout: self.layout.clone(), signals: self.signals, ..SensorView::default() }
+        let usual = SensorView::default();
+        SensorView { layout: self.layout.clone().unwrap_or(usual.layout), signals: self.signals, ..usual }
+    }
+
+    /// The same on the gripper that a store remembers, where no other layout is named.
+    pub(super) fn of_store(&self, view: SensorView, store: &Store) -> Result<SensorView, Failure> {
+        let of_file = |name: &String| name.eq_ignore_ascii_case(SensorLayout::OF_FILE);
+        let file = self.layout.as_ref().is_none_or(of_file) && self.signals == SignalDefinition::Parts;
+        if !file {
+            return Ok(view);
+        }
+        let missing: Vec<&str> = store.calibrations().sensors()?.not_simulated().map(Sensor::channel).collect();
+        if self.layout.is_some() && !missing.is_empty() {
+            warn(&format!("the simulation cannot give {}: simulated trials are read without", missing.join(", ")));
+        }
+        Ok(view.of_store(store)?)
     }
 }
 
@@ -165,6 +182,22 @@ pub(super) fn store_path(path: Option<&Path>) -> Result<PathBuf, Failure> {
 /// Opens the named store, or the default one; creates the file where there is none.
 pub(super) fn open_store(path: Option<&Path>) -> Result<Store, Failure> {
     warned(Store::open(&store_path(path)?)?)
+}
+
+/// Sensors of the gripper that a store remembers; the paper's where there is no store.
+pub(super) fn sensors(path: Option<&Path>) -> Result<SensorList, Failure> {
+    let store = existing_store(path)?;
+    Ok(store.map(|store| store.calibrations().sensors()).transpose()?.unwrap_or_default())
+}
+
+/// The sensor of the gripper with this name, which takes a calibration.
+pub(super) fn sensor_called(sensors: SensorList, name: &str) -> Result<Sensor, Failure> {
+    let found = sensors.called(name).filter(|sensor| sensor.kind() != SensorKind::Raw);
+    found.ok_or_else(|| {
+        let calibrated = sensors.iter().filter(|sensor| sensor.kind() != SensorKind::Raw).map(Sensor::channel);
+        let names = calibrated.collect::<Vec<_>>().join(", ");
+        format!("no strip or pad is called \"{name}\"; the gripper has {names}. --gripper FILE names others").into()
+    })
 }
 
 /// Opens the named store, or the default one, to read it; `None` where there is none, or an empty file: neither is made a

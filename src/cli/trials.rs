@@ -148,7 +148,8 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Export { ids, filters, out, signals, unsound, model, .. } => {
             let ids = &chosen(&store, ids, filters, Shown::Kept)?;
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
-            let options = OpenOptions { sensors: signals.view(), ..OpenOptions::default() };
+            let sensors = signals.of_store(signals.view(), &store)?;
+            let options = OpenOptions { sensors, ..OpenOptions::default() };
             export(&store, &ids, out, options, model.as_deref())
         }
         TrialsCommand::Import(arguments) => import::run(arguments, &mut store),

@@ -148,6 +148,9 @@ pub struct DataCard {
     pub grasps: usize,
     /// Sensor layout of simulated grasps.
     pub layout: Option<String>,
+    /// Sensors of the gripper file through which grasps were read, as JSON; none for those of a layout.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gripper: Option<String>,
     /// Sensor model of simulated grasps.
     pub sensors: Option<String>,
     /// Number of times that drawn or noisy sensors read each simulated grasp, where it is not one.

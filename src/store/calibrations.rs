@@ -6,7 +6,7 @@
 
 use super::store::Store;
 use super::store_error::StoreError;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::calibration::{Calibration, Record, SensorKind};
 use palpate_tactile::trial::TrialId;
 use rusqlite::{Row, Transaction, params};
@@ -39,7 +39,7 @@ pub struct StoredCalibration {
 /// Calibrations that serve a trial, or the present recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Serving {
-    /// A calibration for each place that has one, in the order of [`Sensor::ALL`].
+    /// A calibration for each place that has one, in the order of the gripper's sensors.
     pub calibrations: Vec<(Sensor, Calibration)>,
     /// Numbers of the calibrations, in the same order.
     pub ids: Vec<CalibrationId>,
@@ -127,27 +127,32 @@ impl CalibrationRepository<'_> {
         self.store.in_transaction(|transaction| transaction.execute(sql, values)).map(drop)
     }
 
-    /// The part mounted in each place, in the order of [`Sensor::ALL`].
-    pub fn mounted(&self) -> Result<[Option<String>; 4], StoreError> {
-        self.mounted_at(None)
+    /// The part mounted in each place, in the order of the gripper's sensors.
+    pub fn mounted(&self) -> Result<Vec<Option<String>>, StoreError> {
+        self.mounted_at(self.sensors()?, None)
     }
 
     /// The part mounted in each place at a time; before its first mounting, the first part.
-    fn mounted_at(&self, at: Option<&str>) -> Result<[Option<String>; 4], StoreError> {
+    fn mounted_at(&self, sensors: SensorList, at: Option<&str>) -> Result<Vec<Option<String>>, StoreError> {
         let sql = "SELECT part FROM mountings WHERE sensor = ?1
                    ORDER BY ?2 IS NULL OR since <= ?2 DESC, CASE WHEN ?2 IS NULL OR since <= ?2 THEN -id ELSE id END LIMIT 1";
-        let mut parts = [const { None }; 4];
-        for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
-            *part = self.store.first(sql, params![sensor.channel(), at], |row| row.get(0))?;
+        let mounted = |sensor: Sensor| self.store.first(sql, params![sensor.channel(), at], |row| row.get(0));
+        sensors.iter().map(mounted).collect()
+    }
+
+    /// Sensors of the gripper that a trial was recorded with.
+    fn sensors_of(&self, trial: TrialId) -> Result<SensorList, StoreError> {
+        match self.store.board_info(trial)? {
+            Some(info) => Ok(info.course.board.sensors),
+            None => self.sensors(),
         }
-        Ok(parts)
     }
 
     /// Stores which parts a trial is recorded with: those mounted now. To be called when it begins.
     pub(super) fn note_parts(&self, trial: TrialId) -> Result<(), StoreError> {
-        let parts = self.mounted()?;
+        let (sensors, parts) = (self.sensors()?, self.mounted()?);
         let sql = "INSERT OR REPLACE INTO parts (trial, sensor, part) VALUES (?1, ?2, ?3)";
-        let mut known = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor, part?)));
+        let mut known = sensors.iter().zip(parts).filter_map(|(sensor, part)| Some((sensor, part?)));
         self.store.in_transaction(|transaction| {
             known.try_for_each(|(sensor, part)| {
                 transaction.execute(sql, params![trial, sensor.channel(), part]).map(drop)
@@ -156,11 +161,12 @@ impl CalibrationRepository<'_> {
     }
 
     /// The parts a trial was recorded with; where none are stored, those mounted at its time.
-    pub fn parts_of(&self, trial: TrialId) -> Result<[Option<String>; 4], StoreError> {
+    pub fn parts_of(&self, trial: TrialId) -> Result<Vec<Option<String>>, StoreError> {
         let created: Option<String> =
             self.store.first("SELECT created FROM trials WHERE id = ?1", [trial], |row| row.get(0))?;
-        let mut parts = self.mounted_at(created.as_deref())?;
-        for (part, sensor) in parts.iter_mut().zip(Sensor::ALL) {
+        let sensors = self.sensors_of(trial)?;
+        let mut parts = self.mounted_at(sensors, created.as_deref())?;
+        for (part, sensor) in parts.iter_mut().zip(sensors.iter()) {
             let sql = "SELECT part FROM parts WHERE trial = ?1 AND sensor = ?2";
             let noted = self.store.first(sql, params![trial, sensor.channel()], |row| row.get(0))?;
             *part = noted.or(part.take());
@@ -171,20 +177,21 @@ impl CalibrationRepository<'_> {
     /// Calibrations that serve a trial, or the present recording: of each part the newest that is not withdrawn, or the one
     /// asked for by its number.
     pub fn serving(&self, trial: Option<TrialId>, asked: &[CalibrationId]) -> Result<Serving, StoreError> {
-        let parts = match trial {
-            Some(trial) => self.parts_of(trial)?,
-            None => self.mounted()?,
+        let (sensors, parts) = match trial {
+            Some(trial) => (self.sensors_of(trial)?, self.parts_of(trial)?),
+            None => (self.sensors()?, self.mounted()?),
         };
         let asked = asked.iter().map(|id| self.get(*id)).collect::<Result<Vec<_>, _>>()?;
         let mut serving = Serving::default();
-        for (sensor, part) in Sensor::ALL.into_iter().zip(parts) {
+        let calibrated = sensors.iter().zip(parts).filter(|(sensor, _)| sensor.kind() != SensorKind::Raw);
+        for (sensor, part) in calibrated {
             let Some(part) = part else {
                 let (place, channel) = (sensor.label(), sensor.channel());
                 let text = format!("no part is mounted as the {place}: `palpate calibrate mount {channel} NAME`");
                 serving.warnings.push(text);
                 continue;
             };
-            let fits = |c: &&StoredCalibration| c.record.kind == SensorKind::of(sensor) && c.record.part == part;
+            let fits = |c: &&StoredCalibration| c.record.kind == sensor.kind() && c.record.part == part;
             let wanted: Vec<StoredCalibration> = match asked.iter().find(fits) {
                 Some(one) => vec![one.clone()],
                 None => {
@@ -262,7 +269,7 @@ pub(super) mod tests {
 
     /// A strip's record with some resistance flat, twice that at a right angle.
     pub(crate) fn strip(part: &str, flat_ohm: f64) -> Record {
-        let input = Input::on(&Board::default(), Sensor::FlexLeft);
+        let input = Input::on(&Board::default(), Sensor::FLEX_LEFT);
         let point = |degrees: f64| Point {
             stimulus: degrees.to_radians(),
             counts: input.counts(flat_ohm * (1.0 + degrees / 90.0)),
@@ -319,15 +326,15 @@ pub(super) mod tests {
     fn parts_get_swapped_and_trials_know_theirs() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
         let mut store = store(&folder, "s");
-        assert_eq!(store.calibrations().mounted()?, [const { None }; 4]);
+        assert_eq!(store.calibrations().mounted()?, vec![None; 4]);
         let begun = crate::test_trials::without_frames("empty");
         let untold = store.insert(&begun)?.id();
         // Times are stored to the millisecond.
         std::thread::sleep(std::time::Duration::from_millis(3));
-        store.calibrations().mount(Sensor::FlexLeft, "A")?;
+        store.calibrations().mount(Sensor::FLEX_LEFT, "A")?;
         let first = store.insert(&begun)?.id();
         store.calibrations().note_parts(first)?;
-        store.calibrations().mount(Sensor::FlexLeft, "B")?;
+        store.calibrations().mount(Sensor::FLEX_LEFT, "B")?;
         let second = store.insert(&begun)?.id();
         store.calibrations().note_parts(second)?;
         let left = |trial| store.calibrations().parts_of(trial).map(|parts| parts[0].clone());
@@ -341,7 +348,7 @@ pub(super) mod tests {
     fn the_newest_sound_calibration_serves_old_trials_too() -> Result<(), Box<dyn std::error::Error>> {
         let folder = folder();
         let mut store = store(&folder, "s");
-        store.calibrations().mount(Sensor::FlexLeft, "A")?;
+        store.calibrations().mount(Sensor::FLEX_LEFT, "A")?;
         let begun = crate::test_trials::without_frames("empty");
         let trial = store.insert(&begun)?.id();
         store.calibrations().note_parts(trial)?;
@@ -353,7 +360,7 @@ pub(super) mod tests {
         let degrees = |store: &Store, asked: &[CalibrationId]| -> Result<f64, Box<dyn std::error::Error>> {
             let serving = store.calibrations().serving(Some(trial), asked)?;
             let estimate = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
-            Ok(estimate.angle[0].ok_or("calibrated")?.to_degrees())
+            Ok(estimate.value(Sensor::FLEX_LEFT).ok_or("calibrated")?.to_degrees())
         };
         // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.
         let old = store.calibrations().add(&strip("A", 18e3))?.id;

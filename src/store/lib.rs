@@ -57,6 +57,7 @@ mod file_kind;
 mod file_tests;
 mod frame_blob;
 mod free_space;
+mod gripper;
 mod identity;
 mod imported_trials;
 mod journal;

@@ -28,7 +28,7 @@ pub struct PartTare {
 pub struct StoredTare {
     /// To be subtracted, by [`palpate_tactile::calibration::Readout::with_zero`].
     pub zero: Zero,
-    /// Tare of each sensor that has one, in the order of [`Sensor::ALL`].
+    /// Tare of each sensor that has one, in the order of the gripper's sensors.
     pub parts: Vec<PartTare>,
 }
 
@@ -42,7 +42,7 @@ impl CalibrationRepository<'_> {
                    FROM calibrations WHERE id = ?2";
         self.store.in_transaction(|transaction| {
             for ((sensor, calibration), id) in serving.calibrations.iter().zip(&serving.ids) {
-                let Some(offset) = zero.offsets[*sensor as usize].filter(|offset| offset.is_finite()) else { continue };
+                let Some(offset) = zero.of(*sensor).filter(|offset| offset.is_finite()) else { continue };
                 transaction.execute(sql, params![calibration.record.part, id, offset])?;
             }
             Ok(())
@@ -60,7 +60,7 @@ impl CalibrationRepository<'_> {
                        AND calibration = (SELECT uid FROM calibrations WHERE id = ?2) ORDER BY id DESC LIMIT 1";
             let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?));
             let Some((offset, version, taken)) = self.store.first(sql, params![part, id], row)? else { continue };
-            tare.zero.offsets[*sensor as usize] = Some(offset);
+            tare.zero.set(*sensor, Some(offset));
             tare.parts.push(PartTare { sensor: *sensor, part: part.clone(), version, taken });
         }
         Ok((!tare.parts.is_empty()).then_some(tare))
@@ -78,21 +78,21 @@ mod tests {
         let folder = tempfile::tempdir()?;
         let store = Store::open(&folder.path().join("s"))?;
         assert_eq!(store.calibrations().tare()?, None);
-        for (sensor, part) in [(Sensor::FlexLeft, "A"), (Sensor::FlexRight, "B")] {
+        for (sensor, part) in [(Sensor::FLEX_LEFT, "A"), (Sensor::FLEX_RIGHT, "B")] {
             store.calibrations().add(&strip(part, 24e3))?;
             store.calibrations().mount(sensor, part)?;
         }
         // The pads have no calibration, and of B nothing is known.
-        let zero = |left| Zero { offsets: [Some(left), None, Some(1.0), None] };
+        let zero = |left| Zero { offsets: vec![Some(left), None, Some(1.0), None] };
         store.calibrations().add_tare(&zero(0.01))?;
         let tare = store.calibrations().add_tare(&zero(0.02))?;
-        assert_eq!(tare.zero.offsets, [Some(0.02), None, None, None]);
+        assert_eq!(tare.zero.offsets, [Some(0.02)]);
         assert_eq!((tare.parts.len(), tare.parts[0].version, tare.parts[0].part.as_str()), (1, 2, "A"));
         assert_eq!(store.calibrations().tare()?.as_ref(), Some(&tare));
         // The part moves to the other finger, and its zero with it.
-        store.calibrations().mount(Sensor::FlexRight, "A")?;
-        store.calibrations().mount(Sensor::FlexLeft, "B")?;
-        assert_eq!(store.calibrations().tare()?.map(|tare| tare.zero.offsets), Some([None, Some(0.02), None, None]));
+        store.calibrations().mount(Sensor::FLEX_RIGHT, "A")?;
+        store.calibrations().mount(Sensor::FLEX_LEFT, "B")?;
+        assert_eq!(store.calibrations().tare()?.map(|tare| tare.zero.offsets), Some(vec![None, Some(0.02)]));
         let newer = store.calibrations().add(&strip("A", 25e3))?.id;
         assert_eq!(store.calibrations().tare()?, None);
         store.calibrations().withdraw(newer, true)?;

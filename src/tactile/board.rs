@@ -1,62 +1,8 @@
 //! Decoded data of a sensor board: counts of its converter, stamped. Angle, force and pressure
 //! are derived from them later by a calibration, so that a better one serves old trials too.
 
+pub use crate::sensor_list::{Measures, Sensor, SensorKind, SensorList, SensorRow};
 use serde::{Deserialize, Serialize};
-
-/// Sensor of the gripper, which a channel of the board is wired to (paper, section IV-B).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sensor {
-    /// Flex strip on the back of the left finger.
-    FlexLeft,
-    /// Flex strip on the back of the right finger.
-    FlexRight,
-    /// Force sensor on the pad of the left finger.
-    PadLeft,
-    /// Force sensor on the pad of the right finger.
-    PadRight,
-}
-
-impl Sensor {
-    /// All four, in the order in which the firmware prints them.
-    pub const ALL: [Self; 4] = [Self::FlexLeft, Self::FlexRight, Self::PadLeft, Self::PadRight];
-
-    /// The name of its channel in the firmware's lines.
-    pub fn channel(self) -> &'static str {
-        match self {
-            Self::FlexLeft => "flexL",
-            Self::FlexRight => "flexR",
-            Self::PadLeft => "fsrL",
-            Self::PadRight => "fsrR",
-        }
-    }
-
-    /// The sensor whose channel has such a name; see [`Sensor::is_called`].
-    pub fn called(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|sensor| sensor.is_called(name))
-    }
-
-    /// True for the names that boards may give its channel: case, blanks, hyphens and underscores are ignored.
-    pub fn is_called(self, name: &str) -> bool {
-        let letters = name.chars().filter(|c| !" -_".contains(*c)).map(|c| c.to_ascii_lowercase());
-        letters.eq(self.channel().chars().map(|c| c.to_ascii_lowercase()))
-    }
-
-    /// Display name.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::FlexLeft => "left flex strip",
-            Self::FlexRight => "right flex strip",
-            Self::PadLeft => "left pad",
-            Self::PadRight => "right pad",
-        }
-    }
-
-    /// True for the strips, which read curvature; the others read force.
-    pub fn is_flex(self) -> bool {
-        matches!(self, Self::FlexLeft | Self::FlexRight)
-    }
-}
 
 /// Board description from its handshake line, or inferred from its data lines.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,18 +20,26 @@ pub struct Board {
     pub divider_ohm: Vec<f64>,
     /// Version of its firmware, where reported.
     pub firmware: Option<String>,
+    /// The sensors that its channels are wired to, by name.
+    #[serde(skip_serializing_if = "is_paper")]
+    pub sensors: SensorList,
+}
+
+fn is_paper(sensors: &SensorList) -> bool {
+    *sensors == SensorList::default()
 }
 
 impl Default for Board {
     /// The Due as our firmware sets it up.
     fn default() -> Self {
         Self {
-            channels: Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).collect(),
+            channels: SensorList::default().iter().map(|sensor| sensor.channel().to_owned()).collect(),
             full_scale: 4095,
             reference_volt: 3.3,
             rate_hz: None,
             divider_ohm: Vec::new(),
             firmware: None,
+            sensors: SensorList::default(),
         }
     }
 }
@@ -94,6 +48,11 @@ impl Board {
     /// Channel that a sensor is read on; see [`Sensor::is_called`].
     pub fn channel_of(&self, sensor: Sensor) -> Option<usize> {
         self.channels.iter().position(|name| sensor.is_called(name))
+    }
+
+    /// The sensor that a channel is wired to.
+    pub fn sensor_of(&self, channel: usize) -> Option<Sensor> {
+        self.sensors.called(self.channels.get(channel)?)
     }
 }
 
@@ -206,10 +165,10 @@ mod tests {
     #[test]
     fn a_board_knows_its_channels_by_name_and_not_by_place() {
         let board = Board { channels: vec!["FSRL".into(), "Flex_r".into(), "temperature".into()], ..Board::default() };
-        assert_eq!(board.channel_of(Sensor::PadLeft), Some(0));
-        assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
-        assert_eq!(board.channel_of(Sensor::FlexLeft), None);
-        let places = Sensor::ALL.map(|sensor| Board::default().channel_of(sensor));
+        assert_eq!(board.channel_of(Sensor::PAD_LEFT), Some(0));
+        assert_eq!(board.channel_of(Sensor::FLEX_RIGHT), Some(1));
+        assert_eq!(board.channel_of(Sensor::FLEX_LEFT), None);
+        let places: Vec<_> = SensorList::default().iter().map(|sensor| Board::default().channel_of(sensor)).collect();
         assert_eq!(places, [Some(0), Some(1), Some(2), Some(3)]);
     }
 }

@@ -13,7 +13,7 @@ pub fn channel_with_unit(name: &str, unit: &str) -> Result<(String, f64), String
         ));
     };
     match Quantity::of_name(name) {
-        Some((quantity, _)) if quantity.dimension() != known.dimension => Err(format!(
+        Some((quantity, _)) if quantity.dimension() != Some(known.dimension) => Err(format!(
             "\"{unit}\" is no unit of {}, which \"{name}\" names; its own is {}",
             quantity.name(),
             quantity.unit()

@@ -5,6 +5,7 @@
 //! over pairs of joints, at every joint; C5 to C8 the same with the curvature of both halves. `+F` adds force as a
 //! channel of its own beside each contact pressure; a pad's pressure is its force already.
 
+use crate::sensor_list::{Measures, Sensor, SensorKind, SensorList};
 use crate::unit::Dimension;
 use palpate_sim::gripper::{GripperModel, Side};
 use serde::{Deserialize, Serialize};
@@ -64,6 +65,29 @@ impl Span {
         Self { from, to, name: Cow::Borrowed(name) }
     }
 
+    /// A stretch between two shares of the finger's length, under a name.
+    pub(crate) fn between(name: &'static str, from: f64, to: f64) -> Self {
+        Self::fixed(name, from.clamp(0.0, 1.0), to.clamp(0.0, 1.0))
+    }
+
+    /// The stretch that a name stands for on a finger of so many joints: `proximal`, `distal`, `pair_2`, `joint_7`; the
+    /// whole finger for all other names.
+    pub(crate) fn named(name: &'static str, joints: usize) -> Self {
+        let nth = |prefix: &str, count: usize| {
+            let number: usize = name.strip_prefix(prefix)?.parse().ok()?;
+            (1..=count).contains(&number).then(|| [number - 1, number].map(|k| k as f64 / count.max(1) as f64))
+        };
+        let halves =
+            [Self::PROXIMAL, Self::DISTAL].into_iter().find(|half| half.name == name).map(|half| [half.from, half.to]);
+        let [from, to] = halves.or(nth("pair_", joints.div_ceil(2))).or(nth("joint_", joints)).unwrap_or([0.0, 1.0]);
+        Self::fixed(name, from, to)
+    }
+
+    /// Its name; empty for the whole finger.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// True when the stretch holds a point at a share of the finger's length; its end belongs to the next stretch.
     pub fn holds(&self, share: f64) -> bool {
         // The margin lets a joint or taxel on a boundary fall to one side whatever its rounding.
@@ -115,10 +139,12 @@ pub struct SensorLayout {
     pub pressure: PressureSplit,
     /// True where force is a channel beside each pressure (`+F`).
     pub force: bool,
+    /// Sensors of a gripper file, which have their own stretches.
+    pub list: Option<SensorList>,
 }
 
 const fn row(name: &'static str, curvature: CurvatureSplit, pressure: PressureSplit) -> SensorLayout {
-    SensorLayout { name, curvature, pressure, force: false }
+    SensorLayout { name, curvature, pressure, force: false, list: None }
 }
 
 /// All layouts; adding one is adding a row.
@@ -144,6 +170,13 @@ pub enum Quantity {
     ContactPressure,
     /// Normal force (N).
     Force,
+    /// Anything else that a sensor reads, less its reading at rest.
+    Raw {
+        /// Of what its values are, where it is known.
+        dimension: Option<Dimension>,
+        /// What it measures, where simulations can give it.
+        measures: Option<Measures>,
+    },
 }
 
 impl Quantity {
@@ -154,6 +187,7 @@ impl Quantity {
             Self::Pressure => "pressure",
             Self::ContactPressure => "contact_pressure",
             Self::Force => "force",
+            Self::Raw { .. } => "raw",
         }
     }
 
@@ -169,18 +203,19 @@ impl Quantity {
         matches!(self, Self::Pressure | Self::ContactPressure)
     }
 
-    /// Its dimension.
-    pub fn dimension(self) -> Dimension {
+    /// Its dimension, where it is known.
+    pub fn dimension(self) -> Option<Dimension> {
         match self {
-            Self::Curvature => Dimension::Curvature,
-            Self::Pressure | Self::ContactPressure => Dimension::Pressure,
-            Self::Force => Dimension::Force,
+            Self::Curvature => Some(Dimension::Curvature),
+            Self::Pressure | Self::ContactPressure => Some(Dimension::Pressure),
+            Self::Force => Some(Dimension::Force),
+            Self::Raw { dimension, .. } => dimension,
         }
     }
 
-    /// The unit of its values.
+    /// The unit of its values; empty where it is not known.
     pub fn unit(self) -> &'static str {
-        self.dimension().unit()
+        self.dimension().map_or("", Dimension::unit)
     }
 }
 
@@ -189,9 +224,9 @@ impl Quantity {
 pub struct Channel {
     /// Measured quantity.
     pub quantity: Quantity,
-    /// On which finger.
-    pub side: Side,
-    /// Over which stretch of it.
+    /// On which finger; empty for a sensor of the whole hand.
+    pub finger: Cow<'static, str>,
+    /// Over which stretch of it; for a raw sensor, its name.
     pub span: Span,
     /// Definition of the signal. That of a force is always [`SignalDefinition::Parts`]: all definitions have the same.
     pub signals: SignalDefinition,
@@ -207,16 +242,22 @@ impl Channel {
             (Quantity::Force, _) => (quantity, SignalDefinition::Parts),
             _ => (quantity, signals),
         };
-        Self { quantity, side, span, signals }
+        Self { quantity, finger: Cow::Borrowed(side.name()), span, signals }
     }
 
-    /// Its name in files: `pressure_left_distal`.
+    /// The simulated finger that carries it.
+    pub fn side(&self) -> Option<Side> {
+        Side::BOTH.into_iter().find(|side| side.name() == self.finger)
+    }
+
+    /// Its name in files: `pressure_left_distal`; of a raw sensor its own, with the unit where it is known.
     pub fn name(&self) -> String {
-        let (quantity, side) = (self.quantity.name(), self.side.name());
-        if self.span.name.is_empty() {
-            format!("{quantity}_{side}")
-        } else {
-            format!("{quantity}_{side}_{}", self.span.name)
+        let (quantity, finger, place) = (self.quantity.name(), &self.finger, &self.span.name);
+        match self.quantity {
+            Quantity::Raw { dimension: None, .. } => place.to_string(),
+            Quantity::Raw { dimension: Some(dimension), .. } => format!("{place} [{}]", dimension.unit()),
+            _ if place.is_empty() => format!("{quantity}_{finger}"),
+            _ => format!("{quantity}_{finger}_{place}"),
         }
     }
 }
@@ -243,6 +284,69 @@ pub fn whole_fingers(signals: SignalDefinition) -> Vec<Channel> {
     [Quantity::Curvature, Quantity::Pressure, Quantity::Force].map(pair).concat()
 }
 
+/// Channels of the sensors of a gripper file.
+impl SensorList {
+    /// All channels that calibrated sensors give: curvature of the strips, pressure and then force of the pads, raw values.
+    pub fn channels(self) -> Vec<Channel> {
+        self.channels_on(&GripperModel::default())
+    }
+
+    /// The same on the model of a gripper, whose fingers' length places sensors that the file places in metres or rows.
+    pub fn channels_on(self, gripper: &GripperModel) -> Vec<Channel> {
+        let of = |kind, quantity: &dyn Fn(Sensor) -> Quantity| -> Vec<Channel> {
+            let channel = |sensor: Sensor| sensor.channel_on(quantity(sensor), gripper);
+            self.of_kind(kind).map(channel).collect()
+        };
+        let mut channels = of(SensorKind::Flex, &|_| Quantity::Curvature);
+        channels.extend(of(SensorKind::Pad, &|_| Quantity::Pressure));
+        channels.extend(of(SensorKind::Pad, &|_| Quantity::Force));
+        channels.extend(of(SensorKind::Raw, &|sensor| Quantity::Raw {
+            dimension: sensor.row().raw_unit().map(|unit| unit.dimension),
+            measures: sensor.row().measures,
+        }));
+        channels
+    }
+
+    /// Those that a simulation of a gripper can give: not of other fingers, and of raw sensors only where the file says what
+    /// they measure.
+    pub fn simulated_on(self, gripper: &GripperModel) -> Vec<Channel> {
+        let can = |channel: &Channel| match channel.quantity {
+            Quantity::Raw { measures, .. } => measures.is_some(),
+            _ => channel.side().is_some(),
+        };
+        self.channels_on(gripper).into_iter().filter(can).collect()
+    }
+}
+
+impl Sensor {
+    /// Its channel of a quantity on a gripper.
+    fn channel_on(self, quantity: Quantity, gripper: &GripperModel) -> Channel {
+        let row = self.row();
+        let (length, rows) = (gripper.finger.length, gripper.taxels().rows.max(1) as f64);
+        let from_rows = row.rows.map(|[from, to]| [from as f64 / rows, to as f64 / rows]);
+        let from_m = row.from_m.map(|from| [from / length, row.length_m.map_or(1.0, |own| (from + own) / length)]);
+        let place = if row.kind == SensorKind::Raw { &row.name } else { self.place() };
+        let span = match from_rows.or(from_m) {
+            Some([from, to]) => Span::between(place, from, to),
+            None => Span::named(place, gripper.finger.joints),
+        };
+        let signals = SignalDefinition::Parts;
+        Channel { quantity, finger: Cow::Borrowed(&row.finger), span, signals }
+    }
+
+    /// True where it gives a channel.
+    pub fn gives(self, channel: &Channel) -> bool {
+        let kind = match channel.quantity {
+            Quantity::Curvature => SensorKind::Flex,
+            Quantity::Pressure | Quantity::Force => SensorKind::Pad,
+            Quantity::Raw { .. } => SensorKind::Raw,
+            Quantity::ContactPressure => return false,
+        };
+        let place = if kind == SensorKind::Raw { self.channel() } else { self.place() };
+        self.kind() == kind && *self.finger() == *channel.finger && channel.span.name() == place
+    }
+}
+
 impl SensorLayout {
     /// A layout by its name: `C1` .. `C8`, with `+F` for force channels.
     pub fn named(name: &str) -> Result<Self, LayoutError> {
@@ -258,6 +362,14 @@ impl SensorLayout {
             ))),
         }
     }
+
+    /// The sensors of a gripper file as a layout, as far as simulations can give them.
+    pub fn of_list(list: SensorList) -> Self {
+        Self { list: Some(list), ..row(Self::OF_FILE, CurvatureSplit::Whole, PressureSplit::Whole) }
+    }
+
+    /// Name of the layout of a gripper file.
+    pub const OF_FILE: &'static str = "gripper";
 
     /// A layout by its name, for recognisers: refuses a pad's force beside its pressure.
     pub fn learnt(name: &str, signals: SignalDefinition) -> Result<Self, LayoutError> {
@@ -285,6 +397,14 @@ impl SensorLayout {
 
     /// The channels on a gripper: curvature left and right, then pressure, then force, each from palm to tip.
     pub fn channels(&self, gripper: &GripperModel, signals: SignalDefinition) -> Result<Vec<Channel>, LayoutError> {
+        if let Some(list) = self.list {
+            if signals != SignalDefinition::Parts {
+                return Err(LayoutError::no_such_part());
+            }
+            let mut channels = list.simulated_on(gripper);
+            channels.retain(|channel| self.force || channel.quantity != Quantity::Force);
+            return Ok(channels);
+        }
         let pressure = self.pressure_spans(gripper.finger.joints);
         let grid = gripper.taxels();
         let covered = |span: &Span| (0..grid.rows).any(|r| span.holds((r as f64 + 0.5) / grid.rows as f64));

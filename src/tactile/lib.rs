@@ -14,17 +14,18 @@
 //!
 //! | layer | module | holds |
 //! |---|---|---|
-//! | 0 | [`board`] | sensors, readings and gaps of a board |
 //! | 0 | [`cadence`], [`capture`] | timing statistics of a stream, file format of captured bytes |
 //! | 0 | [`electronics`] | strip, pad, divider and converter |
 //! | 0 | `unit` | units of readings, and their factors |
 //! | 0 | `signals` | channels over time |
-//! | 1 | `layout` | sensor layouts, their channels and the definition of their signals |
-//! | 2 | `column` | names of channels with units |
-//! | 2 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
-//! | 2 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |
-//! | 2 | [`model`] | sensor models: clean signals to those of real sensors |
-//! | 2 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
+//! | 1 | `sensor_list` | sensors of a gripper, and the file that describes them |
+//! | 2 | [`board`] | readings and gaps of a board |
+//! | 2 | `layout` | sensor layouts, their channels and the definition of their signals |
+//! | 3 | `column` | names of channels with units |
+//! | 3 | [`trial`] | recorded grasps: header, and simulated, recorded or imported data |
+//! | 3 | `curvature`, `pressure` | bend under a strip, circle fit along a finger; load and contact patch of a pad |
+//! | 3 | [`model`] | sensor models: clean signals to those of real sensors |
+//! | 3 | [`calibration`] | counts to estimates: curves, intervals, zeros, guided procedure |
 //!
 //! # Example
 //!
@@ -51,6 +52,7 @@ pub mod electronics;
 mod layout;
 pub mod model;
 mod pressure;
+mod sensor_list;
 mod signals;
 pub mod trial;
 mod unit;
@@ -65,6 +67,9 @@ pub use pressure::ContactPatch;
 pub use signals::{SignalGap, Signals};
 pub use unit::{Dimension, KNOWN_UNITS, Unit};
 
+use board::{Measures, SensorList};
+use glam::DVec3;
+use palpate_geometry::Pose;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{BentFinger, GripperModel, Side, TaxelGrid};
 
@@ -76,6 +81,8 @@ pub struct Sensors {
     /// Beginning and end of the strips, from the palm (m).
     strip: [f64; 2],
     grid: TaxelGrid,
+    /// The palm, in the world (m).
+    palm: DVec3,
 }
 
 impl Sensors {
@@ -87,7 +94,24 @@ impl Sensors {
     /// Reads these channels of a gripper.
     pub fn of(channels: Vec<Channel>, gripper: &GripperModel) -> Self {
         let (finger, strip) = (gripper.finger.clone(), gripper.strip.reach(&gripper.finger));
-        Self { channels, finger, strip, grid: gripper.taxels() }
+        Self { channels, finger, strip, grid: gripper.taxels(), palm: DVec3::ZERO }
+    }
+
+    /// Places the sensors of a gripper file on the model of a gripper, as far as simulations can give them.
+    pub fn of_list(list: SensorList, gripper: &GripperModel) -> Self {
+        Self::of(list.simulated_on(gripper), gripper)
+    }
+
+    /// With the palm at a place in the world (m), which the distance of the object is taken from.
+    #[must_use]
+    pub fn with_palm(self, palm: DVec3) -> Self {
+        Self { palm, ..self }
+    }
+
+    /// Only these of its channels.
+    #[must_use]
+    pub fn only(self, channels: Vec<Channel>) -> Self {
+        Self { channels, ..self }
     }
 
     /// Curvature, pressure and force of each finger, which suits any gripper.
@@ -113,30 +137,43 @@ impl Sensors {
     /// no area (only with [`SignalDefinition::Hull`]).
     pub fn read(&self, frame: &Frame) -> Vec<Option<f64>> {
         let bent = Side::BOTH.map(|side| BentFinger::new(&self.finger, frame.joints(side)));
-        self.channels
-            .iter()
-            .map(|channel| match (channel.quantity, channel.signals) {
-                (Quantity::Curvature, SignalDefinition::Parts) => Some(strip_curvature(
-                    frame.joints(channel.side),
-                    self.finger.length,
-                    self.strip_over(&channel.span),
-                )),
-                (Quantity::Curvature, _) => {
-                    Some(curvature(&bent[channel.side.index()], frame.joints(channel.side), &channel.span))
+        let value = |channel: &Channel| {
+            if let Quantity::Raw { measures, .. } = channel.quantity {
+                return self.raw(frame, measures?);
+            }
+            let side = channel.side()?;
+            match (channel.quantity, channel.signals) {
+                (Quantity::Curvature, SignalDefinition::Parts) => {
+                    Some(strip_curvature(frame.joints(side), self.finger.length, self.strip_over(&channel.span)))
                 }
+                (Quantity::Curvature, _) => Some(curvature(&bent[side.index()], frame.joints(side), &channel.span)),
                 (Quantity::Pressure | Quantity::ContactPressure, signals) => {
-                    self.patch(frame, channel).pressure(signals)
+                    self.patch(frame, side, channel).pressure(signals)
                 }
-                (Quantity::Force, _) => Some(self.patch(frame, channel).force()),
-            })
-            .collect()
+                (Quantity::Force, _) => Some(self.patch(frame, side, channel).force()),
+                (Quantity::Raw { .. }, _) => None,
+            }
+        };
+        self.channels.iter().map(value).collect()
+    }
+
+    /// What a raw sensor measures: Pa, or m, at most the length of a finger.
+    fn raw(&self, frame: &Frame, measures: Measures) -> Option<f64> {
+        let palm = self.palm + frame.hand;
+        Some(match measures {
+            Measures::ChamberPressure => frame.line_bar * PASCAL_PER_BAR,
+            Measures::PalmDistance => {
+                let distance = |pose: Pose| (pose.position - palm).length();
+                frame.world_from_object.map_or(self.finger.length, distance).min(self.finger.length)
+            }
+        })
     }
 
     /// Beginning and end of a channel's sensor, along the finger from the palm (m).
     pub fn stretch(&self, channel: &Channel) -> [f64; 2] {
         match channel.quantity {
             Quantity::Curvature => self.strip_over(&channel.span),
-            Quantity::Pressure | Quantity::ContactPressure | Quantity::Force => {
+            Quantity::Pressure | Quantity::ContactPressure | Quantity::Force | Quantity::Raw { .. } => {
                 let (from, to) = channel.span.ends();
                 [from, to].map(|share| share * self.finger.length)
             }
@@ -160,10 +197,13 @@ impl Sensors {
         signals
     }
 
-    fn patch(&self, frame: &Frame, channel: &Channel) -> ContactPatch {
-        ContactPatch::new(frame, channel.side, &self.grid, &channel.span)
+    fn patch(&self, frame: &Frame, side: Side, channel: &Channel) -> ContactPatch {
+        ContactPatch::new(frame, side, &self.grid, &channel.span)
     }
 }
+
+/// Pascal in a bar.
+const PASCAL_PER_BAR: f64 = 1e5;
 
 #[cfg(test)]
 mod tests {

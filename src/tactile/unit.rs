@@ -11,6 +11,9 @@ pub enum Dimension {
     Curvature,
     Angle,
     Voltage,
+    Current,
+    Length,
+    Acceleration,
     /// Steps of a converter.
     Counts,
 }
@@ -25,6 +28,9 @@ impl Dimension {
             Self::Curvature => "1/m",
             Self::Angle => "rad",
             Self::Voltage => "V",
+            Self::Current => "A",
+            Self::Length => "m",
+            Self::Acceleration => "m/s2",
             Self::Counts => "counts",
         }
     }
@@ -65,6 +71,10 @@ const UNITS: &[(&str, Dimension, f64, bool)] = &[
     ("°", Dimension::Angle, std::f64::consts::PI / 180.0, false),
     ("degrees", Dimension::Angle, std::f64::consts::PI / 180.0, false),
     ("V", Dimension::Voltage, 1.0, true),
+    ("A", Dimension::Current, 1.0, true),
+    ("m", Dimension::Length, 1.0, true),
+    ("cm", Dimension::Length, 1e-2, false),
+    ("m/s2", Dimension::Acceleration, 1.0, false),
     ("counts", Dimension::Counts, 1.0, false),
     ("count", Dimension::Counts, 1.0, false),
     ("lsb", Dimension::Counts, 1.0, false),
@@ -75,7 +85,7 @@ const PREFIXES: &[(&str, f64)] =
     &[("", 1.0), ("n", 1e-9), ("µ", 1e-6), ("u", 1e-6), ("m", 1e-3), ("h", 1e2), ("k", 1e3), ("M", 1e6)];
 
 /// Units in words, for errors and help.
-pub const KNOWN_UNITS: &str = "s, ms, us, ns; N, mN, gf, kgf, lbf; Pa, hPa, kPa, MPa, N/cm2, mbar, bar, psi; 1/m, 1/cm, 1/mm; rad, deg; V, mV; counts";
+pub const KNOWN_UNITS: &str = "s, ms, us, ns; N, mN, gf, kgf, lbf; Pa, hPa, kPa, MPa, N/cm2, mbar, bar, psi; 1/m, 1/cm, 1/mm; rad, deg; V, mV; A, mA; m, cm, mm; m/s2; counts";
 
 impl Unit {
     /// The unit of a text such as `kPa` or `m^-1`; none where it is not known. Capitals matter only where two units would

@@ -5,6 +5,7 @@
 use crate::program::{Ran, palpate, ran, refused, run};
 use crate::serial::{HANG, TOO_BUSY, finished, start};
 use palpate_store::Store;
+use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Curve, Readout};
 use palpate_tactile::trial::TrialData;
 use serde_json::Value;
@@ -109,7 +110,7 @@ fn a_gripper_recognises_after_one_close_of_its_empty_hand() {
     let TrialData::Recorded(log) = store.load(adapted["trial"].as_i64().unwrap()).unwrap().data else { panic!() };
     let readout = Readout::new(&log.course.board, &serving.calibrations).unwrap();
     let shown = |side: usize| {
-        let forces = log.readings.iter().filter_map(|reading| readout.estimate(reading).force[side]);
+        let forces = log.readings.iter().filter_map(|reading| readout.estimate(reading).value(Sensor::PAPER[2 + side]));
         forces.fold(0.0, f64::max)
     };
     assert!(shown(0) < 0.08 && shown(1) < 0.08, "{} {}", shown(0), shown(1));

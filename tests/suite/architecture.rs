@@ -87,7 +87,16 @@ const HOMES: &[(&str, &[&str])] = &[
     ("tempfile", &["src"]),
     ("thiserror", &["src"]),
     ("tobj", &["src/geometry/mesh_files"]),
-    ("toml", &["src/sim/scene", "src/sim/objects/catalogue.rs", "src/exchange/mapping.rs", "src/study/public.rs"]),
+    (
+        "toml",
+        &[
+            "src/tactile/sensor_list.rs",
+            "src/sim/scene",
+            "src/sim/objects/catalogue.rs",
+            "src/exchange/mapping.rs",
+            "src/study/public.rs",
+        ],
+    ),
     ("tracing", &["src"]),
     ("tracing_subscriber", &["src/cli/terminal.rs"]),
     ("wgpu", &["src/render", "src/app"]),

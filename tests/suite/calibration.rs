@@ -17,7 +17,7 @@ use palpate_sim::objects::{EMPTY, ObjectModel};
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Store};
 use palpate_study::{Certainty, FingerFit, Observation, Trust, fit_finger};
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, Reading, Sensor, SensorList};
 use palpate_tactile::calibration::{BendingZero, Calibration, Curve, Input, Procedure, Readout, SensorKind};
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use palpate_tactile::electronics::StripPart;
@@ -34,7 +34,14 @@ pub(crate) fn readings(
     seed: u64,
 ) -> (Board, Vec<Reading>) {
     let script = parse_script(script).unwrap();
-    let hand = HandPlan { scene: scene.clone(), objects: vec![EMPTY.to_owned()], seed, grasp_every_s: None, script };
+    let hand = HandPlan {
+        sensors: SensorList::default(),
+        scene: scene.clone(),
+        objects: vec![EMPTY.to_owned()],
+        seed,
+        grasp_every_s: None,
+        script,
+    };
     let setup = EmulatorSetup {
         hand,
         parts: parts.clone(),
@@ -75,7 +82,7 @@ pub(crate) fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor,
         let (own, stream) = readings(parts, &Scene::default(), &script, 2.0 * plan.len() as f64, seed);
         board = own;
         for side in Side::BOTH {
-            let sensor = kind.on(side);
+            let sensor = SensorList::default().first_on(kind, side).unwrap();
             let mut procedure = Procedure::new(sensor, sensor.channel(), None);
             assert!(procedure.see(&board));
             for reading in &stream {
@@ -94,7 +101,8 @@ pub(crate) fn calibrated(parts: &HiddenParts, seed: u64) -> (Board, Vec<(Sensor,
     for side in Side::BOTH {
         let (_, calibration) = &mut calibrations[2 + side.index()];
         let mut record = calibration.record.clone();
-        record.bending = Some(BendingZero::from_empty_close(&readout.bending(side, &close)).unwrap());
+        record.bending =
+            Some(BendingZero::from_empty_close(&readout.bending(Sensor::PAPER[2 + side.index()], &close)).unwrap());
         *calibration = Calibration::fit(record).unwrap();
     }
     (board, calibrations)
@@ -123,8 +131,12 @@ fn errors(parts: &HiddenParts, seed: u64) -> [f64; 2] {
             };
             let (kind, shown) = stimulus;
             let error = match kind {
-                0 => mean(&|reading| readout.estimate(reading).angle[side]).to_degrees() - shown,
-                _ => mean(&|reading| readout.estimate(reading).force[side]) / SensorKind::Pad.stimulus(shown) - 1.0,
+                0 => mean(&|reading| readout.estimate(reading).value(Sensor::PAPER[side])).to_degrees() - shown,
+                _ => {
+                    mean(&|reading| readout.estimate(reading).value(Sensor::PAPER[2 + side]))
+                        / SensorKind::Pad.stimulus(shown)
+                        - 1.0
+                }
             };
             worst[kind] = worst[kind].max(error.abs());
         }
@@ -153,7 +165,7 @@ fn a_resistor_that_is_not_what_the_board_says_is_told() {
     let (mut board, stream) = readings(&wrong, &Scene::default(), &holds(&[], &loads), 16.0, 1);
     // The hello line says what the maker believed.
     board.divider_ohm = vec![47e3, 47e3, 4.7e3, 47e3];
-    let mut procedure = Procedure::new(Sensor::PadRight, "P2", None);
+    let mut procedure = Procedure::new(Sensor::PAD_RIGHT, "P2", None);
     assert!(procedure.see(&board));
     for reading in &stream {
         procedure.feed(reading);
@@ -293,8 +305,14 @@ fn calibrations_are_made_listed_exchanged_and_withdrawn_on_the_command_line() {
 /// What a board sends while a script is done on the bench, as a file of captured bytes.
 pub(crate) fn capture(parts: &HiddenParts, script: &str, faults: &str, seconds: f64, file: &Path) {
     let script = parse_script(script).unwrap();
-    let hand =
-        HandPlan { scene: Scene::default(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
+    let hand = HandPlan {
+        sensors: SensorList::default(),
+        scene: Scene::default(),
+        objects: vec![EMPTY.to_owned()],
+        seed: 1,
+        grasp_every_s: None,
+        script,
+    };
     let (channels, most_steps, clock_start_us) = (4, 30, 0);
     let setup = EmulatorSetup {
         hand,
@@ -497,18 +515,18 @@ struct OnTheBench {
 
 /// A strip of 24 kOhm that rises to 2.2 times that.
 fn strip_counts(degrees: f64) -> f64 {
-    Input::on(&Board::default(), Sensor::FlexRight).counts(24e3 * (1.0 + 1.2 * degrees / 90.0))
+    Input::on(&Board::default(), Sensor::FLEX_RIGHT).counts(24e3 * (1.0 + 1.2 * degrees / 90.0))
 }
 
 /// A pad of 6 kOhm under 1 N.
 fn pad_counts(force: f64) -> f64 {
-    let input = Input::on(&Board::default(), Sensor::PadRight);
+    let input = Input::on(&Board::default(), Sensor::PAD_RIGHT);
     if force < 0.05 { 0.0 } else { input.counts(6e3 / force.powf(0.9)) }
 }
 
 /// Chooses a sensor and begins with a part.
 fn begin_calibration(bench: &mut Bench, sensor: Sensor, part: &str) {
-    bench.harness.get_by_label(sensor.label()).click();
+    bench.harness.get_by_label(&sensor.label()).click();
     bench.harness.get_by_label("Part").focus();
     bench.harness.step();
     for _ in 0..4 {
@@ -528,7 +546,7 @@ fn take_points<'a>(
     holds: impl IntoIterator<Item = (&'a str, f64)>,
 ) {
     for (instruction, wanted) in holds {
-        hand.lock().unwrap().counts[sensor as usize] = wanted;
+        hand.lock().unwrap().counts[sensor.index()] = wanted;
         // Nothing from before it is among the readings whose mean is taken.
         let settled = hand.lock().unwrap().seconds + 5;
         while hand.lock().unwrap().seconds < settled {
@@ -547,7 +565,7 @@ fn the_window_calibrates_step_by_step() {
     let hand =
         Arc::new(Mutex::new(OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: None, seconds: 0 }));
     let read = Arc::clone(&hand);
-    let listen: Listen = Arc::new(move |_| {
+    let listen: Listen = Arc::new(move |_, _| {
         let read = Arc::clone(&read);
         let counts = move || {
             let mut hand = read.lock().unwrap();
@@ -565,10 +583,10 @@ fn the_window_calibrates_step_by_step() {
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "calibration");
     let setup = BenchSetup { panel, size: [340.0, 640.0], listen, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
-    begin_calibration(&mut bench, Sensor::FlexRight, "A7");
+    begin_calibration(&mut bench, Sensor::FLEX_RIGHT, "A7");
     // It has slipped a little at 60 degrees.
     let holds = [("hang straight", 0.0), ("by 30 degrees", 30.0), ("by 60 degrees", 61.5), ("by 90 degrees", 90.0)];
-    take_points(&mut bench, &hand, Sensor::FlexRight, holds.map(|(asked, degrees)| (asked, strip_counts(degrees))));
+    take_points(&mut bench, &hand, Sensor::FLEX_RIGHT, holds.map(|(asked, degrees)| (asked, strip_counts(degrees))));
     bench.until_shown(true, "kOhm flat");
     bench.until_shown(true, "counts, settled");
     assert!(bench.harness.query_by_label("Empty close").is_none(), "a strip has no such zero");
@@ -576,7 +594,7 @@ fn the_window_calibrates_step_by_step() {
     bench.harness.get_by_label("Save").click();
     bench.until_shown(true, "version 1 of \"A7\", the right flex strip");
     // A pad, and what bending does to it.
-    begin_calibration(&mut bench, Sensor::PadRight, "P3");
+    begin_calibration(&mut bench, Sensor::PAD_RIGHT, "P3");
     let plan = palpate_tactile::calibration::plan(SensorKind::Pad);
     let asked: Vec<(String, f64)> = plan
         .iter()
@@ -585,7 +603,7 @@ fn the_window_calibrates_step_by_step() {
             force => (format!("put {:.0} g on", 1e3 * SensorKind::Pad.shown(force)), pad_counts(force)),
         })
         .collect();
-    take_points(&mut bench, &hand, Sensor::PadRight, asked.iter().map(|(asked, counts)| (asked.as_str(), *counts)));
+    take_points(&mut bench, &hand, Sensor::PAD_RIGHT, asked.iter().map(|(asked, counts)| (asked.as_str(), *counts)));
     bench.until_shown(true, "let the empty hand close once");
     *hand.lock().unwrap() = OnTheBench { counts: [1400.0, strip_counts(0.0), 0.0, 0.0], bends: Some(0.0), seconds: 0 };
     bench.harness.get_by_label("Empty close").click();
@@ -599,7 +617,7 @@ fn the_window_calibrates_step_by_step() {
     bench.until_shown(true, "version 1 of \"P3\", the right pad");
     let store = bench.store();
     let serving = store.calibrations().serving(None, &[]).unwrap().calibrations;
-    let (_, pad) = serving.iter().find(|(sensor, _)| *sensor == Sensor::PadRight).unwrap();
+    let (_, pad) = serving.iter().find(|(sensor, _)| *sensor == Sensor::PAD_RIGHT).unwrap();
     let bending = pad.record.bending.as_ref().expect("learned");
     let Curve::Pad(curve) = &pad.curve else { panic!("{pad:?}") };
     let load = bending.preload(curve, 30f64.to_radians() / StripPart::ACTIVE_LENGTH);

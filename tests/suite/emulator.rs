@@ -111,7 +111,14 @@ struct OnItsClock {
 /// Records an emulated gripper with these faults for some seconds of its own time.
 fn record_on_its_clock(faults: &str, change: impl Fn(&mut EmulatorSetup), seconds: f64) -> OnItsClock {
     let objects = vec![EMPTY.to_owned()];
-    let hand = HandPlan { scene: scene(), objects, seed: 1, grasp_every_s: Some(6.0), script: vec![] };
+    let hand = HandPlan {
+        sensors: palpate_tactile::board::SensorList::default(),
+        scene: scene(),
+        objects,
+        seed: 1,
+        grasp_every_s: Some(6.0),
+        script: vec![],
+    };
     let mut setup = EmulatorSetup {
         hand,
         parts: parts(1, true),

@@ -13,10 +13,11 @@ use palpate_lab::workers::{
     GripperWorker, Notice, TraceRow,
 };
 use palpate_sim::gripper::Phase;
+use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::trial::{BoardLog, Control};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,11 +61,18 @@ fn moving(parts: &HiddenParts) -> Listen {
 
 pub(crate) fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Duration, most_steps: u8) -> Listen {
     let parts = parts.clone();
-    Arc::new(move |port| {
+    Arc::new(move |port, _| {
         if let Some(port) = port {
             return Err(format!("there is no {}", port.display()).into());
         }
-        let hand = HandPlan { scene: scene(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s, script: vec![] };
+        let hand = HandPlan {
+            sensors: SensorList::default(),
+            scene: scene(),
+            objects: vec![EMPTY.to_owned()],
+            seed: 1,
+            grasp_every_s,
+            script: vec![],
+        };
         let setup = EmulatorSetup {
             hand,
             parts: parts.clone(),
@@ -330,9 +338,10 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
     let most = |k: usize| of_trial.clone().map(|row| row.sample.values[k]).fold(f32::MIN, f32::max);
     assert!(most(0) > 3.0 && (most(0) - most(1)).abs() < 0.5, "{} {}", most(0), most(1));
     desk.command(GripperCommand::Tare);
-    let tared =
-        desk.until(|view| view.latest.as_ref().is_some_and(|l| l.estimate.curvature[0].is_some_and(|k| k.abs() < 0.3)));
-    assert!(tared.latest.as_ref().unwrap().estimate.force[0].is_some_and(|force| force < 0.05));
+    let tared = desk.until(|view| {
+        view.latest.as_ref().is_some_and(|l| l.estimate.curvature(Side::Left).is_some_and(|k| k.abs() < 0.3))
+    });
+    assert!(tared.latest.as_ref().unwrap().estimate.value(Sensor::PAD_LEFT).is_some_and(|force| force < 0.05));
 }
 
 #[test]
@@ -340,7 +349,7 @@ fn a_calibration_shares_the_port_or_brings_its_own() {
     let mut desk = Desk::on(board(&parts(1, false)));
     let begin = |port: Option<&str>| {
         let port = port.map(PathBuf::from);
-        let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A7".to_owned(), port };
+        let plan = CalibrationPlan { sensor: Sensor::FLEX_LEFT, part: "A7".to_owned(), port };
         GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
     let running = |view: &GripperView| view.calibration.running.is_some();
@@ -374,7 +383,7 @@ fn the_doctor_looks_at_the_link_that_is_held() {
     let alone: Examine = Arc::new(|_, _| panic!("the port is held: it cannot be opened again"));
     let look = desk.worker.examine(alone);
     desk.connect();
-    let request = ExamineRequest { port: None, seconds: 0.3 };
+    let request = ExamineRequest { port: None, seconds: 0.3, sensors: SensorList::default() };
     let mut found = 0;
     let seen = look(&request, &mut |_| {
         found += 1;
@@ -383,7 +392,7 @@ fn the_doctor_looks_at_the_link_that_is_held() {
     assert!(found > 0 && seen.listened_s >= 0.3 && seen.traces.channels.len() == 4);
     assert!(seen.link.is_some_and(|link| link.board.firmware.is_some()), "it has said who it is");
     // One that is given up ends before its time, with what was seen so far.
-    let seen = look(&ExamineRequest { port: None, seconds: 1e6 }, &mut |_| false);
+    let seen = look(&ExamineRequest { port: None, seconds: 1e6, sensors: SensorList::default() }, &mut |_| false);
     assert!(seen.listened_s < 1e3 && seen.traces.channels.len() == 4);
 }
 
@@ -457,9 +466,9 @@ fn a_trial_that_was_asked_for_is_not_taken_over_by_what_the_fingers_do() {
 fn a_port_that_another_program_has_is_opened_when_that_lets_it_go() {
     let tries = AtomicU32::new(0);
     let free = board(&parts(1, false));
-    let mut desk = Desk::on(Arc::new(move |port| match tries.fetch_add(1, Ordering::Relaxed) {
+    let mut desk = Desk::on(Arc::new(move |port, sensors| match tries.fetch_add(1, Ordering::Relaxed) {
         0 | 1 => Err(NotOpened { may_pass: true, ..NotOpened::from("it is open in another program".to_owned()) }),
-        _ => free(port),
+        _ => free(port, sensors),
     }));
     desk.command(GripperCommand::Connect(None));
     desk.until_said("it is open in another program; retrying each second");

@@ -111,7 +111,7 @@ fn has_copied(bench: &Bench, part: &str) -> bool {
 #[test]
 fn a_port_that_may_not_be_opened_says_so_with_a_command_to_copy() {
     let [dark, light] = Theme::ALL.map(|theme| {
-        let listen: Listen = Arc::new(|_| {
+        let listen: Listen = Arc::new(|_, _| {
             Err(NotOpened {
                 text: "cannot open port \"/dev/ttyACM0\": only members of the group dialout are allowed to. Run `sudo \
                        usermod -aG dialout $USER`, then log out and in again"
@@ -154,8 +154,8 @@ fn crosstalk_is_found_sensor_by_sensor_in_a_terminal() {
         for bleed in found {
             // Each channel takes from the one before it, which for the first is the last.
             let [from, into] = ["from", "into"].map(|key| bleed[key].as_str().unwrap());
-            let next = [("flex-left", "flex-right"), ("flex-right", "pad-left"), ("pad-left", "pad-right")];
-            let follows = next.contains(&(from, into)) || (from, into) == ("pad-right", "flex-left");
+            let next = [("flexL", "flexR"), ("flexR", "fsrL"), ("fsrL", "fsrR")];
+            let follows = next.contains(&(from, into)) || (from, into) == ("fsrR", "flexL");
             assert_eq!(bleed["bleeds"], !sound && follows, "{bleed}");
             let share = bleed["share"].as_f64().unwrap();
             assert!(!bleed["bleeds"].as_bool().unwrap() || (share - 0.05).abs() < 0.02, "{bleed}");
@@ -176,7 +176,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
     let [dark, light] = Theme::ALL.map(|theme| {
         let hand = Arc::new(Mutex::new(REST));
         let read = Arc::clone(&hand);
-        let listen: Listen = Arc::new(move |_| {
+        let listen: Listen = Arc::new(move |_, _| {
             let read = Arc::clone(&read);
             let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
             Ok(Box::new(alike(counts)))
@@ -223,7 +223,7 @@ fn crosstalk_is_found_sensor_by_sensor_in_the_window() {
 #[test]
 fn what_is_missing_is_hatched_and_no_line_goes_through_it() {
     let [dark, light] = Theme::ALL.map(|theme| {
-        let listen: Listen = Arc::new(|_| Ok(Box::new(once_with_a_gap())));
+        let listen: Listen = Arc::new(|_, _| Ok(Box::new(once_with_a_gap())));
         let setup = BenchSetup { size: [480.0, 220.0], listen, ..BenchSetup::default() };
         let mut bench = bench("counts", theme, setup);
         bench.tell(|app| app.connect(None));
@@ -243,14 +243,14 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     let read = Arc::clone(&hand);
     let open = Arc::new(AtomicU32::new(0));
     let opened = Arc::clone(&open);
-    let listen: Listen = Arc::new(move |_| {
+    let listen: Listen = Arc::new(move |_, _| {
         let (read, _) = (Arc::clone(&read), opened.fetch_add(1, Ordering::Relaxed));
         let counts = move || read.lock().unwrap().map(|counts| Some(counts as f32)).to_vec();
         Ok(Box::new(alike(counts)))
     });
     let mut bench = bench("doctor", Theme::Dark, BenchSetup { size: [320.0, 420.0], listen, ..BenchSetup::default() });
     let calibrate = || {
-        let plan = CalibrationPlan { sensor: Sensor::FlexLeft, part: "A".to_owned(), port: None };
+        let plan = CalibrationPlan { sensor: Sensor::FLEX_LEFT, part: "A".to_owned(), port: None };
         GripperCommand::Calibrate(CalibrationCommand::Begin(plan))
     };
     // What has the fingers is not disturbed.

@@ -17,7 +17,14 @@ fn capture(at: &Path, name: &str, script: &str, faults: &str) {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let script = parse_script(script).unwrap();
-    let hand = HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 2, grasp_every_s: None, script };
+    let hand = HandPlan {
+        sensors: palpate_tactile::board::SensorList::default(),
+        scene,
+        objects: vec![EMPTY.to_owned()],
+        seed: 2,
+        grasp_every_s: None,
+        script,
+    };
     let (parts, faults) = (HiddenParts::drawn(2), parse_faults(faults).unwrap());
     let (rate_hz, channels, most_steps, clock_start_us) = (50, 4, 30, 0);
     let setup = EmulatorSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 2 };

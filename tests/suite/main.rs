@@ -61,6 +61,7 @@ mod frozen;
 mod fuzz;
 mod golden;
 mod gripper;
+mod gripper_file;
 mod gripper_tools;
 mod imports;
 mod inspect;

@@ -53,8 +53,14 @@ struct FaultyLink {
 
 impl FaultyLink {
     fn new(fault: BoardFault) -> Self {
-        let hand =
-            HandPlan { scene: slow(), objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script: vec![] };
+        let hand = HandPlan {
+            sensors: palpate_tactile::board::SensorList::default(),
+            scene: slow(),
+            objects: vec![EMPTY.to_owned()],
+            seed: 1,
+            grasp_every_s: None,
+            script: vec![],
+        };
         let setup = EmulatorSetup {
             hand,
             parts: parts(1, false),
@@ -171,7 +177,7 @@ fn by_command(fault: BoardFault) -> Essence {
 }
 
 fn by_window(fault: BoardFault) -> Essence {
-    let mut desk = Desk::on(Arc::new(move |_| Ok(Box::new(FaultyLink::new(fault)))));
+    let mut desk = Desk::on(Arc::new(move |_, _| Ok(Box::new(FaultyLink::new(fault)))));
     desk.connect();
     // A command also begins with some tenths of a second of what came before.
     desk.until(|view| view.link.as_ref().is_some_and(|link| link.now_s > 1.0));

@@ -26,18 +26,18 @@ use std::time::Duration;
 fn ohm(kind: SensorKind, stimulus: f64) -> f64 {
     match kind {
         SensorKind::Flex => 25e3 * (1.0 + stimulus.to_degrees() / 90.0),
-        SensorKind::Pad => 6.5e3 * stimulus.max(1e-4).powf(-0.9),
+        SensorKind::Pad | SensorKind::Raw => 6.5e3 * stimulus.max(1e-4).powf(-0.9),
     }
 }
 
 fn counts(sensor: Sensor, stimulus: f64) -> f64 {
-    Input::on(&Board::default(), sensor).counts(ohm(SensorKind::of(sensor), stimulus))
+    Input::on(&Board::default(), sensor).counts(ohm(sensor.kind(), stimulus))
 }
 
 /// All four parts, calibrated and in their places.
 fn calibrate(store: &mut Store) {
-    for sensor in Sensor::ALL {
-        let kind = SensorKind::of(sensor);
+    for sensor in Sensor::PAPER {
+        let kind = sensor.kind();
         let point = |stimulus| Point { stimulus, counts: counts(sensor, stimulus), spread: 1.0, readings: 50 };
         let points = plan(kind).into_iter().map(point).collect();
         let part = sensor.channel().to_owned();
@@ -63,11 +63,11 @@ fn trial(store: &mut Store, object: &str, degrees: f64, newton: f64, number: u32
     let reading = |k: u32| {
         let t_s = 0.02 * f64::from(k);
         let share = spread * t_s.min(1.0);
-        let stimulus = |sensor: Sensor| match SensorKind::of(sensor) {
+        let stimulus = |sensor: Sensor| match sensor.kind() {
             SensorKind::Flex => (share * degrees).to_radians(),
-            SensorKind::Pad => share * newton,
+            SensorKind::Pad | SensorKind::Raw => share * newton,
         };
-        let counts = Sensor::ALL.map(|sensor| Some(counts(sensor, stimulus(sensor)) as f32)).to_vec();
+        let counts = Sensor::PAPER.map(|sensor| Some(counts(sensor, stimulus(sensor)) as f32)).to_vec();
         Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
     };
     let id = store.begin_board(&header, &about).unwrap();

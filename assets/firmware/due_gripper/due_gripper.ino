@@ -1,4 +1,4 @@
-/* Palpate's firmware for an Arduino Due: two flex strips, two force pads, and, where it takes one, the line pressure of the
+/* Palpate's firmware for an Arduino Due: two flex strips, two force pads or the channels of another gripper, and, where it takes one, the line pressure of the
  * control box. Wiring: README.md. Logic: gripper_logic.h; here are only the pins. */
 
 #include "gripper_logic.h"
@@ -30,9 +30,18 @@
 #define CHIP_WATCHDOG
 #endif
 
+/* Channels of another gripper: palpate doctor --gripper FILE.toml --firmware-header gripper_channels.h, put beside this file. */
+#if defined(__has_include)
+#if __has_include("gripper_channels.h")
+#include "gripper_channels.h"
+#endif
+#endif
+#ifndef CHANNELS
+#define CHANNELS 4
 static const uint8_t pins_read[] = {A0, A1, A2, A3};
 static const char *const names[] = {"flexL", "flexR", "fsrL", "fsrR"};
 static const uint32_t divider_ohm[] = {47000, 47000, 4700, 4700};
+#endif
 
 static uint16_t convert(uint8_t channel) { return (uint16_t)analogRead(pins_read[channel]); }
 
@@ -47,7 +56,7 @@ static void put_pressure(uint8_t steps) {
 static void print(const char *text, size_t length) { HOST.write((const uint8_t *)text, length); }
 
 static const GripperPins pins = {convert, put_pressure, print};
-static const GripperSetup gripper = {20000, 4, names, divider_ohm, 12, MOST_STEPS};
+static const GripperSetup gripper = {20000, CHANNELS, names, divider_ohm, 12, MOST_STEPS};
 static GripperState state;
 
 #if MOST_STEPS > 0

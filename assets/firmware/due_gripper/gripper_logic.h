@@ -27,7 +27,7 @@
 #include <stddef.h>
 
 #define GRIPPER_FIRMWARE 2             /* from 2 on, lines end in a checksum */
-#define GRIPPER_MOST_CHANNELS 8
+#define GRIPPER_MOST_CHANNELS 16
 #define GRIPPER_OVERSAMPLE 8         /* conversions that are averaged */
 #define GRIPPER_WATCHDOG_US 1000000u /* pressure goes off after this long without a line */
 #define GRIPPER_LONGEST_HEARD 32     /* bytes of a host's line */
@@ -65,7 +65,7 @@ typedef struct {
 
 /* A line for the host that is being written; what does not fit is left out, but never its end. */
 typedef struct {
-  char text[256];
+  char text[512];
   size_t length;
   uint8_t cut; /* something did not fit */
 } GripperText;

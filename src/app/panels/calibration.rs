@@ -9,7 +9,7 @@ use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, GripperCommand, GripperView};
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::calibration::{Calibration, Curve, Record, SensorKind};
 use std::path::PathBuf;
 
@@ -31,8 +31,13 @@ struct Form {
 
 impl Default for Form {
     fn default() -> Self {
-        Self { sensor: Sensor::FlexLeft, part: String::new(), port: String::new() }
+        Self { sensor: Sensor::FLEX_LEFT, part: String::new(), port: String::new() }
     }
+}
+
+/// Sensors of the gripper.
+fn own_sensors(gripper: Option<&GripperView>) -> SensorList {
+    gripper.map(|gripper| gripper.sensors).unwrap_or_default()
 }
 
 fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
@@ -48,7 +53,12 @@ fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     Grid::new("calibration form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         ui.label("Sensor");
         ui.vertical(|ui| {
-            for pair in Sensor::ALL.chunks(2) {
+            let sensors: Vec<Sensor> =
+                own_sensors(gripper).iter().filter(|sensor| sensor.kind() != SensorKind::Raw).collect();
+            if !sensors.contains(&form.sensor) {
+                form.sensor = *sensors.first().unwrap_or(&form.sensor);
+            }
+            for pair in sensors.chunks(2) {
                 ui.horizontal(|ui| {
                     for sensor in pair {
                         ui.radio_value(&mut form.sensor, *sensor, sensor.label());
@@ -104,7 +114,7 @@ fn running_ui(ui: &mut Ui, gripper: &GripperView, session: &CalibrationSession, 
         Err(why) => remark_ui(ui, why.to_string()),
     }
     if let Some(calibration) = calibration {
-        let (kind, theme) = (SensorKind::of(*sensor), theme::of(ui));
+        let (kind, theme) = (sensor.kind(), theme::of(ui));
         curve_plot(ui, kind, calibration, theme);
         residual_plot(ui, kind, calibration, theme);
         bending_plot(ui, calibration, theme);
@@ -125,7 +135,7 @@ fn buttons_ui(ui: &mut Ui, session: &CalibrationSession, fits: bool, actions: &m
     button(free && next.is_some(), "Skip", "Leave this point out", CalibrationCommand::Skip);
     let has_points = !procedure.record().points.is_empty();
     button(!free || has_points, "Undo", "Measure the last point again", CalibrationCommand::Undo);
-    if SensorKind::of(session.plan().sensor) == SensorKind::Pad {
+    if session.plan().sensor.kind() == SensorKind::Pad {
         let about = "Watch the empty hand close for 15 s, to correct the pad's zero for bending";
         button(free && fits, "Empty close", about, CalibrationCommand::EmptyClose);
     }
@@ -137,8 +147,8 @@ fn buttons_ui(ui: &mut Ui, session: &CalibrationSession, fits: bool, actions: &m
 /// Reading of a part in the unit of the plot: kilohms of a strip, microsiemens of a pad.
 fn shown(kind: SensorKind, ohm: f64) -> f64 {
     match kind {
-        SensorKind::Flex => ohm * 1e-3,
         SensorKind::Pad => 1e6 / ohm,
+        SensorKind::Flex | SensorKind::Raw => ohm * 1e-3,
     }
 }
 

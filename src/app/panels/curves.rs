@@ -6,7 +6,7 @@ use crate::app::shown::DisplayedData;
 use egui::Ui;
 use palpate_geometry::palette::Trace;
 use palpate_tactile::Quantity;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorKind};
 
 pub(super) fn curvature_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let (curves, unit) = channel_curves(data, Quantity::Curvature, (1.0, "1/m"));
@@ -21,6 +21,20 @@ pub(super) fn pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut A
 pub(super) fn force_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let (curves, unit) = channel_curves(data, Quantity::Force, (1.0, "N"));
     show(ui, data, actions, TimePlot { id: "force", unit, curves, least: [0.0, 0.5] });
+}
+
+/// Raw sensors, each in its own unit, less its reading at rest.
+pub(super) fn raw_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let any = Quantity::Raw { dimension: None, measures: None };
+    let units = data.channels().into_iter().flatten().filter(|own| matches!(own.quantity, Quantity::Raw { .. }));
+    let units: Vec<&str> = units.map(|own| own.quantity.unit()).collect();
+    let Some(first) = units.first() else {
+        ui.weak("No sensors beside strips and pads. A gripper file adds some: palpate help sensors.");
+        return;
+    };
+    let unit = if units.iter().all(|own| own == first) { first } else { "" };
+    let (curves, unit) = channel_curves(data, any, (1.0, unit));
+    show(ui, data, actions, TimePlot { id: "raw", unit, curves, least: [0.0, 1.0] });
 }
 
 pub(super) fn line_pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
@@ -43,7 +57,7 @@ pub(super) fn counts_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Act
     };
     let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
     let curves = board.channels.iter().enumerate().map(|(place, name)| {
-        let sensor = Sensor::ALL.into_iter().find(|sensor| board.channel_of(*sensor) == Some(place));
+        let sensor = board.sensor_of(place);
         let (trace, dashed) = look(sensor, place);
         PlotCurve {
             name: name.clone(),
@@ -60,11 +74,11 @@ pub(super) fn counts_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Act
 
 /// Colour and dash: those of the sensor; other channels take turns.
 fn look(sensor: Option<Sensor>, place: usize) -> (Trace, bool) {
-    match sensor {
-        Some(Sensor::FlexLeft) => (Trace::Curvature, false),
-        Some(Sensor::FlexRight) => (Trace::Curvature, true),
-        Some(Sensor::PadLeft) => (Trace::Pressure, false),
-        Some(Sensor::PadRight) => (Trace::Pressure, true),
-        None => ([Trace::Line, Trace::CurvatureDistal, Trace::PressureDistal][place % 3], place % 2 == 1),
+    match sensor.map(|sensor| (sensor.kind(), sensor.finger() != "left")) {
+        Some((SensorKind::Flex, dashed)) => (Trace::Curvature, dashed),
+        Some((SensorKind::Pad, dashed)) => (Trace::Pressure, dashed),
+        Some((SensorKind::Raw, _)) | None => {
+            ([Trace::Line, Trace::CurvatureDistal, Trace::PressureDistal][place % 3], place % 2 == 1)
+        }
     }
 }

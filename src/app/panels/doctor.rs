@@ -14,6 +14,7 @@ use palpate_device::doctor::{
 };
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::{CrosstalkCommand, DiagnosticsReport, ExamineRequest, GripperCommand, GripperView, Job};
+use palpate_tactile::board::SensorList;
 use std::cmp::Reverse;
 
 pub(super) fn ui(
@@ -22,6 +23,7 @@ pub(super) fn ui(
     gripper: Option<&GripperView>,
     actions: &mut Actions,
 ) {
+    let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if let Some((gripper, test)) = gripper.and_then(|gripper| Some((gripper, gripper.crosstalk.running.as_ref()?)))
         {
@@ -29,7 +31,7 @@ pub(super) fn ui(
         }
         let remark = Some("Now bend each finger and press each pad.");
         let stop = (remark, "End and report so far", (|app| app.tools.doctor.stop()) as fn(&mut App));
-        let last = job_ui(ui, doctor, stop, actions, begin_ui);
+        let last = job_ui(ui, doctor, stop, actions, |ui, actions| begin_ui(ui, sensors, actions));
         match gripper.and_then(|gripper| gripper.crosstalk.ended.as_ref()) {
             Some(Ok(test)) => crosstalk_ended_ui(ui, test),
             Some(Err(cause)) => failure_ui(ui, cause),
@@ -45,16 +47,16 @@ pub(super) fn ui(
             }
         }
         ui.add_space(6.0);
-        CollapsingHeader::new("Wiring and firmware").show(ui, wiring_ui);
+        CollapsingHeader::new("Wiring and firmware").show(ui, |ui| wiring_ui(ui, sensors));
     });
 }
 
-fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
+fn begin_ui(ui: &mut Ui, sensors: SensorList, actions: &mut Actions) {
     let port = port_field(ui, egui::Id::unique("doctor port"));
     let hint = "Meanwhile, bend each finger and press each pad: what does not move is not checked.";
     ui.horizontal_wrapped(|ui| {
         if ui.button("Examine").on_hover_text(format!("Listen for {USUAL_LISTEN_S} s")).clicked() {
-            let request = ExamineRequest { port: port.clone(), seconds: USUAL_LISTEN_S };
+            let request = ExamineRequest { port: port.clone(), seconds: USUAL_LISTEN_S, sensors };
             actions.push(|app| _ = app.tools.doctor.start(request));
         }
         let about = "Move each sensor in turn; those of the other finger must not follow";
@@ -66,7 +68,7 @@ fn begin_ui(ui: &mut Ui, actions: &mut Actions) {
 }
 
 /// Wiring of the board.
-fn wiring_ui(ui: &mut Ui) {
+fn wiring_ui(ui: &mut Ui, sensors: SensorList) {
     let [volt, bleeding] = WIRING_RULES;
     warning_ui(ui, volt);
     Grid::new("wiring").num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
@@ -74,7 +76,7 @@ fn wiring_ui(ui: &mut Ui) {
             ui.weak(title);
         }
         ui.end_row();
-        for wire in wires() {
+        for wire in wires(sensors) {
             ui.monospace(wire.pin);
             ui.label(wire.above);
             ui.label(wire.below);

@@ -56,7 +56,7 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
 fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
     let newest = |quantity: Quantity, side: Side| -> Option<f64> {
         let trace = data.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
-        let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side == side)?;
+        let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side() == Some(side))?;
         trace.channels.get(index)?.last().map(|value| f64::from(*value))
     };
     ui.spacing_mut().interact_size.y = 18.0;

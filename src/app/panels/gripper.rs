@@ -9,7 +9,7 @@ use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{GripperCommand, GripperView, LatestReading};
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorKind};
 use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
 use std::path::PathBuf;
@@ -146,14 +146,14 @@ fn readings_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus) {
         return;
     };
     Grid::new("sensors").num_columns(4).spacing([10.0, 4.0]).show(ui, |ui| {
-        for sensor in Sensor::ALL {
+        for sensor in link.board.sensors.iter() {
             let Some(column) = link.board.channel_of(sensor) else { continue };
             ui.label(sensor.label());
             let counts = latest.counts.get(column).copied().flatten();
             let counts = counts.map_or_else(|| "–".to_owned(), |counts| format!("{counts:4.0}"));
             ui.label(RichText::new(counts).monospace().weak()).on_hover_text("ADC counts");
             let value = RichText::new(value_text(latest, sensor)).monospace();
-            if latest.beyond[sensor as usize] {
+            if latest.beyond.contains(&sensor) {
                 let about = "Outside the calibrated range: extrapolated";
                 ui.label(value.color(ui.visuals().warn_fg_color)).on_hover_text(about);
             } else {
@@ -177,12 +177,11 @@ fn readings_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus) {
 
 /// Calibrated value with its unit.
 fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
-    let side = sensor as usize % 2;
-    let text = if sensor.is_flex() {
-        latest.estimate.angle[side].map(|angle| format!("{:6.1}°", angle.to_degrees()))
-    } else {
-        latest.estimate.force[side].map(|force| format!("{:>5} N", three_digits(force)))
-    };
+    let text = latest.estimate.value(sensor).map(|value| match sensor.kind() {
+        SensorKind::Flex => format!("{:6.1}°", value.to_degrees()),
+        SensorKind::Pad => format!("{:>5} N", three_digits(value)),
+        SensorKind::Raw => format!("{:>5} {}", three_digits(value), sensor.raw_unit_name()),
+    });
     text.unwrap_or_else(|| "–".to_owned())
 }
 

@@ -23,7 +23,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     let theme = data.view.theme;
     let channels = data.channels();
     let find = |quantity: Quantity, side: Side| {
-        let wanted = |channel: &Channel| shows(quantity, channel) && channel.side == side;
+        let wanted = |channel: &Channel| shows(quantity, channel) && channel.side() == Some(side);
         channels.iter().position(|channel| channel.is_some_and(wanted))
     };
     let finger = |side: Side| {

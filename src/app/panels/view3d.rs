@@ -18,8 +18,8 @@ use palpate_geometry::palette::{Rgb, Theme};
 use palpate_lab::picture::{GhostKind, PAD_FULL_SCALE, PictureView, Stage};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
+use palpate_sim::gripper::Side;
 use palpate_sim::objects::object_title;
-use palpate_tactile::SensorLayout;
 use std::sync::Arc;
 
 /// What the 3-D view reads.
@@ -150,7 +150,7 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         theme: own.data.view.theme,
         size,
         forces: own.data.view.forces,
-        layout: SensorLayout::named(&own.data.view.sensors.layout).ok(),
+        layout: own.data.view.sensors.sensor_layout().ok(),
         circles: own.data.view.circles,
         inset,
         ..PictureView::default()
@@ -342,9 +342,10 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
 
 /// Curvature of the real fingers (1/m), while they are shown.
 fn real_curvature(own: &View3d<'_>) -> Option<[Option<f64>; 2]> {
-    let estimate = own.data.gripper?.latest.as_ref()?.estimate;
+    let estimate = &own.data.gripper?.latest.as_ref()?.estimate;
     // In invisible steps, so that noise alone does not redraw the picture.
-    let curvature = estimate.curvature.map(|side| side.map(|kappa| (kappa / SEEN_PER_M).round() * SEEN_PER_M));
+    let seen = |kappa: f64| (kappa / SEEN_PER_M).round() * SEEN_PER_M;
+    let curvature = Side::BOTH.map(|side| estimate.curvature(side).map(seen));
     (own.data.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 

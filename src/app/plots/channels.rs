@@ -4,9 +4,8 @@ use super::PlotCurve;
 use crate::app::shown::DisplayedData;
 use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
-use palpate_sim::gripper::Side;
-use palpate_tactile::board::{Board, Sensor};
-use palpate_tactile::{Channel, Quantity, SignalDefinition, Span};
+use palpate_tactile::board::Board;
+use palpate_tactile::{Channel, Quantity, unit_of_channel};
 
 /// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and
 /// their unit; or the raw counts of their sensors, where those are chosen.
@@ -23,24 +22,27 @@ pub(in crate::app) fn channel_curves<'a>(
 
 /// Curves of the counts of the sensors that measure a quantity.
 fn raw_curves(data: &DisplayedData<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
-    let sensors = match quantity {
-        Quantity::Curvature => [Sensor::FlexLeft, Sensor::FlexRight],
-        Quantity::Pressure | Quantity::ContactPressure | Quantity::Force => [Sensor::PadLeft, Sensor::PadRight],
-    };
     let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
-    let curve = |(sensor, side): (Sensor, Side)| {
+    let quantity = if quantity == Quantity::Force { Quantity::Pressure } else { quantity };
+    let shown = board.sensors.channels().into_iter().filter(|channel| shows(quantity, channel));
+    let curve = |channel: Channel| {
+        let sensor = board.sensors.iter().find(|sensor| sensor.gives(&channel))?;
         let column = derived + board.channel_of(sensor)?;
-        let channel = Channel { quantity, side, span: Span::WHOLE, signals: SignalDefinition::Parts };
         Some(PlotCurve {
             name: label(&channel),
             trace: colour_of(&channel),
-            dashed: side == Side::Right,
+            dashed: is_dashed(&channel),
             values: Box::new(move |trace, k| trace.channels.get(column)?.get(k).map(|value| f64::from(*value))),
             half_width: Box::new(|_, _| None),
             channel: None,
         })
     };
-    sensors.into_iter().zip(Side::BOTH).filter_map(curve).collect()
+    shown.filter_map(curve).collect()
+}
+
+/// Curves of all fingers but the left one are dashed.
+fn is_dashed(channel: &Channel) -> bool {
+    !channel.finger.is_empty() && channel.finger != "left"
 }
 
 fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
@@ -51,7 +53,7 @@ fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) ->
         .map(|(index, channel)| PlotCurve {
             name: label(channel),
             trace: colour_of(channel),
-            dashed: channel.side == Side::Right,
+            dashed: is_dashed(channel),
             values: Box::new(move |trace, k| trace.channels.get(index)?.get(k).map(|value| f64::from(*value) * factor)),
             half_width: Box::new(move |trace, k| {
                 band_half_width(&trace.t, trace.errors.get(index)?, k).map(|half| half * factor)
@@ -61,14 +63,20 @@ fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) ->
         .collect()
 }
 
-/// True where a channel measures a quantity; a contact pressure does in place of a pad's.
+/// True where a channel measures a quantity; a contact pressure does in place of a pad's, and any raw channel of another.
 pub(in crate::app) fn shows(quantity: Quantity, channel: &Channel) -> bool {
-    channel.quantity == quantity || (quantity.is_pressure() && channel.quantity.is_pressure())
+    let raw = |quantity: Quantity| matches!(quantity, Quantity::Raw { .. });
+    channel.quantity == quantity
+        || (quantity.is_pressure() && channel.quantity.is_pressure())
+        || (raw(quantity) && raw(channel.quantity))
 }
 
 /// Finger and span.
 fn label(channel: &Channel) -> String {
     let name = channel.name();
+    if let Quantity::Raw { .. } = channel.quantity {
+        return unit_of_channel(&name).0.to_owned();
+    }
     let place = name.trim_start_matches(channel.quantity.name()).trim_start_matches('_').replace('_', " ");
     if channel.quantity == Quantity::ContactPressure { format!("contact, {place}") } else { place }
 }
@@ -81,5 +89,6 @@ pub(in crate::app) fn colour_of(channel: &Channel) -> Trace {
         (Quantity::Curvature, true) => Trace::CurvatureDistal,
         (Quantity::Pressure | Quantity::ContactPressure | Quantity::Force, false) => Trace::Pressure,
         (Quantity::Pressure | Quantity::ContactPressure | Quantity::Force, true) => Trace::PressureDistal,
+        (Quantity::Raw { .. }, _) => Trace::Line,
     }
 }

@@ -5,7 +5,7 @@ use super::super::link::{self, Listener};
 use super::super::prelude::*;
 use super::CalibrateArguments;
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
-use palpate_tactile::board::{Board, KNOWN_AFTER_S, Reading, Sensor};
+use palpate_tactile::board::{Board, KNOWN_AFTER_S, Reading, Sensor, SensorList};
 use palpate_tactile::calibration::{Point, Record, SensorKind};
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -46,8 +46,8 @@ const AUTO_PATIENCE_S: f64 = 60.0;
 const ENDED: &str = "the stream ended before all points were recorded";
 
 /// Opens a port or a file. Where nobody presses a key, captured bytes come without a pause.
-fn listen(port: Option<&Path>, hands_free: bool) -> Result<Listener, Failure> {
-    Listener::open(&link::options(port, hands_free), &AtomicBool::new(false))
+fn listen(port: Option<&Path>, hands_free: bool, sensors: SensorList) -> Result<Listener, Failure> {
+    Listener::open(&link::options(port, hands_free, sensors), &AtomicBool::new(false))
 }
 
 /// Calibrates a part; `points` were measured before, and only the empty close is missing.
@@ -63,13 +63,13 @@ pub(super) fn record(
     let serving = store.filter(|_| close_s.is_some()).map(|store| store.calibrations().serving(None, &[]));
     let setup = CalibrationSetup {
         resistor_ohm: arguments.resistor,
-        stimuli: live.plan.iter().map(|shown| SensorKind::of(sensor).stimulus(*shown)).collect(),
+        stimuli: live.plan.iter().map(|shown| sensor.kind().stimulus(*shown)).collect(),
         record: points,
         automatic: live.auto,
         close_s,
         serving: serving.transpose()?.map(|serving| serving.calibrations).unwrap_or_default(),
     };
-    let board = listen(live.port.as_deref(), live.auto)?;
+    let board = listen(live.port.as_deref(), live.auto, sensor.list())?;
     if setup.record.is_none() {
         let place = sensor.label();
         note(&format!(
@@ -82,7 +82,7 @@ pub(super) fn record(
 
 /// Reads a pad under a known weight (kg): on Enter, or as soon as it has settled.
 pub(in crate::cli) fn weigh(port: Option<&Path>, sensor: Sensor, kg: f64, auto: bool) -> Result<Point, Failure> {
-    let board = listen(port, auto)?;
+    let board = listen(port, auto, sensor.list())?;
     if !auto {
         note(&format!("Press Enter once the weight lies on the {}.", sensor.label()));
     }
@@ -99,7 +99,7 @@ fn guide(mut board: Listener, sensor: Sensor, part: &str, setup: CalibrationSetu
     let keys = if auto { channel().1 } else { typed_lines()? };
     let plan = CalibrationPlan { sensor, part: part.to_owned(), port: None };
     let mut session = CalibrationSession::new(plan, setup);
-    let mut screen = Screen::new(SensorKind::of(sensor), points, auto);
+    let mut screen = Screen::new(sensor.kind(), points, auto);
     while !session.is_complete() {
         let readings = board.next()?.ok_or_else(|| format!("{ENDED}. {}", board.sentence()))?;
         let known = board.board();
@@ -156,8 +156,8 @@ fn typed(
 }
 
 /// Listens for some seconds; returns the board and its readings.
-pub(super) fn watch(port: Option<&Path>, seconds: f64) -> Result<(Board, Vec<Reading>), Failure> {
-    let mut board = listen(port, true)?;
+pub(super) fn watch(port: Option<&Path>, seconds: f64, sensors: SensorList) -> Result<(Board, Vec<Reading>), Failure> {
+    let mut board = listen(port, true, sensors)?;
     let (mut readings, start): (Vec<Reading>, _) = (Vec::new(), Instant::now());
     let mut span_s = -1.0;
     // Within the first, a board tells what it is.

@@ -41,9 +41,8 @@ pub(super) enum CalibrateCommand {
     },
     /// Set which part is mounted in a place, after parts were swapped.
     Mount {
-        /// Place: flexL, flexR, fsrL or fsrR.
-        #[arg(value_parser = one_of(Sensor::ALL.map(|sensor| (sensor.channel(), sensor))))]
-        sensor: Sensor,
+        /// Place: a strip or pad of the gripper, such as flexL.
+        sensor: String,
         /// Name of the part.
         part: String,
     },
@@ -88,7 +87,10 @@ pub(super) fn run(command: &CalibrateCommand, store: &mut Store) -> Result<(), F
         CalibrateCommand::Show { id, json } => show(store, *id)?.print(*json),
         CalibrateCommand::Export { ids, out } => export(store, ids, out),
         CalibrateCommand::Import { files } => files.iter().try_for_each(|file| import(store, file)),
-        CalibrateCommand::Mount { sensor, part } => mount(store, *sensor, part.trim()),
+        CalibrateCommand::Mount { sensor, part } => {
+            let sensor = sensor_called(store.calibrations().sensors()?, sensor)?;
+            mount(store, sensor, part.trim())
+        }
         CalibrateCommand::Tare(arguments) => zero::tare(arguments, store),
         CalibrateCommand::Drift(arguments) => zero::drift(arguments, store),
         CalibrateCommand::Withdraw { id } => {
@@ -123,7 +125,12 @@ struct Row {
 impl ListReport {
     fn new(store: &Store, part: Option<&str>) -> Result<Self, Failure> {
         let parts = store.calibrations().mounted()?;
-        let mounted = Sensor::ALL.into_iter().zip(parts).filter_map(|(sensor, part)| Some((sensor.channel(), part?)));
+        let mounted = store
+            .calibrations()
+            .sensors()?
+            .iter()
+            .zip(parts)
+            .filter_map(|(sensor, part)| Some((sensor.channel(), part?)));
         let rows = store.calibrations().list(part)?.into_iter().map(|stored| {
             let fitted = Calibration::fit(stored.record.clone());
             let summary = fitted.as_ref().ok().map(Calibration::summary);
@@ -223,6 +230,6 @@ fn mount(store: &mut Store, sensor: Sensor, part: &str) -> Result<(), Failure> {
     store.calibrations().mount(sensor, part)?;
     say(format!("\"{part}\" mounted as the {}", sensor.label()))?;
     let serving = store.calibrations().serving(None, &[])?;
-    serving.warnings.iter().filter(|warning| warning.contains(sensor.label())).for_each(|warning| warn(warning));
+    serving.warnings.iter().filter(|warning| warning.contains(&sensor.label())).for_each(|warning| warn(warning));
     Ok(())
 }

@@ -4,7 +4,6 @@ use super::super::prelude::*;
 use super::guided;
 use palpate_store::labels::shown_title;
 use palpate_store::{PartTare, StoredTare};
-use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout};
 use palpate_tactile::trial::TrialSource;
 
@@ -50,7 +49,8 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
         let why = serving.warnings.first().cloned().unwrap_or_default();
         return Err(format!("no mounted part is calibrated, so there is no zero: {why}").into());
     }
-    let (board, readings) = guided::watch(arguments.port.as_deref(), arguments.seconds)?;
+    let (board, readings) =
+        guided::watch(arguments.port.as_deref(), arguments.seconds, store.calibrations().sensors()?)?;
     let readout = Readout::new(&board, &serving.calibrations)?;
     let drift = readout.drift(&readout.zero_from(&readings));
     let zero = readout.tare(&readings)?;
@@ -61,8 +61,9 @@ pub(super) fn tare(arguments: &TareArguments, store: &mut Store) -> Result<(), F
 
 impl Report for TareReport {
     fn text(&self, page: &mut Page) {
-        let row =
-            |drift: &Drift| [drift.sensor.label(), &drift.with_unit(), drift.badge(), to_do(drift)].map(str::to_owned);
+        let row = |drift: &Drift| {
+            [drift.sensor.label(), drift.with_unit(), drift.badge().to_owned(), to_do(drift).to_owned()]
+        };
         page.table(&["sensor", "drift", "", ""], self.drift.iter().map(row));
         self.warnings.iter().for_each(|warning| page.warn(warning));
         let Some(stored) = &self.stored else { return page.line("not stored") };
@@ -126,15 +127,23 @@ impl Report for DriftReport {
         if self.rows.is_empty() {
             return page.line("no trials of the real gripper yet: `palpate record` records one");
         }
+        let mut names: Vec<&str> = Vec::new();
+        for drift in self.rows.iter().flat_map(|row| &row.drift) {
+            if !names.contains(&drift.sensor.channel()) {
+                names.push(drift.sensor.channel());
+            }
+        }
         let row = |row: &DriftRow| {
-            let [a, b, c, d] = Sensor::ALL.map(|sensor| {
-                let drift = row.drift.iter().find(|drift| drift.sensor == sensor);
+            let drift = |name: &&str| {
+                let drift = row.drift.iter().find(|drift| drift.sensor.channel() == *name);
                 drift.map_or_else(|| "–".to_owned(), |drift| format!("{} {}", drift.with_unit(), drift.badge()))
-            });
-            [row.trial.to_string(), date(&row.created), shown_title(&row.object), a, b, c, d]
+            };
+            let first = [row.trial.to_string(), date(&row.created), shown_title(&row.object)];
+            first.into_iter().chain(names.iter().map(drift)).collect::<Vec<String>>()
         };
-        let [a, b, c, d] = Sensor::ALL.map(Sensor::channel);
-        page.table(&["trial", "recorded (UTC)", "object", a, b, c, d], self.rows.iter().map(row));
+        let header: Vec<&str> =
+            ["trial", "recorded (UTC)", "object"].into_iter().chain(names.iter().copied()).collect();
+        page.table(&header, self.rows.iter().map(row));
         for part in &self.tares {
             let (place, version, date) = (part.sensor.label(), part.version, date(&part.taken));
             page.line(format!("\"{}\", the {place}: tare {version} of {date} applies", part.part));

@@ -13,7 +13,7 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::objects::class_of;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::class_name;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorKind};
 use palpate_tactile::trial::{Control, TrialSource};
 use std::io::IsTerminal as _;
 use std::sync::Arc;
@@ -45,7 +45,8 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let store = open_store(store)?;
     refuse_uncalibrated(&store, port)?;
     let stop = stop_flag()?;
-    let link = link::open(&link::options(Some(port), false), link::USUAL_WAIT_S, &stop)?;
+    let link =
+        link::open(&link::options(Some(port), false, store.calibrations().sensors()?), link::USUAL_WAIT_S, &stop)?;
     let keys = std::io::stdin().is_terminal().then(typed_lines).transpose()?;
     let gripper = SerialGripper::new(Box::new(link));
     let mut hand = RealHand { gripper, scene, truth: truth.clone(), store, stop, keys, advisor: Advisor::default() };
@@ -86,11 +87,9 @@ impl Hand for RealHand {
 /// Refuses a gripper without calibrations, whose readings mean nothing yet.
 fn refuse_uncalibrated(store: &Store, port: &Path) -> Result<(), Failure> {
     let serving = store.calibrations().serving(None, &[])?;
-    let missing: Vec<&str> = Sensor::ALL
-        .into_iter()
-        .filter(|sensor| !serving.calibrations.iter().any(|(own, _)| own == sensor))
-        .map(Sensor::label)
-        .collect();
+    let parts = store.calibrations().sensors()?.iter().filter(|sensor| sensor.kind() != SensorKind::Raw);
+    let missing: Vec<String> =
+        parts.filter(|sensor| !serving.calibrations.iter().any(|(own, _)| own == sensor)).map(Sensor::label).collect();
     if missing.is_empty() {
         return Ok(());
     }

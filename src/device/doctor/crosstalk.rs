@@ -11,7 +11,7 @@
 //! A sensor whose reading changes at other times was touched.
 
 use super::DoctorError;
-use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor};
+use palpate_tactile::board::{Board, KNOWN_AFTER, Reading, Sensor, SensorKind, SensorList};
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -65,12 +65,12 @@ pub struct CrosstalkTest {
     scale: f64,
     at: usize,
     /// Times (s) and counts of the last second, while everything rests.
-    window: VecDeque<(f64, [Option<f64>; 4])>,
+    window: VecDeque<(f64, Vec<Option<f64>>)>,
     /// Time since which a rest is awaited (s), and the sensor that does not rest.
     resting: Option<f64>,
     restless: Option<Sensor>,
     /// Sensors that did not come to rest in time.
-    flickers: [bool; 4],
+    flickers: Vec<bool>,
     moving: Option<Moving>,
     found: Vec<Bleed>,
     /// Sensors that could not be watched, each with the one that was moved meanwhile.
@@ -81,11 +81,12 @@ pub struct CrosstalkTest {
 /// A sensor is being moved.
 #[derive(Clone, Debug)]
 struct Moving {
-    rest: [Option<f64>; 4],
+    list: SensorList,
+    rest: Vec<Option<f64>>,
     /// Sums over the readings: of x², x y and y² for each watched sensor y.
-    sums: [[f64; 3]; 4],
+    sums: Vec<[f64; 3]>,
     /// Largest change of each sensor (counts).
-    others: [f64; 4],
+    others: Vec<f64>,
     /// Largest change so far, with its sign (counts).
     most: f64,
     /// Time since which it is back (s).
@@ -95,8 +96,9 @@ struct Moving {
 /// The sensors of a board with their channels, where there are some on both fingers.
 fn sensors_of(board: &Board) -> Result<Vec<(Sensor, usize)>, DoctorError> {
     let channel = |sensor: Sensor| Some((sensor, board.channel_of(sensor)?));
-    let sensors: Vec<(Sensor, usize)> = Sensor::ALL.into_iter().filter_map(channel).collect();
-    if [0, 1].into_iter().all(|side| sensors.iter().any(|(sensor, _)| side_of(*sensor) == side)) {
+    let can_be_moved = board.sensors.iter().filter(|sensor| sensor.kind() != SensorKind::Raw);
+    let sensors: Vec<(Sensor, usize)> = can_be_moved.filter_map(channel).collect();
+    if sensors.iter().any(|(sensor, _)| sensor.finger() != sensors[0].0.finger()) {
         return Ok(sensors);
     }
     let channels = board.channels.join(", ");
@@ -127,7 +129,12 @@ impl CrosstalkTest {
     /// Instruction for the user, while there is a sensor to move.
     pub fn instruction(&self) -> Option<String> {
         let sensor = self.source()?;
-        let (side, other) = if side_of(sensor) == 0 { ("left", "right") } else { ("right", "left") };
+        let side = sensor.finger();
+        let mut others: Vec<&str> =
+            self.sensors.iter().map(|(own, _)| own.finger()).filter(|own| *own != side).collect();
+        others.sort_unstable();
+        others.dedup();
+        let (other, pad) = (others.join(" and "), sensor.label());
         Some(match (&self.moving, self.restless) {
             (None, None) => "do not touch the fingers".to_owned(),
             (None, Some(restless)) => format!("do not touch the fingers: the {} is not at rest", restless.label()),
@@ -135,7 +142,7 @@ impl CrosstalkTest {
             (Some(_), _) if sensor.is_flex() => {
                 format!("bend the {side} finger by hand and release it; do not touch the {other} one")
             }
-            (Some(_), _) => format!("press the {side} pad firmly and release it; do not touch the {other} finger"),
+            (Some(_), _) => format!("press the {pad} firmly and release it; do not touch the {other} finger"),
         })
     }
 
@@ -155,17 +162,17 @@ impl CrosstalkTest {
 
     fn take(&mut self, reading: &Reading) {
         let Some(source) = self.source() else { return };
-        let mut counts = [None; 4];
+        let mut counts = vec![None; source.list().len()];
         for (sensor, channel) in &self.sensors {
             let count = reading.counts.get(*channel).copied().flatten().filter(|count| count.is_finite());
-            counts[*sensor as usize] = count.map(f64::from);
+            counts[sensor.index()] = count.map(f64::from);
         }
         match &mut self.moving {
-            None => self.rest(reading.t_s, counts),
+            None => self.rest(reading.t_s, &counts),
             Some(moving) => {
                 if moving.add(source, &counts, reading.t_s, self.scale) {
                     let found = moving.found(source, self.scale);
-                    let other = |sensor: &Sensor| side_of(*sensor) != side_of(source);
+                    let other = |sensor: &Sensor| sensor.finger() != source.finger();
                     let watched = |sensor: &Sensor| found.iter().any(|bleed| bleed.into == *sensor);
                     let others = self.sensors.iter().map(|(sensor, _)| *sensor).filter(other);
                     self.unwatched.extend(others.filter(|sensor| !watched(sensor)).map(|into| [source, into]));
@@ -222,7 +229,7 @@ impl CrosstalkTest {
         }));
         let asked = self.left_out.iter().map(|sensor| sensor.label());
         let left_out = asked.chain(self.sensors[self.at..].iter().map(|(sensor, _)| sensor.label()));
-        let left_out: Vec<&str> = left_out.collect();
+        let left_out: Vec<String> = left_out.collect();
         if !left_out.is_empty() {
             lines.push(format!("Skipped: {}", left_out.join(", ")));
         }
@@ -232,16 +239,18 @@ impl CrosstalkTest {
     fn next(&mut self) {
         self.at += 1;
         self.moving = None;
-        (self.resting, self.restless, self.flickers) = (None, None, [false; 4]);
+        (self.resting, self.restless) = (None, None);
+        self.flickers.clear();
         self.window.clear();
     }
 
-    fn rest(&mut self, t_s: f64, counts: [Option<f64>; 4]) {
+    fn rest(&mut self, t_s: f64, counts: &[Option<f64>]) {
         // A clock that was set back begins anew.
         if self.window.back().is_some_and(|(last, _)| t_s < *last) {
             self.window.clear();
         }
-        self.window.push_back((t_s, counts));
+        self.window.push_back((t_s, counts.to_vec()));
+        self.flickers.resize(counts.len(), false);
         // Of a slow board it takes longer to see enough.
         while self.window.len() > LEAST_READINGS && self.window.front().is_some_and(|(first, _)| *first < t_s - REST_S)
         {
@@ -254,10 +263,10 @@ impl CrosstalkTest {
             return;
         }
         let Some(source) = self.source() else { return };
-        let mut rest = [None; 4];
+        let mut rest = vec![None; self.flickers.len()];
         self.restless = None;
-        for (sensor, rest) in Sensor::ALL.into_iter().zip(&mut rest) {
-            let place = sensor as usize;
+        for (sensor, rest) in source.list().iter().zip(&mut rest) {
+            let place = sensor.index();
             let counts: Vec<f64> = self.window.iter().filter_map(|(_, counts)| counts[place]).collect();
             let least = counts.iter().copied().fold(f64::INFINITY, f64::min);
             let most = counts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -271,7 +280,7 @@ impl CrosstalkTest {
             }
             *rest = (!counts.is_empty()).then(|| counts.iter().sum::<f64>() / counts.len() as f64);
         }
-        let is_read = self.window.iter().any(|(_, counts)| counts[source as usize].is_some());
+        let is_read = self.window.iter().any(|(_, counts)| counts[source.index()].is_some());
         if !is_read {
             return self.skip();
         }
@@ -279,15 +288,16 @@ impl CrosstalkTest {
             return;
         }
         self.window.clear();
-        self.moving = Some(Moving { rest, sums: [[0.0; 3]; 4], others: [0.0; 4], most: 0.0, back: None });
+        let (list, sums, others) = (source.list(), vec![[0.0; 3]; rest.len()], vec![0.0; rest.len()]);
+        self.moving = Some(Moving { list, rest, sums, others, most: 0.0, back: None });
     }
 }
 
 impl Moving {
     /// Takes in counts; true when the sensor has been moved and is back.
-    fn add(&mut self, source: Sensor, counts: &[Option<f64>; 4], t_s: f64, scale: f64) -> bool {
+    fn add(&mut self, source: Sensor, counts: &[Option<f64>], t_s: f64, scale: f64) -> bool {
         let change = |place: usize| Some(counts[place]? - self.rest[place]?);
-        let Some(x) = change(source as usize) else { return false };
+        let Some(x) = change(source.index()) else { return false };
         if x.abs() > self.most.abs() {
             self.most = x;
         }
@@ -316,17 +326,17 @@ impl Moving {
 
     /// Results for the sensors of the other finger.
     fn found(&self, source: Sensor, scale: f64) -> Vec<Bleed> {
-        let watched = |sensor: &Sensor| side_of(*sensor) != side_of(source) && self.rest[*sensor as usize].is_some();
+        let watched = |sensor: &Sensor| sensor.finger() != source.finger() && self.rest[sensor.index()].is_some();
         let bleed = |into: Sensor| {
-            let [xx, xy, yy] = self.sums[into as usize];
+            let [xx, xy, yy] = self.sums[into.index()];
             let share = if xx > 0.0 { xy / xx } else { 0.0 };
             let counts = share * self.most;
             let in_step = xy.abs() >= IN_STEP * (xx * yy).sqrt();
             let bleeds = in_step && share.abs() >= LEAST_SHARE && counts.abs() >= LEAST_COUNTS * scale;
-            let moved = self.others[into as usize] > STILL * scale;
+            let moved = self.others[into.index()] > STILL * scale;
             Bleed { from: source, into, share, counts, moved, bleeds }
         };
-        Sensor::ALL.into_iter().filter(watched).map(bleed).collect()
+        self.list.iter().filter(watched).map(bleed).collect()
     }
 }
 
@@ -336,11 +346,6 @@ impl Bleed {
         let (into, from) = (self.into.label(), self.from.label());
         format!("The {into} follows the {from} by {:.1} %: {:+.0} counts", 100.0 * self.share, self.counts)
     }
-}
-
-/// The finger of a sensor: 0 for the left one.
-fn side_of(sensor: Sensor) -> usize {
-    sensor as usize % 2
 }
 
 #[cfg(test)]
@@ -396,8 +401,8 @@ mod tests {
                 for k in 0..100u32 {
                     let wave = (std::f64::consts::PI * f64::from(k) / 100.0).sin();
                     let mut counts = [1420.0, 1400.0, 0.0, 0.0];
-                    counts[sensor as usize] += 600.0 * wave;
-                    if self.clumsy && sensor == Sensor::PadLeft && k > 80 {
+                    counts[sensor.index()] += 600.0 * wave;
+                    if self.clumsy && sensor == Sensor::PAD_LEFT && k > 80 {
                         counts[3] += 40.0;
                     }
                     self.feed(counts);
@@ -419,9 +424,9 @@ mod tests {
             .filter(|bleed| bleed.bleeds)
             .map(|bleed| (bleed.from, bleed.into, (1000.0 * bleed.share).round() as i32))
             .collect();
-        use Sensor::{FlexLeft, FlexRight, PadLeft, PadRight};
+        let [flex_left, flex_right, pad_left, pad_right] = Sensor::PAPER;
         // Of the change of the channel before, which keeps 90 % of its own.
-        assert_eq!(bleeds, [(FlexLeft, FlexRight, 100), (FlexRight, PadLeft, 111), (PadLeft, PadRight, 111)]);
+        assert_eq!(bleeds, [(flex_left, flex_right, 100), (flex_right, pad_left, 111), (pad_left, pad_right, 111)]);
         assert_eq!(hand.test.found().len(), 8);
         let lines = hand.test.summary();
         assert!(lines.len() == 4 && lines[0].contains("right flex strip follows the left flex strip by 10.0 %"));
@@ -453,7 +458,7 @@ mod tests {
             }
             for _ in 0..50 {
                 let mut counts = [1420.0, 1403.0, 0.0, 0.0];
-                counts[sensor as usize] += 1000.0;
+                counts[sensor.index()] += 1000.0;
                 hand.feed(counts);
             }
             hand.rest(0.6);

@@ -5,7 +5,7 @@ use super::{ChannelTrace, CheckFinding, CheckStatus, Observations};
 use crate::protocol::{AdcRange, Saturation};
 use crate::serial::LinkStatus;
 use palpate_geometry::units::three_digits;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::SensorKind;
 
 /// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
 const IDLE_COUNTS: f64 = 20.0;
@@ -85,7 +85,8 @@ impl<'a> Evidence<'a> {
     fn of(all: &'a Observations) -> Option<Self> {
         let link = all.link.as_ref()?;
         let channel = |(index, name): (usize, &'a String)| {
-            let sensor = Sensor::ALL.into_iter().find(|sensor| link.board.channel_of(*sensor) == Some(index))?;
+            // Of a raw sensor nothing is known that its readings could contradict.
+            let sensor = link.board.sensor_of(index).filter(|sensor| sensor.kind() != SensorKind::Raw)?;
             let trace = all.traces.channels.get(index).cloned().unwrap_or_default();
             let saturation = link.saturation.get(index).copied().flatten();
             Some(SensorChannel { index, name, is_flex: sensor.is_flex(), trace, saturation })

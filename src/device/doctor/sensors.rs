@@ -22,9 +22,13 @@ const BITS_S: f64 = 5.0;
 pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
     let (board, channels) = (&seen.link.board, seen.link.board.channels.join(", "));
     if seen.sensors.is_empty() {
-        return Failed.seen(format!("none of flexL, flexR, fsrL and fsrR, but {channels}")).because(
-            columns(&seen.all.traces.channels),
-            "Name them in the sketch, as in flexL:512,flexR:498,fsrL:30,fsrR:28, or print a header line flexL,flexR,fsrL,fsrR",
+        let names: Vec<&str> = board.sensors.iter().map(Sensor::channel).collect();
+        let (last, others) = names.split_last().map_or(("", &names[..]), |(last, others)| (*last, others));
+        let values: Vec<String> =
+            names.iter().zip([512, 498, 30, 28]).map(|(name, count)| format!("{name}:{count}")).collect();
+        return Failed.seen(format!("none of {} and {last}, but {channels}", others.join(", "))).because(
+            columns(&seen.all.traces.channels, board.sensors.len()),
+            format!("Name them in the sketch, as in {}, or print a header line {}", values.join(","), names.join(",")),
         );
     }
     if seen.is_swapped() {
@@ -41,26 +45,27 @@ pub(super) fn sensors(seen: &Evidence<'_>) -> CheckFinding {
                 "Exchange their names in the sketch, or their wires",
             );
     }
-    let missing = Sensor::ALL.into_iter().filter(|sensor| board.channel_of(*sensor).is_none());
+    let missing = board.sensors.iter().filter(|sensor| board.channel_of(*sensor).is_none());
     let missing: Vec<&str> = missing.map(Sensor::channel).collect();
     if missing.is_empty() {
         return Passed.seen(format!("{} of {channels}", seen.link.cadence.samples));
     }
     Note.seen(format!("no {}, but {channels}", missing.join(", ")))
-        .because("The board has fewer sensors, or names them otherwise", "Name them as the firmware does")
+        .because("The board has fewer sensors, or names them otherwise", "Name them as the gripper file does")
 }
 
 /// What the columns are that have no name of a sensor.
-fn columns(traces: &[ChannelTrace]) -> &'static str {
+fn columns(traces: &[ChannelTrace], sensors: usize) -> String {
     let is_digit = |trace: &ChannelTrace| trace.least >= 0.0 && trace.most <= 9.0 && !trace.decimals;
+    let many = if sensors == 4 { "four".to_owned() } else { sensors.to_string() };
     match traces {
-        [first, others @ ..] if others.len() == 4 && first.rises && first.numbers > 2 => {
-            "The first column rises from line to line, as a time does: the four others are the sensors"
+        [first, others @ ..] if others.len() == sensors && first.rises && first.numbers > 2 => {
+            format!("The first column rises from line to line, as a time does: the {many} others are the sensors")
         }
         _ if traces.len() >= 4 && traces.iter().skip(1).step_by(2).all(is_digit) => {
-            "Every second column is a single digit: numbers with decimal commas"
+            "Every second column is a single digit: numbers with decimal commas".to_owned()
         }
-        _ => "Their names are unknown, or they are columns without a header, of which there are not four",
+        _ => format!("Their names are unknown, or they are columns without a header, of which there are not {many}"),
     }
 }
 

@@ -2,7 +2,7 @@
 //! program.
 
 use super::DoctorError;
-use palpate_tactile::board::Sensor;
+use palpate_tactile::board::{Sensor, SensorKind, SensorList};
 use palpate_tactile::electronics::{PadPart, StripPart};
 use std::fs;
 use std::io::{ErrorKind, Write as _};
@@ -29,6 +29,7 @@ pub const WIRING_RULES: [&str; 2] = [
 /// Voltage divider of one pin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wire {
+    /// Pin; empty where the gripper file names none.
     pub pin: &'static str,
     pub sensor: Sensor,
     /// Part between the pin and 3.3 V.
@@ -37,18 +38,66 @@ pub struct Wire {
     pub below: String,
 }
 
-/// The dividers of the four sensors.
-pub fn wires() -> [Wire; 4] {
+/// The dividers of the strips and pads.
+pub fn wires(sensors: SensorList) -> Vec<Wire> {
     let kilo = |ohm: f64| format!("{} kΩ", ohm * 1e-3);
-    let pins = ["A0", "A1", "A2", "A3"];
-    Sensor::ALL.map(|sensor| {
-        let (pin, part) = (pins[sensor as usize], sensor.label().to_owned());
-        let (above, below) = match sensor.is_flex() {
-            true => (kilo(StripPart::DIVIDER_OHM), part),
-            false => (part, kilo(PadPart::DIVIDER_OHM)),
+    let wire = |sensor: Sensor| {
+        let (pin, part) = (sensor.row().pin.as_deref().unwrap_or_default(), sensor.label());
+        let stated = sensor.row().divider_ohm;
+        let (above, below) = match sensor.kind() {
+            SensorKind::Flex => (kilo(stated.unwrap_or(StripPart::DIVIDER_OHM)), part),
+            SensorKind::Pad => (part, kilo(stated.unwrap_or(PadPart::DIVIDER_OHM))),
+            SensorKind::Raw => return None,
         };
-        Wire { pin, sensor, above, below }
-    })
+        Some(Wire { pin, sensor, above, below })
+    };
+    sensors.iter().filter_map(wire).collect()
+}
+
+/// Table of the channels of the sketch for these sensors, in C.
+fn header_text(sensors: SensorList) -> Result<String, DoctorError> {
+    let mut rows = [String::new(), String::new(), String::new()];
+    for (k, sensor) in sensors.iter().enumerate() {
+        let name = sensor.channel();
+        let row = sensor.row();
+        if k >= MOST_CHANNELS || name.len() > LONGEST_NAME {
+            return Err(DoctorError(format!(
+                "the sketch reads at most {MOST_CHANNELS} channels with names of at most {LONGEST_NAME} letters; \"{name}\" is \
+                 one too many or too long"
+            )));
+        }
+        let pin = row.pin.as_deref().map_or_else(|| format!("A{k}"), str::to_owned);
+        if !pin.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            return Err(DoctorError(format!("\"{pin}\", the pin of \"{name}\", is no name of a pin such as A4")));
+        }
+        let usual = match sensor.kind() {
+            SensorKind::Flex => StripPart::DIVIDER_OHM,
+            SensorKind::Pad => PadPart::DIVIDER_OHM,
+            SensorKind::Raw => 0.0,
+        };
+        let comma = if k > 0 { ", " } else { "" };
+        let name = name.replace(['\\', '"'], "_");
+        let cells = [pin, format!("\"{name}\""), format!("{:.0}", row.divider_ohm.unwrap_or(usual))];
+        rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push_str(&format!("{comma}{cell}")));
+    }
+    let [pins, names, ohms] = rows;
+    Ok(format!(
+        "/* Channels of the gripper, made by palpate doctor --firmware-header. */\n#define CHANNELS {}\nstatic const uint8_t \
+         pins_read[] = {{{pins}}};\nstatic const char *const names[] = {{{names}}};\nstatic const uint32_t divider_ohm[] = \
+         {{{ohms}}};\n",
+        sensors.len()
+    ))
+}
+
+/// Most channels of the sketch, and the longest name of one.
+const MOST_CHANNELS: usize = 16;
+const LONGEST_NAME: usize = 15;
+
+/// Writes the table of channels for the sketch into a new file.
+pub fn write_header(path: &Path, sensors: SensorList) -> Result<(), DoctorError> {
+    let text = header_text(sensors)?;
+    let written = fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|cause| cannot_write(path, &cause))
 }
 
 fn cannot_write(path: &Path, cause: &std::io::Error) -> DoctorError {
@@ -87,12 +136,13 @@ mod tests {
 
     #[test]
     fn the_page_says_what_the_dividers_are() {
-        for wire in wires() {
+        let wires = wires(SensorList::default());
+        for wire in &wires {
             let row = WIRING_PAGE.lines().find(|line| line.starts_with(&format!("| {} |", wire.pin))).expect("a row");
             let resistor = if wire.sensor.is_flex() { "47 k to 3.3 V" } else { "4.7 k to ground" };
-            assert!(row.contains(wire.sensor.label()) && row.contains(resistor), "{row}");
+            assert!(row.contains(&wire.sensor.label()) && row.contains(resistor), "{row}");
         }
-        assert_eq!([&wires()[1].above, &wires()[3].below], ["47 kΩ", "4.7 kΩ"]);
+        assert_eq!([&wires[1].above, &wires[3].below], ["47 kΩ", "4.7 kΩ"]);
     }
 
     #[test]

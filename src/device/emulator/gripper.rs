@@ -5,17 +5,16 @@ use super::event::{EmulatorEvent, EmulatorEventKind};
 use super::faults::{EmulatedFault, FaultKind};
 use super::firmware::{BoardSetup, FirmwareBoard};
 use super::hand::{Hand, HandPlan};
-use super::parts::{HiddenParts, Sensors, Stimulus};
+use super::parts::{HiddenParts, SPARE_OHM, Sensors};
 use super::script::Step;
 use super::uart::misread;
 use crate::protocol::checksum;
 use palpate_sim::objects::ObjectError;
-use palpate_tactile::board::Sensor;
 use palpate_tactile::electronics::Converter;
 use palpate_tactile::model::Stream;
 
-/// Stated resistor of the inputs beyond the four sensors (ohm).
-const SPARE_OHM: u32 = 4700;
+/// Most channels of a board with our firmware.
+pub(super) const MOST_CHANNELS: usize = 16;
 
 /// Times that differ by less are equal (s): rounding of summed periods, and less than a tick of the clock.
 const SAME_TIME_S: f64 = 5e-7;
@@ -29,7 +28,7 @@ pub struct EmulatorSetup {
     pub parts: HiddenParts,
     /// Samples per second.
     pub rate_hz: u32,
-    /// Number of channels: the four sensors, then spare inputs with slow sine waves.
+    /// Number of channels: the sensors of the hand, then spare inputs with slow sine waves.
     pub channels: usize,
     /// Highest pressure of its board, in steps of 0.05 bar; 0: no pressure output.
     pub most_steps: u8,
@@ -75,9 +74,10 @@ impl EmulatedGripper {
     /// Starts an emulated gripper; takes some tenths of a second for each object.
     pub fn new(setup: EmulatorSetup) -> Result<Self, ObjectError> {
         let spare = (1..).map(|k| format!("aux{k}"));
-        let channels = Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).chain(spare).take(setup.channels);
-        let ohm = [setup.parts.strips.map(|s| s.divider_ohm), setup.parts.pads.map(|p| p.divider_ohm)];
-        let ohm = ohm.concat().into_iter().map(|ohm| ohm.round() as u32).chain(std::iter::repeat(SPARE_OHM));
+        let list = setup.hand.sensors;
+        let channels = list.iter().map(|sensor| sensor.channel().to_owned()).chain(spare).take(setup.channels);
+        let ohm = list.iter().map(|sensor| setup.parts.divider_ohm(sensor)).chain(std::iter::repeat(SPARE_OHM));
+        let ohm = ohm.map(|ohm| ohm.round() as u32);
         let board_setup = BoardSetup {
             period_us: 1_000_000 / setup.rate_hz.max(1),
             channels: channels.collect(),
@@ -89,7 +89,7 @@ impl EmulatedGripper {
         let board = FirmwareBoard::begin(&board_setup, setup.clock_start_us, &mut hello);
         Ok(Self {
             hand: Hand::new(setup.hand)?,
-            sensors: setup.parts.sensors(f64::from(setup.rate_hz)),
+            sensors: setup.parts.sensors(list, f64::from(setup.rate_hz)),
             converter: Conversions::new(&setup.parts, setup.seed, setup.channels),
             parts: setup.parts,
             board_setup,
@@ -208,12 +208,12 @@ impl EmulatedGripper {
         let (_, anchor_us) = self.anchor;
         let clock_us = anchor_us + u64::from(due.wrapping_sub(anchor_us as u32));
         self.anchor = (self.now_s, clock_us);
-        let stimulus = self.hand.at(self.now_s, self.board.line_bar());
+        let stimuli = self.hand.at(self.now_s, self.board.line_bar());
         self.hand.take_began().into_iter().for_each(|began| self.tell(began));
         if let Some(bar) = self.hand.own_bar() {
             self.board.set_by_hand((bar * 20.0).round() as u8, due);
         }
-        let shares = self.shares(stimulus);
+        let shares = self.shares(&stimuli);
         self.converter.strike(&self.faults, self.now_s);
         let converter = &mut self.converter;
         let mut said = String::new();
@@ -225,14 +225,14 @@ impl EmulatedGripper {
     }
 
     /// Shares of the supply on all inputs.
-    fn shares(&mut self, stimulus: Stimulus) -> Vec<f64> {
+    fn shares(&mut self, stimuli: &[f64]) -> Vec<f64> {
         let spare = |k: usize| 0.5 + 0.4 * (self.now_s * (k as f64 + 1.0) * 0.2).sin();
-        let mut shares: Vec<f64> = self.sensors.shares(stimulus).into_iter().chain((0..4).map(spare)).collect();
+        let mut shares: Vec<f64> =
+            self.sensors.shares(stimuli).into_iter().chain((0..MOST_CHANNELS).map(spare)).collect();
         for fault in self.faults.iter().filter(|fault| fault.is_on(self.now_s)) {
             let channel = fault.value as usize;
             if let (FaultKind::Open, Some(share)) = (fault.kind, shares.get_mut(channel)) {
-                // A strip is to ground: without it the input is pulled up. A pad is to the supply.
-                *share = if channel < 2 { 1.0 } else { 0.0 };
+                *share = self.sensors.share_when_open(channel);
             }
         }
         shares

@@ -2,16 +2,17 @@
 //! bench script. Grasps are simulated.
 
 use super::event::EmulatorEventKind;
-use super::parts::Stimulus;
+use super::parts::{Stimuli, between};
 use super::script::Step;
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::{Phase, Programme};
+use palpate_sim::gripper::{Phase, Programme, Side};
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::Scene;
+use palpate_tactile::board::{Measures, Sensor, SensorKind, SensorList};
 use palpate_tactile::electronics::StripPart;
-use palpate_tactile::{Quantity, Sensors, SignalDefinition};
+use palpate_tactile::{Channel, Quantity, Sensors};
 use std::collections::VecDeque;
 
 /// Length of a simulation that a host drives (s): a day, after which the fingers stop.
@@ -40,6 +41,8 @@ struct Graspable {
 /// Plan of the hand.
 #[derive(Clone, Debug)]
 pub struct HandPlan {
+    /// Sensors of the gripper.
+    pub sensors: SensorList,
     /// The gripper, its programme, and how objects lie.
     pub scene: Scene,
     /// What is in the hand, grasp by grasp and then again. If the list starts with `empty`, the hand is empty for the
@@ -58,7 +61,7 @@ pub struct HandPlan {
 #[derive(Debug)]
 enum HandActivity {
     Rest,
-    Held { from: Stimulus, to: Stimulus, since_s: f64, until_s: f64 },
+    Held { from: Stimuli, to: Stimuli, since_s: f64, until_s: f64 },
     Grasp(Box<LiveGrasp>),
 }
 
@@ -78,7 +81,7 @@ pub(super) struct Hand {
     driven: bool,
     vented_since_s: Option<f64>,
     began: Vec<EmulatorEventKind>,
-    last: Stimulus,
+    last: Stimuli,
 }
 
 impl Hand {
@@ -97,6 +100,7 @@ impl Hand {
         let mut hand = Self {
             script: plan.script.iter().cloned().collect(),
             scripted: !plan.script.is_empty(),
+            last: rest(&plan),
             plan,
             things: Vec::new(),
             doing: HandActivity::Rest,
@@ -106,7 +110,6 @@ impl Hand {
             driven: false,
             vented_since_s: None,
             began: Vec::new(),
-            last: Stimulus::default(),
         };
         for name in wanted {
             hand.load(&name)?;
@@ -161,17 +164,17 @@ impl Hand {
         }
     }
 
-    /// Stimulus of the sensors at a time (s), which never decreases; `host_bar` is the pressure set by the host (bar).
-    pub(super) fn at(&mut self, t: f64, host_bar: f64) -> Stimulus {
+    /// Stimuli of the sensors at a time (s), which never decreases; `host_bar` is the pressure set by the host (bar).
+    pub(super) fn at(&mut self, t: f64, host_bar: f64) -> Stimuli {
         if self.driven {
             self.follow_host(t, host_bar);
         } else {
             self.go_on(t);
         }
         self.last = match &mut self.doing {
-            HandActivity::Rest => Stimulus::default(),
+            HandActivity::Rest => rest(&self.plan),
             HandActivity::Held { from, to, since_s, .. } => {
-                from.towards(*to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0))
+                between(from, to, ((t - *since_s) / RAMP_S).clamp(0.0, 1.0))
             }
             HandActivity::Grasp(grasp) => {
                 let stimulus = grasp.at(t, host_bar);
@@ -179,7 +182,7 @@ impl Hand {
                 stimulus
             }
         };
-        self.last
+        self.last.clone()
     }
 
     fn follow_host(&mut self, t: f64, bar: f64) {
@@ -220,8 +223,16 @@ impl Hand {
     fn take_step(&mut self, step: &Step, t: f64) {
         match step {
             Step::Hold { bend, load, seconds } => {
-                let to = Stimulus { kappa: bend.map(|angle| angle / StripPart::ACTIVE_LENGTH), force: *load };
-                self.doing = HandActivity::Held { from: self.last, to, since_s: t, until_s: t + seconds };
+                let mut to = rest(&self.plan);
+                for sensor in self.plan.sensors.iter() {
+                    let Some(side) = sensor.side().map(Side::index) else { continue };
+                    match sensor.kind() {
+                        SensorKind::Flex => to[sensor.index()] = bend[side] / StripPart::ACTIVE_LENGTH,
+                        SensorKind::Pad => to[sensor.index()] = load[side],
+                        SensorKind::Raw => {}
+                    }
+                }
+                self.doing = HandActivity::Held { from: self.last.clone(), to, since_s: t, until_s: t + seconds };
                 let bend_deg = bend.map(f64::to_degrees);
                 self.began.push(EmulatorEventKind::Hold { bend_deg, load_n: *load, seconds: *seconds });
             }
@@ -260,7 +271,7 @@ impl Hand {
         let Graspable { name, model, poses } = &self.things[thing];
         let (scene, _) = poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps)));
         self.began.push(EmulatorEventKind::Grasp { number: self.grasps, object: name.clone() });
-        self.doing = HandActivity::Grasp(Box::new(LiveGrasp::new(&scene, model.as_ref(), t, programme)));
+        self.doing = HandActivity::Grasp(Box::new(LiveGrasp::new(&self.plan, &scene, model.as_ref(), t, programme)));
     }
 }
 
@@ -274,18 +285,27 @@ fn built_in() -> Vec<String> {
 struct LiveGrasp {
     rig: SimRun,
     sensors: Sensors,
+    /// The sensor that each of their channels belongs to.
+    places: Vec<usize>,
+    rest: Stimuli,
     start_s: f64,
     ends_s: f64,
     /// The hand's own programme; none when a host drives.
     programme: Option<Programme>,
     line_bar: f64,
     /// Time since the start (s) and stimulus, at the last frame and at the next.
-    frames: [(f64, Stimulus); 2],
+    frames: [(f64, Stimuli); 2],
     failed: Option<String>,
 }
 
 impl LiveGrasp {
-    fn new(scene: &Scene, object: Option<&ObjectModel>, start_s: f64, programme: Option<Programme>) -> Self {
+    fn new(
+        plan: &HandPlan,
+        scene: &Scene,
+        object: Option<&ObjectModel>,
+        start_s: f64,
+        programme: Option<Programme>,
+    ) -> Self {
         let lasts = |p: &Programme| f64::from(p.total_ticks()) / f64::from(scene.timing.actuation_hz.max(1)) + SETTLE_S;
         let ends_s = start_s + programme.as_ref().map_or(LONGEST_GRASP_S, lasts);
         let mut endless = scene.clone();
@@ -293,12 +313,18 @@ impl LiveGrasp {
         if programme.is_none() {
             (endless.timing.sample_hz, endless.timing.actuation_hz) = (DRIVEN_HZ, DRIVEN_HZ);
         }
-        let sensors = Sensors::whole_fingers(&scene.gripper, SignalDefinition::Parts);
-        let rig = SimRun::new(&endless, object).0;
-        Self { rig, sensors, start_s, ends_s, programme, line_bar: 0.0, frames: Default::default(), failed: None }
+        let felt = |channel: &Channel| plan.sensors.iter().find(|sensor| sensor.gives(channel)).map(Sensor::index);
+        let channels: Vec<Channel> = Sensors::of_list(plan.sensors, &scene.gripper).channels().to_vec();
+        // A pad is loaded by a force; its pressure follows from it.
+        let channels: Vec<Channel> = channels.into_iter().filter(|own| own.quantity != Quantity::Pressure).collect();
+        let places = channels.iter().filter_map(felt).collect();
+        let sensors = Sensors::of_list(plan.sensors, &scene.gripper).only(channels);
+        let (rig, rest) = (SimRun::new(&endless, object).0, rest(plan));
+        let frames = [(0.0, rest.clone()), (0.0, rest.clone())];
+        Self { rig, sensors, places, rest, start_s, ends_s, programme, line_bar: 0.0, frames, failed: None }
     }
 
-    fn at(&mut self, t: f64, host_bar: f64) -> Stimulus {
+    fn at(&mut self, t: f64, host_bar: f64) -> Stimuli {
         let t = t - self.start_s;
         while self.frames[1].0 < t {
             match self.rig.next_event() {
@@ -308,7 +334,10 @@ impl LiveGrasp {
                     self.line_bar = bar;
                     self.rig.command(bar, phase);
                 }
-                Ok(SimEvent::Sampled(frame)) => self.frames = [self.frames[1], (frame.t, self.feel(&frame))],
+                Ok(SimEvent::Sampled(frame)) => {
+                    self.frames.swap(0, 1);
+                    self.frames[1] = (frame.t, self.feel(&frame));
+                }
                 Ok(SimEvent::Finished) => self.frames[1].0 = f64::INFINITY,
                 Err(error) => {
                     self.failed = Some(error.to_string());
@@ -316,27 +345,31 @@ impl LiveGrasp {
                 }
             }
         }
-        let [(before_s, before), (after_s, after)] = self.frames;
+        let [(before_s, before), (after_s, after)] = &self.frames;
+        let (before_s, after_s) = (*before_s, *after_s);
         // No frame yet: nothing to interpolate from.
         if !after_s.is_finite() || after_s <= before_s {
-            return after;
+            return after.clone();
         }
-        before.towards(after, ((t - before_s) / (after_s - before_s)).clamp(0.0, 1.0))
+        between(before, after, ((t - before_s) / (after_s - before_s)).clamp(0.0, 1.0))
     }
 
-    fn feel(&self, frame: &Frame) -> Stimulus {
-        let values = self.sensors.read(frame);
-        let mut stimulus = Stimulus::default();
-        for (channel, value) in self.sensors.channels().iter().zip(values) {
-            let (side, value) = (channel.side.index(), value.unwrap_or_default());
-            match channel.quantity {
-                Quantity::Curvature => stimulus.kappa[side] = value,
-                Quantity::Force => stimulus.force[side] = value,
-                Quantity::Pressure | Quantity::ContactPressure => {}
-            }
+    fn feel(&self, frame: &Frame) -> Stimuli {
+        let mut stimuli = self.rest.clone();
+        for (place, value) in self.places.iter().zip(self.sensors.read(frame)) {
+            stimuli[*place] = value.unwrap_or_default();
         }
-        stimulus
+        stimuli
     }
+}
+
+/// Stimuli of an open, empty hand without pressure.
+fn rest(plan: &HandPlan) -> Stimuli {
+    let of = |sensor: Sensor| match sensor.row().measures {
+        Some(Measures::PalmDistance) => plan.scene.gripper.finger.length,
+        Some(Measures::ChamberPressure) | None => 0.0,
+    };
+    plan.sensors.iter().map(of).collect()
 }
 
 #[cfg(test)]
@@ -348,10 +381,17 @@ mod tests {
         let mut scene = Scene::default();
         scene.solver.accuracy = Accuracy::Draft;
         scene.object.fixed = true;
-        HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script: Vec::new() }
+        HandPlan {
+            sensors: SensorList::default(),
+            scene,
+            objects: vec![EMPTY.to_owned()],
+            seed: 1,
+            grasp_every_s: None,
+            script: Vec::new(),
+        }
     }
 
-    fn run(hand: &mut Hand, from_s: f64, to_s: f64, bar: f64) -> Stimulus {
+    fn run(hand: &mut Hand, from_s: f64, to_s: f64, bar: f64) -> Stimuli {
         let samples = ((to_s - from_s) * 50.0).round() as u32;
         (1..=samples).map(|k| hand.at(from_s + f64::from(k) / 50.0, bar)).last().unwrap_or_default()
     }
@@ -362,10 +402,10 @@ mod tests {
         let mut hand = Hand::new(HandPlan { script, ..plan() }).expect("nothing to load");
         let bent = run(&mut hand, 0.0, 0.9, 0.0);
         // 90 degrees over 55.37 mm: 28.4 1/m.
-        assert!((bent.kappa[0] - 28.37).abs() < 0.01 && bent.kappa[0] == bent.kappa[1] && bent.force == [0.0; 2]);
+        assert!((bent[0] - 28.37).abs() < 0.01 && bent[0] == bent[1] && bent[2..] == [0.0; 2]);
         let loaded = run(&mut hand, 0.9, 1.9, 0.0);
-        assert_eq!(loaded, Stimulus { kappa: [0.0; 2], force: [1.0; 2] });
-        assert_eq!(run(&mut hand, 1.9, 3.0, 0.0), Stimulus::default());
+        assert_eq!(loaded, [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(run(&mut hand, 1.9, 3.0, 0.0), [0.0; 4]);
         let began = hand.take_began();
         assert!(
             matches!(
@@ -380,14 +420,14 @@ mod tests {
     fn a_host_bends_the_fingers_as_far_as_the_pressure_says() {
         let mut hand = Hand::new(plan()).expect("nothing to load");
         hand.take_over(0.0, 0.0);
-        assert_eq!(hand.at(0.02, 0.0), Stimulus::default());
+        assert_eq!(hand.at(0.02, 0.0), [0.0; 4]);
         // 0.5 bar are 0.03 N m on joints of 0.42 N m/rad and 10 mm: 7.14 1/m, less what gravity does.
         let bent = run(&mut hand, 0.02, 1.5, 0.5);
-        assert!((bent.kappa[0] - 7.14).abs() < 0.4 && bent.force == [0.0; 2], "{bent:?}");
+        assert!((bent[0] - 7.14).abs() < 0.4 && bent[2..] == [0.0; 2], "{bent:?}");
         let open = run(&mut hand, 1.5, 3.0, 0.0);
-        assert!(open.kappa[0].abs() < 0.6, "{open:?}");
+        assert!(open[0].abs() < 0.6, "{open:?}");
         run(&mut hand, 3.0, 3.1, 0.5);
-        assert!((0..50).all(|k| hand.at(3.1 + 0.02 * f64::from(k), 0.5).kappa[0].is_finite()));
+        assert!((0..50).all(|k| hand.at(3.1 + 0.02 * f64::from(k), 0.5)[0].is_finite()));
         let began = hand.take_began();
         assert_eq!(began.len(), 2, "a new grasp after it has let go: {began:?}");
     }
@@ -400,7 +440,7 @@ mod tests {
             hand.take_over(0.0, 0.0);
             run(&mut hand, 0.0, 1.0, 0.3);
             hand.take_over(1.0 + late_s, 0.3);
-            hand.at(1.06, 0.6).kappa[0]
+            hand.at(1.06, 0.6)[0]
         };
         let bends = [0.0, 0.01, 0.02, 0.03].map(after);
         assert!(bends.windows(2).all(|pair| pair[0] > pair[1] + 0.05), "{bends:?}");
@@ -410,7 +450,7 @@ mod tests {
     fn by_itself_it_grasps_again_and_again() {
         let mut hand = Hand::new(HandPlan { grasp_every_s: Some(5.0), ..plan() }).expect("nothing to load");
         let held = run(&mut hand, 0.0, 2.5, 0.0);
-        assert!(held.kappa[0] > 5.0 && hand.own_bar() == Some(1.0), "{held:?}");
+        assert!(held[0] > 5.0 && hand.own_bar() == Some(1.0), "{held:?}");
         run(&mut hand, 2.5, 10.2, 0.0);
         let grasps = hand.take_began();
         assert_eq!(grasps.len(), 3, "at 0, 5 and 10 s: {grasps:?}");

@@ -28,7 +28,7 @@ pub use event::{EmulatorError, EmulatorEvent, EmulatorEventKind};
 pub use faults::{EmulatedFault, FaultKind, fault_help, parse_faults};
 pub use gripper::{EmulatedGripper, EmulatorSetup};
 pub use hand::HandPlan;
-pub use parts::{HiddenParts, PadSetup, Stimulus, StripSetup};
+pub use parts::{HiddenParts, PadSetup, StripSetup};
 #[cfg(unix)]
 pub use port::{PortSetup, serve};
 pub use script::{Step, parse_script};

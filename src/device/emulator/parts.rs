@@ -1,6 +1,8 @@
 //! Parts of the emulated gripper: hidden values that a calibration estimates.
 
 use super::event::EmulatorError;
+use palpate_sim::gripper::Side;
+use palpate_tactile::board::{Sensor, SensorKind, SensorList};
 use palpate_tactile::electronics::{Divider, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::model::Stream;
 use serde::{Deserialize, Serialize};
@@ -99,19 +101,43 @@ impl HiddenParts {
         refuse(self.noise_counts >= 0.0, "noise_counts", self.noise_counts, "not be negative")
     }
 
-    /// The four sensors, read so many times a second (1/s).
-    pub(super) fn sensors(&self, rate_hz: f64) -> Sensors {
-        let strips = self.strips.map(|setup| {
-            let mut strip = FlexStrip::new(setup.part, rate_hz);
-            (strip.one_way, strip.folds, strip.creeps) = (true, true, self.hysteresis);
-            (strip, Divider::of_strip(setup.divider_ohm))
-        });
-        let pads = self.pads.map(|setup| {
-            let mut pad = ForcePad::new(setup.part, rate_hz);
-            (pad.hysteretic, pad.drifts) = (self.hysteresis, self.drift);
-            (pad, setup.bending_load, Divider::of_pad(setup.divider_ohm))
-        });
-        Sensors { strips, pads }
+    /// The sensors of a list, read so many times a second (1/s). Those beyond the first of a kind on a finger are parts of
+    /// the same values.
+    pub(super) fn sensors(&self, list: SensorList, rate_hz: f64) -> Sensors {
+        let part = |sensor: Sensor| {
+            let side = side_of(sensor);
+            match sensor.kind() {
+                SensorKind::Flex => {
+                    let setup = self.strips[side];
+                    let mut strip = FlexStrip::new(setup.part, rate_hz);
+                    (strip.one_way, strip.folds, strip.creeps) = (true, true, self.hysteresis);
+                    WiredPart::Strip(strip, Divider::of_strip(setup.divider_ohm))
+                }
+                SensorKind::Pad => {
+                    let setup = self.pads[side];
+                    let mut pad = ForcePad::new(setup.part, rate_hz);
+                    (pad.hysteretic, pad.drifts) = (self.hysteresis, self.drift);
+                    let strip = sensor.strip().map(Sensor::index);
+                    WiredPart::Pad {
+                        pad,
+                        bending_load: setup.bending_load,
+                        strip,
+                        divider: Divider::of_pad(setup.divider_ohm),
+                    }
+                }
+                SensorKind::Raw => WiredPart::Raw { units_of_full: sensor.full_scale(LEVELS) },
+            }
+        };
+        Sensors { parts: list.iter().map(part).collect() }
+    }
+
+    /// Fixed resistor beside a sensor (ohm).
+    pub(super) fn divider_ohm(&self, sensor: Sensor) -> f64 {
+        match sensor.kind() {
+            SensorKind::Flex => self.strips[side_of(sensor)].divider_ohm,
+            SensorKind::Pad => self.pads[side_of(sensor)].divider_ohm,
+            SensorKind::Raw => SPARE_OHM,
+        }
     }
 }
 
@@ -119,43 +145,56 @@ impl HiddenParts {
 /// at 1 bar (14 1/m), so that it shows above the threshold of some pads and not of others.
 const MOST_BENDING_LOAD: [f64; 2] = [0.005, 0.02];
 
-/// Curvature and force on the sensors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Stimulus {
-    /// Curvature under the strip, left and right (1/m).
-    pub kappa: [f64; 2],
-    /// Normal force on the pad, left and right (N).
-    pub force: [f64; 2],
+/// Stated resistor of inputs that are no strip and no pad (ohm).
+pub(super) const SPARE_OHM: f64 = 4700.0;
+/// Counts of the converter.
+const LEVELS: f64 = palpate_tactile::electronics::Converter::DUE.levels;
+
+/// Which of the two parts of a kind a sensor has: the right finger's, or the left one's for all other fingers.
+fn side_of(sensor: Sensor) -> usize {
+    sensor.side().map_or(0, Side::index)
 }
 
-impl Stimulus {
-    /// The one that is `share` of the way to another.
-    pub(super) fn towards(self, other: Self, share: f64) -> Self {
-        let mix = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|side| a[side] + (b[side] - a[side]) * share);
-        Self { kappa: mix(self.kappa, other.kappa), force: mix(self.force, other.force) }
-    }
+/// Stimulus of each sensor of a list: curvature under a strip (1/m), normal force on a pad (N), what a raw sensor measures.
+pub(super) type Stimuli = Vec<f64>;
+
+/// The stimuli that are `share` of the way from one to another.
+pub(super) fn between(from: &[f64], to: &[f64], share: f64) -> Stimuli {
+    from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect()
+}
+
+/// A part with its divider, at work.
+#[derive(Clone, Debug)]
+enum WiredPart {
+    Strip(FlexStrip, Divider),
+    Pad { pad: ForcePad, bending_load: f64, strip: Option<usize>, divider: Divider },
+    Raw { units_of_full: f64 },
 }
 
 /// The sensors at work.
 #[derive(Clone, Debug)]
 pub(super) struct Sensors {
-    strips: [(FlexStrip, Divider); 2],
-    pads: [(ForcePad, f64, Divider); 2],
+    parts: Vec<WiredPart>,
 }
 
 impl Sensors {
-    /// Shares of the supply on the four inputs, in the order of [`palpate_tactile::board::Sensor::ALL`].
-    pub(super) fn shares(&mut self, stimulus: Stimulus) -> [f64; 4] {
-        let mut shares = [0.0; 4];
-        for side in 0..2 {
-            let kappa = stimulus.kappa[side];
-            let (strip, divider) = &mut self.strips[side];
-            shares[side] = divider.share_of_ohm(strip.ohm(kappa));
-            let (pad, bending_load, divider) = &mut self.pads[side];
-            let load = stimulus.force[side] + *bending_load * kappa.max(0.0);
-            shares[2 + side] = divider.share_of_siemens(pad.conductance(load));
-        }
-        shares
+    /// Shares of the supply on the inputs, in the order of the list.
+    pub(super) fn shares(&mut self, stimuli: &[f64]) -> Vec<f64> {
+        let share = |(part, stimulus): (&mut WiredPart, &f64)| match part {
+            WiredPart::Strip(strip, divider) => divider.share_of_ohm(strip.ohm(*stimulus)),
+            WiredPart::Pad { pad, bending_load, strip, divider } => {
+                let kappa = strip.and_then(|strip| stimuli.get(strip)).copied().unwrap_or_default();
+                divider.share_of_siemens(pad.conductance(stimulus + *bending_load * kappa.max(0.0)))
+            }
+            WiredPart::Raw { units_of_full } => (stimulus / *units_of_full).clamp(0.0, 1.0),
+        };
+        self.parts.iter_mut().zip(stimuli).map(share).collect()
+    }
+
+    /// Share that an input reads where nothing is connected: a strip is to ground, so that the input is pulled up; a pad is to
+    /// the supply.
+    pub(super) fn share_when_open(&self, channel: usize) -> f64 {
+        if matches!(self.parts.get(channel), Some(WiredPart::Strip(..))) { 1.0 } else { 0.0 }
     }
 }
 
@@ -194,8 +233,8 @@ mod tests {
         parts.pads[0].part = PadPart { gain: 1.0 / 6e3, exponent: 0.9, ..parts.pads[0].part };
         (parts.hysteresis, parts.drift) = (false, false);
         let force = 0.5 * palpate_geometry::units::STANDARD_GRAVITY;
-        let stimulus = Stimulus { force: [force, 0.0], ..Stimulus::default() };
-        let [flat, _, pressed, idle] = parts.sensors(50.0).shares(stimulus);
+        let shares = parts.sensors(SensorList::default(), 50.0).shares(&[0.0, 0.0, force, 0.0]);
+        let [flat, _, pressed, idle] = shares[..] else { panic!("four sensors") };
         let ratio = 4.7e3 * force.powf(0.9) / 6e3;
         assert!((pressed - ratio / (1.0 + ratio)).abs() < 1e-12 && idle == 0.0);
         let ohm = parts.strips[0].part.flat_ohm;

@@ -8,7 +8,14 @@ fn setup(script: &str, faults: &str) -> EmulatorSetup {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let script = parse_script(script).expect("sound");
-    let hand = HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 1, grasp_every_s: None, script };
+    let hand = HandPlan {
+        sensors: palpate_tactile::board::SensorList::default(),
+        scene,
+        objects: vec![EMPTY.to_owned()],
+        seed: 1,
+        grasp_every_s: None,
+        script,
+    };
     let mut parts = HiddenParts::drawn(1);
     parts.noise_counts = 0.0;
     (parts.hysteresis, parts.drift) = (false, false);

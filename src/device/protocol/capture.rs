@@ -70,7 +70,7 @@ impl<R: Read> CaptureReader<R> {
 
 impl Pace {
     fn go_on(&mut self, line: &[u8]) {
-        let clock = match parse(line) {
+        let clock = match parse(line, self.columns.sensors()) {
             Ok(Parsed::Named(_, fields)) => Role::time_s(&fields),
             Ok(Parsed::Columns(values)) => Role::time_s(&self.columns.name(values, None)),
             Ok(Parsed::Header(names)) => {

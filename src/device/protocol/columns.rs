@@ -2,11 +2,12 @@
 //! [`Columns::why`] states.
 
 use super::fields::{Field, Fields, names_a_sensor};
-use palpate_tactile::board::{Board, Sensor};
+use palpate_tactile::board::{Board, SensorList};
 
 /// Names for columns.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Columns {
+    sensors: SensorList,
     header: Option<Vec<String>>,
     /// The header is from before an interruption: another sketch may be on the board by now.
     header_is_old: bool,
@@ -24,9 +25,20 @@ enum Origin {
 }
 
 impl Columns {
+    /// Names for columns of these sensors.
+    pub(super) fn new(sensors: SensorList) -> Self {
+        Self { sensors, ..Self::default() }
+    }
+
+    /// Sensors of the gripper.
+    pub(super) fn sensors(&self) -> SensorList {
+        self.sensors
+    }
+
     /// Takes names; false where they are words that would put the names of sensors out of use.
     pub(super) fn set_header(&mut self, names: Vec<String>) -> bool {
-        let worse = !names_a_sensor(&names) && self.header.as_ref().is_some_and(|known| names_a_sensor(known));
+        let has_sensor = |names: &[String]| names_a_sensor(names, self.sensors);
+        let worse = !has_sensor(&names) && self.header.as_ref().is_some_and(|known| has_sensor(known));
         let taken = !worse || self.header_is_old;
         if taken {
             (self.header, self.header_is_old) = (Some(names), false);
@@ -46,8 +58,8 @@ impl Columns {
             (Origin::Header, names.clone())
         } else if let Some(names) = handshake.map(|board| &board.channels).filter(fits) {
             (Origin::Handshake, names.clone())
-        } else if count == Sensor::ALL.len() {
-            (Origin::Order, Sensor::ALL.iter().map(|sensor| sensor.channel().to_owned()).collect())
+        } else if count == self.sensors.len() {
+            (Origin::Order, self.sensors.iter().map(|sensor| sensor.channel().to_owned()).collect())
         } else {
             (Origin::Number, (1..=count).map(|number| format!("ch{number}")).collect())
         };
@@ -62,12 +74,18 @@ impl Columns {
     }
 
     /// Origin of the names, in words.
-    pub(super) fn why(&self) -> &'static str {
+    pub(super) fn why(&self) -> String {
         match self.origin {
-            Origin::Header => "a header names them",
-            Origin::Handshake => "the handshake names them",
-            Origin::Order => "no header seen: four columns are assumed to be flexL, flexR, fsrL, fsrR in this order",
-            Origin::Number => "no header seen: columns are numbered",
+            Origin::Header => "a header names them".to_owned(),
+            Origin::Handshake => "the handshake names them".to_owned(),
+            Origin::Order => {
+                let count = match self.sensors.len() {
+                    4 => "four".to_owned(),
+                    many => many.to_string(),
+                };
+                format!("no header seen: {count} columns are assumed to be {} in this order", self.sensors.names())
+            }
+            Origin::Number => "no header seen: columns are numbered".to_owned(),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::lines::{Line, LineSplitter};
 use super::reply::BoardReply;
 use super::saturation::{AdcRange, FULL_10_BIT, FULL_12_BIT, Saturation, SaturationWatch};
 use super::shape::{Candidate, LineVerdict, Role, Shapes};
-use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor, TimeSource};
+use palpate_tactile::board::{Board, Detected, Format, Gap, Reading, Sensor, SensorList, TimeSource};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
 
@@ -53,6 +53,8 @@ pub struct Decoder {
 /// A decoder without the unfinished line.
 #[derive(Clone, Debug, Default)]
 struct Reader {
+    /// Sensors of the gripper.
+    list: SensorList,
     shapes: Shapes,
     columns: Columns,
     /// Names of the channels, in the order of the counts.
@@ -84,12 +86,13 @@ const START_MESSAGES: [&str; 2] = ["rst:0x", ",rst cause:"];
 /// Largest valid counter: beyond it an `f64` no longer separates whole numbers.
 const LARGEST_COUNTER: f64 = 9.0e15;
 
-/// True where two names mean the same channel.
-fn is_same_channel(a: &str, b: &str) -> bool {
-    a.eq_ignore_ascii_case(b) || Sensor::called(a).is_some_and(|sensor| sensor.is_called(b))
-}
-
 impl Decoder {
+    /// A decoder of boards that carry these sensors.
+    pub fn new(sensors: SensorList) -> Self {
+        let reader = Reader { list: sensors, columns: Columns::new(sensors), ..Reader::default() };
+        Self { reader, ..Self::default() }
+    }
+
     /// Decodes bytes that arrived at a time (s since the stream began) and appends their events to `events`.
     pub fn push(&mut self, bytes: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
         let Self { splitter, reader } = self;
@@ -163,7 +166,11 @@ impl Decoder {
 impl Reader {
     fn board(&self) -> Board {
         let mut board = self.said().cloned().unwrap_or_default();
-        let place = |name: &String| board.channels.iter().position(|known| is_same_channel(known, name));
+        board.sensors = self.list;
+        let is_same = |a: &str, b: &str| {
+            a.eq_ignore_ascii_case(b) || self.list.called(a).is_some_and(|sensor| sensor.is_called(b))
+        };
+        let place = |name: &String| board.channels.iter().position(|known| is_same(known, name));
         let ohm = self.channels.iter().map(|name| board.divider_ohm.get(place(name)?).copied());
         board.divider_ohm = ohm.collect::<Option<Vec<f64>>>().unwrap_or_default();
         board.channels.clone_from(&self.channels);
@@ -200,7 +207,7 @@ impl Reader {
         if line.starts_with(b"#") {
             return self.remark(line, arrived_s, events);
         }
-        let (format, fields) = match self.check(line).and_then(|()| parse(line)) {
+        let (format, fields) = match self.check(line).and_then(|()| parse(line, self.list)) {
             Err(why) => return self.bad(line, why, arrived_s),
             Ok(Parsed::Header(names)) => return self.header(names, line, arrived_s, events),
             Ok(Parsed::Columns(values)) => {
@@ -227,13 +234,11 @@ impl Reader {
     /// Skips the first line, which is most often the rest of one, unless it is a header: a board that restarts on connection
     /// begins with it. It is complete unless its first name may be the end of a known one.
     fn first(&mut self, line: &[u8], arrived_s: f64, events: &mut Vec<BoardEvent>) {
-        let Ok(Parsed::Header(names)) = parse(line) else { return };
-        let is_known = |name: &String| !Role::is_channel(name) || Sensor::called(name).is_some();
+        let Ok(Parsed::Header(names)) = parse(line, self.list) else { return };
+        let is_known = |name: &String| !Role::is_channel(name) || self.list.called(name).is_some();
         let is_rest = |name: &String| {
-            let known = Sensor::ALL
-                .map(Sensor::channel)
-                .into_iter()
-                .chain(["t_us", "t_ms", "millis", "micros", "seq", "p_bar"]);
+            let known =
+                self.list.iter().map(Sensor::channel).chain(["t_us", "t_ms", "millis", "micros", "seq", "p_bar"]);
             known.into_iter().any(|known| known.to_ascii_lowercase().ends_with(&name.to_ascii_lowercase()))
         };
         if names.first().is_some_and(|name| is_known(name) || !is_rest(name)) {
@@ -296,7 +301,7 @@ impl Reader {
     }
 
     fn find_sensors(&mut self) {
-        self.sensors = self.channels.iter().map(|name| Sensor::called(name)).collect();
+        self.sensors = self.channels.iter().map(|name| self.list.called(name)).collect();
         let said = self.said();
         let ohm = |sensor: Sensor| said.and_then(|board| board.divider_ohm.get(board.channel_of(sensor)?));
         let is_strip = |sensor: &Option<Sensor>| {

@@ -86,7 +86,7 @@ fn a_header_that_comes_late_renames_the_columns() {
         Some(vec![None, Some(29.0), Some(7.0), Some(8.0), Some(9.0)])
     });
     assert_eq!(decoder.detected().map(|d| d.time), Some(TimeSource::Device));
-    assert_eq!(board.channel_of(Sensor::FlexRight), Some(1));
+    assert_eq!(board.channel_of(Sensor::FLEX_RIGHT), Some(1));
 }
 
 #[test]

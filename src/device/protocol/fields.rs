@@ -10,7 +10,7 @@
 //! If a number is replaced by `nan`, `err` or nothing, only that channel has no value; with any other word the line is
 //! refused. [`super::shape`] accepts the fields found here only when the board repeats them.
 
-use palpate_tactile::board::{Format, Sensor};
+use palpate_tactile::board::{Format, SensorList};
 
 /// Most numbers that a line may carry.
 pub(super) const MAX_FIELDS: usize = 64;
@@ -44,8 +44,8 @@ pub(super) enum Parsed {
     Header(Vec<String>),
 }
 
-/// Parses a line; an error says why it is refused, and what the line is where that is known.
-pub(super) fn parse(line: &[u8]) -> Result<Parsed, &'static str> {
+/// Parses a line of a board with these sensors; an error says why it is refused, and what the line is where that is known.
+pub(super) fn parse(line: &[u8], sensors: SensorList) -> Result<Parsed, &'static str> {
     let text = match std::str::from_utf8(line) {
         Ok(text) => text.trim(),
         Err(_) if line.iter().all(|byte| byte.is_ascii_graphic() || b" \t\xB0\xB5\xB1".contains(byte)) => {
@@ -53,7 +53,7 @@ pub(super) fn parse(line: &[u8]) -> Result<Parsed, &'static str> {
         }
         Err(_) => return Err("not text"),
     };
-    parse_text(text).map_err(|why| if why == NO_NUMBER { form_of(text).unwrap_or(why) } else { why })
+    parse_text(text, sensors).map_err(|why| if why == NO_NUMBER { form_of(text).unwrap_or(why) } else { why })
 }
 
 const NO_NUMBER: &str = "a value is not a number";
@@ -81,7 +81,7 @@ fn form_of(text: &str) -> Option<&'static str> {
     (text.contains(':') && words.len() > 1 && words.iter().all(is_word)).then_some("a name has a blank in it")
 }
 
-fn parse_text(text: &str) -> Result<Parsed, &'static str> {
+fn parse_text(text: &str, sensors: SensorList) -> Result<Parsed, &'static str> {
     if text.chars().any(|c| c.is_control() && c != '\t') {
         return Err("control characters");
     }
@@ -89,7 +89,7 @@ fn parse_text(text: &str) -> Result<Parsed, &'static str> {
         None => Err("blank"),
         Some(b'{') => json(text).map(|fields| Parsed::Named(Format::JsonLines, fields)),
         Some(_) if text.contains(':') => plotter(text).map(|fields| Parsed::Named(Format::Plotter, fields)),
-        Some(_) => csv(text),
+        Some(_) => csv(text, sensors),
     }
 }
 
@@ -166,7 +166,7 @@ fn plotter(text: &str) -> Result<Fields, &'static str> {
     }
 }
 
-fn csv(text: &str) -> Result<Parsed, &'static str> {
+fn csv(text: &str, sensors: SensorList) -> Result<Parsed, &'static str> {
     let separator = [';', ',', '\t'].into_iter().find(|separator| text.contains(*separator));
     let texts: Vec<&str> = match separator {
         Some(separator) => text.split(separator).collect(),
@@ -175,7 +175,7 @@ fn csv(text: &str) -> Result<Parsed, &'static str> {
     if texts.len() > MAX_FIELDS {
         return Err("too many fields");
     }
-    if let Some(names) = header(&texts, separator.is_some()) {
+    if let Some(names) = header(&texts, separator.is_some(), sensors) {
         return Ok(Parsed::Header(names));
     }
     // Between semicolons a comma may stand for a point.
@@ -187,10 +187,10 @@ fn csv(text: &str) -> Result<Parsed, &'static str> {
 
 /// Parses a header: two different names or more. A single word is more likely a remark, and so are words with mere blanks
 /// between them, unless one is the name of a sensor.
-fn header(texts: &[&str], separated: bool) -> Option<Vec<String>> {
+fn header(texts: &[&str], separated: bool, sensors: SensorList) -> Option<Vec<String>> {
     let names: Vec<String> = texts.iter().map(|text| text.trim().trim_matches('"').trim().to_owned()).collect();
     let different = names.iter().enumerate().all(|(i, name)| !names[..i].contains(name));
-    let meant = separated || names_a_sensor(&names);
+    let meant = separated || names_a_sensor(&names, sensors);
     let is_one = |name: &String| {
         // With a digit it would begin as numbers do.
         name.starts_with(|c: char| c.is_alphabetic() || c == '_')
@@ -202,8 +202,8 @@ fn header(texts: &[&str], separated: bool) -> Option<Vec<String>> {
 }
 
 /// True where one of the names is that of a gripper's sensor.
-pub(super) fn names_a_sensor(names: &[String]) -> bool {
-    names.iter().any(|name| Sensor::called(name).is_some())
+pub(super) fn names_a_sensor(names: &[String], sensors: SensorList) -> bool {
+    names.iter().any(|name| sensors.called(name).is_some())
 }
 
 /// Members that are not numbers have no value.
@@ -224,6 +224,10 @@ fn json(text: &str) -> Result<Fields, &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse(line: &[u8]) -> Result<Parsed, &'static str> {
+        super::parse(line, SensorList::default())
+    }
 
     fn named(line: &str) -> Vec<(String, Option<f64>)> {
         match parse(line.as_bytes()) {

@@ -17,7 +17,7 @@ use super::reader::{PortReader, discard_old, open_port};
 use super::replay::Replay;
 use super::shared::{LinkOptions, LinkState, Shared};
 use crate::protocol::{AdcRange, BoardEvent, ConsoleLine, Saturation};
-use palpate_tactile::board::{Board, Detected, Sensor};
+use palpate_tactile::board::{Board, Detected, Sensor, SensorKind};
 use palpate_tactile::cadence::Cadence;
 use serde::Serialize;
 use std::io::Write;
@@ -88,9 +88,8 @@ impl LinkStatus {
                 "counts exceed {full}: derived values are wrong. State the converter's bits in the handshake, as in adc=16"
             )),
         }
-        let is_on = |sensor: &Sensor, channel: usize| self.board.channel_of(*sensor) == Some(channel);
         for (channel, (name, saturation)) in self.board.channels.iter().zip(&self.saturation).enumerate() {
-            let sensor = Sensor::ALL.into_iter().find(|sensor| is_on(sensor, channel));
+            let sensor = self.board.sensor_of(channel).filter(|sensor| sensor.kind() != SensorKind::Raw);
             remarks.extend(match (saturation, sensor.is_some_and(Sensor::is_flex)) {
                 (Some(Saturation::High), true) => {
                     Some(format!("{name} is at full scale: the strip or one of its wires is disconnected"))
@@ -141,11 +140,11 @@ impl SerialLink {
     /// Opens a port or a file of captured bytes, and starts listening.
     pub fn open(options: &LinkOptions) -> Result<Self, PortError> {
         let port = match &options.path {
-            Some(path) if is_capture(path) => return Self::replay(path, options.replay_speed),
+            Some(path) if is_capture(path) => return Self::replay(path, options),
             Some(path) => describe(path),
             None => choose(&list_ports())?,
         };
-        let shared = Shared::new(port.clone(), WhenFull::Drop);
+        let shared = Shared::new(port.clone(), WhenFull::Drop, options.sensors);
         let baud = options.baud.unwrap_or(Baud::B115200);
         let opened = open_port(&port.path, baud)?;
         discard_old(opened.as_ref(), port.kind);
@@ -154,15 +153,15 @@ impl SerialLink {
         Self::start(&shared, move || reader.run(opened))
     }
 
-    fn replay(path: &Path, speed: f64) -> Result<Self, PortError> {
-        let replay = Replay::open(path, speed)?;
+    fn replay(path: &Path, options: &LinkOptions) -> Result<Self, PortError> {
+        let replay = Replay::open(path, options.replay_speed)?;
         let port = PortInfo {
             path: path.to_owned(),
             title: "captured bytes".to_owned(),
             usb: None,
             kind: BoardKind::default(),
         };
-        let shared = Shared::new(port, WhenFull::Wait);
+        let shared = Shared::new(port, WhenFull::Wait, options.sensors);
         let for_thread = Arc::clone(&shared);
         Self::start(&shared, move || replay.run(&for_thread))
     }

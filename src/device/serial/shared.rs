@@ -5,6 +5,7 @@ use super::ports::PortInfo;
 use super::queue::{ByteQueue, EventQueue, WhenFull, lock};
 use crate::protocol::BoardEvent;
 use crate::protocol::Decoder;
+use palpate_tactile::board::SensorList;
 use palpate_tactile::capture::Captured;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -21,13 +22,15 @@ pub struct LinkOptions {
     pub baud: Option<Baud>,
     /// Wait for a board that disconnects.
     pub reconnect: bool,
+    /// Sensors of the gripper.
+    pub sensors: SensorList,
     /// Speed of a replay, as a multiple of the original; infinite for as fast as possible.
     pub replay_speed: f64,
 }
 
 impl Default for LinkOptions {
     fn default() -> Self {
-        Self { path: None, baud: None, reconnect: true, replay_speed: 1.0 }
+        Self { path: None, baud: None, reconnect: true, sensors: SensorList::default(), replay_speed: 1.0 }
     }
 }
 
@@ -104,11 +107,11 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(port: PortInfo, when_full: WhenFull) -> Arc<Self> {
+    pub(super) fn new(port: PortInfo, when_full: WhenFull, sensors: SensorList) -> Arc<Self> {
         Arc::new(Self {
             bytes: ByteQueue::new(when_full),
             events: EventQueue::new(when_full),
-            decoder: Mutex::default(),
+            decoder: Mutex::new(Decoder::new(sensors)),
             state: Mutex::new(LinkState::Waiting),
             port: Mutex::new(port),
             writer: Mutex::new(None),

@@ -18,7 +18,7 @@ use palpate_sim::objects::catalogue;
 use palpate_store::labels::LabelledTrial;
 use palpate_store::{FileKind, NewFolder, Store, StoreError, write_whole};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{Channel, SignalDefinition, Signals, whole_fingers};
+use palpate_tactile::{Channel, Signals, unit_of_channel};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufWriter;
@@ -77,12 +77,13 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, Exchang
 fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Vec<(TrialId, String)>, ExchangeError> {
     let raw = folder.join("raw");
     std::fs::create_dir_all(&raw).map_err(|e| ExchangeError::cannot_write(&raw, &e))?;
-    let channels = whole_fingers(SignalDefinition::Parts);
+    let channels = store.calibrations().sensors()?.channels();
     let (list, signals) = (folder.join("trials.csv"), folder.join("signals.csv"));
     let mut list_out = create(&list)?;
     let mut signals_out = create(&signals)?;
     list_out.write_record(LIST_COLUMNS).map_err(|e| ExchangeError::cannot_write(&list, &e))?;
-    let with_units = channels.iter().map(|channel| format!("{} [{}]", channel.name(), channel.quantity.unit()));
+    let with_unit = |channel: &Channel| format!("{} [{}]", unit_of_channel(&channel.name()).0, channel.quantity.unit());
+    let with_units = channels.iter().map(with_unit);
     let header = ["trial", "label", "size", "shape", "t_s"].into_iter().map(str::to_owned).chain(with_units);
     signals_out.write_record(header).map_err(|e| ExchangeError::cannot_write(&signals, &e))?;
     let mut left_out = Vec::new();

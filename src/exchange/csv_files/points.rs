@@ -18,6 +18,7 @@ fn stimulus_columns(kind: SensorKind) -> &'static [(&'static str, f64)] {
     match kind {
         SensorKind::Flex => &[("angle_deg", 1.0)],
         SensorKind::Pad => &[("load_kg", 1.0), ("load_g", 1e-3)],
+        SensorKind::Raw => &[],
     }
 }
 

@@ -112,7 +112,10 @@ impl<W: Write> Bag<W> {
         let line = self.channel(MessageKind::FluidPressure, "/line_pressure", Pairs::new());
         let bends = |side: Side| {
             open.columns.iter().find(move |column| {
-                column.channel.as_ref().is_some_and(|own| own.quantity == Quantity::Curvature && own.side == side)
+                column
+                    .channel
+                    .as_ref()
+                    .is_some_and(|own| own.quantity == Quantity::Curvature && own.side() == Some(side))
             })
         };
         let strips: Vec<_> =

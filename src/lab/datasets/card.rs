@@ -62,7 +62,9 @@ pub(super) fn card(
         preset: only(&presets),
         object: format!("{object}{built}"),
         grasps: rows.len(),
-        layout: seen.then(|| view.layout.to_ascii_uppercase()),
+        layout: seen
+            .then(|| if view.gripper.is_some() { view.layout.clone() } else { view.layout.to_ascii_uppercase() }),
+        gripper: view.gripper.and_then(|sensors| serde_json::to_string(&sensors).ok()),
         sensors: seen.then(|| view.sensors.name().to_owned()),
         draws: (seen && view.readers() > 1).then(|| view.readers()),
         signals: seen.then(|| view.signals.name().to_owned()),

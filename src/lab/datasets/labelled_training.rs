@@ -142,7 +142,7 @@ impl LabelledTraining<'_> {
         }
         let objects = enough.iter().map(|class| class.name.clone()).collect();
         let source = DatasetQuery { source: Some(TrialSource::Recorded), objects, ..DatasetQuery::default() };
-        let data = source.read(store, &SensorView::default(), &mut |done, of| {
+        let data = source.read(store, &SensorView::default().of_store(store)?, &mut |done, of| {
             (self.progress)(TrainingStage::Reading(done, of));
         })?;
         let all = enough.iter().map(|class| class.trials).sum();

@@ -7,9 +7,10 @@ use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_store::labels::{ClassClash, compared};
 use palpate_store::{CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow};
+use palpate_tactile::board::SensorList;
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
-use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition, Signals};
+use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Sensors, SignalDefinition, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,8 +18,11 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SensorView {
-    /// Name of the sensor layout: `C1`.
+    /// Name of the sensor layout: `C1`, or `gripper` for the sensors of a gripper file.
     pub layout: String,
+    /// Those sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gripper: Option<SensorList>,
     /// Sensor model: ideal, like those of the real gripper, or like those of any.
     pub sensors: SensorModel,
     /// Number of times that drawn or noisy sensors, others each time, read each grasp for training; the others read it once.
@@ -34,7 +38,7 @@ pub struct SensorView {
 impl Default for SensorView {
     fn default() -> Self {
         let (sensors, signals) = (SensorModel::Virtual, SignalDefinition::Parts);
-        Self { layout: "C1".to_owned(), sensors, draws: 1, signals, rate_hz: None, cut: Cut::default() }
+        Self { layout: "C1".to_owned(), gripper: None, sensors, draws: 1, signals, rate_hz: None, cut: Cut::default() }
     }
 }
 
@@ -313,8 +317,11 @@ fn board_signals(
     }
     let read = store.board_signals(id, calibrations)?;
     let read = read.ok_or_else(|| none_calibrated(1, "its board sent no data"))?;
-    let layout = SensorLayout::named(&view.layout)?;
-    let channels = layout.channels(&GripperModel::default(), view.signals)?;
+    let layout = view.sensor_layout()?;
+    let channels = match layout.list {
+        Some(list) => list.channels().into_iter().filter(|channel| channel.quantity != Quantity::Force).collect(),
+        None => layout.channels(&GripperModel::default(), view.signals)?,
+    };
     let wanted: Vec<String> = channels.iter().map(Channel::name).collect();
     let cut = match view.cut {
         Cut::HoldEnd => read.grasp(&wanted),
@@ -336,8 +343,11 @@ impl SensorView {
     /// Sensors that a recogniser expects of simulated trials.
     pub fn of_model(card: &ModelCard) -> Self {
         let (data, usual) = (&card.data, Self::default());
+        let gripper: Option<SensorList> = data.gripper.as_deref().and_then(|text| serde_json::from_str(text).ok());
+        let of_file = || gripper.map(|_| SensorLayout::OF_FILE.to_owned());
         Self {
-            layout: data.layout.clone().unwrap_or(usual.layout),
+            layout: data.layout.clone().or_else(of_file).unwrap_or(usual.layout),
+            gripper,
             sensors: data.sensors.as_deref().and_then(SensorModel::named).unwrap_or_default(),
             draws: 1,
             signals: data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default(),
@@ -346,12 +356,33 @@ impl SensorView {
         }
     }
 
+    /// The same through the sensors of the gripper that a store remembers, where it is not the paper's.
+    pub fn of_store(self, store: &Store) -> Result<Self, StoreError> {
+        let sensors = store.calibrations().sensors()?;
+        let own = sensors != SensorList::default();
+        Ok(if own { self.of_gripper(sensors) } else { self })
+    }
+
+    /// The same through the sensors of a gripper file.
+    #[must_use]
+    pub fn of_gripper(self, sensors: SensorList) -> Self {
+        Self { layout: SensorLayout::OF_FILE.to_owned(), gripper: Some(sensors), ..self }
+    }
+
+    /// The layout.
+    pub fn sensor_layout(&self) -> Result<SensorLayout, LayoutError> {
+        if self.layout.eq_ignore_ascii_case(SensorLayout::OF_FILE) {
+            return Ok(SensorLayout::of_list(self.gripper.unwrap_or_default()));
+        }
+        SensorLayout::named(&self.layout)
+    }
+
     /// The same with another definition of the signals, and without what that definition does not have.
     #[must_use]
     pub fn with_signals(mut self, signals: SignalDefinition) -> Self {
         match signals {
             SignalDefinition::Parts => {
-                let plain = SensorLayout::named(&self.layout).map(|layout| layout.name.to_owned());
+                let plain = self.sensor_layout().map(|layout| layout.name.to_owned());
                 self.layout = plain.unwrap_or(self.layout);
             }
             SignalDefinition::Contact | SignalDefinition::Hull => self.sensors = SensorModel::Virtual,
@@ -375,7 +406,8 @@ impl SensorView {
     /// The layout, as recognisers learn it.
     pub fn learnt(&self) -> Result<SensorLayout, LayoutError> {
         self.check_parts()?;
-        SensorLayout::learnt(&self.layout, self.signals)
+        let layout = self.sensor_layout()?;
+        if layout.list.is_some() { Ok(layout) } else { SensorLayout::learnt(&self.layout, self.signals) }
     }
 
     /// The layout, as it is shown and exported.
@@ -404,8 +436,8 @@ impl SensorView {
     /// Signals of perfect sensors, and the end of the hold (s).
     fn clean(&self, trial: &SimulatedTrial) -> Result<(Signals, f64), LayoutError> {
         self.check_parts()?;
-        let layout = SensorLayout::named(&self.layout)?;
-        let sensors = Sensors::new(&layout, &trial.header.scene.gripper, self.signals)?;
+        let sensors = Sensors::new(&self.sensor_layout()?, &trial.header.scene.gripper, self.signals)?
+            .with_palm(trial.data.world_from_gripper.position);
         let clean = sensors.signals(trial.frames());
         let end = trial.frames().iter().rev().find(|f| f.phase != Phase::Release).map_or(f64::INFINITY, |f| f.t);
         Ok((clean, end))

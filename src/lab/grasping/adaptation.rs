@@ -2,7 +2,7 @@
 //! for any gripper were trained on readings that are calibrated in this way.
 
 use super::run::grasp;
-use palpate_sim::gripper::{Phase, Side};
+use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::TrialEdit;
@@ -50,8 +50,8 @@ impl AdaptedSensor {
 /// Calibrations of a gripper from a close of its empty hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adaptation {
-    /// Each sensor, in the order of [`Sensor::ALL`].
-    pub sensors: [AdaptedSensor; 4],
+    /// Each strip and pad, in the order of the gripper's sensors.
+    pub sensors: Vec<(Sensor, AdaptedSensor)>,
     /// Line pressure at the end of the closing (bar).
     pub bar: f64,
     /// Curvature of the modelled finger at that pressure (1/m), which was assumed.
@@ -101,7 +101,7 @@ impl Adaptation {
         store: &Store,
         id: TrialId,
         scene: &Scene,
-        weights: [Option<KnownWeight>; 2],
+        weights: &[(Sensor, KnownWeight)],
         replace: bool,
     ) -> Result<Self, AdaptError> {
         let Some(log) = store.board_log(id)? else {
@@ -116,10 +116,12 @@ impl Adaptation {
                 "trial {id} is of \"{object}\": adapt needs a close of the empty hand, which touches nothing"
             )));
         }
-        if let Some((side, how)) = held(&log, scene) {
-            return Err(AdaptError::Held { id, finger: side.name(), how, deleted: false });
+        if let Some((finger, how)) = held(&log, scene) {
+            return Err(AdaptError::Held { id, finger, how, deleted: false });
         }
-        let parts = store.calibrations().mounted()?;
+        let mounted = store.calibrations().mounted()?;
+        let names = store.calibrations().sensors()?.iter().zip(mounted);
+        let parts: Vec<(Sensor, String)> = names.filter_map(|(sensor, part)| Some((sensor, part?))).collect();
         let serving = store.calibrations().serving(None, &[])?;
         let measured = serving.calibrations.into_iter().filter(|(_, own)| !own.record.assumed && !replace);
         Ok(Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights))
@@ -127,7 +129,7 @@ impl Adaptation {
 
     /// Adapts by readings that are not stored, of parts without names.
     pub fn of_log(log: &BoardLog, scene: &Scene) -> Self {
-        Self::new(log, scene, &[const { None }; 4], &[], [None; 2])
+        Self::new(log, scene, &[], &[], &[])
     }
 
     /// Adapts by a trial that was recorded for this purpose. Deletes the trial if something was in the hand.
@@ -135,7 +137,7 @@ impl Adaptation {
         store: &mut Store,
         id: TrialId,
         scene: &Scene,
-        weights: [Option<KnownWeight>; 2],
+        weights: &[(Sensor, KnownWeight)],
         replace: bool,
     ) -> Result<Self, AdaptError> {
         match Self::from_trial(store, id, scene, weights, replace) {
@@ -150,45 +152,56 @@ impl Adaptation {
     fn new(
         log: &BoardLog,
         scene: &Scene,
-        parts: &[Option<String>; 4],
+        parts: &[(Sensor, String)],
         measured: &[(Sensor, Calibration)],
-        weights: [Option<KnownWeight>; 2],
+        weights: &[(Sensor, KnownWeight)],
     ) -> Self {
         let scene = as_driven(log, scene);
         let modelled = most(&modelled_close(&scene));
         let hand = closed_hand(log, modelled);
-        let name = |sensor: Sensor| parts[sensor as usize].clone().unwrap_or_else(|| unnamed(sensor));
+        let name = |sensor: Sensor| {
+            parts.iter().find(|(own, _)| *own == sensor).map_or_else(|| unnamed(sensor), |(_, part)| part.clone())
+        };
         let kept = |sensor: Sensor| measured.iter().find(|(own, _)| *own == sensor).map(|(_, own)| own.clone());
         let adapted = |outcome: Result<Calibration, CalibrationFault>| {
             outcome.map_or_else(AdaptedSensor::Failed, AdaptedSensor::Adapted)
         };
-        let strips = Side::BOTH.map(|side| {
-            let sensor = SensorKind::Flex.on(side);
-            kept(sensor).map_or_else(|| adapted(hand.strip(side, &name(sensor))), AdaptedSensor::Kept)
-        });
-        let pads = Side::BOTH.map(|side| {
-            let (sensor, weight) = (SensorKind::Pad.on(side), weights[side.index()]);
-            let strip = strips[side.index()].calibration();
+        let list = log.course.board.sensors;
+        let strips: Vec<(Sensor, AdaptedSensor)> = list
+            .of_kind(SensorKind::Flex)
+            .map(|sensor| {
+                let strip = || adapted(hand.strip(sensor, &name(sensor)));
+                (sensor, kept(sensor).map_or_else(strip, AdaptedSensor::Kept))
+            })
+            .collect();
+        let pad = |sensor: Sensor| {
+            let weight = weights.iter().find(|(own, _)| *own == sensor).map(|(_, weight)| *weight);
+            let under = sensor.strip();
+            let strip = under.and_then(|under| strips.iter().find(|(own, _)| *own == under)?.1.calibration());
             let pad = || match strip {
-                Some(strip) => adapted(hand.pad(side, &name(sensor), strip, weight)),
-                None => AdaptedSensor::Failed(CalibrationFault::no_strip(SensorKind::Flex.on(side).label())),
+                Some(strip) => adapted(hand.pad(sensor, &name(sensor), strip, weight)),
+                None => {
+                    let missing = under.map_or_else(|| format!("{} flex strip", sensor.finger()), Sensor::label);
+                    AdaptedSensor::Failed(CalibrationFault::no_strip(&missing))
+                }
             };
-            kept(sensor).filter(|_| weight.is_none()).map_or_else(pad, AdaptedSensor::Kept)
-        });
-        let warnings =
-            strips.iter().zip(Side::BOTH).filter_map(|(strip, side)| disagrees(strip, side, &hand)).collect();
-        let ([left, right], [left_pad, right_pad]) = (strips, pads);
-        Self { sensors: [left, right, left_pad, right_pad], bar: scene.programme.peak_bar, modelled, warnings }
+            (sensor, kept(sensor).filter(|_| weight.is_none()).map_or_else(pad, AdaptedSensor::Kept))
+        };
+        let pads: Vec<(Sensor, AdaptedSensor)> = list.of_kind(SensorKind::Pad).map(pad).collect();
+        let warnings = strips.iter().filter_map(|(sensor, strip)| disagrees(strip, *sensor, &hand)).collect();
+        let mut sensors = [strips, pads].concat();
+        sensors.sort_by_key(|(sensor, _)| sensor.index());
+        Self { sensors, bar: scene.programme.peak_bar, modelled, warnings }
     }
 
     /// Stores the new calibrations as the newest of their parts, and mounts the parts.
     pub fn keep(&self, store: &Store) -> Result<(), StoreError> {
         let mounted = store.calibrations().mounted()?;
-        for (sensor, adapted) in Sensor::ALL.into_iter().zip(&self.sensors) {
+        for (sensor, adapted) in &self.sensors {
             let AdaptedSensor::Adapted(calibration) = adapted else { continue };
             let stored = store.calibrations().add(&calibration.record)?;
-            if mounted[sensor as usize].as_ref() != Some(&stored.record.part) {
-                store.calibrations().mount(sensor, &stored.record.part)?;
+            if mounted.get(sensor.index()).and_then(Option::as_ref) != Some(&stored.record.part) {
+                store.calibrations().mount(*sensor, &stored.record.part)?;
             }
         }
         Ok(())
@@ -196,7 +209,7 @@ impl Adaptation {
 
     /// True where every sensor has a calibration.
     pub fn is_complete(&self) -> bool {
-        self.sensors.iter().all(|sensor| sensor.calibration().is_some())
+        self.sensors.iter().all(|(_, sensor)| sensor.calibration().is_some())
     }
 }
 
@@ -236,27 +249,27 @@ fn most(course: &[(f64, f64)]) -> f64 {
 /// the empty hand until it touches, and then hardly: it reaches its final bend early, or late if the object slips out.
 /// Only the strips are used: pads also respond when fingers only bend or press on each other. A close by hand follows
 /// no programme and is not checked.
-fn held(log: &BoardLog, scene: &Scene) -> Option<(Side, &'static str)> {
+fn held(log: &BoardLog, scene: &Scene) -> Option<(&'static str, &'static str)> {
     log.course.phases.first()?.line_bar?;
     let scene = as_driven(log, scene);
     let model = modelled_close(&scene);
     let most = most(&model);
     let closed_s = f64::from(scene.programme.close_ticks()) / f64::from(scene.timing.actuation_hz.max(1));
-    let judged = |side: Side| {
-        let course = closed_hand(log, most).course(side);
+    let judged = |strip: Sensor| {
+        let course = closed_hand(log, most).course(strip);
         let closing = course.iter().filter(|(t_s, _)| *t_s < closed_s);
         let mut ahead: Vec<f64> = closing.map(|(t_s, share)| share - at(&model, *t_s) / most).collect();
         ahead.sort_by(f64::total_cmp);
         let (late, early) = (ahead.get(DISTURBED)?, ahead.get(ahead.len().checked_sub(DISTURBED + 1)?)?);
         if *early > MOST_EARLY {
-            Some((side, "stops bending early"))
+            Some((strip.finger(), "stops bending early"))
         } else if -*late > MOST_LATE {
-            Some((side, "is held up and bends late"))
+            Some((strip.finger(), "is held up and bends late"))
         } else {
             None
         }
     };
-    Side::BOTH.into_iter().find_map(judged)
+    log.course.board.sensors.of_kind(SensorKind::Flex).find_map(judged)
 }
 
 /// Value of a curve over time at a time (s).
@@ -270,11 +283,11 @@ fn at(course: &[(f64, f64)], t_s: f64) -> f64 {
 }
 
 /// Doubt about a strip that was calibrated by hand.
-fn disagrees(strip: &AdaptedSensor, side: Side, hand: &EmptyHand<'_>) -> Option<String> {
+fn disagrees(strip: &AdaptedSensor, sensor: Sensor, hand: &EmptyHand<'_>) -> Option<String> {
     let AdaptedSensor::Kept(calibration) = strip else { return None };
-    let sensor = SensorKind::Flex.on(side);
     let readout = Readout::new(hand.board, &[(sensor, calibration.clone())]).ok()?;
-    let read = hand.readings.iter().filter_map(|reading| readout.estimate(reading).curvature[side.index()]);
+    let curvature = readout.channels().into_iter().find(|channel| sensor.gives(channel))?;
+    let read = hand.readings.iter().filter_map(|reading| readout.estimate(reading).of(&curvature));
     let most = read.fold(0.0, f64::max);
     ((most / hand.modelled - 1.0).abs() > AGREES).then(|| {
         format!(
@@ -292,6 +305,7 @@ mod tests {
     use crate::grasping::{GraspController, GraspPlan};
     use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts};
     use palpate_device::protocol::{BoardEvent, Decoder};
+    use palpate_tactile::board::SensorList;
     use palpate_tactile::trial::{BoardCourse, Control};
 
     #[test]
@@ -308,6 +322,7 @@ mod tests {
         let mut scene = Scene::default();
         scene.pose.build = build;
         let hand = HandPlan {
+            sensors: SensorList::default(),
             scene: scene.clone(),
             objects: vec![object.to_owned()],
             seed,
@@ -318,7 +333,7 @@ mod tests {
             hand,
             parts: HiddenParts::drawn(seed),
             rate_hz: 50,
-            channels: Sensor::ALL.len(),
+            channels: 4,
             most_steps: 30,
             clock_start_us: 0,
             faults: Vec::new(),

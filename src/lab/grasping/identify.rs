@@ -3,13 +3,14 @@
 
 use super::felt_geometry::FeltGeometry;
 use super::row::Row;
+use crate::datasets::SensorView;
 use palpate_learn::{
     Belief, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped, Signatures, StopReason,
     StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
-use palpate_tactile::{Channel, LayoutError, SensorLayout, SignalDefinition};
+use palpate_tactile::{Channel, LayoutError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -244,10 +245,8 @@ impl Identification {
 
     /// Channels on this gripper, among them those that the model reads.
     pub fn channels_on(&self, gripper: &GripperModel) -> Result<Vec<Channel>, IdentifyError> {
-        let data = &self.model.card.data;
-        let signals = data.signals.as_deref().and_then(SignalDefinition::named).unwrap_or_default();
-        let layout = SensorLayout::named(data.layout.as_deref().unwrap_or("C1"))?;
-        Ok(layout.shown(signals).channels(gripper, signals)?)
+        let view = SensorView::of_model(&self.model.card);
+        Ok(view.sensor_layout()?.shown(view.signals).channels(gripper, view.signals)?)
     }
 
     /// Begins another grasp of the same object, on a gripper whose rows have these channels in these columns; rows follow

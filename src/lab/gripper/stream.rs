@@ -2,6 +2,7 @@
 
 use palpate_device::protocol::{BoardEvent, ConsoleLine};
 use palpate_device::serial::{LinkOptions, LinkStatus, PortTrouble, SendError, SerialLink};
+use palpate_tactile::board::SensorList;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -71,12 +72,12 @@ impl From<String> for NotOpened {
     }
 }
 
-/// Opens a stream: a port, a file of captured bytes, or the only likely port.
-pub type Listen = Arc<dyn Fn(Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> + Send + Sync>;
+/// Opens a stream of a gripper with these sensors: a port, a file of captured bytes, or the only likely port.
+pub type Listen = Arc<dyn Fn(Option<&Path>, SensorList) -> Result<Box<dyn BoardStream>, NotOpened> + Send + Sync>;
 
-/// Opens a serial port.
-pub fn listen_to_port(port: Option<&Path>) -> Result<Box<dyn BoardStream>, NotOpened> {
-    let options = LinkOptions { path: port.map(Path::to_owned), ..LinkOptions::default() };
+/// Opens a serial port of a gripper with these sensors.
+pub fn listen_to_port(port: Option<&Path>, sensors: SensorList) -> Result<Box<dyn BoardStream>, NotOpened> {
+    let options = LinkOptions { path: port.map(Path::to_owned), sensors, ..LinkOptions::default() };
     let link = SerialLink::open(&options).map_err(|error| NotOpened {
         text: error.to_string(),
         may_pass: error.trouble == PortTrouble::Busy,

@@ -11,13 +11,11 @@ use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::Store;
-use palpate_tactile::board::{Board, Gap, Sensor};
+use palpate_tactile::board::{Board, Gap, SensorKind};
 use palpate_tactile::trial::{
     CorrectedPhases, GraspOrigin, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource,
 };
-use palpate_tactile::{
-    Channel, LayoutError, Quantity, Sensors, SignalDefinition, Signals, unit_of_channel, whole_fingers,
-};
+use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, Signals, unit_of_channel};
 use std::sync::Arc;
 
 /// How a trial is opened.
@@ -295,8 +293,8 @@ impl OpenTrial {
         while let Some(row) = replay.next_row().map_err(|cause| OpenTrialError::Replay { id, cause })? {
             while self.columns.len() < replay.channels().len() {
                 let name = &replay.channels()[self.columns.len()];
-                let channel =
-                    whole_fingers(SignalDefinition::Parts).into_iter().find(|channel| channel.name() == *name);
+                let sensors = self.board.as_ref().map(|board| board.sensors).unwrap_or_default();
+                let channel = sensors.channels().into_iter().find(|channel| channel.name() == *name);
                 let (own, unit) = unit_of_channel(name);
                 let unit = if self.source == TrialSource::Recorded && unit.is_empty() { "counts" } else { unit };
                 let values = vec![f32::NAN; self.t_s.len()];
@@ -382,13 +380,21 @@ impl OpenTrial {
             loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min)
         };
         // The pads as calibrated, or else as the board counted them, or another program named them.
-        let pads = [Sensor::PadLeft, Sensor::PadRight].map(|pad| {
-            let board = self.board.as_ref()?;
-            board.channels.get(board.channel_of(pad)?)
-        });
-        let contact = onsets(&|column| column.channel.as_ref().is_some_and(|own| own.quantity != Quantity::Curvature))
-            .or_else(|| onsets(&|column| pads.contains(&Some(&column.name))))
-            .or_else(|| onsets(&|column| column.name.contains("pressure") || column.name.contains("force")));
+        let pads: Vec<&String> = self
+            .board
+            .iter()
+            .flat_map(|board| {
+                let pads = board.sensors.of_kind(SensorKind::Pad);
+                pads.filter_map(|pad| board.channels.get(board.channel_of(pad)?))
+            })
+            .collect();
+        let contact = onsets(&|column| {
+            column.channel.as_ref().is_some_and(|own| {
+                matches!(own.quantity, Quantity::Pressure | Quantity::ContactPressure | Quantity::Force)
+            })
+        })
+        .or_else(|| onsets(&|column| pads.contains(&&column.name)))
+        .or_else(|| onsets(&|column| column.name.contains("pressure") || column.name.contains("force")));
         let corrected = self.header.phases.unwrap_or_default();
         let times = PhaseTimes {
             closing: corrected.closing.or(Some(begin)),
@@ -407,7 +413,7 @@ impl OpenTrial {
         }
         let gripper = GripperModel::default();
         let columns = Side::BOTH.map(|side| {
-            let bends = |channel: &Channel| channel.quantity == Quantity::Curvature && channel.side == side;
+            let bends = |channel: &Channel| channel.quantity == Quantity::Curvature && channel.side() == Some(side);
             self.columns.iter().find(|column| column.channel.as_ref().is_some_and(bends))
         });
         let read = |k: usize| columns.map(|column| column.map(|c| f64::from(c.values[k])).filter(|v| v.is_finite()));

@@ -10,7 +10,7 @@
 
 use palpate_sim::gripper::Phase;
 use palpate_store::labels::{Flag, FlagRemark};
-use palpate_tactile::board::{Board, Gap, Reading, Sensor};
+use palpate_tactile::board::{Board, Gap, Reading, Sensor, SensorKind};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::calibration::{Calibration, Input, RangeEnd, Readout};
 use palpate_tactile::electronics::PadPart;
@@ -93,8 +93,8 @@ impl Observed<'_> {
         if pressed.is_empty() {
             return (!self.readings.is_empty()).then(|| "ended before the fingers closed".to_owned());
         }
-        let pads = [Sensor::PadLeft, Sensor::PadRight];
-        let rises: Vec<PadRise> = pads.into_iter().filter_map(|pad| self.rise(pad, rest, pressed)).collect();
+        let pads = self.board.sensors.of_kind(SensorKind::Pad);
+        let rises: Vec<PadRise> = pads.filter_map(|pad| self.rise(pad, rest, pressed)).collect();
         if rises.is_empty() || rises.iter().any(|pad| pad.rise > pad.least) {
             return None;
         }
@@ -108,8 +108,7 @@ impl Observed<'_> {
         if let Some((_, calibration)) = self.calibrations.iter().find(|(sensor, _)| *sensor == pad) {
             let readout = Readout::new(self.board, self.calibrations).ok()?;
             let readout = readout.clone().with_zero(readout.zero_from(rest));
-            let side = usize::from(pad == Sensor::PadRight);
-            let rise = lasting_peak(pressed.iter().map(|reading| readout.estimate(reading).force[side]));
+            let rise = lasting_peak(pressed.iter().map(|reading| readout.estimate(reading).value(pad)));
             let least = if calibration.record.bending.is_some() { PadPart::LEAST_FORCE } else { BENT_FORCE };
             return Some(PadRise { pad, rise: rise?, least, unit: "N" });
         }
@@ -140,7 +139,8 @@ impl Observed<'_> {
             let percent = 100.0 * count as f64 / all.max(1) as f64;
             worth_it.then(|| format!("{} saturated for {percent:.0} % of the grasp", sensor.label()))
         };
-        joined(Sensor::ALL.into_iter().filter_map(remark))
+        let parts = self.board.sensors.iter().filter(|sensor| sensor.kind() != SensorKind::Raw);
+        joined(parts.filter_map(remark))
     }
 
     fn interrupted(&self) -> Option<String> {
@@ -155,7 +155,7 @@ impl Observed<'_> {
         // If readings follow, a broken connection is also the cause of a gap: it is listed only once.
         let has_no_gap = |cause: &&String| !self.gaps.iter().any(|gap| gap.cause.contains(cause.as_str()));
         let broken = self.interruptions.iter().filter(has_no_gap).cloned();
-        joined(gaps.chain(broken).chain(Sensor::ALL.into_iter().filter_map(|sensor| self.without_numbers(sensor))))
+        joined(gaps.chain(broken).chain(self.board.sensors.iter().filter_map(|sensor| self.without_numbers(sensor))))
     }
 
     /// Remark for a sensor without a value in most readings: probably an open circuit.

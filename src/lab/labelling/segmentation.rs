@@ -10,7 +10,7 @@
 
 use super::flags::middle_and_deviation;
 use palpate_sim::gripper::Phase;
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, Reading, SensorKind};
 use palpate_tactile::trial::PhaseMark;
 use std::collections::VecDeque;
 
@@ -137,7 +137,12 @@ impl Segmenter {
 
     /// Changes the channels and the full scale to those of `board`.
     pub fn set_board(&mut self, board: &Board) {
-        self.columns = [Sensor::FlexLeft, Sensor::FlexRight].map(|sensor| board.channel_of(sensor));
+        // Strips move first; of a gripper without any, what else there is shows a grasp.
+        let kinds = [SensorKind::Flex, SensorKind::Pad, SensorKind::Raw];
+        let kind = kinds.into_iter().find(|kind| board.sensors.of_kind(*kind).next().is_some());
+        let sensors = kind.into_iter().flat_map(|kind| board.sensors.of_kind(kind));
+        let columns: Vec<usize> = sensors.filter_map(|sensor| board.channel_of(sensor)).take(2).collect();
+        self.columns = [columns.first().copied(), columns.get(1).copied()];
         self.full_scale = f64::from(board.full_scale);
     }
 

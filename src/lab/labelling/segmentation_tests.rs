@@ -167,7 +167,14 @@ fn emulated(script: &str, faults: &str, seconds: f64) -> (Board, Vec<Reading>) {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let script = parse_script(script).expect("sound");
-    let hand = HandPlan { scene, objects: vec![EMPTY.to_owned()], seed: 5, grasp_every_s: None, script };
+    let hand = HandPlan {
+        sensors: palpate_tactile::board::SensorList::default(),
+        scene,
+        objects: vec![EMPTY.to_owned()],
+        seed: 5,
+        grasp_every_s: None,
+        script,
+    };
     let (parts, faults) = (HiddenParts::drawn(5), parse_faults(faults).expect("sound"));
     let (rate_hz, channels, most_steps, clock_start_us) = (50, 4, 30, 0);
     let setup = EmulatorSetup { hand, parts, rate_hz, channels, most_steps, clock_start_us, faults, seed: 5 };

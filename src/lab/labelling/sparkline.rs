@@ -4,7 +4,7 @@ use palpate_sim::gripper::Side;
 use palpate_store::labels::{SPARKLINE_BINS, Sparkline};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::Signals;
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, Reading, SensorKind};
 use palpate_tactile::trial::{Trial, TrialData, TrialId};
 
 /// Readings that flags and pictures are made from, at most.
@@ -22,11 +22,8 @@ pub fn decimated(readings: &[Reading]) -> Vec<Reading> {
 /// Sparkline of a trial: the mean count of each finger in each bin of its time.
 pub fn sparkline(board: &Board, readings: &[Reading]) -> Sparkline {
     Side::BOTH.map(|side| {
-        let sensors = match side {
-            Side::Left => [Sensor::PadLeft, Sensor::FlexLeft],
-            Side::Right => [Sensor::PadRight, Sensor::FlexRight],
-        };
-        match sensors.into_iter().find_map(|sensor| board.channel_of(sensor)) {
+        let on = |kind| board.sensors.on(kind, side.name());
+        match on(SensorKind::Pad).chain(on(SensorKind::Flex)).find_map(|sensor| board.channel_of(sensor)) {
             Some(column) => bins(readings, column),
             None => Vec::new(),
         }

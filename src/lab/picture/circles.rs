@@ -38,16 +38,17 @@ pub(super) fn add(
     let values = sensors.read(frame);
     let strips = sensors.channels().iter().zip(values).filter(|(channel, _)| channel.quantity == Quantity::Curvature);
     for (channel, value) in strips {
+        let Some(side) = channel.side() else { continue };
         let Some(curvature) = value.filter(|kappa| kappa.is_finite() && kappa.abs() >= STRAIGHT) else { continue };
         let stretch = sensors.stretch(channel);
         let trace = if stretch[0] < 0.45 * gripper.finger.length { Trace::Curvature } else { Trace::CurvatureDistal };
         let colour = trace.colour(view.theme);
-        let points: Vec<Option<Vec2>> = arc(gripper, frame, channel.side, stretch, curvature)
+        let points: Vec<Option<Vec2>> = arc(gripper, frame, side, stretch, curvature)
             .into_iter()
             .map(|point| view.camera.project(world_from_gripper.point(point).as_vec3(), view.size))
             .collect();
         for (k, pair) in points.windows(2).enumerate() {
-            let dashed = channel.side == Side::Right && k % 3 == 2;
+            let dashed = side == Side::Right && k % 3 == 2;
             if let ([Some(a), Some(b)], false) = (pair, dashed) {
                 annotator.overlay.line(*a, *b, WIDTH, colour);
             }

@@ -10,7 +10,7 @@ pub(super) fn on_finger(layout: &SensorLayout, gripper: &GripperModel, theme: Th
     let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return FingerSensors::default() };
     let of = |quantity: Quantity| {
         let channels = sensors.channels().iter();
-        channels.filter(move |channel| channel.side == Side::Left && channel.quantity == quantity)
+        channels.filter(move |channel| channel.side() == Some(Side::Left) && channel.quantity == quantity)
     };
     let colours = [Trace::Curvature, Trace::CurvatureDistal].map(|trace| trace.colour(theme));
     let strip = |(k, channel)| SensorStrip {

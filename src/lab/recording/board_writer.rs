@@ -6,7 +6,7 @@ use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::LinkStatus;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardChunk, BoardInfo, Serving, Store, StoreError, check_space};
-use palpate_tactile::board::{Gap, Sensor};
+use palpate_tactile::board::Gap;
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
 use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};
@@ -228,10 +228,10 @@ impl BoardWriter {
             warnings.push(format!("readings are missing in {} gap(s), how many is not known", gaps - restarts));
         }
         warnings.extend(status.wiring_remarks());
-        let assumed = Sensor::ALL.iter().any(|sensor| self.about.course.board.channel_of(*sensor).is_none());
-        if assumed && cadence.samples > 0 {
-            let names = self.about.course.board.channels.join(", ");
-            warnings.push(format!("the board has not all of flexL, flexR, fsrL, fsrR, but {names}"));
+        let board = &self.about.course.board;
+        if cadence.samples > 0 && board.sensors.iter().any(|sensor| board.channel_of(sensor).is_none()) {
+            let (wanted, names) = (board.sensors.names(), board.channels.join(", "));
+            warnings.push(format!("the board has not all of {wanted}, but {names}"));
         }
         warnings
     }

@@ -9,10 +9,10 @@ use palpate_learn::{Model, StopRule};
 use palpate_sim::gripper::Phase;
 use palpate_sim::scene::Scene;
 use palpate_store::{Serving, Store, StoreError};
-use palpate_tactile::board::{Board, Reading};
+use palpate_tactile::board::{Board, Reading, SensorList};
 use palpate_tactile::calibration::Readout;
 use palpate_tactile::trial::{Control, PhaseMark, Trial, TrialData, TrialId};
-use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors, SignalDefinition, whole_fingers};
+use palpate_tactile::{Channel, LayoutError, SensorLayout, Sensors};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,6 +63,8 @@ enum RowReader {
 struct BoardReader {
     serving: Serving,
     readout: Readout,
+    /// Channels that the sensors of the board give.
+    channels: Vec<Channel>,
     recent: RecentEvents,
     /// Commanded line pressure (bar).
     line_bar: Option<f64>,
@@ -96,12 +98,13 @@ impl Replay {
                 let names = signals.channels.clone();
                 Self::of_rows(ReplayedGripper::new(trial), plan, RowReader::Signals, names, identification(model))
             }
-            TrialData::Simulated(_) => {
+            TrialData::Simulated(data) => {
+                let palm = data.world_from_gripper.position;
                 let (gripper, identification) = (&trial.header.scene.gripper, identification(model));
                 let more = identification.as_ref().and_then(|own| own.channels_on(gripper).ok()).unwrap_or_default();
                 // All channels use the model's definition of the signals, so that a name means one channel.
                 let signals = more.first().map(|channel| channel.signals).unwrap_or_default();
-                let mut reader = Sensors::new(&SensorLayout::named("C1+F")?, gripper, signals)?;
+                let mut reader = Sensors::new(&SensorLayout::named("C1+F")?, gripper, signals)?.with_palm(palm);
                 reader.add(&more);
                 let names = reader.channels().iter().map(Channel::name).collect();
                 Self::of_rows(
@@ -133,12 +136,14 @@ impl Replay {
     ) -> Self {
         let segmenter = marks.is_empty().then(|| Segmenter::new(&Board::default()));
         let (readout, recent) = (Readout::default(), RecentEvents::default());
-        let reader = BoardReader { serving, readout, recent, line_bar: None, marks, segmenter };
+        let channels = SensorList::default().channels();
+        let names = channels.iter().map(Channel::name).collect();
+        let reader = BoardReader { serving, readout, channels, recent, line_bar: None, marks, segmenter };
         Self {
             controller: untimed(gripper.now_s()),
             gripper,
             reader: RowReader::Board(Box::new(reader)),
-            channels: whole_fingers(SignalDefinition::Parts).iter().map(Channel::name).collect(),
+            channels: names,
             identification: identification(model),
             off: None,
         }
@@ -226,7 +231,7 @@ impl Replay {
         match event {
             BoardEvent::Board(board) => {
                 reader.set_board(board);
-                self.channels.truncate(whole_fingers(SignalDefinition::Parts).len());
+                self.channels = board.sensors.channels().iter().map(Channel::name).collect();
                 self.channels.extend(board.channels.iter().cloned());
                 None
             }
@@ -270,6 +275,7 @@ impl BoardReader {
     fn set_board(&mut self, board: &Board) {
         // Calibrations that do not fit this board give no values; its counts still do.
         self.readout = Readout::new(board, &self.serving.calibrations).unwrap_or_default();
+        self.channels = board.sensors.channels();
         if let Some(segmenter) = &mut self.segmenter {
             segmenter.set_board(board);
         }
@@ -290,8 +296,7 @@ impl BoardReader {
     }
 
     fn row(&self, reading: &Reading) -> Row {
-        let channels = whole_fingers(SignalDefinition::Parts);
-        Row::of_reading(reading, self.line_bar, &self.readout.estimate(reading), &channels, reading.counts.len())
+        Row::of_reading(reading, self.line_bar, &self.readout.estimate(reading), &self.channels, reading.counts.len())
     }
 }
 

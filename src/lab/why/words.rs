@@ -3,7 +3,7 @@
 use super::occlusion::{Attribution, Evidence};
 use crate::inspection::{PhaseSpan, TouchPhase};
 use palpate_sim::objects::object_title;
-use palpate_tactile::Quantity;
+use palpate_tactile::{Quantity, unit_of_channel};
 
 /// How evidence is measured, in one sentence.
 pub const MEASURED_HOW: &str = "Each part is replaced by its mean over all classes, and the model answers again; points \
@@ -105,12 +105,13 @@ fn phase_words(span: &PhaseSpan) -> &'static str {
 
 /// A channel in words: `left pad pressure, distal` for `pressure_left_distal`.
 pub fn channel_words(name: &str) -> String {
-    let Some((quantity, place)) = Quantity::of_name(name) else { return name.replace('_', " ") };
+    let Some((quantity, place)) = Quantity::of_name(name) else { return unit_of_channel(name).0.replace('_', " ") };
     let quantity = match quantity {
         Quantity::Curvature => "curvature",
         Quantity::Pressure => "pad pressure",
         Quantity::ContactPressure => "contact pressure",
         Quantity::Force => "pad force",
+        Quantity::Raw { .. } => "reading",
     };
     match place.split_once('_') {
         None => format!("{place} {quantity}"),

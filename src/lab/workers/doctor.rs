@@ -4,6 +4,7 @@ use super::job::{Job, Newer};
 use super::messages::Wake;
 use palpate_device::doctor::{CheckFinding, Observations, examine, findings};
 use palpate_device::serial::LinkOptions;
+use palpate_tactile::board::SensorList;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,6 +16,8 @@ pub struct ExamineRequest {
     pub port: Option<PathBuf>,
     /// How long to listen (s).
     pub seconds: f64,
+    /// Sensors of the gripper.
+    pub sensors: SensorList,
 }
 
 /// Function that examines a port: [`examine_port`], or one that uses an open link. It calls the given function repeatedly
@@ -23,7 +26,7 @@ pub type Examine = Arc<dyn Fn(&ExamineRequest, &mut dyn FnMut(f64) -> bool) -> O
 
 /// Examines a port by opening it.
 pub fn examine_port(request: &ExamineRequest, goes_on: &mut dyn FnMut(f64) -> bool) -> Observations {
-    let options = LinkOptions { path: request.port.clone(), ..LinkOptions::default() };
+    let options = LinkOptions { path: request.port.clone(), sensors: request.sensors, ..LinkOptions::default() };
     let seconds = request.seconds.clamp(0.0, 600.0);
     examine(&options, Duration::from_secs_f64(seconds), goes_on)
 }
@@ -65,7 +68,7 @@ mod tests {
     use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 
     fn request(port: PathBuf, seconds: f64) -> ExamineRequest {
-        ExamineRequest { port: Some(port), seconds }
+        ExamineRequest { port: Some(port), seconds, sensors: SensorList::default() }
     }
 
     #[test]

@@ -4,12 +4,12 @@
 use super::job::{Job, JobError, JobRun, Newer};
 use super::messages::Wake;
 use crate::datasets::{
-    JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, SavedModel, TrainingError, TrainingStage,
+    JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, SavedModel, SensorView, TrainingError, TrainingStage,
     labelled_classes, make_models_folder, new_model_path, save_model, saved_models,
 };
 use palpate_learn::{Method, Model, ModelError, method};
 use palpate_store::{Store, StoreError};
-use palpate_tactile::{Channel, SignalDefinition, whole_fingers};
+use palpate_tactile::Channel;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -111,7 +111,9 @@ impl TrainedModel {
 
 /// Refuses a model that needs channels the real gripper does not have.
 fn check_channels(model: &Model) -> Result<(), ModelError> {
-    let names: Vec<String> = whole_fingers(SignalDefinition::Parts).iter().map(Channel::name).collect();
+    // Which of the channels of a gripper file a connected gripper lacks is said when a grasp begins.
+    let sensors = SensorView::of_model(&model.card).gripper.unwrap_or_default();
+    let names: Vec<String> = sensors.channels().iter().map(Channel::name).collect();
     if model.card.channels.iter().all(|channel| names.contains(channel)) {
         Ok(())
     } else {

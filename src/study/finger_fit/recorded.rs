@@ -89,7 +89,7 @@ impl Trust {
                 false => (&mut self.pad_gain, PAD_REPEATS),
             };
             let deviation = calibration.gain_interval().map_or(2.0 * usual, |half| half / HALF);
-            gains[*sensor as usize % 2] = deviation.max(usual);
+            gains[sensor.index() % 2] = deviation.max(usual);
         }
     }
 }

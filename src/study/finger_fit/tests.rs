@@ -6,7 +6,7 @@ use palpate_sim::gripper::{Side, TorquePoint};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_tactile::board::{Board, Reading, Sensor};
-use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, SensorKind, plan};
+use palpate_tactile::calibration::{Calibration, Input, Point, Readout, Record, plan};
 use palpate_tactile::electronics::{Converter, FlexStrip, ForcePad, PadPart, StripPart};
 use palpate_tactile::{Sensors, SignalDefinition, Signals};
 use rand::{RngExt, SeedableRng};
@@ -87,7 +87,7 @@ impl Box4 {
     }
 
     fn count(&mut self, sensor: Sensor, kappa: f64, force: f64) -> f64 {
-        let side = sensor as usize % 2;
+        let side = sensor.index() % 2;
         let input = Input::on(&Board::default(), sensor);
         let share = match sensor.is_flex() {
             true => input.divider.share_of_ohm(FlexStrip::new(self.strips[side], 50.0).ohm(kappa)),
@@ -98,7 +98,7 @@ impl Box4 {
     }
 
     fn calibrate(&mut self, sensor: Sensor) -> Calibration {
-        let kind = SensorKind::of(sensor);
+        let kind = sensor.kind();
         let mut point = |stimulus: f64| {
             let (kappa, force) =
                 if sensor.is_flex() { (stimulus / StripPart::ACTIVE_LENGTH, 0.0) } else { (0.0, stimulus) };
@@ -114,13 +114,13 @@ impl Box4 {
 
     /// Clean signals through a board's converter and its calibrations.
     fn through(&mut self, clean: &Signals) -> Signals {
-        let calibrations = Sensor::ALL.map(|sensor| (sensor, self.calibrate(sensor)));
+        let calibrations = Sensor::PAPER.map(|sensor| (sensor, self.calibrate(sensor)));
         let readings: Vec<Reading> = (0..clean.len())
             .map(|k| {
                 let row = clean.row(k);
                 let value = |column: usize| f64::from(row[column]);
                 let counts =
-                    Sensor::ALL.map(|s| Some(self.count(s, value(s as usize % 2), value(4 + s as usize % 2)) as f32));
+                    Sensor::PAPER.map(|s| Some(self.count(s, value(s.index() % 2), value(4 + s.index() % 2)) as f32));
                 let t_s = clean.t_s[k];
                 Reading { t_s, arrived_s: t_s, seq: None, counts: counts.to_vec(), line_bar: Some(1.0) }
             })

@@ -10,7 +10,7 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Signals;
-use palpate_tactile::board::{Board, Reading, Sensor};
+use palpate_tactile::board::{Board, Reading, Sensor, SensorList};
 use palpate_tactile::calibration::{Calibration, Readout};
 use palpate_tactile::trial::{BoardCourse, BoardLog, PhaseMark};
 use std::sync::Arc;
@@ -90,8 +90,8 @@ impl EmulatedGrippers<'_> {
         let course = BoardCourse { board, phases: vec![mark], ..BoardCourse::default() };
         let log = BoardLog { course, readings, gaps: Vec::new() };
         let adaptation = Adaptation::of_log(&log, self.scene);
-        let all = Sensor::ALL.into_iter().zip(&adaptation.sensors);
-        all.map(|(sensor, adapted)| Some((sensor, adapted.calibration()?.clone())))
+        let all = adaptation.sensors.iter();
+        all.map(|(sensor, adapted)| Some((*sensor, adapted.calibration()?.clone())))
             .collect::<Option<_>>()
             .ok_or_else(|| StudyError::missing("an emulated gripper that can be adapted to"))
     }
@@ -100,6 +100,7 @@ impl EmulatedGrippers<'_> {
     fn readings(&self, parts: &HiddenParts, object: &str, seed: u64) -> Result<(Board, Vec<Reading>), StudyError> {
         let rest = Step::Hold { bend: [0.0; 2], load: [0.0; 2], seconds: REST_S };
         let hand = HandPlan {
+            sensors: SensorList::default(),
             scene: self.scene.clone(),
             objects: vec![EMPTY.to_owned()],
             seed,
@@ -110,7 +111,7 @@ impl EmulatedGrippers<'_> {
             hand,
             parts: parts.clone(),
             rate_hz: RATE_HZ,
-            channels: Sensor::ALL.len(),
+            channels: SensorList::default().len(),
             most_steps: STEPS,
             clock_start_us: 0,
             faults: Vec::new(),

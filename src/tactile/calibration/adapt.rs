@@ -8,13 +8,13 @@
 use super::CalibrationFault;
 use super::input::Input;
 use super::pad_curve::BendingZero;
-use super::point::{Point, SensorKind};
+use super::point::Point;
 use super::readout::{Readout, rest_window};
 use super::record::{Calibration, Record};
-use crate::board::{Board, Reading, Sensor};
+use crate::board::{Board, Reading};
 use crate::electronics::{PadPart, StripPart};
+use crate::sensor_list::Sensor;
 use palpate_geometry::units::STANDARD_GRAVITY;
-use palpate_sim::gripper::Side;
 
 /// Loads of a nominal pad's points (kg).
 const LOADS_KG: [f64; 6] = [0.03, 0.06, 0.1, 0.2, 0.35, 0.5];
@@ -48,14 +48,13 @@ pub struct KnownWeight {
 
 impl EmptyHand<'_> {
     /// Calibration of the strip with this part name.
-    pub fn strip(&self, side: Side, part: &str) -> Result<Calibration, CalibrationFault> {
-        let sensor = SensorKind::Flex.on(side);
+    pub fn strip(&self, sensor: Sensor, part: &str) -> Result<Calibration, CalibrationFault> {
         let rest = self.rest(sensor)?;
         let mut moved: Vec<f64> = self.counts(sensor, self.readings).map(|counts| counts - rest).collect();
         moved.sort_by(f64::total_cmp);
         // The 98th percentile instead of the maximum: up to 2 % of the readings may be transmission errors.
         let farthest =
-            *moved.get(moved.len() * 49 / 50).ok_or_else(|| CalibrationFault::no_readings(sensor.label()))?;
+            *moved.get(moved.len() * 49 / 50).ok_or_else(|| CalibrationFault::no_readings(&sensor.label()))?;
         let bent: Vec<f64> =
             moved.iter().copied().filter(|own| *own >= BENT * farthest && *own <= farthest / BENT).collect();
         let bent_counts = rest + bent.get(bent.len() / 2).copied().unwrap_or_default();
@@ -68,15 +67,14 @@ impl EmptyHand<'_> {
             )));
         }
         let point = |stimulus: f64, counts: f64| Point { stimulus, counts, spread: 0.0, readings: 1 };
-        let angle = self.modelled * StripPart::ACTIVE_LENGTH;
+        let angle = self.modelled * sensor.row().length_m.unwrap_or(StripPart::ACTIVE_LENGTH);
         self.fit(sensor, part, vec![point(0.0, rest), point(angle, bent_counts)], None)
     }
 
     /// Bend of a strip over time: time since the closing began (s), and bend divided by the largest bend. No
     /// calibration is needed, because the resistance is linear in the bend. Empty if the strip does not move or the
     /// start of the closing is unknown.
-    pub fn course(&self, side: Side) -> Vec<(f64, f64)> {
-        let sensor = SensorKind::Flex.on(side);
+    pub fn course(&self, sensor: Sensor) -> Vec<(f64, f64)> {
         let (Some(closing_s), Ok(rest), Some(column)) =
             (self.closing_s, self.rest(sensor), self.board.channel_of(sensor))
         else {
@@ -103,12 +101,11 @@ impl EmptyHand<'_> {
     /// bending is computed.
     pub fn pad(
         &self,
-        side: Side,
+        sensor: Sensor,
         part: &str,
         strip: &Calibration,
         known: Option<KnownWeight>,
     ) -> Result<Calibration, CalibrationFault> {
-        let sensor = SensorKind::Pad.on(side);
         let (input, rest) = (Input::on(self.board, sensor), self.rest(sensor)?);
         let idle = input.siemens(rest);
         let nominal = |force: f64| PadPart::NOMINAL_SIEMENS * force.powf(PadPart::NOMINAL_EXPONENT);
@@ -119,8 +116,9 @@ impl EmptyHand<'_> {
             Point { stimulus: force, counts, spread: 0.0, readings: 1 }
         });
         let unbent = self.fit(sensor, part, points.collect(), None)?;
-        let bent = Readout::new(self.board, &[(SensorKind::Flex.on(side), strip.clone()), (sensor, unbent.clone())])?;
-        let bending = BendingZero::from_empty_close(&bent.bending(side, self.readings))?;
+        let under = sensor.strip().ok_or_else(|| CalibrationFault::no_strip("strip of its finger"))?;
+        let bent = Readout::new(self.board, &[(under, strip.clone()), (sensor, unbent.clone())])?;
+        let bending = BendingZero::from_empty_close(&bent.bending(sensor, self.readings))?;
         self.fit(sensor, part, unbent.record.points, Some(bending))
     }
 
@@ -131,7 +129,7 @@ impl EmptyHand<'_> {
         points: Vec<Point>,
         bending: Option<BendingZero>,
     ) -> Result<Calibration, CalibrationFault> {
-        let (kind, input) = (SensorKind::of(sensor), Input::on(self.board, sensor));
+        let (kind, input) = (sensor.kind(), Input::on(self.board, sensor));
         let note = "from an empty close".to_owned();
         Calibration::fit(Record { part: part.to_owned(), kind, input, points, bending, assumed: true, note })
     }
@@ -142,7 +140,7 @@ impl EmptyHand<'_> {
         let mut counts: Vec<f64> = self.counts(sensor, &self.readings[..window]).collect();
         counts.sort_by(f64::total_cmp);
         let middle = counts.get(counts.len() / 2).copied().filter(|_| counts.len() >= LEAST_READINGS);
-        middle.ok_or_else(|| CalibrationFault::no_readings(sensor.label()))
+        middle.ok_or_else(|| CalibrationFault::no_readings(&sensor.label()))
     }
 
     fn counts<'r>(&self, sensor: Sensor, readings: &'r [Reading]) -> impl Iterator<Item = f64> + use<'r> {
@@ -157,6 +155,7 @@ mod tests {
     use super::super::record::Curve;
     use super::*;
     use crate::electronics::{FlexStrip, ForcePad};
+    use palpate_sim::gripper::Side;
 
     /// Readings of fingers that rest, close and hold, with a pad that fires when bent.
     fn readings(board: &Board, strip: StripPart, pad: PadPart, bending: f64) -> Vec<Reading> {
@@ -165,8 +164,8 @@ mod tests {
         let reading = |k: u32| {
             let t_s = 0.02 * f64::from(k);
             let kappa = 14.3 * ((t_s - 0.5) / 2.0).clamp(0.0, 1.0);
-            let strip = input(Sensor::FlexLeft).counts(strip.ohm(kappa)).floor() as f32;
-            let pad = input(Sensor::PadLeft).counts(1.0 / pad.conductance(bending * kappa)).floor() as f32;
+            let strip = input(Sensor::FLEX_LEFT).counts(strip.ohm(kappa)).floor() as f32;
+            let pad = input(Sensor::PAD_LEFT).counts(1.0 / pad.conductance(bending * kappa)).floor() as f32;
             let counts = vec![Some(strip), Some(1420.0), Some(pad), Some(0.0)];
             Reading { t_s, arrived_s: t_s, seq: None, counts, line_bar: None }
         };
@@ -191,10 +190,10 @@ mod tests {
         let (part, pad) = parts();
         let readings = readings(&board, part, pad, 0.018);
         let hand = EmptyHand { board: &board, readings: &readings, closing_s: None, modelled: 14.3 };
-        let calibration = hand.strip(Side::Left, "A1")?;
+        let calibration = hand.strip(Sensor::FLEX_LEFT, "A1")?;
         assert!(calibration.record.assumed);
-        let readout = Readout::new(&board, &[(Sensor::FlexLeft, calibration)])?;
-        let curvature = |k: usize| readout.estimate(&readings[k]).curvature[0].unwrap_or(f64::NAN);
+        let readout = Readout::new(&board, &[(Sensor::FLEX_LEFT, calibration)])?;
+        let curvature = |k: usize| readout.estimate(&readings[k]).curvature(Side::Left).unwrap_or(f64::NAN);
         assert!(
             curvature(5).abs() < 0.1 && (curvature(199) - 14.3).abs() < 0.15,
             "{} {}",
@@ -203,10 +202,10 @@ mod tests {
         );
         // Resistance is linear in the bend, so that half of it reads as half.
         assert!((curvature(75) - 7.15).abs() < 0.2, "{}", curvature(75));
-        let still = hand.strip(Side::Right, "A2");
+        let still = hand.strip(Sensor::FLEX_RIGHT, "A2");
         assert!(still.is_err_and(|error| error.to_string().starts_with("the right flex strip went from")));
         let nothing = EmptyHand { readings: &[], ..hand };
-        assert!(nothing.strip(Side::Left, "A1") == Err(CalibrationFault::no_readings("left flex strip")));
+        assert!(nothing.strip(Sensor::FLEX_LEFT, "A1") == Err(CalibrationFault::no_readings("left flex strip")));
         Ok(())
     }
 
@@ -216,13 +215,14 @@ mod tests {
         let (part, pad) = parts();
         let readings = readings(&board, part, pad, 0.018);
         let hand = EmptyHand { board: &board, readings: &readings, closing_s: None, modelled: 14.3 };
-        let strip = hand.strip(Side::Left, "A1")?;
-        let nominal = hand.pad(Side::Left, "P1", &strip, None)?;
-        let readout = Readout::new(&board, &[(Sensor::FlexLeft, strip.clone()), (Sensor::PadLeft, nominal)])?;
-        let shown = readings.iter().filter_map(|reading| readout.estimate(reading).force[0]).fold(0.0, f64::max);
+        let strip = hand.strip(Sensor::FLEX_LEFT, "A1")?;
+        let nominal = hand.pad(Sensor::PAD_LEFT, "P1", &strip, None)?;
+        let readout = Readout::new(&board, &[(Sensor::FLEX_LEFT, strip.clone()), (Sensor::PAD_LEFT, nominal)])?;
+        let shown =
+            readings.iter().filter_map(|reading| readout.estimate(reading).value(Sensor::PAD_LEFT)).fold(0.0, f64::max);
         assert!(shown < 0.03, "{shown}");
-        let counts = Input::on(&board, Sensor::PadLeft).counts(1.0 / ForcePad::new(pad, 50.0).conductance(1.0));
-        let known = hand.pad(Side::Left, "P1", &strip, Some(KnownWeight { force: 1.0, counts }))?;
+        let counts = Input::on(&board, Sensor::PAD_LEFT).counts(1.0 / ForcePad::new(pad, 50.0).conductance(1.0));
+        let known = hand.pad(Sensor::PAD_LEFT, "P1", &strip, Some(KnownWeight { force: 1.0, counts }))?;
         let Curve::Pad(curve) = &known.curve else { return Err(CalibrationFault::no_bending()) };
         assert!((1.0 / curve.gain - 6e3 / 1.04).abs() < 10.0, "{}", 1.0 / curve.gain);
         Ok(())

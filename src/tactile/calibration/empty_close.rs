@@ -3,11 +3,10 @@
 
 use super::CalibrationFault;
 use super::pad_curve::BendingZero;
-use super::point::SensorKind;
 use super::readout::Readout;
 use super::record::Calibration;
-use crate::board::{Board, Reading, Sensor};
-use palpate_sim::gripper::Side;
+use crate::board::{Board, Reading};
+use crate::sensor_list::{Sensor, SensorKind};
 
 /// Most readings that are kept: half a minute at 1 kHz.
 const MOST_READINGS: usize = 30_000;
@@ -16,7 +15,7 @@ const MOST_READINGS: usize = 30_000;
 #[derive(Clone, Debug)]
 pub struct EmptyClose {
     readout: Readout,
-    side: Side,
+    pad: Sensor,
     seconds: f64,
     /// Curvature (1/m) and conductance of the pad (S) in the readings so far.
     readings: Vec<(f64, f64)>,
@@ -37,20 +36,23 @@ impl EmptyClose {
         seconds: f64,
     ) -> Result<Self, CalibrationFault> {
         let sensor = pad.0;
-        let side = match sensor {
-            Sensor::PadLeft => Side::Left,
-            Sensor::PadRight => Side::Right,
-            Sensor::FlexLeft | Sensor::FlexRight => return Err(CalibrationFault::no_bending()),
-        };
-        let strip = SensorKind::Flex.on(side);
-        if board.channel_of(strip).is_none() || !serving.iter().any(|(own, _)| *own == strip) {
-            return Err(CalibrationFault::no_strip(strip.label()));
+        if sensor.kind() != SensorKind::Pad {
+            return Err(CalibrationFault::no_bending());
+        }
+        let strip = sensor
+            .strip()
+            .filter(|strip| board.channel_of(*strip).is_some() && serving.iter().any(|(own, _)| own == strip));
+        if strip.is_none() {
+            let finger = sensor.finger();
+            return Err(CalibrationFault::no_strip(
+                &sensor.strip().map_or(format!("{finger} flex strip"), Sensor::label),
+            ));
         }
         let mut calibrations: Vec<(Sensor, Calibration)> =
             serving.iter().filter(|(own, _)| *own != sensor).cloned().collect();
         calibrations.push(pad);
         let readout = Readout::new(board, &calibrations)?;
-        Ok(Self { readout, side, seconds, readings: Vec::new(), span_s: None })
+        Ok(Self { readout, pad: sensor, seconds, readings: Vec::new(), span_s: None })
     }
 
     /// Takes in a reading; true once it has watched for long enough.
@@ -60,7 +62,7 @@ impl EmptyClose {
             (self.readings, self.span_s) = (Vec::new(), None);
         }
         if self.readings.len() < MOST_READINGS {
-            self.readings.extend(self.readout.bending(self.side, std::slice::from_ref(reading)));
+            self.readings.extend(self.readout.bending(self.pad, std::slice::from_ref(reading)));
         }
         self.span_s.get_or_insert([reading.t_s; 2])[1] = reading.t_s;
         self.left_s() <= 0.0
@@ -95,7 +97,7 @@ mod tests {
     use crate::electronics::StripPart;
 
     fn calibration(sensor: Sensor, points: &[(f64, f64)]) -> Calibration {
-        let (kind, input) = (SensorKind::of(sensor), Input::on(&Board::default(), sensor));
+        let (kind, input) = (sensor.kind(), Input::on(&Board::default(), sensor));
         let point = |&(shown, ohm): &(f64, f64)| Point {
             stimulus: kind.stimulus(shown),
             counts: input.counts(ohm),
@@ -112,8 +114,8 @@ mod tests {
         let ohm = |kg: f64| 6e3 / SensorKind::Pad.stimulus(kg).powf(0.9);
         let loads = [0.03, 0.05, 0.1, 0.2, 0.35, 0.5].map(|kg| (kg, ohm(kg)));
         [
-            (Sensor::FlexLeft, calibration(Sensor::FlexLeft, &[(0.0, 25e3), (45.0, 37.5e3), (90.0, 50e3)])),
-            (Sensor::PadLeft, calibration(Sensor::PadLeft, &loads)),
+            (Sensor::FLEX_LEFT, calibration(Sensor::FLEX_LEFT, &[(0.0, 25e3), (45.0, 37.5e3), (90.0, 50e3)])),
+            (Sensor::PAD_LEFT, calibration(Sensor::PAD_LEFT, &loads)),
         ]
     }
 
@@ -123,7 +125,7 @@ mod tests {
         let board = Board::default();
         let mut close = EmptyClose::begin(&board, pad.clone(), std::slice::from_ref(&strip), 4.0)?;
         // At 50 Hz the finger bends to 45 degrees, and its pad shows 0.02 N for each degree.
-        let inputs = [Sensor::FlexLeft, Sensor::PadLeft].map(|sensor| Input::on(&board, sensor));
+        let inputs = [Sensor::FLEX_LEFT, Sensor::PAD_LEFT].map(|sensor| Input::on(&board, sensor));
         let mut over = false;
         for k in 0..=200u32 {
             let degrees = 45.0 * f64::from(k) / 200.0;

@@ -11,9 +11,10 @@
 
 use super::CalibrationFault;
 use super::input::Input;
-use super::point::{Point, SensorKind, check, merged};
+use super::point::{Point, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::StripPart;
+use crate::sensor_list::SensorKind;
 use palpate_geometry::units::three_digits;
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
@@ -187,7 +188,7 @@ mod tests {
     use crate::electronics::Divider;
 
     fn input() -> Input {
-        Input::on(&Board::default(), Sensor::FlexLeft)
+        Input::on(&Board::default(), Sensor::FLEX_LEFT)
     }
 
     /// Points of a strip with a flat resistance and a ratio at 90 degrees, behind some input.

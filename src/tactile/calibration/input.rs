@@ -21,12 +21,13 @@ pub struct Input {
 const RAIL_COUNTS: f64 = 1.5;
 
 impl Input {
-    /// The divider of a sensor on a board: as the board reports it, else as in the wiring plan of our firmware:
+    /// The divider of a sensor on a board: as the board reports it, else as in the gripper file, else as our firmware wires it:
     /// strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
     pub fn on(board: &Board, sensor: Sensor) -> Self {
+        let stated = sensor.row().divider_ohm;
         let usual = match sensor.is_flex() {
-            true => Divider::of_strip(StripPart::DIVIDER_OHM),
-            false => Divider::of_pad(PadPart::DIVIDER_OHM),
+            true => Divider::of_strip(stated.unwrap_or(StripPart::DIVIDER_OHM)),
+            false => Divider::of_pad(stated.unwrap_or(PadPart::DIVIDER_OHM)),
         };
         Self { divider: usual, full_scale: board.full_scale, reference_volt: board.reference_volt }
             .seen_by(board, sensor)
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
 
     fn inputs() -> [Input; 2] {
-        [Input::on(&Board::default(), Sensor::FlexLeft), Input::on(&Board::default(), Sensor::PadRight)]
+        [Input::on(&Board::default(), Sensor::FLEX_LEFT), Input::on(&Board::default(), Sensor::PAD_RIGHT)]
     }
 
     #[test]
@@ -156,10 +157,10 @@ mod tests {
     fn a_board_has_the_last_word_on_its_resistor_and_converter() {
         let ten_bit = Board { full_scale: 1023, divider_ohm: vec![33e3, f64::NAN, 0.0, 3.3e3], ..Board::default() };
         let input = |sensor| Input::on(&ten_bit, sensor);
-        assert_eq!((input(Sensor::FlexLeft).divider.fixed_ohm, input(Sensor::FlexLeft).full_scale), (33e3, 1023));
-        assert_eq!(input(Sensor::FlexRight).divider.fixed_ohm, 47e3);
-        assert_eq!(input(Sensor::PadLeft).divider.fixed_ohm, 4.7e3);
-        let seen = inputs()[1].seen_by(&ten_bit, Sensor::PadRight);
+        assert_eq!((input(Sensor::FLEX_LEFT).divider.fixed_ohm, input(Sensor::FLEX_LEFT).full_scale), (33e3, 1023));
+        assert_eq!(input(Sensor::FLEX_RIGHT).divider.fixed_ohm, 47e3);
+        assert_eq!(input(Sensor::PAD_LEFT).divider.fixed_ohm, 4.7e3);
+        let seen = inputs()[1].seen_by(&ten_bit, Sensor::PAD_RIGHT);
         assert_eq!((seen.divider.fixed_ohm, seen.full_scale), (3.3e3, 1023));
     }
 }

@@ -30,13 +30,14 @@ mod record;
 mod straight_line;
 mod zero;
 
+pub use crate::sensor_list::SensorKind;
 pub use adapt::{EmptyHand, KnownWeight};
 pub use empty_close::EmptyClose;
 pub use fault::CalibrationFault;
 pub use flex_curve::FlexCurve;
 pub use input::{Input, RangeEnd};
 pub use pad_curve::{BendingZero, PadCurve};
-pub use point::{Point, SensorKind};
+pub use point::Point;
 pub use procedure::{Procedure, Unsettled, plan};
 pub use readout::{Derived, Readout, SensorEstimate};
 pub use record::{Calibration, Curve, Record};

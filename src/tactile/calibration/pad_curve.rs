@@ -9,9 +9,10 @@
 
 use super::CalibrationFault;
 use super::input::Input;
-use super::point::{Point, SensorKind, check, merged};
+use super::point::{Point, check, merged};
 use super::straight_line::{StraightLine, WeightedPoint};
 use crate::electronics::PadPart;
+use crate::sensor_list::SensorKind;
 use palpate_geometry::units::{STANDARD_GRAVITY, three_digits};
 use serde::{Deserialize, Serialize};
 

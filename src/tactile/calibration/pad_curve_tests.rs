@@ -6,7 +6,7 @@ use crate::board::{Board, Sensor};
 use crate::electronics::Divider;
 
 fn input() -> Input {
-    Input::on(&Board::default(), Sensor::PadLeft)
+    Input::on(&Board::default(), Sensor::PAD_LEFT)
 }
 
 const WEIGHTS: [f64; 7] = [0.0, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5];

@@ -2,42 +2,17 @@
 
 use super::CalibrationFault;
 use super::input::{Input, RangeEnd};
-use crate::board::Sensor;
+use crate::sensor_list::SensorKind;
 use palpate_geometry::units::{kg_of_load, three_digits};
-use palpate_sim::gripper::Side;
 use serde::{Deserialize, Serialize};
 
-/// The two kinds of sensors, each calibrated against another quantity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SensorKind {
-    /// A strip that reads an angle.
-    Flex,
-    /// A pad that reads a force.
-    Pad,
-}
-
 impl SensorKind {
-    /// The kind of a sensor.
-    pub fn of(sensor: Sensor) -> Self {
-        if sensor.is_flex() { Self::Flex } else { Self::Pad }
-    }
-
-    /// The sensor of this kind on a side.
-    pub fn on(self, side: Side) -> Sensor {
-        match (self, side) {
-            (Self::Flex, Side::Left) => Sensor::FlexLeft,
-            (Self::Flex, Side::Right) => Sensor::FlexRight,
-            (Self::Pad, Side::Left) => Sensor::PadLeft,
-            (Self::Pad, Side::Right) => Sensor::PadRight,
-        }
-    }
-
     /// Name in messages.
     pub fn label(self) -> &'static str {
         match self {
             Self::Flex => "flex strip",
             Self::Pad => "pad",
+            Self::Raw => "raw sensor",
         }
     }
 
@@ -46,6 +21,7 @@ impl SensorKind {
         match self {
             Self::Flex => stimulus.to_degrees(),
             Self::Pad => kg_of_load(stimulus),
+            Self::Raw => stimulus,
         }
     }
 
@@ -54,6 +30,7 @@ impl SensorKind {
         match self {
             Self::Flex => shown.to_radians(),
             Self::Pad => shown * palpate_geometry::units::STANDARD_GRAVITY,
+            Self::Raw => shown,
         }
     }
 
@@ -62,6 +39,7 @@ impl SensorKind {
         match self {
             Self::Flex => "degrees",
             Self::Pad => "kg",
+            Self::Raw => "",
         }
     }
 
@@ -119,7 +97,7 @@ pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64
         }
         let fault = match (kind, input.range_end(*counts)) {
             // An unloaded pad does not conduct.
-            (SensorKind::Pad, Some(RangeEnd::Open)) | (_, None) => continue,
+            (SensorKind::Pad, Some(RangeEnd::Open)) | (SensorKind::Raw, _) | (_, None) => continue,
             (SensorKind::Flex, Some(RangeEnd::Open)) => format!(
                 "at {at} the strip reads {counts:.0} counts, the end of the range: its circuit is open. Check the solder \
                  tabs and the plug; a strip's crimp breaks when it is bent where the cable begins"

@@ -11,11 +11,12 @@
 
 use super::input::Input;
 use super::pad_curve::BendingZero;
-use super::point::{Point, SensorKind};
+use super::point::Point;
 use super::record::{Calibration, Record};
 use super::{CalibrationFault, RangeEnd};
-use crate::board::{Board, Reading, Sensor};
+use crate::board::{Board, Reading};
 use crate::electronics::Divider;
+use crate::sensor_list::{Sensor, SensorKind};
 use std::collections::VecDeque;
 
 /// Length of the window that is averaged (s): two and a half times the late part of a strip's bend, which lasts about
@@ -55,6 +56,7 @@ pub fn plan(kind: SensorKind) -> Vec<f64> {
     let shown: &[f64] = match kind {
         SensorKind::Flex => &[0.0, 30.0, 60.0, 90.0],
         SensorKind::Pad => &[0.0, 0.03, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
+        SensorKind::Raw => &[],
     };
     shown.iter().map(|shown| kind.stimulus(*shown)).collect()
 }
@@ -81,12 +83,12 @@ impl Procedure {
     /// Begins a calibration of a mounted part, on a board as our firmware describes it. `resistor_ohm` overrides the
     /// resistor that the board reports.
     pub fn new(sensor: Sensor, part: &str, resistor_ohm: Option<f64>) -> Self {
-        let (kind, mut input) = (SensorKind::of(sensor), Input::on(&Board::default(), sensor));
+        let (kind, mut input) = (sensor.kind(), Input::on(&Board::default(), sensor));
         input.divider.fixed_ohm = resistor_ohm.unwrap_or(input.divider.fixed_ohm);
         let (part, note) = (part.trim().to_owned(), String::new());
         Self {
             sensor,
-            column: sensor as usize,
+            column: sensor.index(),
             record: Record { part, kind, input, points: Vec::new(), bending: None, assumed: false, note },
             left: plan(kind).into(),
             window: VecDeque::new(),
@@ -163,6 +165,7 @@ impl Procedure {
             }
             SensorKind::Pad if next == 0.0 => format!("{place}: put nothing on it"),
             SensorKind::Pad => format!("{place}: put {:.0} g on its middle", 1e3 * self.record.kind.shown(next)),
+            SensorKind::Raw => format!("{place}: a raw sensor has no calibration"),
         }
     }
 
@@ -274,12 +277,12 @@ mod tests {
 
     fn reading(t_s: f64, counts: Option<f32>) -> Reading {
         let mut all = vec![Some(1000.0); 4];
-        all[Sensor::PadRight as usize] = counts;
+        all[Sensor::PAD_RIGHT.index()] = counts;
         Reading { t_s, arrived_s: t_s, seq: None, counts: all, line_bar: None }
     }
 
     fn procedure() -> Procedure {
-        Procedure::new(Sensor::PadRight, " P7 ", None)
+        Procedure::new(Sensor::PAD_RIGHT, " P7 ", None)
     }
 
     /// Feeds readings at 50 Hz from a time on.
@@ -352,7 +355,7 @@ mod tests {
         assert!((procedure.record().input.ohm(600.0) - 3.3e3 * (1024.0 / 600.0 - 1.0)).abs() < 1e-6);
         assert_eq!(procedure.column, 0);
         // The user's resistor takes precedence over the board's.
-        let mut procedure = Procedure::new(Sensor::PadRight, "x", Some(1e3));
+        let mut procedure = Procedure::new(Sensor::PAD_RIGHT, "x", Some(1e3));
         assert!(procedure.see(&Board { divider_ohm: vec![1.0; 4], ..Board::default() }));
         assert_eq!(procedure.record().input.divider.fixed_ohm, 1e3);
         Ok(())

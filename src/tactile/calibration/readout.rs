@@ -2,39 +2,52 @@
 
 use super::CalibrationFault;
 use super::input::{Input, RangeEnd, stated_resistor};
+use super::pad_curve::PadCurve;
 use super::record::{Calibration, Curve};
 use super::zero::{Drift, DriftLevel, Unrest, Zero};
-use crate::board::{Board, Reading, Sensor};
+use crate::board::{Board, Reading};
 use crate::electronics::{PadPart, StripPart};
-use crate::{Channel, Quantity, SignalDefinition, Signals, whole_fingers};
+use crate::sensor_list::{Sensor, SensorKind, SensorList};
+use crate::{Channel, Quantity, Signals};
 use palpate_geometry::units::three_digits;
 use palpate_sim::gripper::Side;
 
-/// Sensor estimates from one reading, left and right. None where a sensor is missing, not calibrated, or at an end of
-/// its range.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Sensor estimates from one reading. None where a sensor is missing, not calibrated, or at an end of its range.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensorEstimate {
-    /// Angle over the active length of each strip (rad).
-    pub angle: [Option<f64>; 2],
-    /// Curvature of each finger (1/m).
-    pub curvature: [Option<f64>; 2],
-    /// Force on each pad (N).
-    pub force: [Option<f64>; 2],
-    /// Pressure on each pad (Pa): force over the area of the pad.
-    pub pressure: [Option<f64>; 2],
+    sensors: SensorList,
+    /// Angle over the active length of a strip (rad), force on a pad (N), value of a raw sensor; by place in the list.
+    values: Vec<Option<f64>>,
 }
 
 impl SensorEstimate {
-    /// The value of a channel of whole fingers, in its unit; none of what only simulations have.
+    /// Angle of a strip (rad), force on a pad (N) or value of a raw sensor.
+    pub fn value(&self, sensor: Sensor) -> Option<f64> {
+        self.values.get(sensor.index()).copied().flatten()
+    }
+
+    /// Curvature of a simulated finger, by its first strip (1/m).
+    pub fn curvature(&self, side: Side) -> Option<f64> {
+        let strip = self.sensors.first_on(SensorKind::Flex, side)?;
+        Some(self.value(strip)? / active_length(strip))
+    }
+
+    /// The value of a channel in its unit; none of what only simulations have.
     pub fn of(&self, channel: &Channel) -> Option<f64> {
-        let side = channel.side.index();
+        let sensor = self.sensors.iter().find(|sensor| sensor.gives(channel))?;
+        let value = self.value(sensor)?;
         match channel.quantity {
-            Quantity::Curvature => self.curvature[side],
-            Quantity::Pressure => self.pressure[side],
-            Quantity::Force => self.force[side],
+            Quantity::Curvature => Some(value / active_length(sensor)),
+            Quantity::Pressure => Some(value / PadPart::ACTIVE_AREA),
+            Quantity::Force | Quantity::Raw { .. } => Some(value),
             Quantity::ContactPressure => None,
         }
     }
+}
+
+/// Length over which a strip's angle is taken (m).
+fn active_length(strip: Sensor) -> f64 {
+    strip.row().length_m.unwrap_or(StripPart::ACTIVE_LENGTH)
 }
 
 /// A whole trial as derived.
@@ -54,16 +67,18 @@ pub struct Derived {
 /// One sensor on its channel of the board.
 #[derive(Clone, Debug, PartialEq)]
 struct Wired {
+    sensor: Sensor,
     column: usize,
-    input: Input,
-    calibration: Calibration,
+    /// The input and the calibration of its part; a raw sensor has none.
+    part: Option<(Input, Calibration)>,
 }
 
 /// A board with calibrated parts on it; by default none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Readout {
-    /// In the order of [`Sensor::ALL`].
-    wired: [Option<Wired>; 4],
+    sensors: SensorList,
+    /// Those of the list that can be read, in its order.
+    wired: Vec<Wired>,
     zero: Zero,
     warnings: Vec<String>,
 }
@@ -87,19 +102,20 @@ impl Readout {
     /// Puts calibrations onto the channels of a board. A sensor without one gives nothing; a channel that the board
     /// does not have is left out with a warning.
     pub fn new(board: &Board, calibrations: &[(Sensor, Calibration)]) -> Result<Self, CalibrationFault> {
-        let mut wired = [const { None }; 4];
-        let mut warnings = Vec::new();
-        for (place, sensor) in wired.iter_mut().zip(Sensor::ALL) {
+        let (mut wired, mut warnings) = (Vec::new(), Vec::new());
+        for sensor in board.sensors.iter() {
             let label = sensor.label();
             let calibration = calibrations.iter().find(|(own, _)| *own == sensor).map(|(_, calibration)| calibration);
-            let (calibration, column) = match (calibration, board.channel_of(sensor)) {
-                (Some(calibration), Some(column)) => (calibration, column),
-                (None, Some(_)) => continue,
-                (_, None) => {
-                    warnings.push(format!("the board has no channel \"{}\" for the {label}", sensor.channel()));
-                    continue;
-                }
-            };
+            let column = board.channel_of(sensor);
+            if column.is_none() {
+                warnings.push(format!("the board has no channel \"{}\" for the {label}", sensor.channel()));
+            }
+            let Some(column) = column else { continue };
+            if sensor.kind() == SensorKind::Raw {
+                wired.push(Wired { sensor, column, part: None });
+                continue;
+            }
+            let Some(calibration) = calibration else { continue };
             calibration.check_fits(sensor)?;
             let made_with = &calibration.record.input;
             if let Some(ohm) =
@@ -111,9 +127,9 @@ impl Readout {
                 ));
             }
             let input = made_with.seen_by(board, sensor);
-            *place = Some(Wired { column, input, calibration: calibration.clone() });
+            wired.push(Wired { sensor, column, part: Some((input, calibration.clone())) });
         }
-        Ok(Self { wired, zero: Zero::default(), warnings })
+        Ok(Self { sensors: board.sensors, wired, zero: Zero::default(), warnings })
     }
 
     /// Warnings about missing or doubtful channels, in sentences.
@@ -122,8 +138,8 @@ impl Readout {
     }
 
     /// The zero that is subtracted.
-    pub fn zero(&self) -> Zero {
-        self.zero
+    pub fn zero(&self) -> &Zero {
+        &self.zero
     }
 
     /// Subtracts a zero from now on; a sensor whose zero is no drift keeps that of its calibration.
@@ -132,7 +148,7 @@ impl Readout {
         let drift = self.drift(&zero);
         self.zero = zero;
         for Drift { sensor, .. } in drift.iter().filter(|drift| drift.level == DriftLevel::TooFar) {
-            self.zero.offsets[*sensor as usize] = None;
+            self.zero.set(*sensor, None);
         }
         self
     }
@@ -140,11 +156,10 @@ impl Readout {
     /// Zero from readings taken at rest: the median of each sensor, so that a knock does no harm.
     pub fn zero_from(&self, readings: &[Reading]) -> Zero {
         let mut zero = Zero::default();
-        for (offset, wired) in zero.offsets.iter_mut().zip(&self.wired) {
-            let Some(wired) = wired else { continue };
+        for wired in &self.wired {
             let mut raw: Vec<f64> = readings.iter().filter_map(|reading| wired.raw(reading)).collect();
             raw.sort_by(f64::total_cmp);
-            *offset = (raw.len() >= LEAST_READINGS).then(|| raw[raw.len() / 2]);
+            zero.set(wired.sensor, (raw.len() >= LEAST_READINGS).then(|| raw[raw.len() / 2]));
         }
         zero
     }
@@ -174,73 +189,88 @@ impl Readout {
 
     /// Drift of a zero from that of the calibrations.
     pub fn drift(&self, zero: &Zero) -> Vec<Drift> {
-        let each = Sensor::ALL.into_iter().zip(&self.wired).zip(zero.offsets);
-        each.filter_map(|((sensor, wired), offset)| {
-            let moved = match &wired.as_ref()?.calibration.curve {
-                Curve::Flex(_) => offset?,
-                Curve::Pad(curve) => curve.force(offset?),
+        let each = self.wired.iter().filter_map(|wired| {
+            let offset = zero.of(wired.sensor)?;
+            let moved = match &wired.curve()? {
+                Curve::Flex(_) => offset,
+                Curve::Pad(curve) => curve.force(offset),
             };
-            Some(Drift::of(sensor, moved))
-        })
-        .collect()
+            Some(Drift::of(wired.sensor, moved))
+        });
+        each.collect()
     }
 
-    /// Estimates curvature, force and pressure from one reading.
+    /// Estimates what each sensor reads from one reading.
     pub fn estimate(&self, reading: &Reading) -> SensorEstimate {
-        let mut estimate = SensorEstimate::default();
-        for side in Side::BOTH {
-            let side = side.index();
-            let angle = self.raw(reading, side).map(|angle| angle - self.offset(side));
-            let curvature = angle.map(|angle| angle / StripPart::ACTIVE_LENGTH);
-            estimate.angle[side] = angle;
-            estimate.curvature[side] = curvature;
-            let force = self.raw(reading, 2 + side).and_then(|siemens| self.force(2 + side, siemens, curvature));
-            estimate.force[side] = force;
-            estimate.pressure[side] = force.map(|force| force / PadPart::ACTIVE_AREA);
+        let mut estimate = SensorEstimate { sensors: self.sensors, values: vec![None; self.sensors.len()] };
+        // Pads come after the strips that tell how their fingers are bent.
+        for pads in [false, true] {
+            for wired in self.wired.iter().filter(|wired| (wired.sensor.kind() == SensorKind::Pad) == pads) {
+                let value = wired.raw(reading).and_then(|raw| {
+                    let raw = raw - self.zero.of(wired.sensor).unwrap_or(0.0);
+                    match wired.curve() {
+                        Some(Curve::Pad(curve)) => Some(wired.force(curve, raw, self.bend(wired.sensor, &estimate))),
+                        Some(Curve::Flex(_)) | None => Some(raw),
+                    }
+                });
+                estimate.values[wired.sensor.index()] = value;
+            }
         }
         estimate
     }
 
-    /// Sensors, in the order of [`Sensor::ALL`], whose estimate is outside the calibrated range by more than the
-    /// calibration's accuracy: such estimates are extrapolated.
-    pub fn beyond(&self, estimate: &SensorEstimate) -> [bool; 4] {
-        let values = [estimate.angle[0], estimate.angle[1], estimate.force[0], estimate.force[1]];
-        std::array::from_fn(|place| {
-            let (Some(wired), Some(value)) = (&self.wired[place], values[place]) else { return false };
-            let [least, most] = wired.calibration.range();
-            match wired.calibration.curve {
+    /// Curvature of a pad's finger (1/m).
+    fn bend(&self, pad: Sensor, estimate: &SensorEstimate) -> Option<f64> {
+        let strip = pad.strip()?;
+        Some(estimate.value(strip)? / active_length(strip))
+    }
+
+    /// Sensors whose estimate is outside the calibrated range by more than the calibration's accuracy: such estimates are
+    /// extrapolated.
+    pub fn beyond(&self, estimate: &SensorEstimate) -> Vec<Sensor> {
+        let is_beyond = |wired: &&Wired| {
+            let (Some((_, calibration)), Some(value)) = (&wired.part, estimate.value(wired.sensor)) else {
+                return false;
+            };
+            let [least, most] = calibration.range();
+            match calibration.curve {
                 Curve::Flex(_) => value < least - ANGLE_BEYOND || value > most + ANGLE_BEYOND,
                 Curve::Pad(_) => value > most * (1.0 + FORCE_BEYOND),
             }
-        })
+        };
+        self.wired.iter().filter(is_beyond).map(|wired| wired.sensor).collect()
     }
 
     /// Remarks on estimates outside the calibrated range, in sentences.
     fn beyond_remarks(&self, estimates: &[SensorEstimate]) -> Vec<String> {
-        let mut counts = [0; 4];
+        let mut counts = vec![0u32; self.sensors.len()];
         for estimate in estimates {
-            counts.iter_mut().zip(self.beyond(estimate)).for_each(|(count, beyond)| *count += u32::from(beyond));
+            self.beyond(estimate).into_iter().for_each(|sensor| counts[sensor.index()] += 1);
         }
         let all = estimates.len();
-        let of = |((sensor, wired), count): ((Sensor, &Option<Wired>), u32)| {
-            let calibration = &wired.as_ref()?.calibration;
+        let of = |wired: &Wired| {
+            let (_, calibration) = wired.part.as_ref()?;
+            let (label, count) = (wired.sensor.label(), counts[wired.sensor.index()]);
             let [least, most] = calibration.range().map(|end| calibration.record.kind.with_unit(end));
-            let label = sensor.label();
             (count > 0).then(|| {
                 format!(
                     "the {label} was outside its calibrated range, {least} to {most}, in {count} of {all} readings: extrapolated"
                 )
             })
         };
-        Sensor::ALL.into_iter().zip(&self.wired).zip(counts).filter_map(of).collect()
+        self.wired.iter().filter_map(of).collect()
     }
 
-    /// Curvature (1/m) and conductance (S) of one finger in readings of an empty close: what a [`super::BendingZero`]
-    /// is made from.
-    pub fn bending(&self, side: Side, readings: &[Reading]) -> Vec<(f64, f64)> {
+    /// Curvature under a pad (1/m) and its conductance (S) in readings of an empty close: what a [`super::BendingZero`] is
+    /// made from.
+    pub fn bending(&self, pad: Sensor, readings: &[Reading]) -> Vec<(f64, f64)> {
+        let raw = |sensor: Sensor, reading: &Reading| {
+            self.wired.iter().find(|wired| wired.sensor == sensor).and_then(|wired| wired.raw(reading))
+        };
         let pair = |reading: &Reading| {
-            let angle = self.raw(reading, side.index())? - self.offset(side.index());
-            Some((angle / StripPart::ACTIVE_LENGTH, self.raw(reading, 2 + side.index())?))
+            let strip = pad.strip()?;
+            let angle = raw(strip, reading)? - self.zero.of(strip).unwrap_or(0.0);
+            Some((angle / active_length(strip), raw(pad, reading)?))
         };
         readings.iter().filter_map(pair).collect()
     }
@@ -290,66 +320,54 @@ impl Readout {
 
     /// Pads that reached the end of their range: their numbers are lower bounds there.
     fn saturated(&self, readings: &[Reading]) -> Vec<String> {
-        let at_its_end = |wired: &Wired, reading: &Reading| {
-            let counts = reading.counts.get(wired.column).copied().flatten();
-            counts.is_some_and(|counts| wired.input.range_end(f64::from(counts)) == Some(RangeEnd::Short))
-        };
-        let pads = Sensor::ALL.into_iter().zip(&self.wired).filter(|(sensor, _)| !sensor.is_flex());
-        pads.filter_map(|(sensor, wired)| {
-            let wired = wired.as_ref()?;
-            let count = readings.iter().filter(|reading| at_its_end(wired, reading)).count();
-            let (label, all) = (sensor.label(), readings.len());
+        let of = |wired: &Wired| {
+            let (input, _) = wired.part.as_ref().filter(|_| wired.sensor.kind() == SensorKind::Pad)?;
+            let at_its_end = |reading: &&Reading| {
+                let counts = reading.counts.get(wired.column).copied().flatten();
+                counts.is_some_and(|counts| input.range_end(f64::from(counts)) == Some(RangeEnd::Short))
+            };
+            let (count, label, all) =
+                (readings.iter().filter(at_its_end).count(), wired.sensor.label(), readings.len());
             (count > 0)
                 .then(|| format!("the {label} is saturated in {count} of {all} readings: forces are larger there"))
-        })
-        .collect()
+        };
+        self.wired.iter().filter_map(of).collect()
     }
 
-    /// Curvature, pressure and force of each finger, as far as they can be read.
+    /// Curvature, pressure, force and raw values, as far as they can be read.
     pub fn channels(&self) -> Vec<Channel> {
-        whole_fingers(SignalDefinition::Parts).into_iter().filter(|channel| self.has(channel)).collect()
-    }
-
-    /// True when the sensor that a channel needs is there.
-    fn has(&self, channel: &Channel) -> bool {
-        let first = if channel.quantity == Quantity::Curvature { 0 } else { 2 };
-        self.wired[first + channel.side.index()].is_some()
-    }
-
-    /// Angle (rad) or conductance (S) of a sensor, before any zero.
-    fn raw(&self, reading: &Reading, sensor: usize) -> Option<f64> {
-        self.wired[sensor].as_ref()?.raw(reading)
-    }
-
-    fn offset(&self, sensor: usize) -> f64 {
-        self.zero.offsets[sensor].unwrap_or(0.0)
-    }
-
-    /// Force (N) at a conductance, less the reading at rest and the effect of bending.
-    fn force(&self, sensor: usize, siemens: f64, curvature: Option<f64>) -> Option<f64> {
-        let wired = self.wired[sensor].as_ref()?;
-        let Curve::Pad(curve) = &wired.calibration.curve else { return None };
-        let bending = wired.calibration.record.bending.as_ref();
-        let preload = bending.map_or(0.0, |bending| bending.preload(curve, curvature.unwrap_or(0.0)));
-        Some((curve.force(siemens - self.offset(sensor)) - preload).max(0.0))
+        let has = |channel: &Channel| self.wired.iter().any(|wired| wired.sensor.gives(channel));
+        self.sensors.channels().into_iter().filter(has).collect()
     }
 }
 
 impl Wired {
-    /// Angle (rad), or conductance beyond that at rest (S).
+    fn curve(&self) -> Option<&Curve> {
+        self.part.as_ref().map(|(_, calibration)| &calibration.curve)
+    }
+
+    /// Angle (rad), conductance beyond that at rest (S), or raw value.
     fn raw(&self, reading: &Reading) -> Option<f64> {
         let counts = f64::from((*reading.counts.get(self.column)?)?);
         if !counts.is_finite() {
             return None;
         }
-        match (&self.calibration.curve, self.input.range_end(counts)) {
-            (Curve::Flex(curve), None) => Some(curve.angle(self.input.ohm(counts))),
+        let Some((input, calibration)) = &self.part else { return Some(self.sensor.raw_value(counts)) };
+        match (&calibration.curve, input.range_end(counts)) {
+            (Curve::Flex(curve), None) => Some(curve.angle(input.ohm(counts))),
             (Curve::Flex(_), Some(_)) => None,
             // A pad at the end of its range is saturated: the value is a lower bound.
             (Curve::Pad(curve), None | Some(RangeEnd::Open | RangeEnd::Short)) => {
-                Some(self.input.siemens(counts) - curve.idle_siemens)
+                Some(input.siemens(counts) - curve.idle_siemens)
             }
         }
+    }
+
+    /// Force (N) at a conductance beyond that at rest (S), less the effect of bending (1/m).
+    fn force(&self, curve: &PadCurve, siemens: f64, curvature: Option<f64>) -> f64 {
+        let bending = self.part.as_ref().and_then(|(_, calibration)| calibration.record.bending.as_ref());
+        let preload = bending.map_or(0.0, |bending| bending.preload(curve, curvature.unwrap_or(0.0)));
+        (curve.force(siemens) - preload).max(0.0)
     }
 }
 

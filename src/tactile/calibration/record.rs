@@ -3,9 +3,9 @@
 use super::flex_curve::FlexCurve;
 use super::input::Input;
 use super::pad_curve::{BendingZero, PadCurve};
-use super::point::{Point, SensorKind};
+use super::point::Point;
 use super::{CalibrationFault, RangeEnd};
-use crate::board::Sensor;
+use crate::sensor_list::{Sensor, SensorKind};
 use serde::{Deserialize, Serialize};
 
 /// Longest name of a part that is kept (characters).
@@ -72,6 +72,9 @@ impl Calibration {
                 let (curve, warnings) = PadCurve::fit(&record.points, &record.input)?;
                 (Curve::Pad(curve), warnings)
             }
+            SensorKind::Raw => {
+                return Err(CalibrationFault(format!("\"{}\" is a raw sensor, which has no calibration", record.part)));
+            }
         };
         match &record.bending {
             Some(_) if record.kind == SensorKind::Flex => Err(CalibrationFault::no_bending()),
@@ -82,7 +85,7 @@ impl Calibration {
 
     /// Refuses to be used for a sensor of the other kind.
     pub fn check_fits(&self, sensor: Sensor) -> Result<(), CalibrationFault> {
-        let wanted = SensorKind::of(sensor);
+        let wanted = sensor.kind();
         if self.record.kind == wanted {
             return Ok(());
         }

@@ -5,16 +5,35 @@
 //! each trial's closing it is the dynamic calibration that the paper proposes in its outlook. It is subtracted, unless
 //! it is so large that it must have another cause.
 
-use crate::board::Sensor;
 use crate::electronics::PadPart;
+use crate::sensor_list::{Sensor, SensorKind};
 use serde::{Deserialize, Serialize};
 
-/// Readings at rest: the angle of a strip (rad) or the conductance of a pad (S), in the order of [`Sensor::ALL`]; none
-/// where it was not read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Readings at rest: the angle of a strip (rad), the conductance of a pad (S) or a raw value, in the order of the
+/// gripper's sensors; none where it was not read.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Zero {
-    /// Offset of each sensor.
-    pub offsets: [Option<f64>; 4],
+    /// Offset of each sensor; of those beyond the end, none.
+    pub offsets: Vec<Option<f64>>,
+}
+
+impl Zero {
+    /// The offset of a sensor.
+    pub fn of(&self, sensor: Sensor) -> Option<f64> {
+        self.offsets.get(sensor.index()).copied().flatten()
+    }
+
+    /// Sets the offset of a sensor.
+    pub fn set(&mut self, sensor: Sensor, offset: Option<f64>) {
+        let most = self.offsets.len().max(sensor.index() + 1);
+        self.offsets.resize(most, None);
+        self.offsets[sensor.index()] = offset;
+    }
+
+    /// True where no sensor has an offset.
+    pub fn is_none(&self) -> bool {
+        self.offsets.iter().all(Option::is_none)
+    }
 }
 
 /// Reason why readings give no tare.
@@ -71,7 +90,12 @@ const TOO_FAR_N: f64 = 1.0;
 impl Drift {
     /// Judges how far a zero has moved.
     pub(super) fn of(sensor: Sensor, moved: f64) -> Self {
-        let (least, most) = if sensor.is_flex() { (MOVED_RAD, TOO_FAR_RAD) } else { (MOVED_N, TOO_FAR_N) };
+        let (least, most) = match sensor.kind() {
+            SensorKind::Flex => (MOVED_RAD, TOO_FAR_RAD),
+            SensorKind::Pad => (MOVED_N, TOO_FAR_N),
+            // A raw value is read from its rest on, wherever that is.
+            SensorKind::Raw => (f64::INFINITY, f64::INFINITY),
+        };
         let level = match moved.abs() {
             off if off <= least => DriftLevel::Steady,
             off if off <= most => DriftLevel::Moved,
@@ -91,10 +115,10 @@ impl Drift {
 
     /// Shift with its unit: `+1.3°`, `0.2 N`.
     pub fn with_unit(&self) -> String {
-        if self.sensor.is_flex() {
-            format!("{:+.1}°", self.moved.to_degrees())
-        } else {
-            format!("{:.2} N", self.moved)
+        match self.sensor.kind() {
+            SensorKind::Flex => format!("{:+.1}°", self.moved.to_degrees()),
+            SensorKind::Pad => format!("{:.2} N", self.moved),
+            SensorKind::Raw => format!("{:+.3}", self.moved),
         }
     }
 

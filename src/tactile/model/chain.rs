@@ -70,7 +70,7 @@ impl PhysicalLike {
                         into: units.into_iter().filter_map(|(column, unit)| Some((column?, unit))).collect(),
                     }
                 }
-                Some((Quantity::ContactPressure, _)) | None => alone(column, Sensor::None),
+                Some((Quantity::ContactPressure | Quantity::Raw { .. }, _)) | None => alone(column, Sensor::None),
             });
         }
         parts

@@ -12,6 +12,7 @@ use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
+use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::calibration::{Drift, SensorEstimate};
 use palpate_tactile::trial::{Control, TrialId};
 use std::path::PathBuf;
@@ -79,8 +80,8 @@ pub struct LatestReading {
     pub counts: Vec<Option<f32>>,
     /// Angle, curvature, force and pressure by the calibrations; empty without calibrations.
     pub estimate: SensorEstimate,
-    /// Sensors outside their calibrated range, in the order of `Sensor::ALL`.
-    pub beyond: [bool; 4],
+    /// Sensors outside their calibrated range.
+    pub beyond: Vec<Sensor>,
     /// Line pressure: as commanded, or as the board reports it (bar).
     pub line_bar: Option<f64>,
 }
@@ -145,6 +146,8 @@ pub struct GripperView {
     pub ports: Vec<PortInfo>,
     /// The newest reading.
     pub latest: Option<LatestReading>,
+    /// Sensors of the gripper that the store remembers.
+    pub sensors: SensorList,
     /// Channels of the first values of trace rows; counts by channel of the board follow.
     pub channels: Arc<[Channel]>,
     /// Drift of the zeros since calibration.

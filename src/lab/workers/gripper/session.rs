@@ -22,10 +22,9 @@ use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::{PortInfo, list_ports};
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
-use palpate_tactile::board::{Board, Reading};
+use palpate_tactile::board::{Board, Reading, SensorList};
 use palpate_tactile::calibration::{Drift, Readout};
 use palpate_tactile::trial::TrialId;
-use palpate_tactile::{SignalDefinition, whole_fingers};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -89,6 +88,8 @@ pub(super) struct GripperSession {
     observing: Vec<Observing>,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
+    /// Sensors of the gripper that the store remembers, and their channels.
+    sensors: SensorList,
     channels: Arc<[Channel]>,
     revision: u64,
     handled: u64,
@@ -129,12 +130,14 @@ impl GripperSession {
             crosstalk: CrosstalkView::default(),
             observing: Vec::new(),
             stretch: (0, 0.0),
-            channels: whole_fingers(SignalDefinition::Parts).into(),
+            sensors: SensorList::default(),
+            channels: SensorList::default().channels().into(),
             revision: 0,
             handled: 0,
             published: Instant::now(),
         };
         session.set_model(model);
+        session.read_sensors();
         session
     }
 
@@ -231,7 +234,8 @@ impl GripperSession {
     }
 
     fn open_stream(&mut self, port: Option<&Path>) -> Result<(), NotOpened> {
-        let mut gripper = SerialGripper::new((self.listen)(port)?);
+        self.read_sensors();
+        let mut gripper = SerialGripper::new((self.listen)(port, self.sensors)?);
         // A board with our protocol answers with a handshake; others ignore the line.
         let _sent = gripper.send("?");
         self.connection = Some(Connection {
@@ -244,7 +248,7 @@ impl GripperSession {
             latest: None,
             plotted: Plotted::new(Vec::new(), 0),
             borrowed: false,
-            segmenter: Segmenter::new(&Board::default()),
+            segmenter: Segmenter::new(&Board { sensors: self.sensors, ..Board::default() }),
         });
         self.read_calibrations();
         self.begin_stretch(0.0);
@@ -385,6 +389,7 @@ impl GripperSession {
             refused: self.refused.clone(),
             ports: self.ports.clone(),
             latest: connection.and_then(|connection| connection.latest.clone()),
+            sensors: self.sensors,
             channels: Arc::clone(&self.channels),
             drift: connection.map(|connection| connection.drift.clone()).unwrap_or_default(),
             remarks: connection.map(|connection| connection.remarks.clone()).unwrap_or_default(),

@@ -117,6 +117,7 @@ impl Session {
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
         // What the recogniser reads beyond the layout is not plotted.
+        let reader = reader.with_palm(begun.data.world_from_gripper.position);
         self.channels = reader.channels()[..plotted].into();
         let stage = Arc::new(Stage::new(&scene, model.as_deref(), begun.data.world_from_gripper));
         let frame = Arc::new(run.simulation_mut().first_look());

@@ -6,7 +6,6 @@ use crate::recording::TrialRequest;
 use crate::workers::Notice;
 use palpate_sim::objects::EMPTY;
 use palpate_store::Store;
-use palpate_tactile::board::Sensor;
 use palpate_tactile::trial::{Control, TrialId};
 
 impl GripperSession {
@@ -24,7 +23,7 @@ impl GripperSession {
         }
         let scene = self.scene.clone();
         let adapted = self.store.open().map_err(AdaptError::from).and_then(|store: &mut Store| {
-            let adaptation = Adaptation::from_close(store, id, &scene, [None; 2], false)?;
+            let adaptation = Adaptation::from_close(store, id, &scene, &[], false)?;
             adaptation.keep(store)?;
             Ok(adaptation)
         });
@@ -41,18 +40,19 @@ impl GripperSession {
 
 /// Results and assumptions, in a sentence.
 fn notice_of(adaptation: &Adaptation) -> Notice {
-    let sensors = || Sensor::ALL.into_iter().zip(&adaptation.sensors);
-    let failed = sensors().find_map(|(sensor, adapted)| match adapted {
+    let failed = adaptation.sensors.iter().find_map(|(sensor, adapted)| match adapted {
         AdaptedSensor::Failed(fault) => Some(format!("The {} is not calibrated: {fault}", sensor.label())),
         AdaptedSensor::Kept(_) | AdaptedSensor::Adapted(_) => None,
     });
-    let kept = sensors().filter(|(_, adapted)| matches!(adapted, AdaptedSensor::Kept(_))).count();
+    let kept = adaptation.sensors.iter().filter(|(_, adapted)| matches!(adapted, AdaptedSensor::Kept(_))).count();
     let (bar, modelled) = (adaptation.bar, adaptation.modelled);
     let assumed = format!("assumed: nominal pads, and fingers that bend to {modelled:.1} 1/m at {bar:.2} bar");
     match (failed, kept) {
         (Some(failed), _) => Notice::Failed(failed),
         (None, 0) => Notice::Info(format!("Adapted; {assumed}.")),
-        (None, 4) => Notice::Info("Nothing to adapt: all four sensors are calibrated by hand.".to_owned()),
+        (None, kept) if kept == adaptation.sensors.len() => {
+            Notice::Info("Nothing to adapt: all sensors are calibrated by hand.".to_owned())
+        }
         (None, kept) => Notice::Info(format!("Adapted, {kept} sensors calibrated by hand kept; {assumed}.")),
     }
 }

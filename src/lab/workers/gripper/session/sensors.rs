@@ -17,6 +17,14 @@ use std::path::Path;
 const STALE_S: f64 = 2.0;
 
 impl GripperSession {
+    /// Reads which sensors the gripper has.
+    pub(super) fn read_sensors(&mut self) {
+        match self.store.open().and_then(|store| store.calibrations().sensors()) {
+            Ok(sensors) => (self.sensors, self.channels) = (sensors, sensors.channels().into()),
+            Err(cause) => _ = self.publisher.notify(Notice::Warning(cause.to_string())),
+        }
+    }
+
     /// Reads the board through the newest calibrations of its parts.
     pub(super) fn read_calibrations(&mut self) {
         let Some(connection) = &self.connection else { return };
@@ -74,14 +82,14 @@ impl GripperSession {
         };
         readings.retain(|reading| reading.t_s > since_s);
         let zero = match connection.readout.tare(&readings) {
-            Ok(zero) if zero != Zero::default() => zero,
+            Ok(zero) if !zero.is_none() => zero,
             Ok(_) => {
                 let text = "not tared: no calibrated sensor has been read yet";
                 return self.publisher.notify(Notice::Warning(text.to_owned()));
             }
             Err(unrest) => return self.publisher.notify(Notice::Warning(format!("not tared: {unrest}"))),
         };
-        connection.set_zero(zero);
+        connection.set_zero(zero.clone());
         let far: Vec<String> = connection
             .drift
             .iter()

@@ -1,0 +1,121 @@
+//! A gripper that only its file describes: two pads on each finger and the pressure in the chambers, from its board's lines to
+//! a model that recognises with them.
+
+use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts};
+use palpate_device::protocol::{BoardEvent, Decoder};
+use palpate_lab::datasets::{DatasetQuery, SensorView, trial_signals};
+use palpate_lab::grasping::{Adaptation, GraspController, GraspPlan, Identification, Row};
+use palpate_learn::{Fitting, StopRule};
+use palpate_sim::gripper::Phase;
+use palpate_sim::objects::EMPTY;
+use palpate_sim::scene::{Accuracy, Scene};
+use palpate_store::{BoardChunk, BoardInfo, Store};
+use palpate_tactile::board::SensorList;
+use palpate_tactile::trial::{BoardCourse, Control, TrialHeader, TrialId, TrialSource};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// The file, as in the manual.
+pub(crate) const GRIPPER: &str = include_str!("../../assets/grippers/two_pads.toml");
+
+fn sensors() -> SensorList {
+    SensorList::parse(GRIPPER).unwrap()
+}
+
+/// Records one grasp of an emulated gripper of this file.
+fn recorded(store: &mut Store, parts: &HiddenParts, object: &str, seed: u64) -> TrialId {
+    let mut scene = Scene::default();
+    scene.solver.accuracy = Accuracy::Draft;
+    let (sensors, objects) = (sensors(), vec![object.to_owned()]);
+    let hand = HandPlan { sensors, scene: scene.clone(), objects, seed, grasp_every_s: None, script: Vec::new() };
+    let (channels, parts) = (sensors.len(), parts.clone());
+    let mut gripper = EmulatedGripper::new(EmulatorSetup {
+        hand,
+        parts,
+        rate_hz: 50,
+        channels,
+        most_steps: 30,
+        clock_start_us: 0,
+        faults: Vec::new(),
+        seed,
+    })
+    .unwrap();
+    let mut controller = GraspController::new(GraspPlan::recorded(&scene, Control::Driven), 0.0);
+    let (mut decoder, mut events, mut phases) = (Decoder::new(sensors), Vec::new(), Vec::new());
+    for k in 1..=600u32 {
+        let now_s = 0.01 * f64::from(k);
+        gripper.advance(now_s);
+        decoder.push(&gripper.take_bytes(), now_s, &mut events);
+        if let Some(command) = controller.command(now_s) {
+            gripper.hear(format!("P {:.2}\n", command.bar).as_bytes());
+            phases.push(controller.mark(&command));
+        }
+    }
+    let board = decoder.board();
+    assert!(sensors.iter().all(|sensor| board.channel_of(sensor).is_some()), "{:?}", board.channels);
+    let header = TrialHeader::new(object, scene);
+    let about = BoardInfo { course: BoardCourse { board, phases, ..BoardCourse::default() }, ..BoardInfo::default() };
+    let id = store.begin_board(&header, &about).unwrap();
+    let readings = events.into_iter().filter_map(BoardEvent::into_reading).collect();
+    store.append_board(id, &about, &BoardChunk { readings, ..BoardChunk::default() }).unwrap();
+    store.finish_board(id, &about, &[]).unwrap();
+    id
+}
+
+#[test]
+fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
+    store.calibrations().set_sensors(sensors()).unwrap();
+    let parts = HiddenParts::drawn(7);
+    let empty = recorded(&mut store, &parts, EMPTY, 1);
+    let adaptation = Adaptation::from_trial(&store, empty, &Scene::default(), &[], false).unwrap();
+    assert!(adaptation.is_complete() && adaptation.sensors.len() == 6, "{adaptation:?}");
+    adaptation.keep(&store).unwrap();
+
+    let trials: Vec<(TrialId, &str)> = ["ball", "box", "syringe"]
+        .into_iter()
+        .flat_map(|object| (0..6).map(move |k| (object, k)))
+        .map(|(object, k)| (recorded(&mut store, &parts, object, 20 + k), object))
+        .collect();
+    let view = SensorView::default().of_store(&store).unwrap();
+    let query = DatasetQuery { source: Some(TrialSource::Recorded), without_empty: true, ..DatasetQuery::default() };
+    let data = query.read(&store, &view, &mut |_, _| ()).unwrap();
+    let wanted = [
+        "curvature_left",
+        "curvature_right",
+        "pressure_left_proximal",
+        "pressure_left_distal",
+        "pressure_right_proximal",
+        "pressure_right_distal",
+        "chamber [Pa]",
+    ];
+    assert_eq!(data.channels, wanted);
+
+    // Learned from five of each, it knows the sixth.
+    let part: Vec<usize> = (0..data.examples.len()).filter(|k| k % 6 != 5).collect();
+    let method = palpate_learn::method("extra-trees").unwrap();
+    let stop = AtomicBool::new(false);
+    let model = method.train(&data.part(&part), &Fitting::new(1, true, &stop)).unwrap();
+    let model = Arc::new(model);
+    assert_eq!(SensorView::of_model(&model.card).gripper, Some(sensors()));
+    for (id, object) in trials.iter().skip(5).step_by(6) {
+        let mut identification = Identification::new(Arc::clone(&model), StopRule::default());
+        let read = trial_signals(&store, *id, TrialSource::Recorded, &SensorView::of_model(&model.card)).unwrap();
+        identification.begin_grasp(read.signals.channels.iter().cloned().enumerate()).unwrap();
+        for (k, t_s) in read.signals.t_s.iter().enumerate() {
+            let row =
+                Row { t_s: *t_s, line_bar: f64::NAN, phase: Some(Phase::Close), values: read.signals.row(k).into() };
+            identification.push(*t_s, &row);
+        }
+        identification.end_grasp();
+        let belief = identification.view().beliefs.last().cloned().unwrap();
+        assert_eq!(model.card.labels.classes[belief.top().0].name, *object);
+    }
+
+    // A gripper without the added channels is told which it lacks.
+    let mut identification = Identification::new(model, StopRule::default());
+    let paper = SensorList::default().channels();
+    let cause = identification.begin_grasp(paper.iter().map(|own| own.name()).enumerate()).unwrap_err().to_string();
+    assert!(cause.contains("pressure_left_proximal") && cause.contains("chamber"), "{cause}");
+}
