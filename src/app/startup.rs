@@ -240,7 +240,7 @@ mod tests {
         assert_eq!(display(&both, true).unwrap().display, Display::Wayland);
         let fallen_back = display(&both, false).unwrap();
         assert_eq!(fallen_back.display, Display::X11);
-        assert!(fallen_back.note.unwrap().contains("/run/user/1/wayland-0"));
+        assert!(fallen_back.note.unwrap().contains("wayland-0 does not answer"));
         assert_eq!(display(&[("DISPLAY", ":0")], false).unwrap().note, None);
         for nothing in [&[][..], &[("DISPLAY", ""), ("WAYLAND_DISPLAY", "")][..]] {
             assert!(display(nothing, false).unwrap_err().to_string().contains("palpate demo"));

@@ -4,6 +4,7 @@ mod page;
 
 use super::Arguments;
 use super::prelude::*;
+use super::terminal::ESCAPES;
 use crate::manual::TOPICS;
 use clap::builder::PossibleValuesParser;
 use clap::{CommandFactory, Parser};
@@ -86,7 +87,7 @@ fn contents(program: &clap::Command) -> String {
 
 /// True where headings are printed in bold.
 fn emphasis() -> bool {
-    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+    ESCAPES && std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
 /// Width to which clap wraps help: that of the terminal, at most 100.

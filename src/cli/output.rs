@@ -57,7 +57,7 @@ fn checked(path: PathBuf, kinds: &[FileKind], folder: bool) -> Result<PathBuf, S
 
 /// True for a name without ending, and for that of a folder.
 pub(super) fn names_folder(path: &Path) -> bool {
-    path.extension().is_none() || path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/")
+    path.extension().is_none() || path.is_dir() || path.to_string_lossy().ends_with(std::path::is_separator)
 }
 
 /// Refuses, before any work is done for it, a path in a folder that does not exist, or in the place of something else.

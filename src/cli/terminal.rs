@@ -14,6 +14,15 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer as _, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
 
+/// True where terminals understand escape sequences; those of Windows do once a program switches that on.
+pub(super) const ESCAPES: bool = !cfg!(windows);
+/// Clears the line of a terminal.
+pub(super) const CLEAR_LINE: &str = if ESCAPES {
+    "\r\x1b[K"
+} else {
+    "\r                                                                               \r"
+};
+
 /// Prints a line of results. Control characters that a text of others brings are written out, here and below.
 pub(super) fn say(line: impl std::fmt::Display) -> Result<(), Failure> {
     say_as_is(printable_lines(&line.to_string()))
@@ -185,7 +194,7 @@ pub(super) fn date(stamp: &str) -> String {
 /// Prints log messages of the program itself, warnings or worse, to standard error.
 pub(super) fn show_log() {
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).without_time().with_target(false);
-    let lines = lines.with_ansi(std::io::stderr().is_terminal());
+    let lines = lines.with_ansi(ESCAPES && std::io::stderr().is_terminal());
     tracing_subscriber::registry()
         .with(lines.with_filter(Targets::new().with_target("palpate", LevelFilter::WARN)))
         .init();

@@ -75,11 +75,11 @@ pub fn offscreen_backends() -> Vec<Backends> {
 
 /// An interface is tried only if those before it have no driver, because trying makes libraries print messages. Mesa's
 /// Vulkan layer that chooses the device asks the Wayland display, which prints an error if its folder is missing;
-/// OpenGL needs no display.
+/// OpenGL needs no display. Other systems have no such layer, and their own interface comes first.
 fn backends_for(named: Option<Backends>, wayland_folder: Option<&OsStr>) -> Vec<Backends> {
     match named {
         Some(named) => vec![named],
-        None if wayland_folder.is_some_and(|folder| Path::new(folder).is_absolute()) => {
+        None if !cfg!(target_os = "linux") || wayland_folder.is_some_and(|folder| Path::new(folder).is_absolute()) => {
             vec![Backends::PRIMARY, Backends::GL]
         }
         None => vec![Backends::GL, Backends::PRIMARY],
@@ -126,6 +126,7 @@ pub fn describe_adapter(info: &AdapterInfo) -> String {
 mod tests {
     use super::*;
 
+    #[cfg(target_os = "linux")]
     #[test]
     fn vulkan_is_left_alone_where_it_would_ask_for_a_missing_display() {
         let first = |named, folder: Option<&str>| backends_for(named, folder.map(OsStr::new))[0];

@@ -67,10 +67,11 @@ fn beside(file: &Path, ending: &str) -> PathBuf {
 }
 
 impl Store {
-    /// Default path of the store: the platform's folder for application data.
+    /// Default path of the store: the platform's folder for application data, on Windows the one that does not follow the user
+    /// to other computers.
     pub fn default_path() -> PathBuf {
         match directories::ProjectDirs::from("", "", "palpate") {
-            Some(folders) => folders.data_dir().join("trials.sqlite"),
+            Some(folders) => folders.data_local_dir().join("trials.sqlite"),
             None => PathBuf::from("palpate-trials.sqlite"),
         }
     }

@@ -3,6 +3,7 @@
 
 use super::super::link::{self, Listener};
 use super::super::prelude::*;
+use super::super::terminal::CLEAR_LINE;
 use super::CalibrateArguments;
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
 use palpate_tactile::board::{Board, KNOWN_AFTER_S, Reading, Sensor, SensorList};
@@ -255,12 +256,12 @@ impl Screen {
             return;
         }
         let hint = if session.procedure().settled().is_ok() && !self.auto { ": press Enter" } else { "" };
-        let _unseen = write!(std::io::stderr(), "\r\x1b[K  {}{hint}", session.state());
+        let _unseen = write!(std::io::stderr(), "{CLEAR_LINE}  {}{hint}", session.state());
     }
 
     fn clear_line(&self) {
         if self.shows_reading {
-            let _unseen = write!(std::io::stderr(), "\r\x1b[K");
+            let _unseen = write!(std::io::stderr(), "{CLEAR_LINE}");
         }
     }
 }

@@ -62,7 +62,10 @@ impl PortError {
         match error.kind() {
             serialport::ErrorKind::Io(Io::PermissionDenied) => Self::permission(path),
             serialport::ErrorKind::Io(Io::NotFound) => Self::not_found(path, ports),
-            serialport::ErrorKind::NoDevice if path.exists() => Self::busy(path),
+            // Windows says so of a port in use as well, and its ports are no files.
+            serialport::ErrorKind::NoDevice if path.exists() || ports.iter().any(|port| port.path == path) => {
+                Self::busy(path)
+            }
             serialport::ErrorKind::NoDevice => Self::not_found(path, ports),
             _ if path.is_dir() || is_no_terminal(&error.description) => {
                 let fix = format!("Choose another{}", listing(ports));
@@ -154,8 +157,8 @@ fn is_no_terminal(description: &str) -> bool {
     text.contains("typewriter") || text.contains("inappropriate ioctl")
 }
 
-/// The group that a device belongs to.
-#[cfg(unix)]
+/// The group that a device belongs to; elsewhere none can be joined by a command that all systems have.
+#[cfg(target_os = "linux")]
 fn group_of(path: &Path) -> Option<String> {
     use std::os::unix::fs::MetadataExt;
     let gid = std::fs::metadata(path).ok()?.gid().to_string();
@@ -165,7 +168,7 @@ fn group_of(path: &Path) -> Option<String> {
     line.split(':').next().filter(|name| *name != "root").map(str::to_owned)
 }
 
-#[cfg(not(unix))]
+#[cfg(not(target_os = "linux"))]
 fn group_of(_path: &Path) -> Option<String> {
     None
 }
@@ -183,6 +186,14 @@ pub fn is_running(program: &str) -> bool {
 mod tests {
     use super::*;
     use std::path::PathBuf;
+
+    #[test]
+    fn a_listed_port_that_does_not_open_is_busy() {
+        let com = PortInfo::new("COM3".to_owned(), &serialport::SerialPortType::PciPort);
+        let error = serialport::Error::new(serialport::ErrorKind::NoDevice, "Access is denied.");
+        let trouble = |path: &str| PortError::of(Path::new(path), &error, std::slice::from_ref(&com)).trouble;
+        assert_eq!((trouble("COM3"), trouble("COM4")), (PortTrouble::Busy, PortTrouble::NotFound));
+    }
 
     #[cfg(target_os = "linux")]
     fn error(kind: serialport::ErrorKind, text: &str) -> PortError {

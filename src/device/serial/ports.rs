@@ -85,7 +85,9 @@ impl PortInfo {
 
     /// A port that is not listed: a pseudo-terminal, or a link to one.
     pub(super) fn unlisted(path: &Path) -> Self {
-        let is_pty = std::fs::canonicalize(path).is_ok_and(|real| real.starts_with("/dev/pts"));
+        // On a Mac they are called /dev/ttys000.
+        let is_pty = std::fs::canonicalize(path)
+            .is_ok_and(|real| real.starts_with("/dev/pts") || real.to_string_lossy().starts_with("/dev/ttys"));
         let title = if is_pty { "pseudo-terminal" } else { "serial port" };
         Self { path: path.to_owned(), title: title.to_owned(), usb: None, kind: BoardKind::default() }
     }
