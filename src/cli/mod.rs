@@ -33,6 +33,7 @@ mod teach;
 mod terminal;
 mod train;
 mod trials;
+mod version;
 
 use crate::app::{WindowOptions, open_window};
 use crate::manual::TOPICS;
@@ -52,7 +53,15 @@ type Failure = Box<dyn std::error::Error>;
 ///
 /// Without a command it opens the window, with OBJECT or the lemon on the pedestal. Commands need no display.
 #[derive(Debug, Parser)]
-#[command(name = "palpate", version, about, long_about, disable_help_subcommand = true, after_help = after_help())]
+#[command(
+    name = "palpate",
+    version,
+    long_version = version::LONG.as_str(),
+    about,
+    long_about,
+    disable_help_subcommand = true,
+    after_help = after_help()
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
