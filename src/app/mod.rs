@@ -100,15 +100,19 @@ pub struct WindowOptions {
 /// First and smallest size of the window (points).
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
 const LEAST_SIZE: [f32; 2] = [720.0, 480.0];
+/// Icon of the window where the desktop has none (PNG).
+const ICON: &[u8] = include_bytes!("../../assets/desktop/palpate-128.png");
 
 /// Opens the window and returns when it is closed.
 pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
     let surroundings = check_surroundings()?;
     surroundings.apply();
+    let icon = eframe::icon_data::from_png_bytes(ICON).map_err(|error| WindowError::Other(error.to_string()))?;
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Palpate")
             .with_app_id("palpate")
+            .with_icon(icon)
             .with_inner_size(FIRST_SIZE)
             .with_min_inner_size(LEAST_SIZE),
         wgpu_options: viewport::wgpu_options(None),
