@@ -16,6 +16,7 @@
 //! - `command_line`: exit codes, messages, JSON.
 //! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
 //! - `outputs`: what is written replaces nothing else, and is what its name says.
+//! - `packaging`: packages of a release, and the sources of the documentation site.
 //! - `labelling`: trials of the real gripper flagged, labelled, undone, exported, learned from.
 //! - `library`: all trials found and changed, in the window and on the command line.
 //! - `datasets`: each grasp once, nothing mixed in silence, few and foreign trials judged.
@@ -71,6 +72,7 @@ mod library;
 mod one_path;
 mod one_signal;
 mod outputs;
+mod packaging;
 mod panels;
 mod peers;
 mod physics;
