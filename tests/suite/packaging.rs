@@ -90,6 +90,28 @@ fn the_udev_rules_are_those_that_errors_name() {
     assert_eq!(rules, [ACCESS_RULE, MODEM_MANAGER_RULE]);
 }
 
+#[test]
+fn the_action_draws_a_missing_picture_and_then_finds_it_the_same() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let programs = Path::new(env!("CARGO_BIN_EXE_palpate")).parent().unwrap();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH")?);
+    let golden = folder.path().join("golden.png");
+    let compare = |object: &str| -> std::io::Result<(Option<i32>, String)> {
+        let arguments = format!("{object} --size 200x150 --at 0.1 --bare");
+        let mut command = Command::new(root().join(".github/actions/snapshot/compare"));
+        command.arg(folder.path().join("new")).env("GOLDEN", &golden).env("ARGUMENTS", arguments);
+        let output = command.env("TOLERANCE", "2").env("PIXELS", "0").env("PATH", &path).output()?;
+        Ok((output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned()))
+    };
+    let (code, told) = compare("ball")?;
+    assert!(code == Some(3) && told.contains("There is nothing to compare with"), "{code:?} {told}");
+    std::fs::copy(folder.path().join("new/golden.png"), &golden)?;
+    assert_eq!(compare("ball")?.0, Some(0));
+    assert_eq!(compare("lemon")?.0, Some(1));
+    assert_eq!(compare("lemon --nonsense")?.0, Some(2));
+    Ok(())
+}
+
 /// Paths below the folder of an archive.
 #[cfg(target_os = "linux")]
 fn packed(archive: &Path) -> std::io::Result<Vec<PathBuf>> {
