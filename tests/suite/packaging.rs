@@ -1,6 +1,6 @@
 //! Packages, their description of the system that they need, and the sources of the documentation site.
 
-#![cfg(unix)]
+#![cfg(target_os = "linux")]
 
 use palpate::manual::TOPICS;
 use palpate_device::serial::{ACCESS_RULE, MODEM_MANAGER_RULE};
@@ -113,14 +113,12 @@ fn the_action_draws_a_missing_picture_and_then_finds_it_the_same() -> Result<(),
 }
 
 /// Paths below the folder of an archive.
-#[cfg(target_os = "linux")]
 fn packed(archive: &Path) -> std::io::Result<Vec<PathBuf>> {
     let listed = Command::new("tar").arg("-tzf").arg(archive).output()?.stdout;
     let listed = String::from_utf8_lossy(&listed).into_owned();
     Ok(listed.lines().filter_map(|line| line.split_once('/')).map(|(_, rest)| PathBuf::from(rest)).collect())
 }
 
-#[cfg(target_os = "linux")]
 #[test]
 fn the_archive_has_program_and_desktop_files_and_its_bytes_repeat() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
