@@ -18,7 +18,7 @@
 //! | [`palpate-exchange`](palpate_exchange) | `src/exchange` | trials as files of other programs: CSV, MCAP, NPZ, Parquet | `geometry` `sim` `tactile` `learn` `store` `lab` | 4320 |
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 12150 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3050 |
-//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` | 20690 |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` | 20730 |
 //! | `palpate-workshop` | `src/workshop` | development only: makes shipped models, thumbnails and generated tables | `geometry` `sim` `tactile` `learn` `store` `lab` `study` `render` | 500 |
 //!
 //! # One path for every grasp
