@@ -25,6 +25,7 @@
 //! | 4 | `calibrations`, `journal`, `merge` | calibrations, undoable changes, merging of stores |
 //! | 5 | `board_trials`, `imported_trials` | trials of a board and of imported files |
 //! | 5 | `library` | search, filters and order of all trials ([`Library`]) |
+//! | 5 | `gripper` | sensors of the gripper that a store remembers |
 //! | 5 | `label_repository`, `tares` | labels, notes and plan; zeros of parts |
 //! | 5 | `board_signals` | signals of a board trial by the calibrations |
 //! | 6 | `labelled_trials` | lists of trials with labels |
