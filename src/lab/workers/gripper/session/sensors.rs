@@ -17,11 +17,10 @@ use std::path::Path;
 const STALE_S: f64 = 2.0;
 
 impl GripperSession {
-    /// Reads which sensors the gripper has.
+    /// Reads which sensors the gripper has. What is wrong with the store, the calibrations tell.
     pub(super) fn read_sensors(&mut self) {
-        match self.store.open().and_then(|store| store.calibrations().sensors()) {
-            Ok(sensors) => (self.sensors, self.channels) = (sensors, sensors.channels().into()),
-            Err(cause) => _ = self.publisher.notify(Notice::Warning(cause.to_string())),
+        if let Ok(sensors) = self.store.open().and_then(|store| store.calibrations().sensors()) {
+            (self.sensors, self.channels) = (sensors, sensors.channels().into());
         }
     }
 
