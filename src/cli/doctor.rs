@@ -152,7 +152,7 @@ impl Report for CrosstalkReport {
         let row = |bleed: &Bleed| {
             let (share, counts) = (format!("{:.1}", 100.0 * bleed.share), format!("{:+.0}", bleed.counts));
             let verdict = if bleed.bleeds { CheckStatus::Failed } else { CheckStatus::Passed };
-            [bleed.from.label().into(), bleed.into.label().into(), share, counts, verdict.name().into()]
+            [bleed.from.label(), bleed.into.label(), share, counts, verdict.name().into()]
         };
         page.table(&["moved", "watched", "crosstalk [%]", "counts", ""], self.found.iter().map(row));
         self.result.iter().for_each(|sentence| page.line(sentence));

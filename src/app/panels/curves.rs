@@ -23,20 +23,6 @@ pub(super) fn force_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Acti
     show(ui, data, actions, TimePlot { id: "force", unit, curves, least: [0.0, 0.5] });
 }
 
-/// Raw sensors, each in its own unit, less its reading at rest.
-pub(super) fn raw_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
-    let any = Quantity::Raw { dimension: None, measures: None };
-    let units = data.channels().into_iter().flatten().filter(|own| matches!(own.quantity, Quantity::Raw { .. }));
-    let units: Vec<&str> = units.map(|own| own.quantity.unit()).collect();
-    let Some(first) = units.first() else {
-        ui.weak("No sensors beside strips and pads. A gripper file adds some: palpate help sensors.");
-        return;
-    };
-    let unit = if units.iter().all(|own| own == first) { first } else { "" };
-    let (curves, unit) = channel_curves(data, any, (1.0, unit));
-    show(ui, data, actions, TimePlot { id: "raw", unit, curves, least: [0.0, 1.0] });
-}
-
 pub(super) fn line_pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let curve = PlotCurve {
         name: "line".to_owned(),

@@ -206,11 +206,11 @@ impl Readout {
         // Pads come after the strips that tell how their fingers are bent.
         for pads in [false, true] {
             for wired in self.wired.iter().filter(|wired| (wired.sensor.kind() == SensorKind::Pad) == pads) {
-                let value = wired.raw(reading).and_then(|raw| {
+                let value = wired.raw(reading).map(|raw| {
                     let raw = raw - self.zero.of(wired.sensor).unwrap_or(0.0);
                     match wired.curve() {
-                        Some(Curve::Pad(curve)) => Some(wired.force(curve, raw, self.bend(wired.sensor, &estimate))),
-                        Some(Curve::Flex(_)) | None => Some(raw),
+                        Some(Curve::Pad(curve)) => wired.force(curve, raw, self.bend(wired.sensor, &estimate)),
+                        Some(Curve::Flex(_)) | None => raw,
                     }
                 });
                 estimate.values[wired.sensor.index()] = value;
