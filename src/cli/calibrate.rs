@@ -125,7 +125,7 @@ impl Report for CalibrateReport {
 fn part_name(arguments: &CalibrateArguments, sensor: Sensor, store: Option<&Store>) -> Result<String, Failure> {
     let mounted = || -> Result<Option<String>, Failure> {
         let Some(store) = store else { return Ok(None) };
-        Ok(store.calibrations().mounted()?.get(sensor.index()).cloned().flatten())
+        Ok(store.calibrations().part_in(sensor)?)
     };
     let name = match &arguments.part {
         Some(name) => Some(name.trim().to_owned()),

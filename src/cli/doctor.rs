@@ -4,8 +4,8 @@ use super::link::Listener;
 use super::prelude::*;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use palpate_device::doctor::{
-    Bleed, CheckFinding, CheckStatus, CrosstalkTest, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings, is_sound,
-    not_checked, summary, write_header, write_sketch,
+    Bleed, CheckFinding, CheckStatus, CrosstalkTest, SKETCH, USUAL_LISTEN_S, WIRING_PAGE, examine, findings,
+    firmware_header, is_sound, not_checked, summary, write_sketch,
 };
 use palpate_device::serial::{Baud, LinkOptions};
 use palpate_tactile::board::SensorList;
@@ -45,10 +45,9 @@ pub(super) struct DoctorArguments {
     /// Print the sensors of the gripper as a gripper file, to begin one's own with, then exit.
     #[arg(long, conflicts_with_all = ["crosstalk", "json", "wiring", "sketch"])]
     gripper_file: bool,
-    /// Write the table of channels of the Arduino sketch for this gripper, then exit: gripper_channels.h, beside
-    /// due_gripper.ino.
-    #[arg(long, value_name = "FILE.h", conflicts_with_all = ["crosstalk", "json", "wiring", "sketch", "gripper_file"])]
-    firmware_header: Option<PathBuf>,
+    /// Print the channels of the gripper for the Arduino sketch, then exit: gripper_channels.h, beside due_gripper.ino.
+    #[arg(long, conflicts_with_all = ["crosstalk", "json", "wiring", "sketch", "gripper_file"])]
+    firmware_header: bool,
     /// Print one JSON object instead of text.
     #[arg(long)]
     json: bool,
@@ -82,9 +81,8 @@ pub(super) fn run(arguments: &DoctorArguments, sensors: SensorList) -> Result<Ex
         say(sensors.to_toml().trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
-    if let Some(path) = &arguments.firmware_header {
-        write_header(path, sensors)?;
-        say(path.display().to_string())?;
+    if arguments.firmware_header {
+        say(firmware_header(sensors)?.trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
     if arguments.wiring {

@@ -1,6 +1,7 @@
 //! `palpate emulate`: emulates the gripper on a pseudo-terminal. Unix only.
 
 use super::prelude::*;
+use palpate_device::doctor::check_firmware;
 use palpate_device::emulator::{
     EmulatedFault, EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts, Step, fault_help, parse_faults, parse_script,
 };
@@ -101,10 +102,7 @@ fn after_help() -> String {
 
 pub(super) fn run(arguments: &EmulateArguments, sensors: SensorList) -> Result<(), Failure> {
     let parts = parts(arguments)?;
-    let longest = sensors.iter().map(|sensor| sensor.channel().len()).max().unwrap_or_default();
-    if sensors.len() > 16 || longest > 15 {
-        return Err("the board's firmware reads at most 16 channels with names of at most 15 letters".into());
-    }
+    check_firmware(sensors)?;
     if arguments.print_secrets {
         return say_json(&parts);
     }

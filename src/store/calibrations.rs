@@ -134,10 +134,18 @@ impl CalibrationRepository<'_> {
 
     /// The part mounted in each place at a time; before its first mounting, the first part.
     fn mounted_at(&self, sensors: SensorList, at: Option<&str>) -> Result<Vec<Option<String>>, StoreError> {
+        sensors.iter().map(|sensor| self.part_at(sensor, at)).collect()
+    }
+
+    /// The part mounted in a place now.
+    pub fn part_in(&self, sensor: Sensor) -> Result<Option<String>, StoreError> {
+        self.part_at(sensor, None)
+    }
+
+    fn part_at(&self, sensor: Sensor, at: Option<&str>) -> Result<Option<String>, StoreError> {
         let sql = "SELECT part FROM mountings WHERE sensor = ?1
                    ORDER BY ?2 IS NULL OR since <= ?2 DESC, CASE WHEN ?2 IS NULL OR since <= ?2 THEN -id ELSE id END LIMIT 1";
-        let mounted = |sensor: Sensor| self.store.first(sql, params![sensor.channel(), at], |row| row.get(0));
-        sensors.iter().map(mounted).collect()
+        self.store.first(sql, params![sensor.channel(), at], |row| row.get(0))
     }
 
     /// Sensors of the gripper that a trial was recorded with.

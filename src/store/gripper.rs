@@ -27,8 +27,6 @@ impl CalibrationRepository<'_> {
     /// Remembers the sensors of the gripper, and mounts the parts that its file names.
     pub fn set_sensors(&self, sensors: SensorList) -> Result<(), StoreError> {
         if self.sensors().ok() != Some(sensors) {
-            let text = serde_json::to_string(&sensors)
-                .map_err(|error| StoreError::Refused(format!("the gripper cannot be stored: {error}")))?;
             self.store.in_transaction(|transaction| {
                 transaction.execute_batch(
                     "CREATE TABLE IF NOT EXISTS grippers (
@@ -37,12 +35,12 @@ impl CalibrationRepository<'_> {
                         sensors TEXT NOT NULL  -- JSON
                     );",
                 )?;
-                transaction.execute("INSERT INTO grippers (sensors) VALUES (?1)", params![text])
+                transaction.execute("INSERT INTO grippers (sensors) VALUES (?1)", params![super::store::json(&sensors)])
             })?;
         }
-        let mounted = self.mounted()?;
-        for (sensor, mounted) in sensors.iter().zip(mounted) {
-            if let Some(part) = sensor.row().part.as_deref().filter(|part| mounted.as_deref() != Some(part)) {
+        for sensor in sensors.iter() {
+            let Some(part) = sensor.row().part.as_deref() else { continue };
+            if self.part_in(sensor)?.as_deref() != Some(part) {
                 self.mount(sensor, part)?;
             }
         }

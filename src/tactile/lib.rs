@@ -67,7 +67,7 @@ pub use pressure::ContactPatch;
 pub use signals::{SignalGap, Signals};
 pub use unit::{Dimension, KNOWN_UNITS, Unit};
 
-use board::{Measures, SensorList};
+use board::Measures;
 use glam::DVec3;
 use palpate_geometry::Pose;
 use palpate_sim::frame::Frame;
@@ -97,21 +97,10 @@ impl Sensors {
         Self { channels, finger, strip, grid: gripper.taxels(), palm: DVec3::ZERO }
     }
 
-    /// Places the sensors of a gripper file on the model of a gripper, as far as simulations can give them.
-    pub fn of_list(list: SensorList, gripper: &GripperModel) -> Self {
-        Self::of(list.simulated_on(gripper), gripper)
-    }
-
     /// With the palm at a place in the world (m), which the distance of the object is taken from.
     #[must_use]
     pub fn with_palm(self, palm: DVec3) -> Self {
         Self { palm, ..self }
-    }
-
-    /// Only these of its channels.
-    #[must_use]
-    pub fn only(self, channels: Vec<Channel>) -> Self {
-        Self { channels, ..self }
     }
 
     /// Curvature, pressure and force of each finger, which suits any gripper.

@@ -123,7 +123,7 @@ impl SensorRow {
     }
 
     fn check(&self) -> Result<(), String> {
-        let (name, plain) = (&self.name, |text: &str| !text.chars().any(|c| c.is_control() || "\",:;[]".contains(c)));
+        let (name, plain) = (&self.name, |text: &str| !text.chars().any(|c| c.is_control() || "\"\\,:;[]".contains(c)));
         let fits = |text: &str| plain(text) && text.trim() == text && text.chars().count() <= LONGEST_NAME;
         if name.is_empty() || !fits(name) || TAKEN.iter().any(|taken| self.is_called(taken)) {
             return Err(format!(
@@ -412,13 +412,8 @@ impl Sensor {
         self.row().raw_unit().map_or("", |unit| unit.dimension.unit())
     }
 
-    /// The value of a raw sensor at a full scale of so many counts, in its unit's base unit.
-    pub fn full_scale(self, counts: f64) -> f64 {
-        self.raw_value(counts)
-    }
-
     /// The value of a raw sensor's counts, in its unit's base unit.
-    pub(crate) fn raw_value(self, counts: f64) -> f64 {
+    pub fn raw_value(self, counts: f64) -> f64 {
         let row = self.row();
         counts * row.scale.unwrap_or(1.0) * row.raw_unit().map_or(1.0, |unit| unit.factor)
     }

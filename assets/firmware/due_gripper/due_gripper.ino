@@ -30,7 +30,7 @@
 #define CHIP_WATCHDOG
 #endif
 
-/* Channels of another gripper: palpate doctor --gripper FILE.toml --firmware-header gripper_channels.h, put beside this file. */
+/* Channels of another gripper: palpate doctor --gripper FILE.toml --firmware-header > gripper_channels.h, beside this file. */
 #if defined(__has_include)
 #if __has_include("gripper_channels.h")
 #include "gripper_channels.h"

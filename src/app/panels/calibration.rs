@@ -9,7 +9,7 @@ use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::three_digits;
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, GripperCommand, GripperView};
-use palpate_tactile::board::{Sensor, SensorList};
+use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Record, SensorKind};
 use std::path::PathBuf;
 
@@ -35,11 +35,6 @@ impl Default for Form {
     }
 }
 
-/// Sensors of the gripper.
-fn own_sensors(gripper: Option<&GripperView>) -> SensorList {
-    gripper.map(|gripper| gripper.sensors).unwrap_or_default()
-}
-
 fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     let id = egui::Id::unique("calibration form");
     let mut form = ui.data_mut(|data| data.get_temp::<Form>(id)).unwrap_or_default();
@@ -53,8 +48,8 @@ fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     Grid::new("calibration form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         ui.label("Sensor");
         ui.vertical(|ui| {
-            let sensors: Vec<Sensor> =
-                own_sensors(gripper).iter().filter(|sensor| sensor.kind() != SensorKind::Raw).collect();
+            let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
+            let sensors: Vec<Sensor> = sensors.iter().filter(|sensor| sensor.kind() != SensorKind::Raw).collect();
             if !sensors.contains(&form.sensor) {
                 form.sensor = *sensors.first().unwrap_or(&form.sensor);
             }

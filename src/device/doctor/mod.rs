@@ -19,7 +19,7 @@ pub use checks::{CHECKS, Check};
 pub use crosstalk::{Bleed, CrosstalkTest};
 pub use examine::{Examination, examine};
 pub use traces::{ChannelTrace, ChannelTraces};
-pub use wiring::{SKETCH, WIRING_PAGE, WIRING_RULES, Wire, wires, write_header, write_sketch};
+pub use wiring::{SKETCH, WIRING_PAGE, WIRING_RULES, Wire, check_firmware, firmware_header, wires, write_sketch};
 
 use crate::protocol::ConsoleLine;
 use crate::serial::{LinkStatus, PortError, PortInfo};

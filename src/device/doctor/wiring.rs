@@ -54,19 +54,30 @@ pub fn wires(sensors: SensorList) -> Vec<Wire> {
     sensors.iter().filter_map(wire).collect()
 }
 
+/// Most channels of the sketch, and the longest name of one (bytes).
+const MOST_CHANNELS: usize = 16;
+const LONGEST_NAME: usize = 15;
+
+/// Refuses sensors that the sketch has no room for.
+pub fn check_firmware(sensors: SensorList) -> Result<(), DoctorError> {
+    let has_room = |sensor: &Sensor| sensor.index() < MOST_CHANNELS && sensor.channel().len() <= LONGEST_NAME;
+    match sensors.iter().find(|sensor| !has_room(sensor)) {
+        None => Ok(()),
+        Some(sensor) => Err(DoctorError(format!(
+            "the sketch reads at most {MOST_CHANNELS} channels with names of at most {LONGEST_NAME} letters; \"{}\" is one too \
+             many or too long",
+            sensor.channel()
+        ))),
+    }
+}
+
 /// Table of the channels of the sketch for these sensors, in C.
-fn header_text(sensors: SensorList) -> Result<String, DoctorError> {
-    let mut rows = [String::new(), String::new(), String::new()];
-    for (k, sensor) in sensors.iter().enumerate() {
-        let name = sensor.channel();
-        let row = sensor.row();
-        if k >= MOST_CHANNELS || name.len() > LONGEST_NAME {
-            return Err(DoctorError(format!(
-                "the sketch reads at most {MOST_CHANNELS} channels with names of at most {LONGEST_NAME} letters; \"{name}\" is \
-                 one too many or too long"
-            )));
-        }
-        let pin = row.pin.as_deref().map_or_else(|| format!("A{k}"), str::to_owned);
+pub fn firmware_header(sensors: SensorList) -> Result<String, DoctorError> {
+    check_firmware(sensors)?;
+    let (mut pins, mut names, mut ohms) = (Vec::new(), Vec::new(), Vec::new());
+    for sensor in sensors.iter() {
+        let (row, name) = (sensor.row(), sensor.channel());
+        let pin = row.pin.as_deref().map_or_else(|| format!("A{}", sensor.index()), str::to_owned);
         if !pin.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return Err(DoctorError(format!("\"{pin}\", the pin of \"{name}\", is no name of a pin such as A4")));
         }
@@ -75,29 +86,17 @@ fn header_text(sensors: SensorList) -> Result<String, DoctorError> {
             SensorKind::Pad => PadPart::DIVIDER_OHM,
             SensorKind::Raw => 0.0,
         };
-        let comma = if k > 0 { ", " } else { "" };
-        let name = name.replace(['\\', '"'], "_");
-        let cells = [pin, format!("\"{name}\""), format!("{:.0}", row.divider_ohm.unwrap_or(usual))];
-        rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push_str(&format!("{comma}{cell}")));
+        pins.push(pin);
+        names.push(format!("\"{name}\""));
+        ohms.push(format!("{:.0}", row.divider_ohm.unwrap_or(usual)));
     }
-    let [pins, names, ohms] = rows;
+    let [pins, names, ohms] = [pins, names, ohms].map(|cells| cells.join(", "));
     Ok(format!(
         "/* Channels of the gripper, made by palpate doctor --firmware-header. */\n#define CHANNELS {}\nstatic const uint8_t \
          pins_read[] = {{{pins}}};\nstatic const char *const names[] = {{{names}}};\nstatic const uint32_t divider_ohm[] = \
          {{{ohms}}};\n",
         sensors.len()
     ))
-}
-
-/// Most channels of the sketch, and the longest name of one.
-const MOST_CHANNELS: usize = 16;
-const LONGEST_NAME: usize = 15;
-
-/// Writes the table of channels for the sketch into a new file.
-pub fn write_header(path: &Path, sensors: SensorList) -> Result<(), DoctorError> {
-    let text = header_text(sensors)?;
-    let written = fs::File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|cause| cannot_write(path, &cause))
 }
 
 fn cannot_write(path: &Path, cause: &std::io::Error) -> DoctorError {

@@ -13,9 +13,6 @@ use palpate_sim::objects::ObjectError;
 use palpate_tactile::electronics::Converter;
 use palpate_tactile::model::Stream;
 
-/// Most channels of a board with our firmware.
-pub(super) const MOST_CHANNELS: usize = 16;
-
 /// Times that differ by less are equal (s): rounding of summed periods, and less than a tick of the clock.
 const SAME_TIME_S: f64 = 5e-7;
 
@@ -228,7 +225,7 @@ impl EmulatedGripper {
     fn shares(&mut self, stimuli: &[f64]) -> Vec<f64> {
         let spare = |k: usize| 0.5 + 0.4 * (self.now_s * (k as f64 + 1.0) * 0.2).sin();
         let mut shares: Vec<f64> =
-            self.sensors.shares(stimuli).into_iter().chain((0..MOST_CHANNELS).map(spare)).collect();
+            self.sensors.shares(stimuli).into_iter().chain((0..self.board_setup.channels.len()).map(spare)).collect();
         for fault in self.faults.iter().filter(|fault| fault.is_on(self.now_s)) {
             let channel = fault.value as usize;
             if let (FaultKind::Open, Some(share)) = (fault.kind, shares.get_mut(channel)) {

@@ -314,12 +314,13 @@ impl LiveGrasp {
             (endless.timing.sample_hz, endless.timing.actuation_hz) = (DRIVEN_HZ, DRIVEN_HZ);
         }
         let felt = |channel: &Channel| plan.sensors.iter().find(|sensor| sensor.gives(channel)).map(Sensor::index);
-        let channels: Vec<Channel> = Sensors::of_list(plan.sensors, &scene.gripper).channels().to_vec();
+        let mut channels = plan.sensors.simulated_on(&scene.gripper);
         // A pad is loaded by a force; its pressure follows from it.
-        let channels: Vec<Channel> = channels.into_iter().filter(|own| own.quantity != Quantity::Pressure).collect();
+        channels.retain(|channel| channel.quantity != Quantity::Pressure);
         let places = channels.iter().filter_map(felt).collect();
-        let sensors = Sensors::of_list(plan.sensors, &scene.gripper).only(channels);
-        let (rig, rest) = (SimRun::new(&endless, object).0, rest(plan));
+        let (rig, placement) = SimRun::new(&endless, object);
+        let sensors = Sensors::of(channels, &scene.gripper).with_palm(placement.world_from_gripper.position);
+        let rest = rest(plan);
         let frames = [(0.0, rest.clone()), (0.0, rest.clone())];
         Self { rig, sensors, places, rest, start_s, ends_s, programme, line_bar: 0.0, frames, failed: None }
     }
@@ -444,6 +445,21 @@ mod tests {
         };
         let bends = [0.0, 0.01, 0.02, 0.03].map(after);
         assert!(bends.windows(2).all(|pair| pair[0] > pair[1] + 0.05), "{bends:?}");
+    }
+
+    #[test]
+    fn the_palm_is_as_far_as_the_object_lies() {
+        let text = "[[sensor]]\nname = \"palm\"\nkind = \"raw\"\nmeasures = \"palm-distance\"\n";
+        let sensors = SensorList::parse(text).expect("sound");
+        let held = |object: &str| {
+            let mut hand =
+                Hand::new(HandPlan { sensors, objects: vec![object.to_owned()], ..plan() }).expect("built in");
+            hand.take_over(0.0, 0.0);
+            run(&mut hand, 0.0, 1.0, 0.5)[0]
+        };
+        let finger = Scene::default().gripper.finger.length;
+        assert_eq!(held(EMPTY), finger);
+        assert!((0.3 * finger..0.99 * finger).contains(&held("ball")), "{}", held("ball"));
     }
 
     #[test]

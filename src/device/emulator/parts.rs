@@ -125,7 +125,7 @@ impl HiddenParts {
                         divider: Divider::of_pad(setup.divider_ohm),
                     }
                 }
-                SensorKind::Raw => WiredPart::Raw { units_of_full: sensor.full_scale(LEVELS) },
+                SensorKind::Raw => WiredPart::Raw { units_of_full: sensor.raw_value(LEVELS) },
             }
         };
         Sensors { parts: list.iter().map(part).collect() }

@@ -359,14 +359,10 @@ impl SensorView {
     /// The same through the sensors of the gripper that a store remembers, where it is not the paper's.
     pub fn of_store(self, store: &Store) -> Result<Self, StoreError> {
         let sensors = store.calibrations().sensors()?;
-        let own = sensors != SensorList::default();
-        Ok(if own { self.of_gripper(sensors) } else { self })
-    }
-
-    /// The same through the sensors of a gripper file.
-    #[must_use]
-    pub fn of_gripper(self, sensors: SensorList) -> Self {
-        Self { layout: SensorLayout::OF_FILE.to_owned(), gripper: Some(sensors), ..self }
+        if sensors == SensorList::default() {
+            return Ok(self);
+        }
+        Ok(Self { layout: SensorLayout::OF_FILE.to_owned(), gripper: Some(sensors), ..self })
     }
 
     /// The layout.

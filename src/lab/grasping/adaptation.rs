@@ -119,9 +119,10 @@ impl Adaptation {
         if let Some((finger, how)) = held(&log, scene) {
             return Err(AdaptError::Held { id, finger, how, deleted: false });
         }
-        let mounted = store.calibrations().mounted()?;
-        let names = store.calibrations().sensors()?.iter().zip(mounted);
-        let parts: Vec<(Sensor, String)> = names.filter_map(|(sensor, part)| Some((sensor, part?))).collect();
+        let mut parts = Vec::new();
+        for sensor in log.course.board.sensors.iter() {
+            parts.extend(store.calibrations().part_in(sensor)?.map(|part| (sensor, part)));
+        }
         let serving = store.calibrations().serving(None, &[])?;
         let measured = serving.calibrations.into_iter().filter(|(_, own)| !own.record.assumed && !replace);
         Ok(Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights))
@@ -196,11 +197,10 @@ impl Adaptation {
 
     /// Stores the new calibrations as the newest of their parts, and mounts the parts.
     pub fn keep(&self, store: &Store) -> Result<(), StoreError> {
-        let mounted = store.calibrations().mounted()?;
         for (sensor, adapted) in &self.sensors {
             let AdaptedSensor::Adapted(calibration) = adapted else { continue };
             let stored = store.calibrations().add(&calibration.record)?;
-            if mounted.get(sensor.index()).and_then(Option::as_ref) != Some(&stored.record.part) {
+            if store.calibrations().part_in(*sensor)?.as_ref() != Some(&stored.record.part) {
                 store.calibrations().mount(*sensor, &stored.record.part)?;
             }
         }

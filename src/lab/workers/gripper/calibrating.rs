@@ -235,7 +235,7 @@ pub fn keep_calibration(
     calibration: &Calibration,
 ) -> Result<StoredCalibration, StoreError> {
     let stored = store.calibrations().add(&calibration.record)?;
-    if store.calibrations().mounted()?.get(sensor.index()).and_then(Option::as_ref) != Some(&stored.record.part) {
+    if store.calibrations().part_in(sensor)?.as_ref() != Some(&stored.record.part) {
         store.calibrations().mount(sensor, &stored.record.part)?;
     }
     Ok(stored)
