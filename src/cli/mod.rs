@@ -78,18 +78,9 @@ struct Arguments {
     store: Option<PathBuf>,
     /// Sensors of the real gripper, a TOML file; the store remembers them (default: as remembered, else two strips and two
     /// pads).
-    #[arg(long, global = true, value_name = "FILE.toml", value_parser = parse_gripper)]
-    gripper: Option<SensorList>,
+    #[arg(long, global = true, value_name = "FILE.toml")]
+    gripper: Option<PathBuf>,
 }
-
-/// Reads a gripper file.
-fn parse_gripper(path: &str) -> Result<SensorList, String> {
-    let text = palpate_geometry::read_text(Path::new(path), LARGEST_GRIPPER).map_err(|error| error.to_string())?;
-    SensorList::parse(&text)
-}
-
-/// Largest gripper file (bytes).
-const LARGEST_GRIPPER: u64 = 1 << 20;
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -245,10 +236,11 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let store = arguments.store.as_deref();
     // The emulator and the doctor take the file as it is; all others work with a store.
     let direct = matches!(arguments.command, Some(Command::Doctor(_) | Command::Emulate(_)));
-    if let Some(sensors) = arguments.gripper.filter(|_| !direct) {
+    let named = arguments.gripper.as_deref().map(SensorList::from_file).transpose()?;
+    if let Some(sensors) = named.filter(|_| !direct) {
         setup::open_store(store)?.calibrations().set_sensors(sensors)?;
     }
-    let sensors = || arguments.gripper.map_or_else(|| setup::sensors(store), Ok);
+    let sensors = || named.map_or_else(|| setup::sensors(store), Ok);
     match &arguments.command {
         Some(Command::Grasp(grasp)) => grasp::run(grasp, store)?,
         Some(Command::Demo(demo)) => demo::run(demo, store)?,

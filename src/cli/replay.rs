@@ -81,9 +81,13 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
             Replay::of_capture(gripper, existing_store(store)?.as_ref(), model(Shipped::AnyGripper)?)?
         }
     };
-    let (mut rows, mut header, mut pace, mut count) = (Vec::new(), Vec::new(), None, 0);
+    let (mut rows, mut header, mut pace, mut count, mut unlike) = (Vec::new(), Vec::new(), None, 0, false);
     while let Some(row) = replay.next_row()? {
         count += 1;
+        if let Some(text) = replay.identification().and_then(Identification::unlike_at_start).filter(|_| !unlike) {
+            unlike = true;
+            warn(&text);
+        }
         let answer = answer(&replay);
         if arguments.json {
             rows.push(report(&replay, &row, answer));

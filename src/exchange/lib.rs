@@ -98,7 +98,9 @@ pub fn read_trials(path: &Path, mapping: &Mapping) -> Result<Import, ImportError
             return Err(ImportError::of(path, what));
         }
     }
-    format.read(path, mapping)
+    let mut import = format.read(path, mapping)?;
+    import.trials.iter_mut().for_each(|trial| mapping.rezero(&mut trial.signals));
+    Ok(import)
 }
 
 /// Names of the columns of a file that a mapping gives roles; none where the format gives them.

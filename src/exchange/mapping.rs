@@ -3,6 +3,7 @@
 
 use palpate_geometry::read_text;
 use palpate_store::FileKind;
+use palpate_tactile::Signals;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -38,6 +39,9 @@ pub struct Mapping {
     /// Columns that are left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignore: Vec<String>,
+    /// Subtract each channel's mean over the first [`REZERO_S`] of its trial.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rezero: bool,
     /// In a table with a row for each value: the columns of the channel's name and of the value.
     pub name: Option<String>,
     pub value: Option<String>,
@@ -54,6 +58,8 @@ pub const PROFILES: [(&str, &str); 5] = [
 
 /// Largest profile (bytes).
 const LARGEST: u64 = 1 << 20;
+/// Rest by whose mean trials are re-zeroed: half of what the leak check reads (s).
+pub const REZERO_S: f64 = 0.15;
 /// Pause that begins a new trial where no other length is given (s).
 pub const SPLIT_GAP_S: f64 = 1.0;
 
@@ -118,6 +124,24 @@ impl Mapping {
         ends.map_or(stem.as_str(), |end| &stem[..end]).to_owned()
     }
 
+    /// Subtracts the rest of a trial, where that is asked for.
+    pub(crate) fn rezero(&self, signals: &mut Signals) {
+        let Some(from) = signals.t_s.first().copied().filter(|_| self.rezero) else { return };
+        let width = signals.channels.len();
+        let rest = signals.t_s.iter().take_while(|t| **t <= from + REZERO_S).count();
+        for channel in 0..width {
+            let own = || signals.values.iter().skip(channel).step_by(width);
+            let [count, sum] = own()
+                .take(rest)
+                .filter(|x| x.is_finite())
+                .fold([0.0, 0.0], |[n, sum], x| [n + 1.0, sum + f64::from(*x)]);
+            if count > 0.0 {
+                let mean = sum / count;
+                signals.values.iter_mut().skip(channel).step_by(width).for_each(|x| *x = (f64::from(*x) - mean) as f32);
+            }
+        }
+    }
+
     /// Checks what no file can mend.
     pub fn check(&self) -> Result<(), String> {
         if self.name.is_some() != self.value.is_some() {
@@ -160,6 +184,14 @@ mod tests {
             let again: Mapping = toml::from_str(&profile.to_toml().expect("writes")).expect("reads");
             assert_eq!(again, profile);
         }
+        let mut signals = Signals {
+            channels: vec!["a".to_owned(), "b".to_owned()],
+            t_s: vec![5.0, 5.1, 5.2],
+            values: vec![10.0, f32::NAN, 12.0, f32::NAN, 31.0, 7.0],
+        };
+        Mapping { rezero: true, ..Mapping::default() }.rezero(&mut signals);
+        let finite: Vec<f32> = signals.values.iter().copied().filter(|x| x.is_finite()).collect();
+        assert_eq!(finite, [-1.0, 1.0, 20.0, 7.0]);
         let known = |header: &[&str]| Mapping::known_for(header).map(|(name, _)| name);
         assert_eq!(known(&["__time", "a"]), Some("plotjuggler"));
         assert_eq!(known(&["time", "a"]), None);

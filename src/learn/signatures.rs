@@ -172,6 +172,22 @@ impl Signatures {
         (squares / f64::from(u32::try_from(count.max(1)).unwrap_or(u32::MAX))).sqrt()
     }
 
+    /// Channels that begin farther from every class than all means of the channel are apart, as where a zero is another one:
+    /// the channel, its value, and the mean of all classes.
+    pub fn far_at_start(&self, row: &[f32]) -> Vec<(&str, f32, f32)> {
+        let far = |(channel, value): (usize, &f32)| {
+            let classes = (0..self.grasps.len()).filter_map(|class| Some(self.of_class(class, channel)?.0));
+            let (mut low, mut high, mut nearest) = (f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY);
+            for mean in classes {
+                mean.iter().for_each(|mean| (low, high) = (low.min(*mean), high.max(*mean)));
+                nearest = nearest.min((mean.first()? - value).abs());
+            }
+            let is_far = high > low && nearest > high - low;
+            is_far.then(|| (self.channels[channel].as_str(), *value, self.average(channel)[0]))
+        };
+        row.iter().enumerate().take(self.channels.len()).filter_map(far).collect()
+    }
+
     /// Adds the arrays of a model file.
     pub(crate) fn put_into(&self, arrays: &mut Arrays) {
         let shape = [self.grasps.len(), self.channels.len(), self.t_s.len()];

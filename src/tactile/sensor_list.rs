@@ -16,8 +16,11 @@ use crate::unit::{KNOWN_UNITS, Unit};
 use palpate_sim::gripper::Side;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::path::Path;
 use std::sync::Mutex;
 
+/// Largest gripper file (bytes).
+const LARGEST_FILE: u64 = 1 << 20;
 /// Most sensors of a gripper.
 const MOST_SENSORS: usize = 64;
 /// Longest name of a sensor or a finger (characters); boards with our firmware take 15.
@@ -241,6 +244,20 @@ impl SensorList {
             )),
             None => Ok(list),
         }
+    }
+
+    /// Reads a gripper file; errors name it.
+    pub fn from_file(path: &Path) -> Result<Self, String> {
+        palpate_geometry::read_text(path, LARGEST_FILE)
+            .map_err(|error| error.to_string())
+            .and_then(|text| Self::parse(&text))
+            .map_err(|error| format!("{}: {error}", path.display()))
+    }
+
+    /// True for a file that lists sensors, sound or not.
+    pub fn is_in(path: &Path) -> bool {
+        palpate_geometry::read_text(path, LARGEST_FILE)
+            .is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("[[sensor]]")))
     }
 
     /// Reads the text of a gripper file.

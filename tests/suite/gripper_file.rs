@@ -118,4 +118,5 @@ fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
     let paper = SensorList::default().channels();
     let cause = identification.begin_grasp(paper.iter().map(|own| own.name()).enumerate()).unwrap_err().to_string();
     assert!(cause.contains("pressure_left_proximal") && cause.contains("chamber"), "{cause}");
+    assert!(cause.contains("models/any-gripper.safetensors would fit"), "{cause}");
 }

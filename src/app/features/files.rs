@@ -138,6 +138,11 @@ impl App {
         self.files.ask("Open object or scene", extensions, None, |app, path| app.open(&path.to_string_lossy()));
     }
 
+    /// Opens a gripper file.
+    pub(in crate::app) fn ask_for_sensors(&mut self) {
+        self.files.ask("Open gripper file", &["toml"], None, |app, path| app.set_gripper_file(&path));
+    }
+
     pub(in crate::app) fn save_scene(&mut self) {
         self.save_scene_as(self.simulation.scene.clone());
     }

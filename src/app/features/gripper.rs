@@ -10,8 +10,9 @@ use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
+use palpate_tactile::board::SensorList;
 use palpate_tactile::trial::Control;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// State of the real gripper in the window.
@@ -60,6 +61,14 @@ impl GripperFeature {
 }
 
 impl App {
+    /// Takes the sensors of a gripper file.
+    pub(in crate::app) fn set_gripper_file(&mut self, path: &Path) {
+        match SensorList::from_file(path) {
+            Ok(sensors) => _ = self.gripper.send(GripperCommand::SetSensors(sensors)),
+            Err(cause) => self.notices.error(cause),
+        }
+    }
+
     /// Takes in rows and notices since the last frame, and lets the simulation follow.
     pub(super) fn poll_gripper(&mut self) {
         let Self { gripper, simulation, notices, .. } = self;

@@ -11,6 +11,7 @@ use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
 use palpate_study::Explanation;
 use palpate_study::accuracy::{AccuracyStudy, stored_accuracy};
+use palpate_tactile::board::SensorList;
 use palpate_tactile::trial::TrialId;
 use std::path::Path;
 use std::sync::Arc;
@@ -186,9 +187,12 @@ impl App {
         self.simulation.use_scene(scene);
     }
 
-    /// Grasps a built-in object, a file, or the scene in a scene file.
+    /// Grasps a built-in object, a file, or the scene in a scene file; takes the sensors of a gripper file.
     pub fn open(&mut self, source: &str) {
         if source.to_ascii_lowercase().ends_with(".toml") {
+            if SensorList::is_in(Path::new(source)) {
+                return self.set_gripper_file(Path::new(source));
+            }
             return match Scene::from_file(Path::new(source)) {
                 Ok(scene) => self.set_scene(scene),
                 Err(error) => self.notices.error(error.to_string()),

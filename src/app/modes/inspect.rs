@@ -60,7 +60,7 @@ fn layout(tiles: &mut Tiles<String>) -> TileId {
     let compared = tabs(tiles, &["compared", "sensors"]);
     let left = split(tiles, LinearDir::Vertical, [(library, 0.72), (compared, 0.28)]);
     let [view, curvature] = [&["view"][..], &["curvature", "signature"]].map(|names| tabs(tiles, names));
-    let loads = tabs(tiles, &["pressure", "force", "line", "counts", "hysteresis", "pads"]);
+    let loads = tabs(tiles, &["pressure", "force", "line", "other", "counts", "hysteresis", "pads"]);
     let right = tabs(tiles, &["recognition", "why", "trial"]);
     let middle = split(tiles, LinearDir::Vertical, [(view, 0.42), (curvature, 0.29), (loads, 0.29)]);
     split(tiles, LinearDir::Horizontal, [(left, 0.22), (middle, 0.52), (right, 0.26)])

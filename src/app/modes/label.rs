@@ -60,7 +60,7 @@ fn layout(tiles: &mut Tiles<String>) -> TileId {
     let trials = tabs(tiles, &["trials", "journal"]);
     let left = split(tiles, LinearDir::Vertical, [(plan, 0.45), (trials, 0.55)]);
     let [curvature, view] = ["curvature", "view"].map(|name| tabs(tiles, &[name]));
-    let loads = tabs(tiles, &["pressure", "force", "line", "counts"]);
+    let loads = tabs(tiles, &["pressure", "force", "line", "other", "counts"]);
     let middle = split(tiles, LinearDir::Vertical, [(curvature, 0.28), (loads, 0.28), (view, 0.44)]);
     let label = tabs(tiles, &["label", "recognition", "why"]);
     let gripper = tabs(tiles, &["gripper", "calibration", "doctor", "fit", "training", "console"]);

@@ -1,12 +1,15 @@
-//! Curves over time: curvature, pressure and force of both fingers, line pressure, and raw counts.
+//! Curves over time: curvature, pressure and force of both fingers, other channels, line pressure, and raw counts.
 
 use crate::app::actions::Actions;
 use crate::app::plots::{PlotCurve, TimePlot, channel_curves, show};
 use crate::app::shown::DisplayedData;
 use egui::Ui;
 use palpate_geometry::palette::Trace;
-use palpate_tactile::Quantity;
 use palpate_tactile::board::{Sensor, SensorKind};
+use palpate_tactile::{Quantity, unit_of_channel};
+
+/// Range of values whose quantity is not known.
+const ANY_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 pub(super) fn curvature_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let (curves, unit) = channel_curves(data, Quantity::Curvature, (1.0, "1/m"));
@@ -21,6 +24,32 @@ pub(super) fn pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut A
 pub(super) fn force_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let (curves, unit) = channel_curves(data, Quantity::Force, (1.0, "N"));
     show(ui, data, actions, TimePlot { id: "force", unit, curves, least: [0.0, 0.5] });
+}
+
+/// Channels that are neither curvature nor pressure nor force: a plot for each unit.
+pub(super) fn other_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let (curves, counts) = channel_curves(data, Quantity::Raw { dimension: None, measures: None }, (1.0, ""));
+    let mut plots: Vec<(&str, Vec<PlotCurve>)> = Vec::new();
+    for curve in curves {
+        let unit = curve.channel.as_ref().map_or(counts, |(name, _)| unit_of_channel(name).1);
+        match plots.iter_mut().find(|(other, _)| *other == unit) {
+            Some((_, curves)) => curves.push(curve),
+            None => plots.push((unit, vec![curve])),
+        }
+    }
+    if plots.is_empty() {
+        ui.weak(
+            "Channels that are neither curvature nor pressure nor force, such as a motor's current: sensors of kind raw in a \
+             gripper file, or columns of an imported table.",
+        );
+    }
+    let height = (ui.available_height() - ui.spacing().item_spacing.y * plots.len() as f32) / plots.len().max(1) as f32;
+    for (unit, curves) in plots {
+        let id = format!("other channels {unit}");
+        ui.allocate_ui(egui::vec2(ui.available_width(), height), |ui| {
+            show(ui, data, actions, TimePlot { id: &id, unit, curves, least: ANY_RANGE });
+        });
+    }
 }
 
 pub(super) fn line_pressure_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {

@@ -63,6 +63,12 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         }
     });
     ui.data_mut(|data| data.insert_temp(id, path));
+    let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
+    wrapped(ui, RichText::new(format!("Sensors: {}", sensors.names())).small().weak());
+    let button = ui.button("Open gripper file");
+    let about =
+        "A TOML file that lists the sensors of another gripper; the store remembers them. It can also be dropped here";
+    actions.on(&button.on_hover_text(about), App::ask_for_sensors);
 }
 
 fn connected_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus, control: Control, actions: &mut Actions) {

@@ -49,7 +49,7 @@ const fn panel(name: &'static str, title: &'static str, ui: fn(&mut Ui, &App, &m
 }
 
 /// All panels, and what each of them reads.
-pub const ALL: [PanelKind; 34] = [
+pub const ALL: [PanelKind; 35] = [
     panel("objects", "Objects", |ui, app, actions| {
         objects::ui(ui, &app.simulation.scene.object.source, &app.view.recent, &app.thumbnails, actions);
     }),
@@ -57,6 +57,7 @@ pub const ALL: [PanelKind; 34] = [
     panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),
     panel("pressure", "Pressure", |ui, app, actions| curves::pressure_ui(ui, &app.shown(), actions)),
     panel("force", "Force", |ui, app, actions| curves::force_ui(ui, &app.shown(), actions)),
+    panel("other", "Other channels", |ui, app, actions| curves::other_ui(ui, &app.shown(), actions)),
     panel("line", "Line pressure", |ui, app, actions| curves::line_pressure_ui(ui, &app.shown(), actions)),
     panel("recognition", "Recognition", |ui, app, actions| {
         recognition::ui(ui, &app.shown(), &app.tools, &app.thumbnails, actions);

@@ -24,14 +24,15 @@ pub(in crate::app) fn channel_curves<'a>(
 fn raw_curves(data: &DisplayedData<'_>, board: &Board, quantity: Quantity) -> Vec<PlotCurve> {
     let derived = data.channels().iter().filter(|channel| channel.is_some()).count();
     let quantity = if quantity == Quantity::Force { Quantity::Pressure } else { quantity };
-    let shown = board.sensors.channels().into_iter().filter(|channel| shows(quantity, channel));
-    let curve = |channel: Channel| {
+    let shown = board.sensors.channels().into_iter().filter(|channel| shows(quantity, channel)).enumerate();
+    let curve = |(place, channel): (usize, Channel)| {
+        let (trace, dashed) = look(&channel, place);
         let sensor = board.sensors.iter().find(|sensor| sensor.gives(&channel))?;
         let column = derived + board.channel_of(sensor)?;
         Some(PlotCurve {
             name: label(&channel),
-            trace: colour_of(&channel),
-            dashed: is_dashed(&channel),
+            trace,
+            dashed,
             values: Box::new(move |trace, k| trace.channels.get(column)?.get(k).map(|value| f64::from(*value))),
             half_width: Box::new(|_, _| None),
             channel: None,
@@ -40,9 +41,13 @@ fn raw_curves(data: &DisplayedData<'_>, board: &Board, quantity: Quantity) -> Ve
     shown.filter_map(curve).collect()
 }
 
-/// Curves of all fingers but the left one are dashed.
-fn is_dashed(channel: &Channel) -> bool {
-    !channel.finger.is_empty() && channel.finger != "left"
+/// Colour and dash: by quantity and span, dashed for all fingers but the left one. Raw channels, numbered by `place`, take
+/// turns.
+fn look(channel: &Channel, place: usize) -> (Trace, bool) {
+    match channel.quantity {
+        Quantity::Raw { .. } => (Trace::ALL[place % Trace::ALL.len()], place % 2 == 1),
+        _ => (colour_of(channel), !channel.finger.is_empty() && channel.finger != "left"),
+    }
 }
 
 fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) -> Vec<PlotCurve> {
@@ -50,15 +55,21 @@ fn physical_curves(data: &DisplayedData<'_>, quantity: Quantity, factor: f64) ->
     let channels = channels.into_iter().enumerate().filter_map(|(index, channel)| Some((index, channel?)));
     channels
         .filter(|(_, channel)| shows(quantity, channel))
-        .map(|(index, channel)| PlotCurve {
-            name: label(channel),
-            trace: colour_of(channel),
-            dashed: is_dashed(channel),
-            values: Box::new(move |trace, k| trace.channels.get(index)?.get(k).map(|value| f64::from(*value) * factor)),
-            half_width: Box::new(move |trace, k| {
-                band_half_width(&trace.t, trace.errors.get(index)?, k).map(|half| half * factor)
-            }),
-            channel: Some((channel.name(), factor)),
+        .enumerate()
+        .map(|(place, (index, channel))| {
+            let (trace, dashed) = look(channel, place);
+            PlotCurve {
+                name: label(channel),
+                trace,
+                dashed,
+                values: Box::new(move |trace, k| {
+                    trace.channels.get(index)?.get(k).map(|value| f64::from(*value) * factor)
+                }),
+                half_width: Box::new(move |trace, k| {
+                    band_half_width(&trace.t, trace.errors.get(index)?, k).map(|half| half * factor)
+                }),
+                channel: Some((channel.name(), factor)),
+            }
         })
         .collect()
 }

@@ -49,7 +49,7 @@ pub(super) struct TimePlot<'a> {
     /// Unit of the values, shown at the axis.
     pub(super) unit: &'a str,
     pub(super) curves: Vec<PlotCurve>,
-    /// Least range of values, so that noise does not fill a plot.
+    /// Least range of values, so that noise does not fill a plot; its ends are swapped where there is none.
     pub(super) least: [f64; 2],
 }
 
@@ -213,6 +213,9 @@ fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 
                 high = high.max(value);
             }
         }
+    }
+    if low >= high {
+        [low, high] = if low.is_finite() { [low - 0.5, high + 0.5] } else { [0.0, 1.0] };
     }
     // The word "hold" has a place of its own above the curves.
     let air = 0.06 * (high - low);

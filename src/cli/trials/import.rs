@@ -49,6 +49,9 @@ pub(in crate::cli) struct MappingArguments {
     /// Channel with the column that it is read from, as in `force_left=grip [kgf]`; may be repeated (default: all columns).
     #[arg(long, value_name = "NAME=COLUMN")]
     channel: Vec<String>,
+    /// Subtract each channel's mean over the first 0.15 s of its trial: a live gripper's readings are less their rest, too.
+    #[arg(long)]
+    rezero: bool,
     /// Lines above the header.
     #[arg(long, value_name = "N")]
     skip: Option<u64>,
@@ -90,6 +93,7 @@ impl MappingArguments {
             label: self.label.clone().or(profile.label),
             trial: self.trial.clone().or(profile.trial),
             split_gap_s: self.split_by.or(profile.split_gap_s),
+            rezero: self.rezero || profile.rezero,
             channels: if self.channel.is_empty() { profile.channels } else { self.channel.clone() },
             ..profile
         };
@@ -106,6 +110,7 @@ impl MappingArguments {
             .option("trial", quoted(&self.trial))
             .option("split-by", self.split_by.map(|seconds| format!("gap={seconds}")))
             .option("skip", self.skip)
+            .flag("rezero", self.rezero)
             .option("delimiter", quoted(&self.delimiter.map(String::from)))
             .option("profile", quoted(&self.profile));
         self.channel.iter().fold(command, |command, channel| command.option("channel", Some(format!("'{channel}'"))))

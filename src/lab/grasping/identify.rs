@@ -5,8 +5,8 @@ use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use crate::datasets::SensorView;
 use palpate_learn::{
-    Belief, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped, Signatures, StopReason,
-    StopRule, Verdict,
+    Belief, GeometryEncoder, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped,
+    Signatures, StopReason, StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_tactile::trial::EarlierGrasps;
@@ -21,8 +21,13 @@ pub enum IdentifyError {
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// The model reads other channels than the gripper has.
-    #[error(transparent)]
-    Channels(#[from] ModelError),
+    #[error("{cause}{}", fits.map_or_else(String::new, |fits| format!("; models/{} would fit", fits.model_file())))]
+    Channels {
+        /// The difference.
+        cause: ModelError,
+        /// The shipped model whose channels the gripper has.
+        fits: Option<Shipped>,
+    },
 }
 
 /// A finished grasp as a model read it, and the model's answers.
@@ -257,12 +262,17 @@ impl Identification {
         let wanted = &self.model.card.channels;
         self.columns = wanted.iter().filter_map(|name| named.get(name).copied()).collect();
         let found: Vec<String> = wanted.iter().filter(|name| named.contains_key(*name)).cloned().collect();
-        self.model.check_channels(&found)?;
+        // Readings that suit the model suit the encoder for such sensors.
+        let shipped = Shipped::of(&self.model.card.data);
+        self.model.check_channels(&found).map_err(|cause| {
+            let read = |encoder: &GeometryEncoder| encoder.channels().iter().all(|name| named.contains_key(name));
+            let fits = shipped.encoder().is_ok_and(|encoder| read(&encoder)).then_some(shipped);
+            IdentifyError::Channels { cause, fits }
+        })?;
         self.readings = Sequence::default();
         self.hold_s = None;
         self.verdict = None;
-        // Readings that suit the model suit the encoder for such sensors.
-        self.geometry.begin(Shipped::of(&self.model.card.data), &named);
+        self.geometry.begin(shipped, &named);
         self.closed = false;
         if let Some(live) = &mut self.live {
             live.begin(self.belief.now().or(self.prior.as_ref()));
@@ -295,6 +305,19 @@ impl Identification {
         self.verdict = answer.or_else(|| self.verdict.take());
         let measured = self.geometry.push(t, row);
         new || measured
+    }
+
+    /// After the first row: says so where a channel begins far from what the model learned.
+    pub fn unlike_at_start(&self) -> Option<String> {
+        let signatures = self.model.signatures.as_ref().filter(|_| self.readings.t_s.len() == 1)?;
+        let far = signatures.far_at_start(&self.readings.values);
+        let (channel, value, mean) = far.first()?;
+        Some(format!(
+            "{} of {} channels begin far from the grasps that the model learned ({channel}: {value:.0}, there {mean:.0}), so its \
+             answers mean little. Where it learned an imported table, import that anew with --rezero",
+            far.len(),
+            signatures.channels().len()
+        ))
     }
 
     /// Ends the grasp and adds its verdict to the belief; no effect on a grasp that has ended.

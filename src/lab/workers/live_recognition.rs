@@ -88,11 +88,14 @@ impl LiveRecognition {
         (!std::mem::replace(&mut self.warned, true)).then_some(text)
     }
 
-    /// Adds a row, `t` seconds after the closing began.
-    pub(super) fn push(&mut self, t: f64, row: &Row) {
+    /// Adds a row, `t` seconds after the closing began. Returns once per scene how readings differ from those of the model.
+    pub(super) fn push(&mut self, t: f64, row: &Row) -> Option<String> {
         if self.off.is_none() && self.identification.push(t, row) {
             self.refresh();
         }
+        let unlike = self.identification.unlike_at_start().filter(|_| !self.warned)?;
+        self.warned = true;
+        Some(unlike)
     }
 
     /// The grasp is over.

@@ -3,7 +3,7 @@
 use super::date_time::date_time_s;
 use super::table::{
     Fault, Header, Limited, Opened, REQUIRED, TIME, empty, empty_field, filled_name, is_called, name, next_row, number,
-    time_factor, unmapped, without_unit,
+    time_factor, unit_at_end, unmapped, without_unit,
 };
 use super::{FARTHEST_TIME_S, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS, MOST_VALUES, brief};
 use crate::mapping::{Mapping, named_column};
@@ -176,6 +176,7 @@ fn long_table<R: Read>(
     let time = mapping.time.as_deref().unwrap_or(TIME);
     let columns = || -> Result<_, String> {
         let (time, unit) = header.needed(time)?;
+        let unit = unit.or_else(|| unit_at_end(header.names[time].0));
         Ok(([time, header.needed(name)?.0, header.needed(value)?.0], time_factor(unit)?.unwrap_or(1.0)))
     };
     let ([time, name, value], factor) = columns().map_err(|fault| (Some(line), fault))?;

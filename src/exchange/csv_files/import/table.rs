@@ -164,6 +164,12 @@ pub(super) fn time_factor(unit: Option<&str>) -> Result<Option<f64>, String> {
     Ok(unit.map(|unit| unit.factor))
 }
 
+/// The unit of times at the end of a name such as `timestamp_ms`; seconds may be a habit of the name alone.
+pub(super) fn unit_at_end(name: &str) -> Option<&str> {
+    let (_, end) = name.rsplit_once(['_', ' '])?;
+    ["ms", "us", "ns"].contains(&end).then_some(end)
+}
+
 /// Reads the next row that is not blank and returns the line on which it begins, or none at the end.
 pub(super) fn next_row<R: Read>(
     reader: &mut csv::Reader<Limited<R>>,

@@ -37,6 +37,8 @@ pub struct GripperSetup {
 /// Command to the gripper thread.
 #[derive(Clone)]
 pub enum GripperCommand {
+    /// Read these sensors from now on; the store remembers them.
+    SetSensors(SensorList),
     /// List the ports again.
     ListPorts,
     /// Open a port or a file of captured bytes; without a name, the only likely port.

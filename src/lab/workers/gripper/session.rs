@@ -178,6 +178,7 @@ impl GripperSession {
 
     fn handle(&mut self, command: GripperCommand) {
         match command {
+            GripperCommand::SetSensors(sensors) => self.set_sensors(sensors),
             GripperCommand::ListPorts => self.ports = list_ports(),
             GripperCommand::Connect(port) => {
                 self.disconnect("another port was chosen");

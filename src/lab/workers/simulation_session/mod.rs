@@ -332,8 +332,8 @@ impl Session {
         let Some(frame) = current.run.next_frame().cloned() else { return self.end_grasp() };
         let read = current.reader.read(&frame);
         let mut sample = Row::of_values(&frame, &read);
-        if let Some(recognition) = &mut self.recognition {
-            recognition.push(sample.t_s, &sample);
+        if let Some(warning) = self.recognition.as_mut().and_then(|own| own.push(sample.t_s, &sample)) {
+            self.publisher.notify(Notice::Warning(warning));
         }
         let plotted = self.channels.len();
         let errors = current.refined_run.as_mut().map(|c| c.errors(frame.t, &read, &current.reader));

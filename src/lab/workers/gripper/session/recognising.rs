@@ -41,8 +41,10 @@ impl GripperSession {
     pub(super) fn recognise(&mut self, row: &Row) {
         let (Some(recognition), Some(recording)) = (&mut self.recognition, &self.recording) else { return };
         let since = recording.controller.closing_s().map(|closing_s| row.t_s - closing_s);
-        if let Some(t) = since.filter(|t| *t >= 0.0) {
-            recognition.push(t, row);
+        if let Some(t) = since.filter(|t| *t >= 0.0)
+            && let Some(warning) = recognition.push(t, row)
+        {
+            self.publisher.notify(Notice::Warning(warning));
         }
     }
 

@@ -9,7 +9,7 @@ use crate::workers::gripper::guided::{CrosstalkCommand, Guided};
 use crate::workers::gripper::plotted::Plotted;
 use crate::workers::job::JobError;
 use palpate_device::doctor::{CrosstalkTest, DoctorError};
-use palpate_tactile::board::Reading;
+use palpate_tactile::board::{Reading, SensorList};
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
 
@@ -21,6 +21,23 @@ impl GripperSession {
     pub(super) fn read_sensors(&mut self) {
         if let Ok(sensors) = self.store.open().and_then(|store| store.calibrations().sensors()) {
             (self.sensors, self.channels) = (sensors, sensors.channels().into());
+        }
+    }
+
+    /// Sets which sensors the gripper has; a board that is connected is connected anew.
+    pub(super) fn set_sensors(&mut self, sensors: SensorList) {
+        if let Some(occupied) = self.occupied() {
+            return self.publisher.notify(Notice::Warning(occupied.to_owned()));
+        }
+        if let Err(cause) = self.store.open().and_then(|store| store.calibrations().set_sensors(sensors)) {
+            return self.publisher.notify(Notice::Failed(format!("sensors not set: {cause}")));
+        }
+        self.publisher.notify(Notice::Info(format!("Sensors of the gripper: {}.", sensors.names())));
+        let port = self.connection.as_ref().map(|connection| connection.gripper.stream().status().port.path);
+        self.read_sensors();
+        if let Some(port) = port {
+            self.disconnect("the sensors were set anew");
+            self.connect(Some(&port));
         }
     }
 
