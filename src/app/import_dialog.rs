@@ -318,6 +318,8 @@ impl ImportDialog {
             }
             let pause = format!("New trial after a pause of {} s", self.gap_s());
             ui.checkbox(&mut self.split, pause);
+            let about = "Less each channel's mean over the first 0.15 s of its trial, as a live gripper's readings are";
+            ui.checkbox(&mut self.base.rezero, "Subtract the rest").on_hover_text(about);
         });
         ui.horizontal(|ui| {
             ui.label("Label");

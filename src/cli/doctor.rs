@@ -20,6 +20,7 @@ use std::time::Duration;
   palpate doctor --crosstalk
   palpate doctor --wiring
   palpate doctor --sketch due_gripper
+  palpate doctor /dev/ttyACM0 --gripper-file > mine.toml
 
 Exit codes: 0 no fault in what was seen, 1 something is wrong, 2 wrong use")]
 pub(super) struct DoctorArguments {
@@ -42,7 +43,8 @@ pub(super) struct DoctorArguments {
     /// Write the Arduino sketch to a folder, which must be named due_gripper, then exit.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["crosstalk", "json", "wiring"], value_parser = sketch_folder())]
     sketch: Option<PathBuf>,
-    /// Print the sensors of the gripper as a gripper file, to begin one's own with, then exit.
+    /// Print the sensors of the gripper as a gripper file, to begin one's own with, then exit. With a port, one sensor for each
+    /// column of its board, raw where the column is not known.
     #[arg(long, conflicts_with_all = ["crosstalk", "json", "wiring", "sketch"])]
     gripper_file: bool,
     /// Print the channels of the gripper for the Arduino sketch, then exit: gripper_channels.h, beside due_gripper.ino.
@@ -77,7 +79,7 @@ struct DoctorReport<'a> {
 }
 
 pub(super) fn run(arguments: &DoctorArguments, sensors: SensorList) -> Result<ExitCode, Failure> {
-    if arguments.gripper_file {
+    if arguments.gripper_file && arguments.port.is_none() {
         say(sensors.to_toml().trim_end())?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -107,6 +109,10 @@ pub(super) fn run(arguments: &DoctorArguments, sensors: SensorList) -> Result<Ex
         !stop.load(Ordering::Relaxed)
     });
     drop(bar);
+    if let Some(link) = seen.link.as_ref().filter(|link| arguments.gripper_file && link.cadence.samples > 0) {
+        say(sensors.of_columns(&link.board.channels)?.to_toml().trim_end())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let found = findings(&seen);
     let (sound, link) = (is_sound(&found), seen.link.as_ref());
     let report = DoctorReport {

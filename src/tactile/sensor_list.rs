@@ -266,6 +266,13 @@ impl SensorList {
         Self::new(file.sensor)
     }
 
+    /// The sensors of a board with these columns: those of this list, and a raw one for each other column.
+    pub fn of_columns(self, columns: &[String]) -> Result<Self, String> {
+        let raw = |name: &String| SensorRow { name: Cow::Owned(name.clone()), ..SensorRow::default() };
+        let row = |name: &String| self.called(name).map_or_else(|| raw(name), |sensor| sensor.row().clone());
+        Self::new(columns.iter().map(row).collect())
+    }
+
     /// Writes it as a gripper file.
     pub fn to_toml(self) -> String {
         let file = GripperFile { sensor: self.0.to_vec() };
@@ -485,6 +492,10 @@ mod tests {
                 "chamber [Pa]"
             ]
         );
+        let columns = ["pad_L2", "t1"].map(str::to_owned);
+        let of_board = list.of_columns(&columns).expect("sound");
+        let found: Vec<(&str, SensorKind)> = of_board.iter().map(|own| (own.channel(), own.kind())).collect();
+        assert_eq!(found, [("padL2", SensorKind::Pad), ("t1", SensorKind::Raw)]);
         assert_eq!(list.called("PAD_L2").map(Sensor::label).as_deref(), Some("left distal pad"));
         assert_eq!(list.called("padL1").and_then(Sensor::strip).map(Sensor::channel), Some("flexL"));
         assert!((list.called("chamber").expect("there").raw_value(10.0) - 500.0).abs() < 1e-9);
