@@ -59,7 +59,7 @@ pub const PROFILES: [(&str, &str); 5] = [
 /// Largest profile (bytes).
 const LARGEST: u64 = 1 << 20;
 /// Rest by whose mean trials are re-zeroed: half of what the leak check reads (s).
-pub const REZERO_S: f64 = 0.15;
+pub(crate) const REZERO_S: f64 = 0.15;
 /// Pause that begins a new trial where no other length is given (s).
 pub const SPLIT_GAP_S: f64 = 1.0;
 

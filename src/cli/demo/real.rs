@@ -119,8 +119,8 @@ fn read_trial(identification: &mut Identification, store: &Store, id: TrialId) -
         let phase = read.hold_s.map(|hold_s| if *t_s < hold_s { Phase::Close } else { Phase::Hold });
         let row = Row { t_s: *t_s, line_bar: f64::NAN, phase, values: read.signals.row(k).into() };
         identification.push(*t_s, &row);
-        identification.unlike_at_start().iter().for_each(|text| warn(text));
     }
+    identification.unlike_at_start().iter().for_each(|text| warn(text));
     identification.end_grasp();
     Ok(())
 }

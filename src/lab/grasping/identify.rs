@@ -307,9 +307,9 @@ impl Identification {
         new || measured
     }
 
-    /// After the first row: says so where a channel begins far from what the model learned.
+    /// Says so where channels begin far from what the model learned.
     pub fn unlike_at_start(&self) -> Option<String> {
-        let signatures = self.model.signatures.as_ref().filter(|_| self.readings.t_s.len() == 1)?;
+        let signatures = self.model.signatures.as_ref()?;
         let far = signatures.far_at_start(&self.readings.values);
         let (channel, value, mean) = far.first()?;
         Some(format!(

@@ -232,7 +232,13 @@ impl Replay {
             BoardEvent::Board(board) => {
                 reader.set_board(board);
                 self.channels = board.sensors.channels().iter().map(Channel::name).collect();
-                self.channels.extend(board.channels.iter().cloned());
+                // A raw sensor without a unit is called like its counts.
+                let counts = |name: &String| match self.channels.contains(name) {
+                    true => format!("{name} [counts]"),
+                    false => name.clone(),
+                };
+                let counts: Vec<String> = board.channels.iter().map(counts).collect();
+                self.channels.extend(counts);
                 None
             }
             BoardEvent::Reading(reading) => {

@@ -19,6 +19,8 @@ pub(super) struct LiveRecognition {
     off: Option<Arc<str>>,
     /// The reason was reported for this scene.
     warned: bool,
+    /// The beginning of this grasp was compared with those that the model learned.
+    compared: bool,
     /// View, updated with each change.
     view: Arc<IdentificationView>,
 }
@@ -29,7 +31,7 @@ impl LiveRecognition {
         let rule = StopRule { most_grasps: most_grasps as usize, ..model.card.stop };
         let identification = Identification::new(model, rule);
         let view = Arc::new(identification.view());
-        Self { identification, rule, off: None, warned: false, view }
+        Self { identification, rule, off: None, warned: false, compared: false, view }
     }
 
     /// True where it asks this model.
@@ -78,6 +80,7 @@ impl LiveRecognition {
         place: &str,
     ) -> Option<String> {
         let begun = self.identification.begin_grasp(columns);
+        self.compared = false;
         self.refresh();
         let Err(cause) = begun else {
             self.off = None;
@@ -93,9 +96,12 @@ impl LiveRecognition {
         if self.off.is_none() && self.identification.push(t, row) {
             self.refresh();
         }
-        let unlike = self.identification.unlike_at_start().filter(|_| !self.warned)?;
-        self.warned = true;
-        Some(unlike)
+        if self.warned || std::mem::replace(&mut self.compared, true) {
+            return None;
+        }
+        let unlike = self.identification.unlike_at_start();
+        self.warned = unlike.is_some();
+        unlike
     }
 
     /// The grasp is over.

@@ -3,7 +3,7 @@
 use super::date_time::date_time_s;
 use super::table::{
     Fault, Header, Limited, Opened, REQUIRED, TIME, empty, empty_field, filled_name, is_called, name, next_row, number,
-    time_factor, unit_at_end, unmapped, without_unit,
+    time_factor, unmapped, without_unit,
 };
 use super::{FARTHEST_TIME_S, MOST_CHANNELS, MOST_SAMPLES, MOST_TRIALS, MOST_VALUES, brief};
 use crate::mapping::{Mapping, named_column};
@@ -175,8 +175,7 @@ fn long_table<R: Read>(
     let header = Header::read(header).map_err(|fault| (Some(line), fault))?;
     let time = mapping.time.as_deref().unwrap_or(TIME);
     let columns = || -> Result<_, String> {
-        let (time, unit) = header.needed(time)?;
-        let unit = unit.or_else(|| unit_at_end(header.names[time].0));
+        let (time, unit) = header.time(time)?;
         Ok(([time, header.needed(name)?.0, header.needed(value)?.0], time_factor(unit)?.unwrap_or(1.0)))
     };
     let ([time, name, value], factor) = columns().map_err(|fault| (Some(line), fault))?;
@@ -212,7 +211,7 @@ impl Rows {
             return Err(unmapped(&header, &missing));
         }
         let time = mapping.time.as_deref().unwrap_or(TIME);
-        let (time, unit) = header.needed(time)?;
+        let (time, unit) = header.time(time)?;
         let trial = match &mapping.trial {
             Some(wanted) => Some(header.needed(wanted)?.0),
             None => place("trial"),

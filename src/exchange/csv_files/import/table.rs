@@ -137,6 +137,13 @@ impl<'a> Header<'a> {
         self.column(wanted).ok_or_else(|| self.lacks(&[wanted]))
     }
 
+    /// The same for times, whose unit may be the end of a name such as `timestamp_ms`. Seconds may be a habit of the name alone.
+    pub(super) fn time<'b>(&'b self, wanted: &'b str) -> Result<(usize, Option<&'b str>), String> {
+        let (at, unit) = self.needed(wanted)?;
+        let end = self.names[at].0.rsplit_once(['_', ' ']).map(|(_, end)| end);
+        Ok((at, unit.or(end.filter(|end| ["ms", "us", "ns"].contains(end)))))
+    }
+
     /// Some columns are not there.
     pub(super) fn lacks(&self, missing: &[&str]) -> String {
         let missing: Vec<String> = missing.iter().map(|name| format!("\"{}\"", brief(name))).collect();
@@ -162,12 +169,6 @@ pub(super) fn time_factor(unit: Option<&str>) -> Result<Option<f64>, String> {
     let no_time = |text: &str| format!("\"{}\" is no unit of time; known are s, ms, us, ns and min", brief(text));
     let unit = unit.map(|text| of_time(text).ok_or_else(|| no_time(text))).transpose()?;
     Ok(unit.map(|unit| unit.factor))
-}
-
-/// The unit of times at the end of a name such as `timestamp_ms`; seconds may be a habit of the name alone.
-pub(super) fn unit_at_end(name: &str) -> Option<&str> {
-    let (_, end) = name.rsplit_once(['_', ' '])?;
-    ["ms", "us", "ns"].contains(&end).then_some(end)
 }
 
 /// Reads the next row that is not blank and returns the line on which it begins, or none at the end.

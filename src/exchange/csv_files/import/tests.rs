@@ -149,6 +149,13 @@ fn other_rates_come_to_the_common_one() {
 }
 
 #[test]
+fn the_name_of_a_column_of_times_tells_its_unit() {
+    let mapping = Mapping { time: Some("stamp_ms".to_owned()), ..Mapping::default() };
+    let import = mapped("stamp_ms,label,p\n0,x,1\n20,x,2\n40,x,3\n", &mapping);
+    assert_eq!(import.trials[0].signals.t_s, [0.0, 0.02, 0.04]);
+}
+
+#[test]
 fn doubtful_rates_are_told() {
     let fast = read("trial,label,t_s,p\na,x,0,1\na,x,0.0005,2\na,x,0.001,3\nb,y,0,1\nb,y,0.0002,2\nb,y,0.0011,3\n");
     assert!(fast.warnings[0].contains("2 of 2 trials were resampled to 1000 Hz"), "{:?}", fast.warnings);
