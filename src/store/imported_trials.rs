@@ -135,7 +135,12 @@ impl Store {
         let channels = serde_json::from_slice(&channels).map_err(|e| bad(e.to_string()))?;
         let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
         all_there(id, "samples", signals.len(), count)?;
-        Ok(Some(signals))
+        // Times may be those of a clock that ran before the trial; a rest before a known closing has negative ones.
+        let late = signals.t_s.first().copied().filter(|first| *first > 0.0);
+        Ok(Some(match late {
+            Some(first) => signals.since(first),
+            None => signals,
+        }))
     }
 }
 

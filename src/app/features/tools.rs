@@ -60,7 +60,7 @@ impl GripperTools {
             fit: fit_job(store(), fit, wake()),
             data: training_data_job(store(), models.clone(), wake()),
             training: training_job(store(), models.clone(), wake()),
-            load: load_model_job(wake()),
+            load: load_model_job(store(), wake()),
             teaching: class_training_job(store(), models, wake()),
             advice: advice_job(wake()),
             awaited: None,

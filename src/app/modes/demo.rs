@@ -59,7 +59,7 @@ fn move_threshold(app: &mut App, sign: f64) -> Result<(), &'static str> {
 fn layout(tiles: &mut Tiles<String>) -> TileId {
     let left = tabs(tiles, &["objects", "scene"]);
     let [view, curvature] = ["view", "curvature"].map(|name| tabs(tiles, &[name]));
-    let loads = tabs(tiles, &["pressure", "force", "line"]);
+    let loads = tabs(tiles, &["pressure", "force", "line", "other"]);
     let right = tabs(tiles, &["recognition", "why", "grasp", "effects", "accuracy", "gripper"]);
     let middle = split(tiles, LinearDir::Vertical, [(view, 0.58), (curvature, 0.21), (loads, 0.21)]);
     split(tiles, LinearDir::Horizontal, [(left, 0.185), (middle, 0.555), (right, 0.26)])

@@ -192,6 +192,9 @@ fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'stati
         ViewSource::Trial => data.inspected.is_some_and(|own| own.trial.source == TrialSource::Recorded),
     };
     let trace = data.traces.current().filter(|_| real)?;
+    if plot.curves.is_empty() {
+        return Some("The gripper has no such sensors; those that it has may be in the panel Other channels.");
+    }
     let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
     let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
     nothing.then_some(if plot.id == "line pressure" {

@@ -10,6 +10,7 @@ use crate::datasets::{
 use palpate_learn::{Method, Model, ModelError, method};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::Channel;
+use palpate_tactile::board::SensorList;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -86,10 +87,12 @@ fn report(run: &JobRun<'_>, method: &Method, stage: TrainingStage) {
 }
 
 /// The job that loads a model that works with the channels of the real gripper.
-pub fn load_model_job(wake: Wake) -> Job<PathBuf, TrainedModel> {
-    Job::new("load-model", Newer::Waits, wake, |path: &PathBuf, _run| {
+pub fn load_model_job(store: PathBuf, wake: Wake) -> Job<PathBuf, TrainedModel> {
+    Job::new("load-model", Newer::Waits, wake, move |path: &PathBuf, _run| {
         let model = Model::load(path)?;
-        check_channels(&model)?;
+        // What is wrong with a store, the trials tell.
+        let sensors = Store::open(&store).and_then(|store| store.calibrations().sensors()).unwrap_or_default();
+        check_channels(&model, sensors)?;
         Ok(Some(TrainedModel::new(model, path.clone())))
     })
 }
@@ -110,9 +113,9 @@ impl TrainedModel {
 }
 
 /// Refuses a model that needs channels the real gripper does not have.
-fn check_channels(model: &Model) -> Result<(), ModelError> {
+fn check_channels(model: &Model, sensors: SensorList) -> Result<(), ModelError> {
     // Which of the channels of a gripper file a connected gripper lacks is said when a grasp begins.
-    let sensors = SensorView::of_model(&model.card).gripper.unwrap_or_default();
+    let sensors = SensorView::of_model(&model.card).gripper.unwrap_or(sensors);
     let names: Vec<String> = sensors.channels().iter().map(Channel::name).collect();
     if model.card.channels.iter().all(|channel| names.contains(channel)) {
         Ok(())
