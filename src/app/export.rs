@@ -19,7 +19,13 @@ pub enum ExportRequest {
     /// The 3-D view, width and height in points: .png with two pixels per point.
     View3d(Box<DrawList>, [u32; 2]),
     /// Sound trials of a store: the formats of [`palpate_exchange::FORMATS`]; as CSV into a new folder.
-    Trials(PathBuf, Vec<TrialId>, OpenOptions),
+    Trials {
+        store: PathBuf,
+        ids: Vec<TrialId>,
+        options: OpenOptions,
+        /// With the force on every taxel.
+        taxels: bool,
+    },
     /// All labelled trials of a store, into a new folder.
     Labelled(PathBuf),
 }
@@ -42,7 +48,10 @@ impl ExportRequest {
                 Picture::draw(&gpu, &mut renderer, list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
             Self::View3d(..) => return unknown("a .png file"),
-            Self::Trials(store, ids, options) => return write_sound(&Store::open(store)?, ids, options, path, stop),
+            Self::Trials { store, ids, options, taxels } => {
+                let (store, is_stopped) = (&Store::open(store)?, &|| stop.load(Ordering::Relaxed));
+                return write_sound(&TrialExport { store, ids, options, taxels: *taxels, is_stopped }, path);
+            }
             Self::Labelled(store) => return write_labelled(&Store::open(store)?, path),
         };
         write_whole(path, kind.unwrap_or(FileKind::Png), &bytes)
@@ -51,23 +60,16 @@ impl ExportRequest {
     }
 }
 
-fn write_sound(
-    store: &Store,
-    ids: &[TrialId],
-    options: &OpenOptions,
-    path: &Path,
-    stop: &AtomicBool,
-) -> Result<String, JobError> {
+fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError> {
     // A name without ending is that of a folder.
     let path = if path.extension().is_none() { unused(path) } else { path.to_owned() };
-    let (sound, _unsound) = sound_ones(store, ids)?;
-    let export = TrialExport { store, ids: &sound, options, is_stopped: &|| stop.load(Ordering::Relaxed) };
-    let written = sound.len() - write_trials(&export, &path)?.left_out.len();
-    let unsound = match ids.len() - written {
+    let (sound, _unsound) = sound_ones(export.store, export.ids)?;
+    let written = sound.len() - write_trials(&TrialExport { ids: &sound, ..*export }, &path)?.left_out.len();
+    let unsound = match export.ids.len() - written {
         0 => String::new(),
         count => format!("; {count} unsound or damaged left out"),
     };
-    Ok(format!("{written} of {} trials exported into {}{unsound}", ids.len(), path.display()))
+    Ok(format!("{written} of {} trials exported into {}{unsound}", export.ids.len(), path.display()))
 }
 
 fn write_labelled(store: &Store, path: &Path) -> Result<String, JobError> {
@@ -106,7 +108,8 @@ mod tests {
         let (store, out) = (folder.path().join("s.sqlite"), folder.path().join("export"));
         std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/data/store.sqlite"), &store).expect("copies");
         std::fs::create_dir(&out).expect("a folder of this name");
-        let request = ExportRequest::Trials(store, vec![1, 2, 4], OpenOptions::default());
+        let options = OpenOptions::default();
+        let request = ExportRequest::Trials { store, ids: vec![1, 2, 4], options, taxels: false };
         let said = request.write(&out, &AtomicBool::new(false)).expect("writes");
         assert!(said.starts_with("3 of 3 trials exported into") && said.ends_with("export-2"), "{said}");
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {

@@ -9,7 +9,7 @@ use super::output::trials_target;
 use super::prelude::*;
 pub(super) use import::{MappingArguments, import_all};
 use labels::LabelCommand;
-use palpate_exchange::{CSV, TrialExport, format_of};
+use palpate_exchange::{CSV, TrialExport, format_of, write_lerobot};
 use palpate_lab::inspection::OpenOptions;
 use palpate_learn::{Model, Models};
 use palpate_store::labels::shown_title;
@@ -25,6 +25,8 @@ use std::sync::Arc;
   palpate trials show 1
   palpate trials export 1 2 3 --out csv/
   palpate trials export 1 2 3 --out grasps.mcap
+  palpate trials export 1 2 3 --taxels --out grasps.npz
+  palpate trials export matching --preset B --as lerobot --out grasps/
   palpate trials import grasps.mcap
   palpate trials label 7 lemon
   palpate trials tag matching wet --add --search slipped
@@ -91,6 +93,12 @@ enum TrialsCommand {
         out: PathBuf,
         #[command(flatten)]
         signals: SignalArguments,
+        /// Data set to write into a folder instead of CSV files: version 3.0 of LeRobot's, with a card.
+        #[arg(long = "as", value_name = "KIND", conflicts_with_all = ["labelled", "model"])]
+        kind: Option<DataSetKind>,
+        /// Write the force on every taxel of simulated trials as well, normal and shear: .npz, .parquet, .mcap and LeRobot.
+        #[arg(long, conflicts_with = "labelled")]
+        taxels: bool,
         /// Include trials that diverged, did not converge or did not come to rest.
         #[arg(long)]
         unsound: bool,
@@ -115,6 +123,12 @@ enum TrialsCommand {
     Restore(ChosenTrials),
     /// Remove all deleted trials permanently.
     Purge,
+}
+
+/// Data sets of other programs.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum DataSetKind {
+    Lerobot,
 }
 
 pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -145,12 +159,12 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
         TrialsCommand::Export { labelled: true, out, .. } => labels::export(&store, out),
-        TrialsCommand::Export { ids, filters, out, signals, unsound, model, .. } => {
+        TrialsCommand::Export { ids, filters, out, signals, kind, taxels, unsound, model, .. } => {
             let ids = &chosen(&store, ids, filters, Shown::Kept)?;
             let ids = if *unsound { ids.clone() } else { sound_ones(&store, ids)? };
             let sensors = signals.of_store(signals.view(), &store)?;
             let options = OpenOptions { sensors, ..OpenOptions::default() };
-            export(&store, &ids, out, options, model.as_deref())
+            export(&store, (&ids, *taxels), (out, *kind), options, model.as_deref())
         }
         TrialsCommand::Import(arguments) => import::run(arguments, &mut store),
         TrialsCommand::Merge { stores } => {
@@ -307,13 +321,16 @@ fn sound_ones(store: &Store, ids: &[TrialId]) -> Result<Vec<TrialId>, Failure> {
 
 fn export(
     store: &Store,
-    ids: &[TrialId],
-    out: &Path,
+    (ids, taxels): (&[TrialId], bool),
+    (out, kind): (&Path, Option<DataSetKind>),
     mut options: OpenOptions,
     model: Option<&Path>,
 ) -> Result<(), Failure> {
     let format = format_of(out).unwrap_or(CSV);
-    if format.kind() != FileKind::Csv {
+    if kind.is_some() && out.extension().is_some() && !out.is_dir() {
+        return Err(format!("\"{}\" has an ending, but a data set is a folder: --out FOLDER", out.display()).into());
+    }
+    if kind.is_none() && format.kind() != FileKind::Csv {
         check_new(out, format.kind())?;
         options.models = match model {
             Some(path) => Models::all(&Arc::new(Model::load(path)?)),
@@ -322,7 +339,11 @@ fn export(
     }
     let stop = stop_flag()?;
     let is_stopped = || stop.load(Ordering::Relaxed);
-    let written = format.write(&TrialExport { store, ids, options: &options, is_stopped: &is_stopped }, out)?;
+    let export = TrialExport { store, ids, options: &options, taxels, is_stopped: &is_stopped };
+    let written = match kind {
+        Some(DataSetKind::Lerobot) => write_lerobot(&export, out),
+        None => format.write(&export, out),
+    }?;
     written.left_out.iter().for_each(|(_, why)| warn(why));
     written.files.iter().try_for_each(|file| say(file.display()))
 }

@@ -1,6 +1,7 @@
 //! What a stored trial gives to other programs: its channels, poses, labels and origin, whatever its source.
 
 use crate::format::{ExchangeError, TrialExport};
+use crate::taxels::Taxels;
 use glam::{DMat3, DQuat};
 use palpate_geometry::Pose;
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial, SimulatedFacts};
@@ -27,6 +28,12 @@ impl TrialExport<'_> {
     /// The trials, opened one by one.
     pub(crate) fn contents(&self) -> Result<impl Iterator<Item = Result<TrialContent, ExchangeError>>, ExchangeError> {
         let rows: BTreeMap<TrialId, TrialRow> = self.store.list(false)?.into_iter().map(|row| (row.id, row)).collect();
+        // An unknown number is told where the trial is opened.
+        let has_taxels = |id: &TrialId| rows.get(id).is_none_or(|row| row.source == TrialSource::Simulated);
+        if self.taxels && !self.ids.iter().any(has_taxels) {
+            let text = "no trial has taxels: only simulated grasps know the force on each; export without them";
+            return Err(ExchangeError::Refused(text.to_owned()));
+        }
         let options = OpenOptions { keep: Keep::Frames, ..self.options.clone() };
         Ok(self.numbers().map(move |id| {
             let id = id?;
@@ -65,6 +72,25 @@ impl TrialContent {
     pub(crate) fn simulated(&self) -> Option<(&SimulatedFacts, &[Arc<Frame>])> {
         self.open.simulated.as_ref().map(|facts| (facts, self.open.frames.as_slice()))
     }
+
+    /// Frame of a simulated trial at a sample: the last until then.
+    pub(crate) fn frame_at(&self, sample: usize) -> Option<&Frame> {
+        self.simulated()?;
+        self.open.at(self.open.t_s[sample])?.frame.map(Arc::as_ref)
+    }
+
+    /// Taxels of a simulated trial.
+    pub(crate) fn taxels(&self) -> Option<Taxels<'_>> {
+        self.simulated().map(|_| Taxels::of(&self.open.header.scene.gripper))
+    }
+
+    /// Forces on all taxels at samples of a simulated trial (N): normal, towards the tip, across.
+    pub(crate) fn taxel_forces(&self, samples: impl Iterator<Item = usize>) -> impl Iterator<Item = [f32; 3]> {
+        let taxels = self.taxels();
+        samples.flat_map(move |k| {
+            taxels.as_ref().zip(self.frame_at(k)).map_or_else(Vec::new, |(taxels, frame)| taxels.forces(frame))
+        })
+    }
 }
 
 /// Channels of any trial with their units, in the order in which they appear.
@@ -76,6 +102,19 @@ pub(crate) fn channels_of(trials: &[TrialContent]) -> Vec<(&str, &'static str)> 
         }
     }
     channels
+}
+
+/// Fingers, rows and columns of taxels, which must be those of every trial that has any.
+pub(crate) fn common_pads(trials: &[TrialContent]) -> Result<[usize; 3], ExchangeError> {
+    let mut shapes = trials.iter().filter_map(|trial| Some((trial.open.id, trial.taxels()?.shape())));
+    let (first, shape) = shapes.next().unwrap_or_default();
+    match shapes.find(|(_, other)| *other != shape) {
+        None => Ok(shape),
+        Some((id, [_, rows, columns])) => Err(ExchangeError::Refused(format!(
+            "trial {first} has {} x {} taxels on a pad, and trial {id} has {rows} x {columns}; export them into separate files",
+            shape[1], shape[2]
+        ))),
+    }
 }
 
 /// Pose of a finger's segment in the gripper: z towards the tip, x out of the pad, so that joints turn about y.
@@ -101,7 +140,33 @@ pub(crate) fn segment_name(side: Side, segment: usize) -> String {
 mod tests {
     use super::*;
     use glam::DVec3;
+    use palpate_sim::frame::TaxelLoad;
     use palpate_sim::gripper::{Phase, Sway};
+    use palpate_sim::run::SimRun;
+    use palpate_sim::scene::Scene;
+
+    #[test]
+    fn taxels_of_a_straight_finger_lie_in_the_frame_of_its_first_segment() {
+        let scene = Scene::default();
+        let gripper = &scene.gripper;
+        let mut frame = SimRun::new(&scene, None).0.first_look();
+        let taxels = Taxels::of(gripper);
+        let load = |taxel| TaxelLoad { taxel, normal: 0.5, along: 0.25, across: 0.125 };
+        frame.taxels = (0..taxels.count() as u16).map(load).collect();
+        let positions = taxels.positions();
+        for side in Side::BOTH {
+            let first = side.index() * positions.len() / 2;
+            let root = segment_pose(&frame, gripper, side, 0);
+            for loaded in taxels.loaded(&frame, side) {
+                let place = root.point(DVec3::from(positions[first + loaded.taxel]));
+                assert!((place - loaded.place).length() < 1e-12, "{side:?} {}: {place}", loaded.taxel);
+                // Into the pad, towards the tip that hangs down, and along y.
+                let wanted = DVec3::new(-0.5 * side.closing_sign(), 0.125, -0.25);
+                assert!((loaded.force - wanted).length() < 1e-12, "{}", loaded.force);
+            }
+        }
+        assert_eq!(taxels.forces(&frame)[7], [0.5, 0.25, 0.125]);
+    }
 
     #[test]
     fn joints_turn_about_y_from_one_segment_to_the_next() {

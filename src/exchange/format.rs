@@ -2,7 +2,7 @@
 
 use crate::mapping::Mapping;
 use palpate_lab::inspection::{OpenOptions, OpenTrialError};
-use palpate_store::{FileKind, ImportedTrial, NewFile, Store, StoreError};
+use palpate_store::{FileKind, ImportedTrial, NewFile, NewFolder, Store, StoreError};
 use palpate_tactile::LayoutError;
 use palpate_tactile::trial::TrialId;
 use std::fmt::Display;
@@ -33,6 +33,8 @@ pub struct TrialExport<'a> {
     pub ids: &'a [TrialId],
     /// Sensors through which simulated trials are read, and the models whose answers are written where there is a place.
     pub options: &'a OpenOptions,
+    /// Write the force on every taxel of simulated trials as well.
+    pub taxels: bool,
     /// Asked before each trial; true ends the export.
     pub is_stopped: &'a dyn Fn() -> bool,
 }
@@ -95,6 +97,15 @@ impl ExchangeError {
 /// Begins a file.
 pub(crate) fn new_file(path: &Path, kind: FileKind) -> Result<NewFile, ExchangeError> {
     NewFile::create(path, kind).map_err(|cause| ExchangeError::cannot_write(path, &cause))
+}
+
+/// Begins a folder, in the place of an empty one or of none.
+pub(crate) fn new_folder(folder: &Path) -> Result<NewFolder, ExchangeError> {
+    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
+        let folder = folder.display();
+        return Err(ExchangeError::Refused(format!("\"{folder}\" is not empty; choose an empty or new folder")));
+    }
+    NewFolder::create(folder).map_err(|cause| ExchangeError::cannot_write(folder, &cause))
 }
 
 /// Error of an import, with its place in the file.

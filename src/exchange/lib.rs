@@ -1,4 +1,4 @@
-//! Trials as files of other programs: CSV, MCAP, NPZ and Parquet.
+//! Trials as files of other programs: CSV, MCAP, NPZ, Parquet and data sets of LeRobot.
 //!
 //! [`FORMATS`] is the one list of formats: command line and window read it. To add a format, write a file with its
 //! [`TrialFormat`] and add it to the list.
@@ -11,13 +11,17 @@
 //! |---|---|---|
 //! | 0 | `mapping` | which columns of a table are which, profiles of other programs |
 //! | 0 | `series` | readings of channels at their own times, and their table |
+//! | 0 | `parquet_table` | tables of Parquet, written |
+//! | 0 | `taxels` | force on every taxel of both pads, and its place |
 //! | 1 | `format` | the trait [`TrialFormat`], what is written and read, errors |
 //! | 2 | `content` | a stored trial as other programs see it |
 //! | 2 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
+//! | 3 | `card` | cards of data sets, for hubs |
 //! | 3 | `urdf` | the gripper for viewers of ROS |
 //! | 3 | `npz_import` | arrays of numpy as trials |
 //! | 4 | `npz`, `parquet` | arrays and tables |
 //! | 4 | `mcap` | messages of ROS 2 |
+//! | 5 | `lerobot` | data sets of LeRobot |
 //!
 //! # Example
 //!
@@ -32,15 +36,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod card;
 mod content;
 mod csv_files;
 mod format;
+mod lerobot;
 mod mapping;
 mod mcap;
 mod npz;
 mod npz_import;
 mod parquet;
+mod parquet_table;
 mod series;
+mod taxels;
 #[cfg(test)]
 mod tests;
 mod urdf;
@@ -50,6 +58,7 @@ pub use csv_files::{
     write_trial_csv,
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+pub use lerobot::write_lerobot;
 pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S, plain_name};
 pub use parquet::is_contained;
 

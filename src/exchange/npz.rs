@@ -2,10 +2,11 @@
 //!
 //! NPY is a header of text, padded to 64 bytes, and the numbers in rows. Source: numpy, *numpy.lib.format*, version 1.0.
 
-use crate::content::{TrialContent, channels_of};
+use crate::content::{TrialContent, channels_of, common_pads};
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, new_file};
 use crate::mapping::Mapping;
 use crate::npz_import::{names_of, read_npz};
+use crate::taxels::{NORMAL, POSITION, SHEAR};
 use palpate_geometry::Pose;
 use palpate_lab::inspection::{TouchPhase, scene_hash};
 use palpate_sim::frame::Frame;
@@ -35,7 +36,8 @@ impl TrialFormat for Npz {
         for trial in export.contents()? {
             let trial = trial?;
             let joints = joints_of(&trial);
-            let each = 8 * (trial.open.columns.len() + joints + 2 * POSE + 4) as u64;
+            let taxels = trial.taxels().filter(|_| export.taxels).map_or(0, |taxels| taxels.count());
+            let each = (8 * (trial.open.columns.len() + joints + 2 * POSE + 4) + 12 * taxels) as u64;
             bytes = u64::max(bytes, each * trial.samples.len() as u64);
             let gigabytes = (bytes * export.ids.len() as u64) as f64 / 1e9;
             if bytes.saturating_mul(export.ids.len() as u64) > MOST_BYTES {
@@ -46,8 +48,9 @@ impl TrialFormat for Npz {
             }
             trials.push(trial);
         }
+        let pads = if export.taxels { Some(common_pads(&trials)?) } else { None };
         let mut archive = Archive { zip: zip::ZipWriter::new(file) };
-        let written = arrays(&trials, &mut archive).and_then(|()| archive.zip.finish().map_err(io::Error::other));
+        let written = arrays(&trials, pads, &mut archive).and_then(|()| archive.zip.finish().map_err(io::Error::other));
         written.and_then(NewFile::finish).map_err(|e| ExchangeError::cannot_write(path, &e))?;
         Ok(Written::whole(path))
     }
@@ -61,7 +64,17 @@ impl TrialFormat for Npz {
     }
 }
 
-fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>) -> io::Result<()> {
+/// Samples of trials in the order of arrays; none beyond the end of a trial.
+fn places(trials: &[TrialContent], samples: usize) -> impl Iterator<Item = (&TrialContent, Option<usize>)> {
+    trials.iter().flat_map(move |trial| (0..samples).map(move |k| (trial, trial.samples.get(k).copied())))
+}
+
+/// Arrays of trials whose pads have a shape; without one, no taxels.
+fn arrays<W: Write + io::Seek>(
+    trials: &[TrialContent],
+    pads: Option<[usize; 3]>,
+    archive: &mut Archive<W>,
+) -> io::Result<()> {
     let count = trials.len();
     let samples = trials.iter().map(|trial| trial.samples.len()).max().unwrap_or(0);
     let channels = channels_of(trials);
@@ -75,8 +88,7 @@ fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>
     archive.texts("created", trials.iter().map(|trial| trial.open.created.clone()))?;
     archive.texts("scene", trials.iter().map(|trial| scene_hash(&trial.open.header.scene)))?;
     archive.texts("phase_names", TouchPhase::ALL.iter().map(|phase| phase.name().to_owned()))?;
-    // A sample of a trial, or none beyond its end.
-    let places = || trials.iter().flat_map(|trial| (0..samples).map(move |k| (trial, trial.samples.get(k).copied())));
+    let places = || places(trials, samples);
     let grid = [count, samples];
     let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
     archive.array("t_s", &grid, places().map(|(trial, k)| or_nan(k.map(|k| trial.open.t_s[k]))))?;
@@ -100,6 +112,9 @@ fn arrays<W: Write + io::Seek>(trials: &[TrialContent], archive: &mut Archive<W>
     };
     archive.array("phase", &grid, places().map(|(trial, k)| phase(trial, k)))?;
     motion(trials, samples, archive)?;
+    if let Some(pads) = pads {
+        taxels(trials, (samples, pads), archive)?;
+    }
     answers(trials, samples, archive)
 }
 
@@ -114,14 +129,7 @@ fn motion<W: Write + io::Seek>(trials: &[TrialContent], samples: usize, archive:
     if joints == 0 {
         return Ok(());
     }
-    let frames = || {
-        trials.iter().flat_map(|trial| {
-            (0..samples).map(move |k| {
-                let t_s = trial.simulated().and(trial.samples.get(k)).map(|k| trial.open.t_s[*k]);
-                (trial, t_s.and_then(|t_s| trial.open.at(t_s)?.frame))
-            })
-        })
-    };
+    let frames = || places(trials, samples).map(|(trial, k)| (trial, k.and_then(|k| trial.frame_at(k))));
     let angles = frames().flat_map(|(_, frame)| {
         Side::BOTH.into_iter().flat_map(move |side| {
             let own = frame.map(|frame| frame.joints(side)).unwrap_or_default();
@@ -143,6 +151,31 @@ fn motion<W: Write + io::Seek>(trials: &[TrialContent], samples: usize, archive:
     archive.array("gripper_pose", &shape, gripper)?;
     let object = frames().flat_map(|(_, frame)| numbers(frame.and_then(|frame| frame.world_from_object)));
     archive.array("object_pose", &shape, object)
+}
+
+/// Forces on taxels and their places, NaN in trials that have none.
+fn taxels<W: Write + io::Seek>(
+    trials: &[TrialContent],
+    (samples, pads): (usize, [usize; 3]),
+    archive: &mut Archive<W>,
+) -> io::Result<()> {
+    let count = pads.iter().product();
+    let forces = || {
+        places(trials, samples).flat_map(|(trial, k)| {
+            let frame = k.and_then(|k| trial.frame_at(k));
+            let forces = trial.taxels().zip(frame).map(|(taxels, frame)| taxels.forces(frame));
+            forces.unwrap_or_else(|| vec![[f32::NAN; 3]; count])
+        })
+    };
+    let shape = |before: &[usize], after: &[usize]| [before, &pads, after].concat();
+    let grid = [trials.len(), samples];
+    archive.array(NORMAL, &shape(&grid, &[]), forces().map(|[normal, ..]| normal))?;
+    archive.array(SHEAR, &shape(&grid, &[2]), forces().flat_map(|[_, along, across]| [along, across]))?;
+    let positions = trials.iter().flat_map(|trial| {
+        let own = trial.taxels().map(|taxels| taxels.positions());
+        own.unwrap_or_else(|| vec![[f64::NAN; 3]; count]).into_iter().flatten()
+    });
+    archive.array(POSITION, &shape(&grid[..1], &[3]), positions.map(|metres| metres as f32))
 }
 
 /// Probabilities of classes, where a model answered.
@@ -247,6 +280,7 @@ fn header(kind: &str, shape: &[usize]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::{assert_sums, ideal_forces, mixed_store};
     use crate::write_trials;
     use palpate_lab::grasping::grasp;
     use palpate_lab::inspection::{OpenOptions, OpenTrial};
@@ -295,7 +329,10 @@ mod tests {
         }
         let path = folder.path().join("out.npz");
         let options = OpenOptions::default();
-        write_trials(&TrialExport { store: &store, ids: &[1, 2], options: &options, is_stopped: &|| false }, &path)?;
+        write_trials(
+            &TrialExport { store: &store, ids: &[1, 2], options: &options, taxels: false, is_stopped: &|| false },
+            &path,
+        )?;
         let arrays = read(&path);
         let shape = |name: &str, wanted: &str| {
             let header = &arrays[&format!("{name}.npy")].0;
@@ -323,6 +360,48 @@ mod tests {
         }
         let label = &arrays["label.npy"].1;
         assert_eq!(label[..8], [b'l', 0, 0, 0, b'e', 0, 0, 0]);
+        Ok(())
+    }
+
+    #[test]
+    fn taxels_add_up_to_the_ideal_force_and_are_missing_where_there_are_none() -> Result<(), Box<dyn std::error::Error>>
+    {
+        let (folder, mut store) = mixed_store();
+        let path = folder.path().join("out.npz");
+        let options = OpenOptions::default();
+        let export = |store: &Store, ids: &[i64]| {
+            write_trials(&TrialExport { store, ids, options: &options, taxels: true, is_stopped: &|| false }, &path)
+        };
+        export(&store, &[1, 2])?;
+        let arrays = read(&path);
+        let numbers = |name: &str, shape: &str| -> Vec<f32> {
+            let (header, bytes) = &arrays[&format!("{name}.npy")];
+            assert!(header.contains(&format!("'descr': '<f4', 'fortran_order': False, 'shape': {shape}")), "{header}");
+            bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+        };
+        let wanted = ideal_forces(&store, 1);
+        let samples = wanted.len();
+        let normal = numbers("taxel_normal", &format!("(2,{samples},2,40,4,)"));
+        let shear = numbers("taxel_shear", &format!("(2,{samples},2,40,4,2,)"));
+        let position = numbers("taxel_position", "(2,2,40,4,3,)");
+        let (own, missing) = normal.split_at(normal.len() / 2);
+        own.chunks(320).zip(&wanted).for_each(|(normal, wanted)| assert_sums(normal, *wanted));
+        assert!(missing.iter().all(|force| force.is_nan()));
+        let trial = store.load(1)?;
+        let load = trial.frames().iter().flat_map(|frame| &frame.taxels).max_by(|a, b| a.along.total_cmp(&b.along));
+        let load = load.expect("loaded");
+        let sample = trial.frames().iter().position(|frame| frame.taxels.contains(load)).expect("is there");
+        let place = 2 * (320 * sample + usize::from(load.taxel));
+        assert_eq!(shear[place..place + 2], [load.along, load.across]);
+        // The first taxel of the left pad: half a pitch from the palm, and from the edge, which is at positive y there.
+        assert!((position[1] - 0.0075).abs() < 1e-6 && (position[2] - 0.00125).abs() < 1e-6, "{:?}", &position[..3]);
+        assert!(position[960..].iter().all(|metres| metres.is_nan()));
+
+        let mut scene = Scene::default();
+        (scene.timing.duration_s, scene.gripper.pad.rows) = (0.1, 20);
+        store.insert(&grasp(&scene, None, 0))?;
+        let error = export(&store, &[1, 3]).expect_err("refused").to_string();
+        assert!(error.contains("trial 1 has 40 x 4") && error.contains("trial 3 has 20 x 4"), "{error}");
         Ok(())
     }
 }

@@ -7,6 +7,7 @@ use crate::csv_files::read_made;
 use crate::format::{Import, ImportError, file_name};
 use crate::mapping::{Mapping, plain_name};
 use crate::series::{Lines, quoted};
+use crate::taxels::is_taxels;
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
@@ -46,10 +47,14 @@ fn arrays(path: &Path) -> Result<Arrays, String> {
     }
     let (mut arrays, mut left_out) = (BTreeMap::new(), Vec::new());
     let mut left = MOST_BYTES;
+    let is_own = ["values.npy", "channels.npy"].iter().all(|name| archive.index_for_name(name).is_some());
     for place in 0..archive.len() {
         let file = archive.by_index(place).map_err(|error| no_archive(&error))?;
         let name = file.name().map(|name| name.into_owned()).map_err(|error| no_archive(&error))?;
         let Some(name) = name.strip_suffix(".npy").map(str::to_owned) else { continue };
+        if is_own && is_taxels(&name) {
+            continue;
+        }
         let mut bytes = Vec::new();
         file.take(left + 1).read_to_end(&mut bytes).map_err(|error| no_archive(&error))?;
         left = left

@@ -1,43 +1,28 @@
 //! Trials as Apache Parquet: a table with one row per sample, for data frames.
 //!
 //! Columns: `trial`, `label`, `source`, `seed`, `sample`, `t_s`, `line_bar`, `phase`, then a column of every channel. Units
-//! stand in the file's key-value metadata under `units`, as JSON.
+//! stand in the file's key-value metadata under `units`, as JSON. Taxels are lists, whose shapes stand there under `taxels`.
 
 use crate::content::{TrialContent, channels_of};
 use crate::csv_files::read_made;
 use crate::format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written, file_name, new_file};
 use crate::mapping::Mapping;
+use crate::parquet_table::{Cells, Columns, TableWriter};
 use crate::series::{Lines, quoted};
-use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int64Type};
+use crate::taxels::{NORMAL, SHEAR, is_taxels};
 use ::parquet::errors::ParquetError;
-use ::parquet::file::metadata::KeyValue;
-use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::reader::{ChunkReader, FileReader as _, Length};
 use ::parquet::file::serialized_reader::SerializedFileReader;
-use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use ::parquet::record::reader::RowIter;
 use ::parquet::record::{Field, Row};
 use ::parquet::schema::types::Type;
-use palpate_store::{FileKind, NewFile};
+use palpate_store::FileKind;
+use palpate_tactile::trial::TrialId;
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Arc;
-
-/// Columns before the channels.
-const FIXED: [(&str, Physical); 8] = [
-    ("trial", Physical::INT64),
-    ("label", Physical::BYTE_ARRAY),
-    ("source", Physical::BYTE_ARRAY),
-    ("seed", Physical::INT64),
-    ("sample", Physical::INT64),
-    ("t_s", Physical::DOUBLE),
-    ("line_bar", Physical::DOUBLE),
-    ("phase", Physical::BYTE_ARRAY),
-];
 
 /// Tables of Parquet, a row group for each trial.
 pub(crate) struct Parquet;
@@ -48,12 +33,19 @@ impl TrialFormat for Parquet {
     }
 
     fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
-        let failed = |error: &dyn std::fmt::Display| ExchangeError::cannot_write(path, error);
         let file = new_file(path, self.kind())?;
         // Every trial has to be seen before the columns are known.
         let trials = export.contents()?.collect::<Result<Vec<_>, _>>()?;
-        let written = table(&trials, &channels_of(&trials), file).map_err(|e| failed(&e))?;
-        written.finish().map_err(|e| failed(&e))?;
+        let channels = channels_of(&trials);
+        let of = |trial| columns_of(trial, &channels, export.taxels);
+        let first =
+            trials.first().map(of).ok_or_else(|| ExchangeError::Refused("no trial is left to write".to_owned()))?;
+        let written =
+            TableWriter::create(file, &first, metadata(&trials, &channels, export.taxels)).and_then(|mut table| {
+                trials.iter().try_for_each(|trial| table.write(&of(trial)))?;
+                table.finish()
+            });
+        written.map_err(|error| ExchangeError::cannot_write(path, &error))?;
         Ok(Written::whole(path))
     }
 
@@ -192,11 +184,27 @@ fn varint(rest: &mut &[u8]) -> Option<u64> {
     Some(number)
 }
 
+/// True for a file of this program.
+fn is_own(reader: &SerializedFileReader<Bounded>) -> bool {
+    let pairs = reader.metadata().file_metadata().key_value_metadata();
+    pairs.is_some_and(|pairs| pairs.iter().any(|pair| pair.key == "palpate"))
+}
+
+/// Schema of the columns of a file of this program that can be channels; none where they are all that it has.
+fn without_taxels(reader: &SerializedFileReader<Bounded>) -> Result<Option<Type>, ParquetError> {
+    let schema = reader.metadata().file_metadata().schema();
+    let fields: Vec<_> = schema.get_fields().iter().filter(|field| !is_taxels(field.name())).cloned().collect();
+    if !is_own(reader) || fields.len() == schema.get_fields().len() {
+        return Ok(None);
+    }
+    Type::group_type_builder(schema.name()).with_fields(fields).build().map(Some)
+}
+
 /// Names of the columns of all rows, in their order: later lists may be longer.
 fn names_of(reader: &SerializedFileReader<Bounded>) -> Result<Vec<String>, ParquetError> {
     let mut names: Vec<String> = Vec::new();
     let mut known = BTreeSet::new();
-    for row in reader.get_row_iter(None)? {
+    for row in reader.get_row_iter(without_taxels(reader)?)? {
         let mut before = 0;
         cells(&row?, &mut |name, _| {
             if names.get(before) == Some(&name) {
@@ -222,22 +230,15 @@ fn read_table(file: File, path: &Path, mapping: &Mapping) -> Result<Import, Impo
     let reader = SerializedFileReader::new(Bounded(file)).map_err(failed)?;
     let pairs = reader.metadata().file_metadata().key_value_metadata();
     let of_metadata = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.as_deref();
-    let is_own = of_metadata("palpate").is_some();
+    let is_own = is_own(&reader);
     let units: BTreeMap<String, String> =
         of_metadata("units").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-    let own = Mapping {
-        ignore: FIXED
-            .iter()
-            .map(|(name, _)| *name)
-            .filter(|name| !OWN_ROLES.contains(name))
-            .map(str::to_owned)
-            .collect(),
-        ..Mapping::default()
-    };
+    let own = Mapping { ignore: NO_CHANNELS.map(str::to_owned).into(), ..Mapping::default() };
     let mapping = if is_own && !mapping.has_roles() { &own } else { mapping };
     let names = names_of(&reader).map_err(failed)?;
     let places: BTreeMap<&str, usize> = names.iter().map(String::as_str).zip(0..).collect();
-    let mut rows = RowIter::from_file_into(Box::new(reader)).peekable();
+    let schema = without_taxels(&reader).map_err(failed)?;
+    let mut rows = RowIter::from_file_into(Box::new(reader)).project(schema).map_err(failed)?.peekable();
     let wanted = mapping.time.as_deref().unwrap_or("t_s");
     if let Some(Ok(first)) = rows.peek()
         && !is_own
@@ -276,8 +277,8 @@ fn why(error: &ParquetError) -> String {
     }
 }
 
-/// Columns of this program's tables that an import reads besides the channels.
-const OWN_ROLES: [&str; 3] = ["trial", "label", "t_s"];
+/// Columns of this program's tables that an import does not read.
+const NO_CHANNELS: [&str; 5] = ["source", "seed", "sample", "line_bar", "phase"];
 /// Most columns.
 const MOST_COLUMNS: usize = 2000;
 
@@ -324,77 +325,116 @@ fn cell_texts(name: &str, cell: &Field, take: &mut dyn FnMut(String, String)) {
     take(name.to_owned(), text);
 }
 
-fn table(trials: &[TrialContent], channels: &[(&str, &'static str)], file: NewFile) -> Result<NewFile, ParquetError> {
-    let field = |name: &str, physical: Physical| -> Result<Arc<Type>, ParquetError> {
-        let text = (physical == Physical::BYTE_ARRAY).then_some(LogicalType::String);
-        let field = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
-        Ok(Arc::new(field.with_logical_type(text).build()?))
-    };
-    let fixed = FIXED.iter().map(|(name, physical)| field(name, *physical));
-    let numbers = channels.iter().map(|(name, _)| field(name, Physical::FLOAT));
-    let fields = fixed.chain(numbers).collect::<Result<Vec<_>, _>>()?;
-    let schema = Arc::new(Type::group_type_builder("palpate").with_fields(fields).build()?);
-    let units: serde_json::Map<String, serde_json::Value> =
-        channels.iter().map(|(name, unit)| ((*name).to_owned(), (*unit).into())).collect();
-    let metadata = [
-        ("units".to_owned(), serde_json::Value::from(units).to_string()),
-        ("palpate".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-    ];
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .set_key_value_metadata(Some(metadata.into_iter().map(|(key, value)| KeyValue::new(key, value)).collect()))
-        .build();
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
-    for trial in trials {
-        let mut group = writer.next_row_group()?;
-        let mut place = 0;
-        while let Some(mut column) = group.next_column()? {
-            match FIXED.get(place) {
-                Some((name, _)) => fixed_column(&mut column, name, trial)?,
-                None => {
-                    let own = trial.open.columns.iter().find(|own| own.name == channels[place - FIXED.len()].0);
-                    let value = |k: &usize| own.map_or(f32::NAN, |own| own.values[*k]);
-                    let values: Vec<f32> = trial.samples.iter().map(value).collect();
-                    column.typed::<FloatType>().write_batch(&values, None, None)?;
-                }
-            }
-            column.close()?;
-            place += 1;
-        }
-        group.close()?;
+/// Columns of a trial: those of every table, channels, and forces on taxels where they are wanted.
+fn columns_of(trial: &TrialContent, channels: &[(&str, &str)], taxels: bool) -> Columns {
+    let open = &trial.open;
+    let samples = &trial.samples;
+    let phase = |t_s: f64| open.phases.iter().rfind(|span| span.from_s <= t_s).map_or("", |span| span.phase.name());
+    let text = |text: &str| Cells::Text(vec![text.to_owned(); samples.len()]);
+    let whole = |number: i64| Cells::Whole(vec![number; samples.len()]);
+    let real = |values: &[f64]| Cells::Real(samples.iter().map(|k| values[*k]).collect());
+    let mut columns: Columns = [
+        ("trial", whole(open.id)),
+        ("label", text(&open.header.object)),
+        ("source", text(open.source.name())),
+        ("seed", whole(open.header.seed.cast_signed())),
+        ("sample", Cells::Whole((0..samples.len() as i64).collect())),
+        ("t_s", real(&open.t_s)),
+        ("line_bar", real(&open.line_bar)),
+        ("phase", Cells::Text(samples.iter().map(|k| phase(open.t_s[*k]).to_owned()).collect())),
+    ]
+    .map(|(name, cells)| (name.to_owned(), cells))
+    .into();
+    for (name, _) in channels {
+        let own = open.column(name);
+        let value = |k: &usize| own.map_or(f32::NAN, |own| own.values[*k]);
+        columns.push(((*name).to_owned(), Cells::Small(samples.iter().map(value).collect())));
     }
-    writer.into_inner()
+    if taxels {
+        let (mut normal, mut shear) = (Vec::new(), Vec::new());
+        for [own, along, across] in trial.taxel_forces(samples.iter().copied()) {
+            normal.push(own);
+            shear.extend([along, across]);
+        }
+        let count = trial.taxels().map(|taxels| taxels.count());
+        let lists = |numbers, each: usize| {
+            Cells::Lists(Box::new(Cells::Small(numbers)), vec![count.map(|count| each * count); samples.len()])
+        };
+        columns.push((NORMAL.to_owned(), lists(normal, 1)));
+        columns.push((SHEAR.to_owned(), lists(shear, 2)));
+    }
+    columns
 }
 
-fn fixed_column(column: &mut SerializedColumnWriter<'_>, name: &str, trial: &TrialContent) -> Result<(), ParquetError> {
-    let open = &trial.open;
-    let phase = |t_s: f64| open.phases.iter().rfind(|span| span.from_s <= t_s).map_or("", |span| span.phase.name());
-    let whole = |value: &dyn Fn(usize, usize) -> i64| -> Vec<i64> {
-        trial.samples.iter().enumerate().map(|(n, k)| value(n, *k)).collect()
-    };
-    let real = |values: &[f64]| -> Vec<f64> { trial.samples.iter().map(|k| values[*k]).collect() };
-    let text = |value: &dyn Fn(usize) -> String| -> Vec<ByteArray> {
-        trial.samples.iter().map(|k| ByteArray::from(value(*k).into_bytes())).collect()
-    };
-    match name {
-        "label" => column.typed::<ByteArrayType>().write_batch(&text(&|_| open.header.object.clone()), None, None),
-        "source" => column.typed::<ByteArrayType>().write_batch(&text(&|_| open.source.name().to_owned()), None, None),
-        "phase" => column.typed::<ByteArrayType>().write_batch(&text(&|k| phase(open.t_s[k]).to_owned()), None, None),
-        "t_s" => column.typed::<DoubleType>().write_batch(&real(&open.t_s), None, None),
-        "line_bar" => column.typed::<DoubleType>().write_batch(&real(&open.line_bar), None, None),
-        "seed" => {
-            let seed = open.header.seed.cast_signed();
-            column.typed::<Int64Type>().write_batch(&whole(&|_, _| seed), None, None)
-        }
-        "sample" => column.typed::<Int64Type>().write_batch(&whole(&|n, _| n as i64), None, None),
-        _ => column.typed::<Int64Type>().write_batch(&whole(&|_, _| open.id), None, None),
+/// Metadata of the file: units, version, and the pads where forces on taxels are written.
+fn metadata(trials: &[TrialContent], channels: &[(&str, &str)], taxels: bool) -> Vec<(&'static str, String)> {
+    let forces: &[(&str, &str)] = if taxels { &[(NORMAL, "N"), (SHEAR, "N")] } else { &[] };
+    let units: serde_json::Map<String, serde_json::Value> =
+        channels.iter().chain(forces).map(|(name, unit)| ((*name).to_owned(), (*unit).into())).collect();
+    let mut pairs =
+        vec![("units", serde_json::Value::from(units).to_string()), ("palpate", env!("CARGO_PKG_VERSION").to_owned())];
+    if taxels {
+        pairs.push(("taxels", pads_json(trials).to_string()));
     }
-    .map(drop)
+    pairs
+}
+
+/// Trials, and the shape of their taxels with the place of each (m).
+type Pads = (Vec<TrialId>, [usize; 3], Vec<[f64; 3]>);
+
+/// Pads that trials have: the numbers of these, fingers, rows and columns of taxels, and the place of each (m).
+fn pads_json(trials: &[TrialContent]) -> serde_json::Value {
+    let mut pads: Vec<Pads> = Vec::new();
+    for (id, taxels) in trials.iter().filter_map(|trial| Some((trial.open.id, trial.taxels()?))) {
+        let (shape, positions) = (taxels.shape(), taxels.positions());
+        match pads.iter_mut().find(|(_, own, places)| *own == shape && *places == positions) {
+            Some((ids, ..)) => ids.push(id),
+            None => pads.push((vec![id], shape, positions)),
+        }
+    }
+    let pad = |(trials, shape, position)| serde_json::json!({"trials": trials, "shape": shape, "position": position});
+    pads.into_iter().map(pad).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::unpacked_size;
+    use super::*;
+    use crate::tests::{assert_sums, ideal_forces, mixed_store};
+    use palpate_lab::inspection::OpenOptions;
+
+    #[test]
+    fn lists_of_taxels_add_up_to_the_ideal_force() -> Result<(), Box<dyn std::error::Error>> {
+        let (folder, store) = mixed_store();
+        let path = folder.path().join("out.parquet");
+        let options = OpenOptions::default();
+        let export =
+            TrialExport { store: &store, ids: &[1, 2], options: &options, taxels: true, is_stopped: &|| false };
+        Parquet.write(&export, &path)?;
+        let reader = SerializedFileReader::new(File::open(&path)?)?;
+        let pairs = reader.metadata().file_metadata().key_value_metadata().expect("has some");
+        let pads = pairs.iter().find(|pair| pair.key == "taxels").and_then(|pair| pair.value.as_deref());
+        let pads: serde_json::Value = serde_json::from_str(pads.expect("is there"))?;
+        assert_eq!((&pads[0]["trials"], &pads[0]["shape"]), (&serde_json::json!([1]), &serde_json::json!([2, 40, 4])));
+        assert_eq!(pads[0]["position"].as_array().map(Vec::len), Some(320));
+        let wanted = ideal_forces(&store, 1);
+        let rows = reader.get_row_iter(None)?.collect::<Result<Vec<Row>, _>>()?;
+        for (k, row) in rows.iter().enumerate() {
+            let list = |name: &str| row.get_column_iter().find(|(own, _)| *own == name).expect("a column").1;
+            let numbers = |name: &str| -> Option<Vec<f32>> {
+                let Field::ListInternal(list) = list(name) else { return None };
+                let number = |cell: &Field| if let Field::Float(number) = cell { *number } else { f32::NAN };
+                Some(list.elements().iter().map(number).collect())
+            };
+            let Some(wanted) = wanted.get(k) else {
+                assert!(*list(NORMAL) == Field::Null && *list(SHEAR) == Field::Null, "an imported trial has none");
+                continue;
+            };
+            assert_sums(&numbers(NORMAL).expect("a list"), *wanted);
+            assert_eq!(numbers(SHEAR).map(|shear| shear.len()), Some(640));
+        }
+        assert_eq!(rows.len(), wanted.len() + 2);
+        Ok(())
+    }
 
     #[test]
     fn the_size_of_a_page_is_read_from_its_head() {

@@ -9,7 +9,7 @@ use palpate_tactile::Signals;
 use palpate_tactile::trial::TrialId;
 use std::cell::Cell;
 
-fn store_of(objects: &[&str]) -> (tempfile::TempDir, Store) {
+pub(crate) fn store_of(objects: &[&str]) -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().expect("a folder");
     let mut store = Store::open(&folder.path().join("trials.sqlite")).expect("opens");
     for object in objects {
@@ -29,7 +29,123 @@ fn write(
     options: &OpenOptions,
     (path, is_stopped): (&Path, &dyn Fn() -> bool),
 ) -> Result<Written, ExchangeError> {
-    write_trials(&TrialExport { store, ids, options, is_stopped }, path)
+    write_trials(&TrialExport { store, ids, options, taxels: false, is_stopped }, path)
+}
+
+/// The ideal sensors' forces on both pads at each sample of a simulated trial (N).
+pub(crate) fn ideal_forces(store: &Store, id: TrialId) -> Vec<[f64; 2]> {
+    let open = OpenTrial::open(store, id, &OpenOptions::default()).expect("opens");
+    let [left, right] = ["force_left", "force_right"].map(|name| &open.column(name).expect("is read").values);
+    let forces: Vec<[f64; 2]> = left.iter().zip(right).map(|(l, r)| [l, r].map(|force| f64::from(*force))).collect();
+    assert!(forces.iter().flatten().any(|force| *force > 0.1), "trial {id} holds its object");
+    forces
+}
+
+/// Checks that the normal forces of all taxels, the left pad first, add up to those of ideal sensors (N).
+pub(crate) fn assert_sums(normal: &[f32], wanted: [f64; 2]) {
+    for (pad, wanted) in normal.chunks(normal.len() / 2).zip(wanted) {
+        let sum: f64 = pad.iter().map(|force| f64::from(*force)).sum();
+        assert!((sum - wanted).abs() < 1e-5, "{sum} N instead of {wanted}");
+    }
+}
+
+/// A store with a simulated trial of a lemon and an imported one.
+pub(crate) fn mixed_store() -> (tempfile::TempDir, Store) {
+    let (folder, mut store) = store_of(&["lemon"]);
+    let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
+    let (name, label) = ("1".to_owned(), "mug".to_owned());
+    let imported = ImportedTrial { name, label, size: None, shape: None, session: None, signals };
+    store.insert_imported("mine", &[imported]).expect("stored");
+    (folder, store)
+}
+
+#[test]
+fn trials_with_taxels_come_back_as_those_without() -> Result<(), Box<dyn std::error::Error>> {
+    let (folder, store) = mixed_store();
+    let options = OpenOptions::default();
+    let export = |ids: &[TrialId], taxels: bool, path: &Path| {
+        write_trials(&TrialExport { store: &store, ids, options: &options, taxels, is_stopped: &|| false }, path)
+    };
+    for ending in ["mcap", "npz", "parquet"] {
+        let [bare, full] = ["bare", "full"].map(|name| folder.path().join(format!("{name}.{ending}")));
+        export(&[1], false, &bare)?;
+        export(&[1], true, &full)?;
+        let [bare, full] = [bare, full].map(|path| {
+            let columns = columns_of(&path, &Mapping::default()).expect("lists");
+            (
+                columns,
+                read_trials(&path, &Mapping::default()).expect("reads"),
+                std::fs::metadata(path).expect("is there"),
+            )
+        });
+        assert!(full.2.len() > bare.2.len(), "{ending}");
+        assert_eq!((bare.0, bare.1), (full.0, full.1), "{ending}");
+        let lost = folder.path().join(format!("lost.{ending}"));
+        let error = export(&[2], true, &lost).expect_err("refused").to_string();
+        assert!(error.contains("only simulated grasps") && !lost.exists(), "{error}");
+    }
+    let error = export(&[1], true, folder.path()).expect_err("refused").to_string();
+    assert!(error.contains(".contacts.csv"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn a_data_set_of_lerobot_has_an_episode_for_each_trial() -> Result<(), Box<dyn std::error::Error>> {
+    let (folder, mut store) = store_of(&["lemon", "ball"]);
+    let (at, options) = (folder.path().join("set"), OpenOptions::default());
+    let export = |store: &Store, ids: &[TrialId], taxels: bool, path: &Path| {
+        write_lerobot(&TrialExport { store, ids, options: &options, taxels, is_stopped: &|| false }, path)
+    };
+    export(&store, &[1, 2], true, &at)?;
+    let read = |name: &str| std::fs::read_to_string(at.join(name));
+    let info: serde_json::Value = serde_json::from_str(&read("meta/info.json")?)?;
+    let opened = [1, 2].map(|id| OpenTrial::open(&store, id, &options).expect("opens"));
+    let frames: usize = opened.iter().map(|open| open.t_s.len()).sum();
+    assert_eq!((&info["total_frames"], &info["fps"]), (&serde_json::json!(frames), &serde_json::json!(75)));
+    let features = &info["features"];
+    assert_eq!(features["observation.state"]["names"], serde_json::json!(["curvature_left", "curvature_right"]));
+    for (name, width) in [("observation.tactile", 4), ("observation.taxel_shear", 640), ("action", 1)] {
+        assert_eq!(features[name]["shape"], serde_json::json!([width]), "{name}");
+    }
+    let stats: serde_json::Value = serde_json::from_str(&read("meta/stats.json")?)?;
+    let force = opened.iter().flat_map(|open| &open.column("force_left").expect("is read").values);
+    let highest = force.copied().fold(0.0, f32::max);
+    assert!((stats["observation.tactile"]["max"][2].as_f64().expect("a number") - f64::from(highest)).abs() < 1e-9);
+    assert_eq!(stats["action"]["count"], serde_json::json!([frames]));
+    let card = read("README.md")?;
+    for text in ["license: unknown", "- LeRobot", "| lemon | 1 |", "physics 2", "`force_left` (N)", "free object"] {
+        assert!(card.contains(text), "{text}: {card}");
+    }
+    // Its tables come back by the profile for data sets of LeRobot.
+    export(&store, &[1, 2], false, &folder.path().join("bare"))?;
+    let data = folder.path().join("bare/data/chunk-000/file-000.parquet");
+    let import = read_trials(&data, &Mapping::profile("lerobot")?)?;
+    for (trial, open) in import.trials.iter().zip(&opened) {
+        let column = |name: &str| trial.signals.channels.iter().position(|own| own == name).expect(name);
+        assert_eq!(trial.signals.t_s.len(), open.t_s.len());
+        for (name, own) in [("observation.state_1", "curvature_right"), ("observation.tactile_2", "force_left")] {
+            let (column, own) = (column(name), &open.column(own).expect("is read").values);
+            assert!((0..own.len()).all(|k| trial.signals.row(k)[column].to_bits() == own[k].to_bits()), "{name}");
+        }
+    }
+    assert_eq!(import.trials.len(), 2);
+
+    let error = export(&store, &[1], false, &at).expect_err("refused").to_string();
+    assert!(error.contains("is not empty"), "{error}");
+    let signals = Signals { channels: vec!["grip".to_owned()], t_s: vec![0.0, 0.1], values: vec![1.0, 2.0] };
+    let (name, label) = ("1".to_owned(), "mug".to_owned());
+    let imported = ImportedTrial { name, label, size: None, shape: None, session: None, signals };
+    store.insert_imported("mine", &[imported])?;
+    let other = folder.path().join("other");
+    for (taxels, wanted) in [(false, "no channel that all"), (true, "trial 3 has no taxels")] {
+        let error = export(&store, &[1, 3], taxels, &other).expect_err("refused").to_string();
+        assert!(error.contains(wanted) && !other.exists(), "{error}");
+    }
+    // What other programs measured has no line pressure, so that nothing acts.
+    export(&store, &[3], false, &other)?;
+    let info: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(other.join("meta/info.json"))?)?;
+    assert!(info["features"].get("action").is_none() && info["fps"] == 10);
+    Ok(())
 }
 
 fn bits(signals: &Signals) -> (Vec<u64>, Vec<u32>) {

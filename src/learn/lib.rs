@@ -26,6 +26,7 @@
 //! | 2 | `answer_sets` | classes that are left, with a promise |
 //! | 3 | `leaks` | whether labels can be told by something else than touch |
 //! | 3 | `model`, [`evaluation`] | a trained model with its card; its results on test grasps |
+//! | 4 | `hub_card` | card of a model for hubs |
 //! | 4 | [`network`] | the paper's networks: LSTM kernel, macro-layer, training, dual-stage LSTM |
 //! | 5 | `baselines` | methods for comparison: features with trees, SVM or KNN; DTW; convolution. The geometry encoder |
 //! | 6 | `methods` | table of all methods |
@@ -73,6 +74,7 @@ mod features;
 mod fitting;
 mod forest;
 mod gaps;
+mod hub_card;
 mod leaks;
 mod learned;
 mod methods;

@@ -82,6 +82,23 @@ fn trials_travel_through_mcap_and_npz() {
 }
 
 #[test]
+fn taxels_and_data_sets_leave_the_program() {
+    let folder = folder();
+    let at = folder.path();
+    for ending in ["mcap", "npz", "parquet"] {
+        done(at, &["trials", "export", "1", "2", "--taxels", "--out", &format!("pads.{ending}")]);
+    }
+    done(at, &["trials", "export", "1", "2", "--as", "lerobot", "--out", "set"]);
+    assert!(at.join("set/meta/episodes/chunk-000/file-000.parquet").is_file());
+    done(at, &["trials", "import", "pads.npz"]);
+    refused(at, &["trials", "export", "3", "--taxels", "--out", "no.npz"], &["only simulated grasps know"]);
+    refused(at, &["trials", "export", "1", "--taxels", "--out", "csv"], &[".contacts.csv"]);
+    refused(at, &["trials", "export", "1", "--as", "lerobot", "--out", "a.npz"], &["a data set is a folder"]);
+    refused(at, &["trials", "export", "1", "--as", "lerobot", "--out", "set"], &["is not empty"]);
+    assert_eq!(files(at), ["pads.mcap", "pads.npz", "pads.parquet", "set"]);
+}
+
+#[test]
 fn figures_of_trials_are_drawn_and_named() {
     let folder = folder();
     let at = folder.path();

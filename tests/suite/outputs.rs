@@ -78,12 +78,15 @@ fn a_model_replaces_neither_the_card_of_others_nor_what_has_a_temporary_name() {
     refused(at, &["train", "knn", "--out", "m.safetensors"], &["m.json", "no card of a model"]);
     misused(at, &["train", "knn", "--out", "q.json"], &["no format has this ending; choose .safetensors"]);
     assert!(contents(at) == before);
+    std::fs::write(at.join("o.md"), "# Notes").unwrap();
+    refused(at, &["train", "knn", "--out", "o.safetensors"], &["o.md", "card of a model"]);
+    std::fs::remove_file(at.join("o.md")).unwrap();
     for _ in 0..2 {
         let trained = run(at, &["train", "knn", "--out", "n.safetensors"]);
         assert_eq!(trained.code, Some(0), "{trained:?}");
     }
     let mut after = contents(at);
-    assert!(after.remove("n.safetensors").is_some() && after.remove("n.json").is_some());
+    assert!(["n.safetensors", "n.json", "n.md"].iter().all(|name| after.remove(*name).is_some()));
     assert!(after == before, "nothing else was touched or left");
 }
 

@@ -106,7 +106,7 @@ fn exported() -> Vec<(&'static str, Vec<u8>)> {
     let mut store = Store::open(&folder.path().join("a.sqlite")).unwrap();
     store.insert_imported("a", &read_trials(&path, &Mapping::default()).unwrap().trials).unwrap();
     let options = OpenOptions::default();
-    let export = TrialExport { store: &store, ids: &[1, 2], options: &options, is_stopped: &|| false };
+    let export = TrialExport { store: &store, ids: &[1, 2], options: &options, taxels: false, is_stopped: &|| false };
     let mut files = vec![("csv", table.into_bytes())];
     for ending in ["mcap", "npz", "parquet"] {
         let path = folder.path().join(format!("b.{ending}"));

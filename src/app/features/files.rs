@@ -75,7 +75,7 @@ impl FileFeature {
         let (title, extensions) = match request {
             ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
-            ExportRequest::Trials(..) | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
+            ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
         };
         let name = Some(format!("palpate.{}", extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
@@ -198,18 +198,20 @@ impl App {
         }
     }
 
-    /// Exports the trials selected in the library into one file.
-    pub(in crate::app) fn export_trials(&mut self) {
+    /// Exports the trials selected in the library into one file, with the force on every taxel where this is wanted.
+    pub(in crate::app) fn export_trials(&mut self, taxels: bool) {
         let ids = self.library.selection.ids();
         if ids.is_empty() {
             return self.notices.warning("Select trials in the library first.");
         }
-        self.files.export(ExportRequest::Trials(self.store.clone(), ids, self.inspect.options.clone()));
+        let (store, options) = (self.store.clone(), self.inspect.options.clone());
+        self.files.export(ExportRequest::Trials { store, ids, options, taxels });
     }
 
     /// Exports the trials selected in the library as CSV, into a folder beside the store.
     pub(in crate::app) fn export_tables(&mut self) {
-        let request = ExportRequest::Trials(self.store.clone(), self.library.selection.ids(), OpenOptions::default());
+        let (store, ids) = (self.store.clone(), self.library.selection.ids());
+        let request = ExportRequest::Trials { store, ids, options: OpenOptions::default(), taxels: false };
         self.files.exports.start((self.export_folder(), request));
     }
 

@@ -13,10 +13,10 @@
 
 use super::board::write_board_csv;
 use super::writing::number;
-use crate::format::ExchangeError;
+use crate::format::{ExchangeError, new_folder};
 use palpate_sim::objects::catalogue;
 use palpate_store::labels::LabelledTrial;
-use palpate_store::{FileKind, NewFolder, Store, StoreError, write_whole};
+use palpate_store::{FileKind, Store, StoreError, write_whole};
 use palpate_tactile::trial::TrialId;
 use palpate_tactile::{Channel, Signals, unit_of_channel};
 use serde::Serialize;
@@ -61,11 +61,7 @@ pub fn export_labelled(store: &Store, folder: &Path) -> Result<Exported, Exchang
         let cause = "no trial of the real gripper is labelled; label one with `palpate trials label ID NAME`";
         return Err(ExchangeError::Refused(cause.to_owned()));
     }
-    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
-        let folder = folder.display();
-        return Err(ExchangeError::Refused(format!("\"{folder}\" is not empty; choose an empty or new folder")));
-    }
-    let new = NewFolder::create(folder).map_err(|e| ExchangeError::cannot_write(folder, &e))?;
+    let new = new_folder(folder)?;
     let mut left_out = write_all(store, &rows, new.unfinished())?;
     new.finish().map_err(|e| ExchangeError::cannot_write(folder, &e))?;
     let derived = rows.len() - left_out.len();

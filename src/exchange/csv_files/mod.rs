@@ -34,6 +34,11 @@ impl TrialFormat for Csv {
 
     fn write(&self, export: &TrialExport<'_>, path: &Path) -> Result<Written, ExchangeError> {
         let is_file = FileKind::of(path, &[FileKind::Csv]).is_some();
+        if export.taxels {
+            let text =
+                "CSV lists loaded taxels in .contacts.csv anyway; arrays of taxels go to .npz, .parquet or .mcap";
+            return Err(ExchangeError::Refused(text.to_owned()));
+        }
         if is_file && export.ids.len() > 1 {
             return Err(ExchangeError::Refused("several trials need a folder: --out FOLDER".to_owned()));
         }

@@ -7,6 +7,7 @@
 
 use super::writing::{number, write_file};
 use crate::format::ExchangeError;
+use crate::taxels::{LoadedTaxel, Taxels};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Side, Sway};
 use palpate_sim::scene::Scene;
@@ -38,8 +39,6 @@ pub fn write_trial_csv(
 }
 
 /// Writes one row per loaded taxel and sample: its position in the world and the force on it.
-///
-/// Positions are those of the undeformed skin, which is indented by at most the pad's thickness.
 pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) -> Result<(), ExchangeError> {
     let header = [
         "t_s",
@@ -53,19 +52,16 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
         "shear_along [N]",
         "shear_across [N]",
     ];
-    let grid = scene.gripper.taxels();
+    let taxels = Taxels::of(&scene.gripper);
     write_file(path, FileKind::Contacts, |out| {
         out.write_record(header)?;
         for frame in trial.frames() {
+            let world_from_gripper = frame.world_from_gripper(&trial.data.world_from_gripper);
             for side in Side::BOTH {
-                let placed = frame.placed(&scene.gripper, side);
-                for (taxel, load) in frame.loads(side, grid.count()) {
-                    let (segment, along) = grid.place(taxel, &scene.gripper.finger);
-                    let in_gripper = placed.point(segment, along, grid.across(taxel), grid.height(taxel));
-                    let place = frame.world_from_gripper(&trial.data.world_from_gripper).point(in_gripper);
+                for LoadedTaxel { segment, taxel, load, place, .. } in taxels.loaded(frame, side) {
                     let mut record = vec![number(frame.t), side.name().to_owned()];
                     record.extend([segment, taxel].map(|n| n.to_string()));
-                    record.extend(place.to_array().map(number));
+                    record.extend(world_from_gripper.point(place).to_array().map(number));
                     record.extend([load.normal, load.along, load.across].map(|f| f.to_string()));
                     out.write_record(record)?;
                 }

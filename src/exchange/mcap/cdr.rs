@@ -23,9 +23,17 @@ impl CdrWriter {
         self.bytes.resize(HEADER.len() + body.next_multiple_of(size), 0);
     }
 
+    pub(super) fn u8(&mut self, value: u8) {
+        self.bytes.push(value);
+    }
+
     pub(super) fn u32(&mut self, value: u32) {
         self.align(4);
         self.bytes.extend(value.to_le_bytes());
+    }
+
+    pub(super) fn f32(&mut self, value: f32) {
+        self.u32(value.to_bits());
     }
 
     pub(super) fn f64(&mut self, value: f64) {

@@ -2,9 +2,10 @@
 
 use super::container::{McapWriter, Pairs};
 use super::messages::{self, MessageKind};
-use super::{CHANNELS, TRIAL};
+use super::{CHANNELS, TAXELS, TRIAL};
 use crate::content::{TrialContent, joint_name, segment_name, segment_pose};
 use crate::format::{ExchangeError, TrialExport, new_file};
+use crate::taxels::LoadedTaxel;
 use crate::urdf::gripper_urdf;
 use palpate_geometry::Pose;
 use palpate_lab::inspection::scene_hash;
@@ -20,6 +21,9 @@ use std::path::Path;
 /// Time between trials that were not recorded one after the other (ns).
 const BETWEEN: u64 = 1_000_000_000;
 
+/// Length of the line of one newton (m): forces on taxels are tenths of that.
+const PER_NEWTON: f64 = 0.05;
+
 /// Writes trials into one file.
 pub(super) fn write(export: &TrialExport<'_>, path: &Path, kind: FileKind) -> Result<(), ExchangeError> {
     let failed = |error: io::Error| ExchangeError::cannot_write(path, &error);
@@ -28,6 +32,7 @@ pub(super) fn write(export: &TrialExport<'_>, path: &Path, kind: FileKind) -> Re
         writer: McapWriter::new(new_file(path, kind)?, &library).map_err(failed)?,
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
+        taxels: export.taxels,
     };
     let mut earliest = 0;
     for content in export.contents()? {
@@ -44,6 +49,8 @@ struct Bag<W: Write> {
     writer: McapWriter<W>,
     schemas: BTreeMap<&'static str, u16>,
     channels: BTreeMap<(String, Pairs), u16>,
+    /// Forces on taxels, and the mesh of the object, are written.
+    taxels: bool,
 }
 
 impl<W: Write> Bag<W> {
@@ -77,7 +84,11 @@ impl<W: Write> Bag<W> {
         let at = |t_s: f64| begin + ((t_s - first_s).max(0.0) * 1e9).round() as u64;
         let end = at(open.span_s()[1]);
         if open.simulated.is_some() {
-            self.text("/robot_description", begin, &gripper_urdf(&open.header.scene.gripper))?;
+            let scene = &open.header.scene;
+            // An object whose file is gone is not drawn.
+            let object = if self.taxels { scene.load_object().ok().flatten() } else { None };
+            let surface = object.as_ref().map(|object| object.surface.as_ref());
+            self.text("/robot_description", begin, &gripper_urdf(&scene.gripper, surface))?;
         }
         self.text("/label", begin, &label_json(content).to_string())?;
         for span in &open.phases {
@@ -85,6 +96,9 @@ impl<W: Write> Bag<W> {
         }
         self.samples(content, &at)?;
         self.motion(content, &at)?;
+        if self.taxels {
+            self.forces(content, &at)?;
+        }
         self.answers(content, &at)?;
         self.metadata(content, [begin, end])?;
         let id = open.id;
@@ -160,6 +174,34 @@ impl<W: Write> Bag<W> {
             }
             placed.extend(frame.world_from_object.map(|pose: Pose| ("object".to_owned(), pose)));
             self.writer.message(poses, ns, &messages::transforms(ns, &placed))?;
+        }
+        Ok(())
+    }
+
+    /// Forces on the taxels of a simulated trial, as numbers and as lines in the world.
+    fn forces(&mut self, content: &TrialContent, at: &dyn Fn(f64) -> u64) -> io::Result<()> {
+        let (Some((facts, frames)), Some(taxels)) = (content.simulated(), content.taxels()) else { return Ok(()) };
+        let [fingers, rows, columns] = taxels.shape();
+        let axes = [("finger", fingers), ("row", rows), ("column", columns), ("force", 3)];
+        let names = |names: &[&str]| serde_json::Value::from(names.to_vec()).to_string();
+        let metadata = [
+            ("finger", names(&Side::BOTH.map(Side::name))),
+            ("force", names(&["normal", "shear_along", "shear_across"])),
+            ("unit", "N".to_owned()),
+            ("position", serde_json::json!(taxels.positions()).to_string()),
+        ];
+        let metadata = metadata.map(|(name, value)| (name.to_owned(), value)).into();
+        let numbers = self.channel(MessageKind::SmallNumbers, TAXELS, metadata);
+        let lines = self.channel(MessageKind::Markers, "/palpate/forces", Pairs::new());
+        for frame in frames {
+            let ns = at(frame.t);
+            self.writer.message(numbers, ns, &messages::array(&axes, taxels.forces(frame).as_flattened()))?;
+            let world_from_gripper = frame.world_from_gripper(&facts.world_from_gripper);
+            let line = |loaded: LoadedTaxel| {
+                [loaded.place, loaded.place + PER_NEWTON * loaded.force].map(|end| world_from_gripper.point(end))
+            };
+            let sets = Side::BOTH.map(|side| (side.name(), taxels.loaded(frame, side).map(line).collect()));
+            self.writer.message(lines, ns, &messages::lines(ns, &sets))?;
         }
         Ok(())
     }
@@ -264,7 +306,52 @@ pub(super) fn utc_ns(text: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cdr::CdrReader;
+    use super::super::reader::{ContainerFault, Record, read_records};
     use super::*;
+    use crate::tests::{assert_sums, ideal_forces, mixed_store};
+    use palpate_lab::inspection::OpenOptions;
+
+    #[test]
+    fn messages_of_taxels_add_up_to_the_ideal_force() -> Result<(), Box<dyn std::error::Error>> {
+        let (folder, store) = mixed_store();
+        let path = folder.path().join("out.mcap");
+        let options = OpenOptions::default();
+        let export =
+            TrialExport { store: &store, ids: &[1, 2], options: &options, taxels: true, is_stopped: &|| false };
+        crate::write_trials(&export, &path)?;
+        let (mut topics, mut messages) = (BTreeMap::new(), BTreeMap::<String, Vec<Vec<u8>>>::new());
+        read_records(std::fs::File::open(&path)?, |record| {
+            match record {
+                Record::Channel { id, topic, .. } => drop(topics.insert(id, topic.to_owned())),
+                Record::Message { channel, data, .. } => {
+                    messages.entry(topics[&channel].clone()).or_default().push(data.to_owned());
+                }
+                _ => {}
+            }
+            Ok::<(), ContainerFault>(())
+        })?;
+        let wanted = ideal_forces(&store, 1);
+        let trial = store.load(1)?;
+        assert_eq!((messages[TAXELS].len(), messages["/palpate/forces"].len()), (wanted.len(), wanted.len()));
+        for (k, (data, wanted)) in messages[TAXELS].iter().zip(wanted).enumerate() {
+            let mut read = CdrReader::new(data).expect("a message");
+            let axes = read.u32().expect("axes");
+            let axis = |read: &mut CdrReader<'_>| (read.text().expect("a name").to_owned(), [read.u32(), read.u32()]);
+            let axes: Vec<_> = (0..axes).map(|_| axis(&mut read)).collect();
+            assert_eq!(axes[1], ("row".to_owned(), [Some(40), Some(480)]));
+            assert_eq!((read.u32(), axes.len()), (Some(0), 4));
+            let numbers = read.small_numbers().expect("numbers");
+            assert_sums(&numbers.iter().step_by(3).map(|number| *number as f32).collect::<Vec<_>>(), wanted);
+            // Two ends of three numbers for each loaded taxel.
+            let ends = 48 * trial.frames()[k].taxels.len();
+            let size = messages["/palpate/forces"][k].len();
+            assert!((ends + 400..ends + 800).contains(&size), "{size} bytes with {ends} of lines");
+        }
+        let urdf = String::from_utf8_lossy(&messages["/robot_description"][0]);
+        assert!(urdf.contains("<child link=\"object\"/>") && urdf.contains("data:model/stl;base64,AAAA"));
+        Ok(())
+    }
 
     #[test]
     fn times_of_the_store_are_nanoseconds_since_1970() {

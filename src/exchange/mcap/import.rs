@@ -3,7 +3,7 @@
 use super::container::Pairs;
 use super::messages::{MessageKind, Numbers, read_numbers};
 use super::reader::{ContainerFault, Record, read_records};
-use super::{CHANNELS, TRIAL};
+use super::{CHANNELS, TAXELS, TRIAL};
 use crate::csv_files::read_made;
 use crate::format::{Import, ImportError, file_name};
 use crate::mapping::Mapping;
@@ -128,7 +128,8 @@ impl<'a> Bag<'a> {
                 let schema = self.schemas.get(&schema);
                 let is_ros = |written: &str| written == "ros2msg" || written == "ros2idl";
                 let kind = schema.filter(|[_, written]| encoding == "cdr" && is_ros(written));
-                let kind = kind.and_then(|[name, _]| MessageKind::named(name));
+                // Forces on taxels are not channels.
+                let kind = kind.filter(|_| topic != TAXELS).and_then(|[name, _]| MessageKind::named(name));
                 let type_name = match schema {
                     Some([name, _]) if encoding == "cdr" => clean(name),
                     Some([name, _]) => format!("{} in the encoding {}", clean(name), clean(encoding)),
@@ -161,7 +162,7 @@ impl<'a> Bag<'a> {
     fn message(&mut self, channel: u16, ns: u64, data: &[u8]) -> Result<(), String> {
         let Some(topic) = self.topics.get(&channel) else { return Ok(()) };
         let Some(kind) = topic.kind else { return Ok(()) };
-        if kind == MessageKind::Text || kind == MessageKind::Transforms {
+        if matches!(kind, MessageKind::Text | MessageKind::Transforms | MessageKind::Markers) {
             return Ok(());
         }
         let Some(Numbers { stamp_ns, values }) = read_numbers(kind, data) else {

@@ -17,16 +17,24 @@ pub(super) enum MessageKind {
     ShortNumber,
     Wrench,
     Transforms,
+    Markers,
     Text,
 }
 
 const HEADER: &str = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
 const TIME: &str = "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
 const LAYOUT: &str = "MSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset\n";
+const VECTOR: &str = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
+const QUATERNION: &str = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
+const MARKER: &str = "MSG: visualization_msgs/Marker\nstd_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\n\
+    geometry_msgs/Pose pose\ngeometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration lifetime\n\
+    bool frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\nstring texture_resource\n\
+    sensor_msgs/CompressedImage texture\nUVCoordinate[] uv_coordinates\nstring text\nstring mesh_resource\n\
+    MeshFile mesh_file\nbool mesh_use_embedded_materials\n";
 const DIMENSION: &str = "MSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n";
 
 impl MessageKind {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::JointState,
         Self::FluidPressure,
         Self::Numbers,
@@ -37,6 +45,7 @@ impl MessageKind {
         Self::ShortNumber,
         Self::Wrench,
         Self::Transforms,
+        Self::Markers,
         Self::Text,
     ];
 
@@ -53,6 +62,7 @@ impl MessageKind {
             Self::ShortNumber => "std_msgs/msg/UInt16",
             Self::Wrench => "geometry_msgs/msg/WrenchStamped",
             Self::Transforms => "tf2_msgs/msg/TFMessage",
+            Self::Markers => "visualization_msgs/msg/MarkerArray",
             Self::Text => "std_msgs/msg/String",
         }
     }
@@ -80,12 +90,7 @@ impl MessageKind {
             Self::ShortNumber => ("uint16 data\n", &[]),
             Self::Wrench => (
                 "std_msgs/Header header\nWrench wrench\n",
-                &[
-                    "MSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque\n",
-                    "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
-                    HEADER,
-                    TIME,
-                ],
+                &["MSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque\n", VECTOR, HEADER, TIME],
             ),
             Self::Transforms => (
                 "geometry_msgs/TransformStamped[] transforms\n",
@@ -93,8 +98,25 @@ impl MessageKind {
                     "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\nTransform \
                      transform\n",
                     "MSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n",
-                    "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
-                    "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+                    VECTOR,
+                    QUATERNION,
+                    HEADER,
+                    TIME,
+                ],
+            ),
+            Self::Markers => (
+                "visualization_msgs/Marker[] markers\n",
+                &[
+                    MARKER,
+                    "MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n",
+                    "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
+                    QUATERNION,
+                    VECTOR,
+                    "MSG: std_msgs/ColorRGBA\nfloat32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
+                    "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec\n",
+                    "MSG: sensor_msgs/CompressedImage\nstd_msgs/Header header\nstring format\nuint8[] data\n",
+                    "MSG: visualization_msgs/UVCoordinate\nfloat32 u\nfloat32 v\n",
+                    "MSG: visualization_msgs/MeshFile\nstring filename\nuint8[] data\n",
                     HEADER,
                     TIME,
                 ],
@@ -143,6 +165,60 @@ pub(super) fn numbers(label: &str, values: impl ExactSizeIterator<Item = f64>) -
     out.numbers(values);
     out.finish()
 }
+
+/// Numbers in rows, the last axis first; axes have names.
+pub(super) fn array(axes: &[(&str, usize)], values: &[f32]) -> Vec<u8> {
+    let mut out = CdrWriter::new();
+    out.u32(axes.len() as u32);
+    for (k, (name, size)) in axes.iter().enumerate() {
+        let stride: usize = axes[k..].iter().map(|(_, size)| size).product();
+        out.text(name);
+        out.u32(*size as u32);
+        out.u32(stride as u32);
+    }
+    out.u32(0);
+    out.u32(values.len() as u32);
+    values.iter().for_each(|value| out.f32(*value));
+    out.finish()
+}
+
+/// Lines in the world, one set for each name; a set without lines is taken away.
+pub(super) fn lines(ns: u64, sets: &[(&str, Vec<[DVec3; 2]>)]) -> Vec<u8> {
+    const LINE_LIST: u32 = 5;
+    const ADD: u32 = 0;
+    const DELETE: u32 = 2;
+    let mut out = CdrWriter::new();
+    out.u32(sets.len() as u32);
+    for (name, lines) in sets {
+        header(&mut out, ns, "world");
+        out.text(name);
+        [0, LINE_LIST, if lines.is_empty() { DELETE } else { ADD }].into_iter().for_each(|number| out.u32(number));
+        // A pose that moves nothing; of the scale, the first number is the width.
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].into_iter().for_each(|number| out.f64(number));
+        [LINE_WIDTH, 0.0, 0.0].into_iter().for_each(|number| out.f64(number));
+        LINE_COLOUR.into_iter().for_each(|share| out.f32(share));
+        // No end of its life, and no lock to its frame.
+        out.time(0);
+        out.u8(0);
+        out.u32(2 * lines.len() as u32);
+        lines.iter().flatten().for_each(|end| end.to_array().into_iter().for_each(|number| out.f64(number)));
+        // No colours of points, no texture.
+        out.u32(0);
+        out.text("");
+        header(&mut out, 0, "");
+        out.text("");
+        (0..2).for_each(|_| out.u32(0));
+        // Neither text nor mesh.
+        (0..3).for_each(|_| out.text(""));
+        out.u32(0);
+        out.u8(0);
+    }
+    out.finish()
+}
+
+/// Width (m) and colour (red, green, blue, opacity) of lines.
+const LINE_WIDTH: f64 = 0.0008;
+const LINE_COLOUR: [f32; 4] = [1.0, 0.55, 0.1, 1.0];
 
 /// Poses of frames in the world.
 pub(super) fn transforms(ns: u64, poses: &[(String, Pose)]) -> Vec<u8> {
@@ -225,7 +301,7 @@ pub(super) fn read_numbers(kind: MessageKind, bytes: &[u8]) -> Option<Numbers> {
             }
             found
         }
-        MessageKind::Transforms | MessageKind::Text => return None,
+        MessageKind::Transforms | MessageKind::Markers | MessageKind::Text => return None,
     };
     Some(Numbers { stamp_ns, values })
 }

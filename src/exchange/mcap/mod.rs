@@ -10,6 +10,13 @@
 //! | `/robot_description` | String | URDF of the gripper |
 //! | `/tf` | TFMessage | palm, segments of the fingers and object, in the world |
 //!
+//! With taxels the object is a link of the URDF, with its mesh, and there are two topics more:
+//!
+//! | topic | message | content |
+//! |---|---|---|
+//! | `/palpate/taxels` | Float32MultiArray | force on every taxel (N); places in the channel's metadata |
+//! | `/palpate/forces` | MarkerArray | a line for each loaded taxel, in the world |
+//!
 //! Trials follow each other in time, each at the time of its recording where that is later than the one before. A metadata
 //! record `palpate:trial` for each says where it lies and what is known of it; scene and calibrations are attachments. An
 //! import of such a file gives channels and times back bit by bit.
@@ -28,6 +35,8 @@ use std::path::Path;
 
 /// Topic of all channels.
 const CHANNELS: &str = "/palpate/channels";
+/// Topic of the forces on taxels.
+const TAXELS: &str = "/palpate/taxels";
 /// Name of the metadata record of a trial.
 const TRIAL: &str = "palpate:trial";
 

@@ -18,7 +18,8 @@ pub fn make_models_folder(folder: &Path) -> Result<(), ModelError> {
 
 /// Refuses a path whose model, or the card beside it, would replace something else.
 pub fn check_model_path(path: &Path) -> Result<(), ModelError> {
-    let card = ModelCard::path_beside(path);
+    let (card, hub_card) = (ModelCard::path_beside(path), ModelCard::hub_path_beside(path));
+    check_target(&hub_card, HUB_CARD).map_err(|cause| unwritable(&hub_card, &cause))?;
     check_target(path, FileKind::Model).map_err(|cause| unwritable(path, &cause))?;
     check_target(&card, FileKind::Json).map_err(|cause| unwritable(&card, &cause))?;
     if card == path {
@@ -31,10 +32,14 @@ pub fn check_model_path(path: &Path) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// Writes a model, and its card for people beside it, into a folder that exists.
+/// Cards of models for hubs.
+const HUB_CARD: FileKind =
+    FileKind::Other { title: "card of a model", endings: &["md"], begin: ModelCard::HUB_BEGIN.as_bytes() };
+
+/// Writes a model, and its cards for people and for hubs beside it, into a folder that exists.
 pub fn save_model(model: &Model, path: &Path) -> Result<(), ModelError> {
     check_model_path(path)?;
-    let card = ModelCard::path_beside(path);
+    let (card, hub_card) = (ModelCard::path_beside(path), ModelCard::hub_path_beside(path));
     let written = |path: &Path, kind, bytes: &[u8]| {
         let write = || {
             let mut file = NewFile::create(path, kind)?;
@@ -45,8 +50,10 @@ pub fn save_model(model: &Model, path: &Path) -> Result<(), ModelError> {
     };
     let new_model = written(path, FileKind::Model, &model.to_bytes()?)?;
     let new_card = written(&card, FileKind::Json, model.card_text()?.as_bytes())?;
+    let new_hub_card = written(&hub_card, HUB_CARD, model.card.hub_text().as_bytes())?;
     new_model.finish().map_err(|cause| unwritable(path, &cause))?;
-    new_card.finish().map_err(|cause| unwritable(&card, &cause))
+    new_card.finish().map_err(|cause| unwritable(&card, &cause))?;
+    new_hub_card.finish().map_err(|cause| unwritable(&hub_card, &cause))
 }
 
 fn unwritable(path: &Path, cause: &dyn std::fmt::Display) -> ModelError {

@@ -61,13 +61,19 @@ fn edits_ui(
     menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
+        let id = Id::unique("exported taxels");
+        let mut taxels = ui.data(|data| data.get_temp(id)).unwrap_or(false);
         if ui.button("CSV into a folder beside the store").clicked() {
             actions.push(App::export_tables);
             ui.close();
         }
         if ui.button("MCAP or NPZ file ..").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
-            actions.push(App::export_trials);
+            actions.push(move |app| app.export_trials(taxels));
             ui.close();
+        }
+        let hint = "The file also holds the force on every taxel of simulated trials, normal and shear";
+        if ui.checkbox(&mut taxels, "Taxels").on_hover_text(hint).changed() {
+            ui.data_mut(|data| data.insert_temp(id, taxels));
         }
     });
     if ui.button("Discard").on_hover_text("Discard (Del); Ctrl+Z brings them back").clicked() {

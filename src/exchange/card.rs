@@ -1,0 +1,124 @@
+//! Cards of data sets, as hubs expect them: YAML, then text. All of it comes from what is stored of the trials.
+
+use crate::content::{TrialContent, channels_of};
+use palpate_store::labels::shown_name;
+use palpate_tactile::trial::TrialSource;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Card of a LeRobot data set that `info.json` describes.
+pub(crate) fn data_set_card(trials: &[TrialContent], info: &Value) -> String {
+    let frames = info["total_frames"].as_u64().unwrap_or(0);
+    let size = match frames {
+        0..1_000 => "n<1K",
+        1_000..10_000 => "1K<n<10K",
+        10_000..100_000 => "10K<n<100K",
+        100_000..1_000_000 => "100K<n<1M",
+        _ => "n>1M",
+    };
+    let (episodes, fps, version) = (trials.len(), &info["fps"], env!("CARGO_PKG_VERSION"));
+    let mut text = format!(
+        "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:\n- LeRobot\n- tactile\n- soft-gripper\nsize_categories:\n- \
+         {size}\nconfigs:\n- config_name: default\n  data_files: data/*/*.parquet\n---\n\n# Grasps of a two-finger soft gripper\n\n\
+         {episodes} grasps, {frames} frames at {fps} Hz, written by Palpate {version}. The licence is unknown: name one before \
+         you publish them.\n\n## Objects\n\n| task | episodes |\n|---|---|\n"
+    );
+    let mut line = |line: &str| {
+        // Writing to a text cannot fail.
+        let _written = writeln!(text, "{line}");
+    };
+    let tasks = counts(trials.iter().map(|trial| shown_name(&trial.open.header.object).to_owned()));
+    tasks.iter().for_each(|(task, count)| line(&format!("| {task} | {count} |")));
+    line("\n## How they were measured\n");
+    for (origin, count) in counts(trials.iter().map(origin_of)) {
+        line(&format!("- {count}: {origin}"));
+    }
+    line("\n## Features\n\n| feature | shape | content |\n|---|---|---|");
+    let units: BTreeMap<&str, &str> = channels_of(trials).into_iter().collect();
+    for (name, feature) in info["features"].as_object().into_iter().flatten() {
+        let channels: Vec<String> = feature["names"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_str)
+            .map(|name| match units.get(name).filter(|unit| !unit.is_empty()) {
+                Some(unit) => format!("`{name}` ({unit})"),
+                None => format!("`{name}`"),
+            })
+            .collect();
+        let content = match name.as_str() {
+            "action" => "line pressure, as commanded (bar)".to_owned(),
+            "observation.taxel_normal" => "force into each taxel (N): finger, row, column in line".to_owned(),
+            "observation.taxel_shear" => {
+                "shear on each taxel (N): finger, row, column, along and across in line".to_owned()
+            }
+            "timestamp" => "time from the beginning of the episode (s)".to_owned(),
+            index if index.ends_with("index") => "number, from 0".to_owned(),
+            _ => channels.join(", "),
+        };
+        line(&format!("| `{name}` | {} | {content} |", feature["shape"]));
+    }
+    line("\n## Limits\n");
+    limits(trials).iter().for_each(|limit| line(&format!("- {limit}")));
+    text
+}
+
+/// How often each text occurs.
+fn counts(texts: impl Iterator<Item = String>) -> BTreeMap<String, usize> {
+    texts.fold(BTreeMap::new(), |mut counts, text| {
+        *counts.entry(text).or_default() += 1;
+        counts
+    })
+}
+
+/// Where a trial comes from: physics, preset and sensors, or parts of a gripper.
+fn origin_of(trial: &TrialContent) -> String {
+    let (open, row) = (&trial.open, trial.row.as_ref());
+    let parts = row.map(|row| row.sensors.as_str()).filter(|parts| !parts.is_empty()).unwrap_or("unknown");
+    match open.source {
+        TrialSource::Simulated => {
+            let scene = &open.header.scene;
+            let object = if scene.holds_object() { "fixed" } else { "free" };
+            let preset = row.and_then(|row| row.preset).map_or("none".to_owned(), |preset| format!("\"{preset}\""));
+            let physics = row.and_then(|row| row.physics).map_or("of an early version".to_owned(), |n| n.to_string());
+            let (layout, sensors) = (&open.sensors.layout, open.sensors.sensors.name());
+            format!(
+                "simulated, physics {physics}, accuracy {}, {object} object, preset of poses {preset}, sensors {layout} \
+                 ({sensors})",
+                scene.solver.accuracy
+            )
+        }
+        TrialSource::Recorded => format!("real gripper, its parts: {parts}"),
+        TrialSource::Imported => format!("imported from another program, its channels: {parts}"),
+    }
+}
+
+/// What the trials do not tell.
+fn limits(trials: &[TrialContent]) -> Vec<String> {
+    let count = |is: &dyn Fn(&TrialContent) -> bool| trials.iter().filter(|trial| is(trial)).count();
+    let of_row = |is: fn(&palpate_store::TrialRow) -> bool| count(&|trial| trial.row.as_ref().is_some_and(is));
+    let all = trials.len();
+    let mut limits = vec![
+        "A gap in the readings keeps the value before it; a pressure that is undefined, because nothing touches, is 0."
+            .to_owned(),
+        "Frames hold the last sample until their time. Statistics of quantiles are means over episodes.".to_owned(),
+    ];
+    if count(&|trial| trial.simulated().is_some()) > 0 {
+        limits.push(
+            "Forces of simulated grasps come from a model: pads are fields of springs with friction (`palpate help \
+             stability` tells its measured errors)."
+                .to_owned(),
+        );
+    }
+    for (found, what) in [
+        (of_row(|row| !row.sound), "did not converge, diverged or did not come to rest"),
+        (of_row(|row| !row.flags.is_empty()), "are flagged as faulty"),
+        (of_row(|row| row.unsure), "have a label that is marked as unsure"),
+    ] {
+        if found > 0 {
+            limits.push(format!("{found} of {all} episodes {what}."));
+        }
+    }
+    limits
+}
