@@ -49,6 +49,7 @@ topics! {
     studies
     sensors
     gripper
+    serve
     labelling
     objects
     inspect

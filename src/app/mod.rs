@@ -80,12 +80,12 @@ pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
+use palpate_serve::{Clients, DeskSetup};
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Options that the window opens with.
-#[derive(Clone, Debug)]
 pub struct WindowOptions {
     /// First scene.
     pub scene: Scene,
@@ -95,6 +95,8 @@ pub struct WindowOptions {
     pub port: Option<PathBuf>,
     /// Recognition model for the real gripper; the last one used where none is named.
     pub model: Option<PathBuf>,
+    /// Other programs that may control the real gripper.
+    pub serve: Option<(DeskSetup, Clients)>,
 }
 
 /// First and smallest size of the window (points).
@@ -133,6 +135,9 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
         if let Some(port) = options.port {
             workbench.act(|app| app.connect(Some(port)));
+        }
+        if let Some((desk, clients)) = options.serve {
+            workbench.act(|app| app.serve(desk, clients));
         }
         Ok(Box::new(Window { workbench }))
     });

@@ -26,6 +26,7 @@ mod recognise;
 mod record;
 mod replay;
 mod scene;
+mod serve;
 mod setup;
 mod snapshot;
 mod study;
@@ -73,6 +74,12 @@ struct Arguments {
     /// Recognition model for the real gripper in the window (.safetensors); remembered.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Let other programs control the real gripper beside the window, over this TCP port (default: 4747; `palpate help serve`).
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "4747")]
+    serve: Option<u16>,
+    /// File of the token for them; made where there is none (default: a new token, printed at the start).
+    #[arg(long, value_name = "FILE", requires = "serve")]
+    token: Option<PathBuf>,
     /// Store of trials, an SQLite file (default: in the platform's data folder).
     #[arg(long, global = true, value_name = "FILE")]
     store: Option<PathBuf>,
@@ -126,6 +133,8 @@ enum Command {
     Gap(gap::GapArguments),
     /// Diagnose the connection to the real gripper: what is wrong, why, and what to do.
     Doctor(doctor::DoctorArguments),
+    /// Let other programs control the gripper: JSON lines over TCP on this computer, or over standard input and output.
+    Serve(serve::ServeArguments),
     /// Emulate the gripper on a serial port, with random sensors and optional faults (Unix).
     Emulate(emulate::EmulateArguments),
     /// Measure CPU time on this machine.
@@ -148,7 +157,7 @@ fn after_help() -> String {
 
 /// Opens the window on an object.
 fn window(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { object, port, model, store, .. } = arguments;
+    let Arguments { object, port, model, store, serve, token, .. } = arguments;
     let mut scene = Scene::default();
     if let Some(object) = object {
         if object.to_ascii_lowercase().ends_with(".toml") {
@@ -166,7 +175,8 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
     // The path is remembered; the working folder may differ next time.
     let model = model.as_ref().map(std::path::absolute).transpose()?;
     let store = setup::store_path(store.as_deref())?;
-    Ok(open_window(WindowOptions { scene, store, port: port.clone(), model })?)
+    let serve = serve.map(|listen| serve::beside_window(listen, token.as_deref(), &store)).transpose()?;
+    Ok(open_window(WindowOptions { scene, store, port: port.clone(), model, serve })?)
 }
 
 /// Refuses a misspelt command or object, with the nearest of those there are.
@@ -187,7 +197,7 @@ fn first_word() -> Option<String> {
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         match word.as_str() {
-            "--store" | "--port" | "--model" | "--gripper" => drop(words.next()),
+            "--store" | "--port" | "--model" | "--gripper" | "--token" => drop(words.next()),
             option if option.starts_with('-') => {}
             _ => return Some(word),
         }
@@ -209,8 +219,9 @@ pub fn run() -> ExitCode {
         }
         error.exit()
     });
-    if (arguments.port.is_some() || arguments.model.is_some()) && arguments.command.is_some() {
-        let text = "--port and --model before a command apply to the window only; put them after the command";
+    let of_window = arguments.port.is_some() || arguments.model.is_some() || arguments.serve.is_some();
+    if of_window && arguments.command.is_some() {
+        let text = "--port, --model and --serve before a command apply to the window only; put them after the command";
         Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, text).exit();
     }
     if let (Some(object), Some(_)) = (&arguments.object, &arguments.command) {
@@ -233,7 +244,11 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    let store = arguments.store.as_deref();
+    let own = match &arguments.command {
+        Some(Command::Serve(serve)) => serve.own_store(),
+        _ => None,
+    };
+    let store = arguments.store.as_deref().or(own.as_deref());
     // The emulator and the doctor take the file as it is; all others work with a store.
     let direct = matches!(arguments.command, Some(Command::Doctor(_) | Command::Emulate(_)));
     let named = arguments.gripper.as_deref().map(SensorList::from_file).transpose()?;
@@ -263,6 +278,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Fit(fit)) => fit::run(fit, store)?,
         Some(Command::Gap(gap)) => gap::run(gap, store)?,
         Some(Command::Doctor(doctor)) => return doctor::run(doctor, sensors()?),
+        Some(Command::Serve(serve)) => serve::run(serve, store)?,
         Some(Command::Emulate(emulate)) => emulate::run(emulate, sensors()?)?,
         Some(Command::Bench(bench)) => bench::run(bench)?,
         Some(Command::Study(study)) => study::run(study, store)?,

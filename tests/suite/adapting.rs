@@ -14,14 +14,14 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// A running `palpate emulate`, killed when dropped.
-struct Emulator {
+pub(crate) struct Emulator {
     child: Child,
-    port: PathBuf,
+    pub(crate) port: PathBuf,
 }
 
 impl Emulator {
     /// Starts it.
-    fn start(folder: &Path, arguments: &[&str]) -> Self {
+    pub(crate) fn start(folder: &Path, arguments: &[&str]) -> Self {
         let port = folder.join("port");
         // An earlier one was killed.
         let _old = std::fs::remove_file(&port);

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Folders of packages below `src`. The root package has the rest of `src`.
-const PACKAGES: [&str; 11] =
-    ["geometry", "sim", "tactile", "learn", "device", "store", "lab", "exchange", "study", "render", "workshop"];
+const PACKAGES: [&str; 12] = [
+    "geometry", "sim", "tactile", "learn", "device", "store", "lab", "exchange", "study", "render", "serve", "workshop",
+];
 
 /// Where each third-party crate may be named.
 const HOMES: &[(&str, &[&str])] = &[
@@ -78,8 +79,10 @@ const HOMES: &[(&str, &[&str])] = &[
     ("rusqlite", &["src/store"]),
     ("ruzstd", &["src/exchange/mcap/reader.rs"]),
     ("safetensors", &["src/learn/tensor_file.rs"]),
+    ("schemars", &["src/serve/messages.rs"]),
     ("serde", &["src"]),
     ("serde_json", &["src"]),
+    ("serde_path_to_error", &["src/serve/messages.rs"]),
     ("serialport", &["src/device/serial", "src/device/emulator/port.rs"]),
     ("statrs", &["src/learn/metrics", "src/tactile/calibration/straight_line.rs"]),
     ("stl_io", &["src/geometry/mesh_files"]),

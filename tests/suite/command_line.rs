@@ -154,7 +154,7 @@ fn wrong_use_exits_with_2() {
 }
 
 /// Every command: what succeeds, and what fails. `--help` succeeds and an unknown option is wrong use for all.
-const EXIT_CODES: [(&str, &str, &str); 24] = [
+const EXIT_CODES: [(&str, &str, &str); 25] = [
     ("grasp", "ball --no-store", "nothing.urdf"),
     ("demo", "--object ball --grasps 1 --no-store", "--object nothing"),
     ("collect", "--objects empty --trials 1", "--objects nothing"),
@@ -176,6 +176,7 @@ const EXIT_CODES: [(&str, &str, &str); 24] = [
     ("fit", "", "99"),
     ("gap", "", "99"),
     ("doctor", "--wiring", "nothing"),
+    ("serve", "--schema", "--port nothing"),
     ("emulate", "--print-secrets", "--link l --secrets nothing.json"),
     ("study", "", "merge nothing --out x"),
     ("help", "store", ""),

@@ -132,7 +132,7 @@ fn record_on_its_clock(faults: &str, change: impl Fn(&mut EmulatorSetup), second
     change(&mut setup);
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path().join("trials.sqlite");
-    let board = streams::Emulated::new(setup, Duration::ZERO);
+    let mut board = streams::emulated(setup, Duration::ZERO);
     let printed = board.printed();
     let request = TrialRequest { object: None, length_s: Some(seconds), control: Control::Free, adds: false };
     let (mut gripper, go_on) = (SerialGripper::new(Box::new(board)), AtomicBool::new(false));

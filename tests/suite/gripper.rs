@@ -3,7 +3,7 @@
 
 use crate::calibration::{calibrated, parts};
 use crate::scripted;
-use crate::streams::Emulated;
+use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts};
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::gripper::{Listen, NotOpened};
@@ -83,7 +83,7 @@ pub(crate) fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Du
             faults: vec![],
             seed: 1,
         };
-        Ok(Box::new(Emulated::new(setup, look)))
+        Ok(Box::new(streams::emulated(setup, look)))
     })
 }
 

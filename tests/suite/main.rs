@@ -12,6 +12,7 @@
 //! - `adapting`: a gripper recognises without labels, after one close of its empty hand.
 //! - `emulator`: the emulated gripper, with every fault, recorded and diagnosed.
 //! - `serial`: a board on a pseudo-terminal, recorded, unplugged, killed.
+//! - `serving`: the gripper controlled by other programs: every request, errors, lost connections, slow readers, random lines.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
 //! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
@@ -83,6 +84,7 @@ mod reader_fuzz;
 mod recognition_panel;
 mod scripted;
 mod serial;
+mod serving;
 mod signatures;
 mod store;
 mod streams;

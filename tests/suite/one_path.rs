@@ -4,12 +4,12 @@
 use crate::calibration::{capture, parts};
 use crate::gripper::{Desk, FAST, scene, store_calibrations};
 use crate::program::{json, refused, run};
-use crate::streams::Emulated;
+use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan};
 use palpate_device::protocol::{BoardEvent, ConsoleLine};
 use palpate_device::serial::{LinkOptions, LinkStatus, SendError, SerialLink};
 use palpate_lab::grasping::{Identification, Row, grasp};
-use palpate_lab::gripper::{BoardStream, SerialGripper};
+use palpate_lab::gripper::{BoardStream, EmulatedStream, SerialGripper};
 use palpate_lab::recording::{Replay, TrialRequest, record};
 use palpate_lab::workers::GripperCommand;
 use palpate_learn::{Shipped, StopRule, Verdict};
@@ -44,7 +44,7 @@ const STRIKES_S: f64 = 1.05;
 
 /// The emulated gripper behind a link with a fault.
 struct FaultyLink {
-    inner: Emulated,
+    inner: EmulatedStream,
     fault: BoardFault,
     /// First pressure (s).
     driven_s: Option<f64>,
@@ -71,7 +71,7 @@ impl FaultyLink {
             faults: vec![],
             seed: 1,
         };
-        Self { inner: Emulated::new(setup, FAST), fault, driven_s: None, struck: false }
+        Self { inner: streams::emulated(setup, FAST), fault, driven_s: None, struck: false }
     }
 
     fn is_past(&self, seconds: f64) -> bool {
@@ -85,7 +85,7 @@ impl BoardStream for FaultyLink {
             && self.is_past(STRIKES_S)
             && !std::mem::replace(&mut self.struck, true)
         {
-            self.inner.strike(fault, seconds);
+            streams::strike(&self.inner, fault, seconds);
         }
         let events = self.inner.take(patience);
         let breaks = self.fault == BoardFault::Unplugs && self.is_past(1.0);

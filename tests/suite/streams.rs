@@ -3,13 +3,11 @@
 
 use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, parse_faults};
 use palpate_device::protocol::AdcRange;
-use palpate_device::protocol::{BoardEvent, ConsoleLine, Decoder};
+use palpate_device::protocol::{BoardEvent, ConsoleLine};
 use palpate_device::serial::{BoardKind, LinkState, LinkStatus, PortInfo, SendError};
-use palpate_lab::gripper::BoardStream;
+use palpate_lab::gripper::{BoardStream, EmulatedStream, SharedEmulator};
 use palpate_tactile::board::{Board, Gap, Reading};
 use palpate_tactile::cadence::Cadence;
-use palpate_tactile::capture::Captured;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// How a link stands that listens.
@@ -104,75 +102,15 @@ impl<F: FnMut(Duration) -> (f64, Vec<BoardEvent>)> BoardStream for MadeUp<F> {
     }
 }
 
-/// The emulated gripper. Each look at it lets 10 ms of its time pass.
-pub(crate) struct Emulated {
-    gripper: EmulatedGripper,
-    decoder: Decoder,
-    t_s: f64,
-    /// How long a look takes in truth.
-    look: Duration,
-    /// What its board has printed, before any fault.
-    printed: Arc<Mutex<String>>,
+/// The emulated gripper. A look at it takes the time `look` in truth.
+pub(crate) fn emulated(setup: EmulatorSetup, look: Duration) -> EmulatedStream {
+    let sensors = setup.hand.sensors;
+    EmulatedStream::new(SharedEmulator::new(EmulatedGripper::new(setup).unwrap()), sensors, look)
 }
 
-/// Time that passes with each look (s).
-const LOOK_S: f64 = 0.01;
-
-impl Emulated {
-    pub(crate) fn new(setup: EmulatorSetup, look: Duration) -> Self {
-        let gripper = EmulatedGripper::new(setup).unwrap();
-        Self { gripper, decoder: Decoder::default(), t_s: 0.0, look, printed: Arc::default() }
-    }
-
-    /// What its board prints, before any fault.
-    pub(crate) fn printed(&self) -> Arc<Mutex<String>> {
-        Arc::clone(&self.printed)
-    }
-
-    /// Lets a fault begin now: `NAME[=VALUE]`, and how long it lasts (s).
-    pub(crate) fn strike(&mut self, fault: &str, seconds: f64) {
-        for fault in parse_faults(&format!("{fault}@{}/{seconds}", self.t_s)).unwrap() {
-            self.gripper.add_fault(fault);
-        }
-    }
-}
-
-impl BoardStream for Emulated {
-    fn take(&mut self, _: Duration) -> Vec<BoardEvent> {
-        std::thread::sleep(self.look);
-        self.t_s += LOOK_S;
-        self.gripper.advance(self.t_s);
-        self.printed.lock().unwrap().push_str(&self.gripper.take_printed());
-        let (bytes, mut decoded) = (self.gripper.take_bytes(), Vec::new());
-        if bytes.is_empty() {
-            return Vec::new();
-        }
-        self.decoder.push(&bytes, self.t_s, &mut decoded);
-        let piece = BoardEvent::Captured(Captured::Bytes { arrived_s: self.t_s, bytes });
-        std::iter::once(piece).chain(decoded).collect()
-    }
-
-    fn status(&self) -> LinkStatus {
-        LinkStatus {
-            detected: self.decoder.detected(),
-            ..listening(self.decoder.board(), self.decoder.cadence(), self.t_s)
-        }
-    }
-
-    fn now_s(&self) -> f64 {
-        self.t_s
-    }
-
-    fn send(&mut self, line: &str) -> Result<(), SendError> {
-        self.gripper.hear(format!("{line}\n").as_bytes());
-        Ok(())
-    }
-
-    fn console(&self) -> Vec<ConsoleLine> {
-        self.decoder.console().cloned().collect()
-    }
-
-    fn is_over(&self) -> bool {
-        false
+/// Lets a fault of an emulated gripper begin now: `NAME[=VALUE]`, and how long it lasts (s).
+pub(crate) fn strike(stream: &EmulatedStream, fault: &str, seconds: f64) {
+    for fault in parse_faults(&format!("{fault}@{}/{seconds}", stream.now_s())).unwrap() {
+        stream.gripper().lock().add_fault(fault);
     }
 }

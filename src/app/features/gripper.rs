@@ -5,7 +5,8 @@ use super::view::ViewSource;
 use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
-use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, TrialView};
+use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, Notice, TrialView};
+use palpate_serve::{Clients, Desk, DeskSetup};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -14,9 +15,13 @@ use palpate_tactile::board::SensorList;
 use palpate_tactile::trial::Control;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, JoinHandle};
 
 /// State of the real gripper in the window.
 pub struct GripperFeature {
+    /// Dropped before the worker.
+    served: Option<Served>,
     pub(super) worker: GripperWorker,
     /// Its newest state, as of this frame.
     pub(in crate::app) view: Option<Arc<GripperView>>,
@@ -32,10 +37,25 @@ pub struct GripperFeature {
     before_adapting: Option<Scene>,
 }
 
+/// Other programs that control the gripper, until this is dropped.
+struct Served {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // A panic in the thread has printed itself.
+        let _ended = self.thread.take().map(JoinHandle::join);
+    }
+}
+
 impl GripperFeature {
     /// `scene` is the one that the worker was started with.
     pub(in crate::app) fn new(worker: GripperWorker, scene: Scene) -> Self {
         Self {
+            served: None,
             worker,
             view: None,
             traces: TraceHistory::default(),
@@ -98,6 +118,18 @@ impl App {
             for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {
                 self.simulation.send(command);
             }
+        }
+    }
+
+    /// Lets other programs control the gripper beside the window, through the same commands.
+    pub fn serve(&mut self, desk: DeskSetup, clients: Clients) {
+        let desk = Desk::new(desk, clients, |wake| self.gripper.worker.tap(wake));
+        let stop = Arc::<AtomicBool>::default();
+        let stopped = Arc::clone(&stop);
+        let serving = move || desk.serve(|| !stopped.load(Ordering::Relaxed));
+        match Builder::new().name("serve".to_owned()).spawn(serving) {
+            Ok(thread) => self.gripper.served = Some(Served { stop, thread: Some(thread) }),
+            Err(cause) => self.notices.show(Notice::Failed(format!("Other programs are not served: {cause}"))),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The emulated gripper: fingers, sensors, board and connection, with its faults. It has no port and no clock of its own: time
 //! and the host's bytes go in, the board's bytes come out. The same seed, times and input give the same bytes.
 
-use super::event::{EmulatorEvent, EmulatorEventKind};
+use super::event::{EmulatorError, EmulatorEvent, EmulatorEventKind};
 use super::faults::{EmulatedFault, FaultKind};
 use super::firmware::{BoardSetup, FirmwareBoard};
 use super::hand::{Hand, HandPlan};
@@ -10,6 +10,7 @@ use super::script::Step;
 use super::uart::misread;
 use crate::protocol::checksum;
 use palpate_sim::objects::ObjectError;
+use palpate_sim::scene::Scene;
 use palpate_tactile::electronics::Converter;
 use palpate_tactile::model::Stream;
 
@@ -116,6 +117,22 @@ impl EmulatedGripper {
     /// Adds a step to its script.
     pub fn add_step(&mut self, step: Step) -> Result<(), ObjectError> {
         self.hand.add(step)
+    }
+
+    /// Puts an object into the hand that a host drives, for the next grasps: first as in `scene`, where one is given, then and
+    /// without one in random poses.
+    pub fn place(&mut self, object: &str, scene: Option<Scene>) -> Result<(), EmulatorError> {
+        self.hand.place(object, scene)
+    }
+
+    /// Scene of the last grasp, its object included.
+    pub fn scene(&self) -> Option<&Scene> {
+        self.hand.scene()
+    }
+
+    /// Time to which it was advanced (s).
+    pub fn now_s(&self) -> f64 {
+        self.now_s
     }
 
     /// Adds a fault.

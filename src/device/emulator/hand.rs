@@ -1,13 +1,13 @@
 //! Fingers of the emulated gripper: they grasp by a programme of their own, as a host drives them, or are bent and loaded by a
 //! bench script. Grasps are simulated.
 
-use super::event::EmulatorEventKind;
+use super::event::{EmulatorError, EmulatorEventKind};
 use super::parts::{Stimuli, between};
 use super::script::Step;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Phase, Programme, Side};
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
-use palpate_sim::poses::PoseSampler;
+use palpate_sim::poses::{PoseSampler, has_room};
 use palpate_sim::run::{SimEvent, SimRun};
 use palpate_sim::scene::Scene;
 use palpate_tactile::board::{Measures, Sensor, SensorKind, SensorList};
@@ -77,6 +77,9 @@ pub(super) struct Hand {
     /// Grasps since the hand was last emptied.
     turn: usize,
     next_s: f64,
+    /// Scene of the last grasp, and of the next one where it was placed.
+    scene: Option<Scene>,
+    placed: Option<Scene>,
     /// A host drives.
     driven: bool,
     vented_since_s: Option<f64>,
@@ -107,6 +110,8 @@ impl Hand {
             grasps: 0,
             turn: 0,
             next_s: 0.0,
+            scene: None,
+            placed: None,
             driven: false,
             vented_since_s: None,
             began: Vec::new(),
@@ -137,6 +142,22 @@ impl Hand {
         self.script.push_back(step);
         self.scripted = true;
         Ok(())
+    }
+
+    /// Puts an object into the hand for the next grasps of a host, first as in a scene.
+    pub(super) fn place(&mut self, object: &str, scene: Option<Scene>) -> Result<(), EmulatorError> {
+        let thing = self.load(object).map_err(|error| EmulatorError(error.to_string()))?;
+        if scene.as_ref().is_some_and(|scene| !has_room(scene, self.things[thing].model.as_ref())) {
+            return Err(EmulatorError("the fingers would stand inside the object, or outside of the scene".to_owned()));
+        }
+        self.plan.objects = vec![object.to_owned()];
+        self.placed = scene;
+        Ok(())
+    }
+
+    /// Scene of the last grasp.
+    pub(super) fn scene(&self) -> Option<&Scene> {
+        self.scene.as_ref()
     }
 
     /// Takes the starts since the last call.
@@ -269,9 +290,11 @@ impl Hand {
     fn grasp(&mut self, thing: usize, t: f64, programme: Option<Programme>) {
         self.grasps += 1;
         let Graspable { name, model, poses } = &self.things[thing];
-        let (scene, _) = poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps)));
+        let drawn = || poses.draw(model.as_ref(), self.plan.seed.wrapping_add(u64::from(self.grasps))).0;
+        let scene = self.placed.take().unwrap_or_else(drawn);
         self.began.push(EmulatorEventKind::Grasp { number: self.grasps, object: name.clone() });
         self.doing = HandActivity::Grasp(Box::new(LiveGrasp::new(&self.plan, &scene, model.as_ref(), t, programme)));
+        self.scene = Some(scene);
     }
 }
 

@@ -167,6 +167,19 @@ impl GraspController {
         Some(PressureCommand { bar, phase, at_s: now_s })
     }
 
+    /// Goes from the present pressure to `bar`, up at the pace of the programme and down at the next tick, and stays there.
+    pub fn aim(&mut self, bar: f64, now_s: f64) {
+        let programme = &mut self.plan.programme;
+        if self.tick.is_some() && programme.peak_bar == bar {
+            return;
+        }
+        (programme.peak_bar, programme.hold_ticks) = (bar, u32::MAX);
+        let on_bar = self.command.map_or(0.0, |(bar, _)| bar).min(bar);
+        let ticks = (on_bar / programme.close_bar_per_tick + 1e-9) as u32;
+        self.tick = ticks.checked_sub(1);
+        self.programme_s = now_s - self.tick.map_or(0.0, f64::from) / self.plan.actuation_hz;
+    }
+
     /// Starts the checks of the board that drives the fingers; it was told to vent at `now_s`.
     pub fn watch_board(&mut self, now_s: f64) {
         self.watch = Some(PressureWatch::new(now_s));
@@ -286,6 +299,25 @@ mod tests {
 
     fn plan(control: Control) -> GraspPlan {
         GraspPlan::recorded(&Scene::default(), control)
+    }
+
+    #[test]
+    fn an_aim_is_reached_step_by_step_and_kept() {
+        let mut controller = GraspController::new(plan(Control::Driven), 0.0);
+        let mut bars = vec![0.0];
+        let mut now_s = 0.0;
+        for bar in [0.3, 0.5, 0.5, 0.1, 0.0, 0.2] {
+            controller.aim(bar, now_s);
+            for _ in 0..10_000 {
+                bars.extend(controller.command(now_s).map(|command| command.bar));
+                now_s += 1e-3;
+            }
+            assert!(bars.last().is_some_and(|last| (last - bar).abs() < 1e-9), "{bar}: {bars:?}");
+        }
+        // Another phase at the same pressure is a command, too.
+        bars.dedup_by(|next, last| (*next - *last).abs() < 1e-9);
+        assert_eq!(bars.len(), 1 + 6 + 4 + 2 + 4, "{bars:?}");
+        assert!(bars.windows(2).all(|pair| pair[1] - pair[0] < 0.05 + 1e-9), "{bars:?}");
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Grippers behind one interface: events out, line pressure in. Simulated, on a serial port, or replayed; the grasp
 //! controller ([`crate::grasping::GraspController`]) drives all three alike.
 
+mod emulated;
 mod replayed;
 mod serial;
 mod simulated;
 mod stream;
 
+pub use emulated::{EmulatedStream, SharedEmulator};
 pub use replayed::ReplayedGripper;
 pub use serial::SerialGripper;
 pub use simulated::SimulatedGripper;

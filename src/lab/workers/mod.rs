@@ -28,6 +28,9 @@
 //! | [`open_trial_job`] [`portrait_job`] | a trial, a file | what is shown of it | waits |
 //! | of the simulation | a grasp | its ghost by the other engine; a check by other runs | replaces |
 //!
+//! A [`Tap`] is a second listener of a worker, and a second sender of its commands: other programs control the gripper through
+//! one.
+//!
 //! Pictures may be skipped, samples may not: a newer snapshot replaces an older one, but trace rows keep their order
 //! and none is lost.
 
@@ -87,4 +90,4 @@ pub use training::{
     FinishedTraining, TrainRequest, TrainedModel, TrainingData, load_model_job, training_data_job, training_job,
 };
 pub use why::{ExplainRequest, Explainer};
-pub use worker::Worker;
+pub use worker::{Said, Tap, Worker};

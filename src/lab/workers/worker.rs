@@ -3,9 +3,9 @@
 use super::latest::Latest;
 use super::messages::{Notice, TraceRow, Wake};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -15,13 +15,77 @@ const MOST_ROWS: usize = 9000;
 /// Handle of the thread. Dropping it ends the thread after all commands, and waits for that.
 pub struct Worker<C, V> {
     mail: Sender<Mail<C>>,
-    /// Number of commands sent.
-    sent: AtomicU64,
+    /// Number of commands sent, locked while one is sent.
+    sent: Arc<Mutex<u64>>,
     view: Arc<Latest<V>>,
     rows: Receiver<TraceRow>,
     notices: Receiver<Notice>,
     shared: Arc<Shared>,
+    taps: Arc<Taps>,
     thread: Option<JoinHandle<()>>,
+}
+
+/// A second listener of a worker, beside the holder of its handle, and a second sender of commands.
+pub struct Tap<C, V> {
+    mail: Sender<Mail<C>>,
+    sent: Arc<Mutex<u64>>,
+    view: Arc<Latest<V>>,
+    said: Receiver<Said>,
+}
+
+/// What a worker says besides its views.
+#[derive(Clone, Debug)]
+pub enum Said {
+    /// A sample.
+    Row(TraceRow),
+    /// A notice.
+    Notice(Notice),
+}
+
+/// The second listeners, and what wakes them.
+#[derive(Default)]
+struct Taps(Mutex<Vec<(SyncSender<Said>, Wake)>>);
+
+impl Taps {
+    /// Tells all. A listener whose queue is full misses it; one that has gone is forgotten.
+    fn tell(&self, said: &dyn Fn() -> Said) {
+        locked(&self.0).retain(|(tap, _)| !matches!(tap.try_send(said()), Err(TrySendError::Disconnected(_))));
+    }
+
+    fn wake(&self) {
+        locked(&self.0).iter().for_each(|(_, wake)| wake());
+    }
+}
+
+/// The values are valid after a panic too: they are changed by single calls.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Sends a command; returns the number of commands so far.
+fn send_counted<C>(mail: &Sender<Mail<C>>, sent: &Mutex<u64>, command: C) -> u64 {
+    let mut sent = locked(sent);
+    // A thread that has failed has sent a notice; the rest of the window works.
+    let _sent = mail.send(Mail::Command(command));
+    *sent += 1;
+    *sent
+}
+
+impl<C, V> Tap<C, V> {
+    /// [`Worker::send`].
+    pub fn send(&self, command: C) -> u64 {
+        send_counted(&self.mail, &self.sent, command)
+    }
+
+    /// [`Worker::view`].
+    pub fn view(&self) -> Option<Arc<V>> {
+        self.view.get()
+    }
+
+    /// Rows and notices since the last call, in order.
+    pub fn said(&self) -> impl Iterator<Item = Said> + '_ {
+        self.said.try_iter()
+    }
 }
 
 /// State that the handle and its thread share.
@@ -83,13 +147,24 @@ impl<C: Send + 'static> Inbox<C> {
 pub(super) struct Notifier {
     notices: Sender<Notice>,
     wake: Wake,
+    taps: Arc<Taps>,
 }
 
 impl Notifier {
     pub(super) fn notify(&self, notice: Notice) {
+        self.send(notice);
+        self.wake();
+    }
+
+    fn send(&self, notice: Notice) {
+        self.taps.tell(&|| Said::Notice(notice.clone()));
         // The window may be closed.
         let _sent = self.notices.send(notice);
+    }
+
+    fn wake(&self) {
         (self.wake)();
+        self.taps.wake();
     }
 }
 
@@ -110,16 +185,14 @@ impl<V> Publisher<V> {
     /// Replaces the view, with notices about these results.
     pub(super) fn publish_with(&self, view: V, notices: impl IntoIterator<Item = Notice>) {
         self.view.publish(Arc::new(view));
-        for notice in notices {
-            // The window may be closed.
-            let _sent = self.notifier.notices.send(notice);
-        }
+        notices.into_iter().for_each(|notice| self.notifier.send(notice));
         self.shared.handled.store(self.shared.taken.load(Ordering::Relaxed), Ordering::Release);
         self.wake();
     }
 
     /// Sends a row; if the queue is full, records that a row was lost.
     pub(super) fn row(&self, row: TraceRow) {
+        self.notifier.taps.tell(&|| Said::Row(row.clone()));
         if let Err(TrySendError::Full(_)) = self.rows.try_send(row) {
             self.shared.rows_lost.store(true, Ordering::Relaxed);
         }
@@ -130,7 +203,7 @@ impl<V> Publisher<V> {
     }
 
     pub(super) fn wake(&self) {
-        (self.notifier.wake)();
+        self.notifier.wake();
     }
 
     /// Returns what could be started; otherwise a notice says what is missing.
@@ -156,7 +229,8 @@ impl<C: Send + 'static, V: Send + Sync + 'static> Worker<C, V> {
         let (row_sender, rows) = sync_channel(MOST_ROWS);
         let (notice_sender, notices) = channel();
         let (view, shared) = (Arc::<Latest<V>>::default(), Arc::<Shared>::default());
-        let notifier = Notifier { notices: notice_sender, wake };
+        let taps = Arc::<Taps>::default();
+        let notifier = Notifier { notices: notice_sender, wake, taps: Arc::clone(&taps) };
         let last_words = notifier.clone();
         let inbox = Inbox { mail, sender: sender.clone(), shared: Arc::clone(&shared) };
         let (shown, state) = (Arc::clone(&view), Arc::clone(&shared));
@@ -169,21 +243,27 @@ impl<C: Send + 'static, V: Send + Sync + 'static> Worker<C, V> {
                 last_words.notify(Notice::Failed(text));
             }
         })?;
-        Ok(Self { mail: sender, sent: AtomicU64::new(0), view, rows, notices, shared, thread: Some(thread) })
+        let sent = Arc::default();
+        Ok(Self { mail: sender, sent, view, rows, notices, shared, taps, thread: Some(thread) })
     }
 }
 
 impl<C, V> Worker<C, V> {
     /// Sends a command; returns the number of commands so far. Commands are handled in order.
     pub fn send(&self, command: C) -> u64 {
-        // A thread that has failed has sent a notice; the rest of the window works.
-        let _sent = self.mail.send(Mail::Command(command));
-        self.sent.fetch_add(1, Ordering::Relaxed) + 1
+        send_counted(&self.mail, &self.sent, command)
+    }
+
+    /// A second listener, which `wake` is called for like the first.
+    pub fn tap(&self, wake: Wake) -> Tap<C, V> {
+        let (sender, said) = sync_channel(MOST_ROWS);
+        locked(&self.taps.0).push((sender, wake));
+        Tap { mail: self.mail.clone(), sent: Arc::clone(&self.sent), view: Arc::clone(&self.view), said }
     }
 
     /// True when all commands are handled and the view shows their results.
     pub fn is_settled(&self) -> bool {
-        self.shared.handled.load(Ordering::Acquire) == self.sent.load(Ordering::Relaxed)
+        self.shared.handled.load(Ordering::Acquire) == *locked(&self.sent)
     }
 
     /// True once the thread has failed.

@@ -104,6 +104,13 @@ impl GripperMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectMove(GripperMove);
 
+impl ObjectMove {
+    /// The move of the gripper.
+    pub fn of_gripper(self) -> GripperMove {
+        self.0
+    }
+}
+
 /// Millimetres, without sign.
 fn whole_mm(metres: f64) -> f64 {
     (1e3 * metres.abs()).round()

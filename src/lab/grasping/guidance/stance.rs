@@ -92,25 +92,41 @@ impl GripperMove {
         let quarter = (90.0 / TURN_STEP_DEG) as i32;
         let mut all = Vec::new();
         for turn_deg in (1 - quarter..=quarter).map(|k| TURN_STEP_DEG * f64::from(k)) {
-            let yaw_deg = here.yaw_deg + turn_deg;
             for (across, along) in ACROSS.iter().flat_map(|across| ALONG.map(|along| (*across, along))) {
-                let shift = DVec2::from_angle(yaw_deg.to_radians()).rotate(DVec2::new(across, along));
                 for height in HEIGHTS.map(|share| centre[2] + share * most[2]) {
-                    let offset = [here.offset[0] + shift.x, here.offset[1] + shift.y, height];
-                    let is_far = |axis: usize| (offset[axis] - centre[axis]).abs() > most[axis] + 1e-9;
-                    if (0..3).any(is_far) {
-                        continue;
-                    }
-                    let mut scene = from.clone();
-                    scene.gripper.mount.offset = offset;
-                    scene.gripper.mount.yaw_deg = (yaw_deg + 180.0).rem_euclid(360.0) - 180.0;
                     let by = Self { turn_deg, shift: [across, along], lift: height - here.offset[2] };
-                    all.push((by, scene));
+                    let (offset, yaw_deg) = by.mount(from, height);
+                    let is_far = |axis: usize| (offset[axis] - centre[axis]).abs() > most[axis] + 1e-9;
+                    if !(0..3).any(is_far) {
+                        all.push((by, mounted(from, offset, yaw_deg)));
+                    }
                 }
             }
         }
         all
     }
+
+    /// A scene after this move.
+    pub fn after(&self, from: &Scene) -> Scene {
+        let (offset, yaw_deg) = self.mount(from, from.gripper.mount.offset[2] + self.lift);
+        mounted(from, offset, yaw_deg)
+    }
+
+    /// Offset (m) and turn (degrees) of the gripper after this move to a height (m).
+    fn mount(&self, from: &Scene, height: f64) -> ([f64; 3], f64) {
+        let here = &from.gripper.mount;
+        let yaw_deg = here.yaw_deg + self.turn_deg;
+        let shift = DVec2::from_angle(yaw_deg.to_radians()).rotate(DVec2::from_array(self.shift));
+        ([here.offset[0] + shift.x, here.offset[1] + shift.y, height], yaw_deg)
+    }
+}
+
+/// A scene with the gripper there.
+fn mounted(from: &Scene, offset: [f64; 3], yaw_deg: f64) -> Scene {
+    let mut scene = from.clone();
+    scene.gripper.mount.offset = offset;
+    scene.gripper.mount.yaw_deg = (yaw_deg + 180.0).rem_euclid(360.0) - 180.0;
+    scene
 }
 
 #[cfg(test)]
@@ -131,6 +147,7 @@ mod tests {
         for (by, after) in all {
             let (own, wanted) = (Stance::of(&from).moved(&by), Stance::of(&after));
             assert!(own.distance2(&wanted) < 1e-9, "{by:?}: {own:?}, {wanted:?}");
+            assert!(Stance::of(&by.after(&from)).distance2(&wanted) < 1e-9, "{by:?}");
             let mount = &after.gripper.mount;
             assert!(mount.offset.iter().all(|x| x.abs() <= 0.008 + 1e-9) && mount.yaw_deg.abs() <= 180.0);
         }

@@ -57,6 +57,9 @@ pub enum GripperCommand {
     SetThreshold(f64),
     /// Start over with another object; earlier grasps no longer count.
     AnotherObject,
+    /// Move the line pressure to this value (bar; none for that of the programme), up at the pace of the programme and down at
+    /// once, and keep it there until it is moved again or vented; not while a trial is driven.
+    Press(Option<f64>),
     /// Begin a trial.
     Begin(TrialRequest),
     /// Record a close of the empty hand and calibrate the sensors by it, but not those that were calibrated by hand.
@@ -127,6 +130,8 @@ pub struct EndedTrial {
     pub request: TrialRequest,
     /// True where it was discarded.
     pub discarded: bool,
+    /// True where readings came until the end of the programme or the length.
+    pub complete: bool,
     /// Warnings, in sentences.
     pub warnings: Vec<String>,
     /// Timing statistics of the board, in a line.
@@ -156,6 +161,8 @@ pub struct GripperView {
     pub drift: Vec<Drift>,
     /// Remarks on missing calibrations, in sentences.
     pub remarks: Vec<String>,
+    /// Line pressure that is kept outside of driven trials (bar).
+    pub kept_bar: Option<f64>,
     /// Running trial.
     pub trial: Option<TrialView>,
     /// Request of automatic trials; none while they are off.

@@ -1,6 +1,7 @@
 //! Session of the gripper thread: owns the link, distributes its readings and handles commands.
 
 mod adapting;
+mod pressing;
 mod recognising;
 mod sensors;
 mod trials;
@@ -9,7 +10,7 @@ use super::guided::{CalibrationView, CrosstalkView};
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
-use crate::grasping::Row;
+use crate::grasping::{GraspController, Row};
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
@@ -75,8 +76,10 @@ pub(super) struct GripperSession {
     recording: Option<BoardTrialRecording>,
     /// Number of the trial that is recorded, once the store has given one.
     recording_id: Option<TrialId>,
-    /// Requests of trials whose end the recorder has not reported yet; whether they were discarded.
-    ending: VecDeque<(TrialRequest, bool)>,
+    /// Requests of trials whose end the recorder has not reported yet; whether they were discarded, and are complete.
+    ending: VecDeque<(TrialRequest, bool, bool)>,
+    /// Keeps a line pressure outside of driven trials.
+    pressing: Option<GraspController>,
     /// The trial that is recorded is a close of the empty hand, to adapt to.
     adapting: bool,
     /// Number of trials begun so far.
@@ -122,6 +125,7 @@ impl GripperSession {
             recording: None,
             recording_id: None,
             ending: VecDeque::new(),
+            pressing: None,
             adapting: false,
             begun: 0,
             watching: None,
@@ -195,6 +199,7 @@ impl GripperSession {
                 }
             }
             GripperCommand::AnotherObject => self.start_over(),
+            GripperCommand::Press(bar) => self.press(bar),
             GripperCommand::Begin(request) => self.begin(request, None),
             GripperCommand::Adapt(control) => self.adapt(control),
             GripperCommand::Watch(request) => self.set_watching(request),
@@ -264,6 +269,7 @@ impl GripperSession {
         }
         self.end_crosstalk(Ok(()));
         self.observing.clear();
+        self.pressing = None;
         self.connection = None;
         self.retried = None;
     }
@@ -277,15 +283,15 @@ impl GripperSession {
                 Ok(GripperEvent::Board(event)) => self.take_event(event),
                 Ok(_) => break,
                 Err(error) => {
-                    if let Some(recording) = &mut self.recording {
-                        recording.controller.abort(error.to_string());
-                    }
+                    let driving = self.recording.iter_mut().map(|recording| &mut recording.controller);
+                    driving.chain(&mut self.pressing).for_each(|controller| controller.abort(error.to_string()));
                     break;
                 }
             }
             patience = Duration::ZERO;
         }
         self.drive();
+        self.keep_pressure();
         self.take_recorded();
         self.end_observations();
         let over = self.connection.as_ref().is_some_and(|connection| connection.gripper.stream().is_over());
@@ -329,6 +335,9 @@ impl GripperSession {
             }
             BoardEvent::Board(_) | BoardEvent::Reply(_) | BoardEvent::Captured(_) => {}
         }
+        if let Some(pressing) = &mut self.pressing {
+            pressing.observe(&GripperEvent::Board(event.clone()));
+        }
         // An event that began a trial is already part of it.
         if begun == self.begun
             && let (Some(recording), Some(recorder)) = (&mut self.recording, &self.recorder)
@@ -341,7 +350,8 @@ impl GripperSession {
     fn take_reading(&mut self, reading: &Reading) {
         let Some(connection) = &mut self.connection else { return };
         let estimate = connection.readout.estimate(reading);
-        let commanded = self.recording.as_ref().and_then(|recording| recording.controller.line_bar());
+        let driving = self.recording.as_ref().map(|recording| &recording.controller).into_iter().chain(&self.pressing);
+        let commanded = driving.filter_map(GraspController::line_bar).next();
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
         let row = connection.plotted.row(reading, &estimate, commanded);
         let rows = connection.plotted.push(row.clone());
@@ -394,6 +404,7 @@ impl GripperSession {
             channels: Arc::clone(&self.channels),
             drift: connection.map(|connection| connection.drift.clone()).unwrap_or_default(),
             remarks: connection.map(|connection| connection.remarks.clone()).unwrap_or_default(),
+            kept_bar: self.pressing.as_ref().map(|pressing| pressing.plan().programme.peak_bar),
             trial,
             watching: self.watching.clone(),
             ended: self.ended.clone(),

@@ -39,7 +39,8 @@ fn running(id: TrialId) -> GripperView {
 
 fn ended(id: TrialId) -> GripperView {
     let request = request();
-    let ended = EndedTrial { id, request, discarded: false, warnings: Vec::new(), cadence: String::new() };
+    let (warnings, cadence) = (Vec::new(), String::new());
+    let ended = EndedTrial { id, request, discarded: false, complete: true, warnings, cadence };
     GripperView { ended: Some(Arc::new(ended)), ..GripperView::default() }
 }
 

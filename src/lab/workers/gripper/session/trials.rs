@@ -11,6 +11,7 @@ use palpate_sim::gripper::Phase;
 use palpate_store::Stored;
 use palpate_store::labels::cadence_line;
 use palpate_tactile::board::Reading;
+use palpate_tactile::trial::Control;
 use std::sync::Arc;
 
 impl GripperSession {
@@ -50,6 +51,7 @@ impl GripperSession {
         let Some(connection) = &mut self.connection else {
             return self.publisher.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
+        self.pressing = None;
         let sent = connection.gripper.vent();
         match sent {
             Err(error) => self.publisher.notify(Notice::Failed(format!("{error}: vent at the control box"))),
@@ -132,6 +134,8 @@ impl GripperSession {
             return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
+        // A driven trial vents before it closes.
+        self.pressing.take_if(|_| request.control == Control::Driven);
         let recording = BoardTrialRecording::begin(
             recorder,
             &mut connection.gripper,
@@ -156,14 +160,15 @@ impl GripperSession {
             match notice {
                 RecorderNotice::Begun(id) => self.recording_id = Some(id),
                 RecorderNotice::Recorded(trial) => {
-                    let Some((request, discarded)) = self.ending.pop_front() else { continue };
+                    let Some((request, discarded, complete)) = self.ending.pop_front() else { continue };
                     if !discarded {
                         self.publisher.notify(Notice::Stored(Stored::New(trial.id)));
                     }
                     self.adapt_to(trial.id, discarded);
                     let cadence = cadence_line(&trial.about.course.cadence);
                     let warnings = trial.warnings;
-                    self.ended = Some(Arc::new(EndedTrial { id: trial.id, request, discarded, warnings, cadence }));
+                    let ended = EndedTrial { id: trial.id, request, discarded, complete, warnings, cadence };
+                    self.ended = Some(Arc::new(ended));
                     self.publish();
                 }
                 RecorderNotice::Warning(text) => self.publisher.notify(Notice::Warning(text)),
@@ -208,7 +213,7 @@ impl GripperSession {
         let alone = !discarded && !adds && recording.controller.closing_s().is_some();
         let guess = self.recognition.as_ref().filter(|_| alone).and_then(LiveRecognition::guess);
         let guess = self.model.clone().zip(guess);
-        self.ending.push_back((recording.request.clone(), discarded));
+        self.ending.push_back((recording.request.clone(), discarded, recording.is_complete()));
         recording.finish(recorder, &mut connection.gripper, discarded, guess);
         self.begin_stretch(0.0);
     }
