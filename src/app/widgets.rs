@@ -2,14 +2,14 @@
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
-use crate::app::theme::{self, colour};
+use crate::app::theme::{self, colour, veil};
 use egui::text_edit::TextEditState;
 use egui::{
     AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense, Stroke, TextEdit, Ui,
     UiBuilder, Widget, WidgetInfo, pos2, vec2,
 };
-use palpate_geometry::palette::Trace;
-use palpate_lab::workers::{GripperCommand, Job, JobFailure};
+use palpate_geometry::palette::{Rgb, Trace};
+use palpate_lab::workers::{GripperCommand, GripperView, Job, JobFailure};
 use palpate_store::labels::Sparkline;
 use std::fmt::Display;
 use std::path::PathBuf;
@@ -28,6 +28,22 @@ pub(super) fn remark_ui(ui: &mut Ui, text: impl Into<String>) {
 /// Warning that wraps.
 pub(super) fn warning_ui(ui: &mut Ui, text: impl Into<String>) {
     wrapped(ui, RichText::new(text).color(ui.visuals().warn_fg_color));
+}
+
+/// Chip: a short text on a veil of its colour.
+pub(super) fn chip(ui: &mut Ui, text: impl Into<String>, ink: Rgb) -> Response {
+    let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(5, 1));
+    let text = RichText::new(text).small().color(colour(ink));
+    frame.show(ui, |ui| ui.label(text)).response
+}
+
+/// Chip that names sensors of the real gripper that have failed.
+pub(super) fn failed_sensors_ui(ui: &mut Ui, gripper: &GripperView) {
+    if let Some(failed) = &gripper.failed {
+        let about = "The Doctor names the cause. Sensors count as sound again after Tare (T), a calibration or a new connection";
+        let ink = theme::of(ui).colours().warning;
+        chip(ui, failed.as_ref(), ink).on_hover_text(about);
+    }
 }
 
 /// A text with a capital at its beginning.

@@ -7,6 +7,7 @@ mod output;
 mod paper;
 mod promises;
 mod public;
+mod sensor_faults;
 mod stability;
 
 use super::Failure;
@@ -23,6 +24,7 @@ use std::path::Path;
   palpate study stability --quick
   palpate study promises --quick
   palpate study public --data icub.csv
+  palpate study sensor-faults --quick
   palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
     #[command(subcommand)]
@@ -41,6 +43,8 @@ enum Study {
     Promises(promises::PromisesArguments),
     /// Fit and test all methods on recordings of others, beside what can be told without touch; resumes.
     Public(public::PublicArguments),
+    /// Let sensors of emulated grippers fail in the middle of a grasp: which are found, and what recognition loses; resumes.
+    SensorFaults(sensor_faults::SensorFaultArguments),
     /// Join the parts of a study that `--shard` measured on several machines.
     Merge(merge::MergeArguments),
     /// Studies of the paper.
@@ -55,6 +59,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Stability(arguments) => stability::run(arguments),
         Study::Promises(arguments) => promises::run(arguments),
         Study::Public(arguments) => public::run(arguments),
+        Study::SensorFaults(arguments) => sensor_faults::run(arguments),
         Study::Merge(arguments) => merge::run(arguments),
         Study::Paper(command) => paper::run(command, store),
     }

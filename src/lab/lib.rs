@@ -19,14 +19,14 @@
 //! | layer | module | holds |
 //! |---|---|---|
 //! | 0 | [`gripper`] | the trait [`gripper::Gripper`]; simulated, serial and replayed grippers |
-//! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, trials to review |
-//! | 0 | [`datasets`] | trials of a store as a data set; training on labelled trials; saved models |
+//! | 0 | [`labelling`] | flags of a trial, begin and end of a grasp, sensors that fail, trials to review |
 //! | 0 | [`picture`] | scene and frame to a draw list; frames to heat maps |
-//! | 1 | [`grasping`] | the grasp controller, runs, computing again, cost and error, collections, identification, error bands |
-//! | 2 | [`recording`] | the recorder thread; recording of a real grasp |
-//! | 3 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
-//! | 4 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
-//! | 5 | [`workers`] | threads for the window: commands in, snapshots and rows out |
+//! | 1 | [`datasets`] | trials of a store as a data set; training on labelled trials; saved models |
+//! | 2 | [`grasping`] | the grasp controller, runs, computing again, cost and error, collections, identification, error bands |
+//! | 3 | [`recording`] | the recorder thread; recording of a real grasp |
+//! | 4 | [`inspection`] | a stored trial opened: channels, fingers, phases and answers over time |
+//! | 5 | [`why`] | why a model gave its answer: class signatures, evidence, nearest trials |
+//! | 6 | [`workers`] | threads for the window: commands in, snapshots and rows out |
 //!
 //! # A grasp in six lines
 //!

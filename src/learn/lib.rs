@@ -20,6 +20,7 @@
 //! | 1 | `rows` | training rows of features, and models that classify them |
 //! | 1 | `gaps` | readings that are not finite numbers |
 //! | 1 | `signatures` | mean and spread of each class over time |
+//! | 2 | `sound` | what channels tell of each other, to find and replace a sensor that fails |
 //! | 2 | `features` | a grasp as a row of features |
 //! | 2 | `recogniser` | the interface of recognisers |
 //! | 2 | `forest` | decision trees and their ensembles |
@@ -88,6 +89,7 @@ mod recogniser;
 mod rows;
 pub mod search;
 mod signatures;
+mod sound;
 mod split;
 #[cfg(test)]
 mod split_tests;
@@ -111,5 +113,6 @@ pub use model_file::Models;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};
 pub use signatures::{SIGNATURE_STEPS, Signatures};
+pub use sound::{SOUND_WINDOW_S, SoundChannels};
 pub use split::{Split, SplitError, SplitPlan, check_apart};
 pub use tensor_file::{TensorFile, encode};

@@ -2,7 +2,7 @@
 
 use crate::frame::ListedStudy;
 use crate::paper::PAPER_STUDIES;
-use crate::{accuracy, effects, promises, public, stability};
+use crate::{accuracy, effects, promises, public, sensor_faults, stability};
 
 /// The studies of the paper, then those of answers and of the simulation.
 pub fn all_studies() -> impl DoubleEndedIterator<Item = &'static dyn ListedStudy> {
@@ -17,8 +17,9 @@ pub fn listed_study(key: &str) -> Option<&'static dyn ListedStudy> {
 
 /// Name of a study by its key, of the list or not.
 pub fn study_title(key: &str) -> Option<&'static str> {
-    let of_others = (key == public::PUBLIC).then_some(public::TITLE);
-    of_others.or_else(|| listed_study(key).map(|study| study.card().title))
+    let unlisted = [(public::PUBLIC, public::TITLE), (sensor_faults::SENSOR_FAULTS, sensor_faults::TITLE)];
+    let title = unlisted.into_iter().find(|(own, _)| *own == key).map(|(_, title)| title);
+    title.or_else(|| listed_study(key).map(|study| study.card().title))
 }
 
 #[cfg(test)]

@@ -13,19 +13,22 @@
 //! | 0 | `finger_fit` | the simulated finger, fitted to recorded grasps |
 //! | 0 | `network_cost`, `physics_cost` | CPU time of networks and of the physics, for `palpate bench` |
 //! | 0 | `shipped` | the shipped models in the manual |
-//! | 1 | `effects` | cost and influence of physical effects; an audit of the rules that switch them on |
-//! | 1 | [`stability`] | hard cases, holds that chatter, random scenes |
-//! | 1 | [`paper`] | the studies of the paper |
-//! | 2 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
-//! | 2 | `public` | recordings of others |
-//! | 2 | `promises` | whether answers keep their promise |
-//! | 3 | `generated` | sections of manual and README, written from stored results |
-//! | 3 | `all` | the list of all studies |
-//! | 4 | [`jobs`] | background tasks of the window |
+//! | 1 | `emulated` | grasps of emulated grippers, with faults |
+//! | 2 | `effects` | cost and influence of physical effects; an audit of the rules that switch them on |
+//! | 2 | [`stability`] | hard cases, holds that chatter, random scenes |
+//! | 2 | [`paper`] | the studies of the paper |
+//! | 3 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
+//! | 3 | `public` | recordings of others |
+//! | 3 | `sensor_faults` | sensors that fail in the middle of a grasp |
+//! | 3 | `promises` | whether answers keep their promise |
+//! | 4 | `generated` | sections of manual and README, written from stored results |
+//! | 4 | `all` | the list of all studies |
+//! | 5 | [`jobs`] | background tasks of the window |
 
 pub mod accuracy;
 mod all;
 mod effects;
+mod emulated;
 mod finger_fit;
 mod frame;
 mod generated;
@@ -35,6 +38,7 @@ pub mod paper;
 mod physics_cost;
 mod promises;
 mod public;
+mod sensor_faults;
 mod shipped;
 pub mod stability;
 
@@ -61,3 +65,4 @@ pub use network_cost::{
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
 pub use promises::{KeptPromise, PromiseCase, PromiseStudy};
 pub use public::{PUBLIC, PublicData, PublishedResult, PublishedResults, public_study};
+pub use sensor_faults::{SENSOR_FAULTS, sensor_fault_study, sound_channels};

@@ -5,6 +5,7 @@
 //! | `cargo run -p palpate-workshop -- thumbnails` | the thumbnails of the built-in objects below `assets/objects` |
 //! | `cargo run --release -p palpate-workshop -- model [--any-gripper] --store FILE` | a recognition model below `models`, with its card |
 //! | `cargo run --release -p palpate-workshop -- encoder [--any-gripper]` | a geometry encoder below `models` |
+//! | `cargo run --release -p palpate-workshop -- sound` | what sound channels foretell, below `models` |
 //! | `cargo run --release -p palpate-workshop -- touches [--any-gripper] --store FILE` | the grasps in known poses that guide the next grasp, below `models` |
 //! | `cargo run --release -p palpate-workshop -- attack` | nothing; it kills, floods and damages stores, and fails where one loses a trial |
 //! | `cargo run -p palpate-workshop -- tables` | tables of the manual and the README and the picture of the study of accuracy, from stored results in `assets/studies` |
@@ -20,7 +21,7 @@ use palpate_learn::Shipped;
 use palpate_render::figure_svg;
 use palpate_store::Store;
 use palpate_study::accuracy::stored_accuracy;
-use palpate_study::generated_sections;
+use palpate_study::{generated_sections, sound_channels};
 use std::path::{Path, PathBuf};
 
 /// Any failure, as a sentence.
@@ -60,6 +61,15 @@ enum Command {
         /// Poses of each shape, grasped free and fixed.
         #[arg(long, default_value_t = 3)]
         poses: u64,
+    },
+    /// Grasp with emulated grippers, and fit what sound channels foretell of each other.
+    Sound {
+        /// Output folder.
+        #[arg(long, default_value = "models")]
+        out: PathBuf,
+        /// Number of grippers.
+        #[arg(long, default_value_t = 30)]
+        grippers: u64,
     },
     /// Kill programs, flip bits and fill disks, and see that the store loses nothing.
     Attack {
@@ -108,6 +118,11 @@ fn main() -> Result<(), Failure> {
         }
         Command::Encoder { any_gripper, out, shapes, poses } => {
             encoder::make(shipped(any_gripper, false), &out, shapes, poses)?;
+        }
+        Command::Sound { out, grippers } => {
+            let path = out.join("sound.safetensors");
+            std::fs::write(&path, sound_channels(grippers)?.to_bytes()?)?;
+            report(format_args!("saved as {}", path.display()));
         }
         Command::Attack { program, rounds, full } => attack::run(&program, rounds, full.as_deref())?,
         Command::Tables => write_tables()?,

@@ -16,6 +16,7 @@ use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{Recording, TrialRequest, record};
 use palpate_sim::objects::EMPTY;
 use palpate_store::Store;
+use palpate_store::labels::Flag;
 use palpate_tactile::board::{Gap, Reading};
 use palpate_tactile::trial::{BoardLog, Control};
 use serde_json::Value;
@@ -207,6 +208,27 @@ fn whatever_fails_nothing_is_invented_and_what_is_missing_is_said() {
             let without = log.readings.iter().filter(|reading| reading.counts[3].is_none()).count();
             assert!((30..40).contains(&without) && log.readings.iter().all(|r| r.counts[0].is_some()), "{without}");
         }
+    }
+}
+
+#[test]
+fn a_trial_in_which_a_sensor_fails_is_flagged_and_names_it() {
+    // The hand closes at 0 s and opens from 3 s on, again and again, on nothing: pads are idle, and look so when they are open.
+    for (faults, wanted) in [
+        ("", None),
+        ("burst=0.3@1.6/0.7", None),
+        ("silent@1.6/0.7", None),
+        ("stuck=0@1", Some("left flex strip stuck")),
+        ("open=1@1", Some("right flex strip at an end of its range")),
+        ("saturation=2@1", Some("left pad at an end of its range")),
+        ("nan=3@1", Some("right pad silent")),
+        ("gain=1*0.7@1.5", Some("right flex strip jumped")),
+        ("open=3@1", None),
+    ] {
+        let recording = record_on_its_clock(faults, |_| {}, 4.0).recording;
+        let flags = recording.trial.about.flags;
+        let found = flags.iter().find(|found| found.flag == Flag::SensorFault).map(|found| found.remark.as_str());
+        assert_eq!(found.map(|remark| remark.split(',').next().unwrap()), wanted, "{faults}: {found:?}");
     }
 }
 

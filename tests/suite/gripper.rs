@@ -4,7 +4,7 @@
 use crate::calibration::{calibrated, parts};
 use crate::scripted;
 use crate::streams;
-use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts};
+use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts, parse_faults};
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::recording::TrialRequest;
@@ -17,6 +17,7 @@ use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;
+use palpate_store::labels::Flag;
 use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::trial::{BoardLog, Control};
 use std::path::{Path, PathBuf};
@@ -65,26 +66,21 @@ pub(crate) fn emulated(parts: &HiddenParts, grasp_every_s: Option<f64>, look: Du
         if let Some(port) = port {
             return Err(format!("there is no {}", port.display()).into());
         }
-        let hand = HandPlan {
-            sensors: SensorList::default(),
-            scene: scene(),
-            objects: vec![EMPTY.to_owned()],
-            seed: 1,
-            grasp_every_s,
-            script: vec![],
-        };
-        let setup = EmulatorSetup {
-            hand,
-            parts: parts.clone(),
-            rate_hz: 50,
-            channels: 4,
-            most_steps,
-            clock_start_us: 0,
-            faults: vec![],
-            seed: 1,
-        };
-        Ok(Box::new(streams::emulated(setup, look)))
+        Ok(Box::new(streams::emulated(setup(&parts, grasp_every_s, most_steps), look)))
     })
+}
+
+fn setup(parts: &HiddenParts, grasp_every_s: Option<f64>, most_steps: u8) -> EmulatorSetup {
+    let hand = HandPlan {
+        sensors: SensorList::default(),
+        scene: scene(),
+        objects: vec![EMPTY.to_owned()],
+        seed: 1,
+        grasp_every_s,
+        script: vec![],
+    };
+    let (parts, faults) = (parts.clone(), vec![]);
+    EmulatorSetup { hand, parts, rate_hz: 50, channels: 4, most_steps, clock_start_us: 0, faults, seed: 1 }
 }
 
 impl Desk {
@@ -342,6 +338,33 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
         view.latest.as_ref().is_some_and(|l| l.estimate.curvature(Side::Left).is_some_and(|k| k.abs() < 0.3))
     });
     assert!(tared.latest.as_ref().unwrap().estimate.value(Sensor::PAD_LEFT).is_some_and(|force| force < 0.05));
+}
+
+#[test]
+fn a_pad_that_falls_silent_is_named_and_the_answer_goes_on_without_it() {
+    let parts = parts(1, false);
+    let faulty = |faults: &'static str| -> Listen {
+        let parts = parts.clone();
+        Arc::new(move |_, _| {
+            let setup = EmulatorSetup { faults: parse_faults(faults).unwrap(), ..setup(&parts, None, 30) };
+            Ok(Box::new(streams::emulated(setup, FAST)))
+        })
+    };
+    let mut desk = Desk::on(faulty("nan=2@0"));
+    store_calibrations(&desk.store, &parts);
+    desk.connect();
+    let trial = desk.trial(Control::Driven, true);
+    let view = desk.until(|view| view.identification.as_ref().is_some_and(|i| i.beliefs.len() == 1));
+    // The model reads pressure and force of each pad.
+    assert_eq!(view.failed.as_deref(), Some("left pad silent: answering from 4 channels"));
+    let flags = desk.store().board_info(trial).unwrap().unwrap().flags;
+    let found = flags.iter().find(|found| found.flag == Flag::SensorFault).unwrap_or_else(|| panic!("{flags:?}"));
+    assert!(found.remark.starts_with("left pad silent, found at "), "{found:?}");
+    let read = desk.rows.iter().filter(|row| !row.rolling).map(|row| row.sample.values[2]);
+    assert!(
+        read.clone().count() > 100 && read.filter(|value| value.is_finite()).count() < 10,
+        "plots show what was read"
+    );
 }
 
 #[test]

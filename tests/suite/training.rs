@@ -136,7 +136,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     assert_eq!(listed.too_little(), None);
 
     // A long training is given up, and nothing comes of it.
-    let training = training_job(path, models, Arc::clone(&wake));
+    let training = training_job(path.clone(), models, Arc::clone(&wake));
     training.start(TrainRequest { quick: false, ..request("macro-layer") });
     while training.running().is_some_and(|running| running.progress.words.is_empty()) {
         woken.recv_timeout(Duration::from_secs(600)).expect("the thread is alive");
@@ -155,7 +155,7 @@ fn what_was_labelled_is_learned_judged_kept_and_found_again() {
     assert!(saved[0].about.starts_with("KNN, 4 classes, 48 grasps, macro F1 0."), "{saved:?}");
 
     // From its file it comes back with its card.
-    let load = load_model_job(wake);
+    let load = load_model_job(path, wake);
     let loaded = done(&load, &woken, saved[0].path.clone()).unwrap();
     assert_eq!((&loaded.path, &loaded.model.card), (&saved[0].path, &finished.trained.model.card));
     assert_eq!(loaded.model.card.metrics["f1_macro"], judged.evaluation.f1_macro);

@@ -3,8 +3,10 @@
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::gripper::{CONTROLS, control_title};
-use crate::app::theme::{self, accented, colour, veil};
-use crate::app::widgets::{command_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui, wrapped};
+use crate::app::theme::{self, accented};
+use crate::app::widgets::{
+    chip, command_ui, failed_sensors_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui, wrapped,
+};
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_geometry::units::three_digits;
@@ -95,6 +97,7 @@ fn connected_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus, control: 
         actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| _ = app.gripper.send(GripperCommand::Disconnect));
     });
     health_ui(ui, link);
+    failed_sensors_ui(ui, gripper);
     ui.separator();
     readings_ui(ui, gripper, link);
     for remark in &gripper.remarks {
@@ -199,10 +202,8 @@ fn drift_badge(ui: &mut Ui, drift: &Drift) {
         DriftLevel::Moved => ("drifted", colours.warning),
         DriftLevel::TooFar => ("too large", colours.error),
     };
-    let text = format!("{word} {}", drift.with_unit());
-    let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(5, 1));
     let about = drift.remark().unwrap_or_else(|| "Zero as calibrated".to_owned());
-    frame.show(ui, |ui| ui.label(RichText::new(text).small().color(colour(ink)))).response.on_hover_text(about);
+    chip(ui, format!("{word} {}", drift.with_unit()), ink).on_hover_text(about);
 }
 
 /// Actuation, and automatic detection of trials.

@@ -170,11 +170,16 @@ impl ChannelTraces {
 
     /// Count at which a channel was constant while others moved, and for how long (s).
     pub fn stuck(&self, channel: usize) -> Option<[f64; 2]> {
+        let least_s = STUCK_S.max(STUCK_SHARE * self.seconds());
+        self.constant(channel, |_| true).filter(|[_, lasted]| *lasted >= least_s)
+    }
+
+    /// Newest count of a channel that is exactly as before while one of these others moved, and for how long (s).
+    pub fn constant(&self, channel: usize, others: impl Fn(usize) -> bool) -> Option<[f64; 2]> {
         let [count, since] = self.channels.get(channel)?.still?;
-        let lasted = self.span?[1][0] - since;
-        let moved = |(other, trace): (usize, &ChannelTrace)| other != channel && trace.moved_s > since;
-        let long = lasted >= STUCK_S.max(STUCK_SHARE * self.seconds());
-        (long && self.channels.iter().enumerate().any(moved)).then_some([count, lasted])
+        let moved = |(other, trace): (usize, &ChannelTrace)| other != channel && others(other) && trace.moved_s > since;
+        let is_constant = self.channels.iter().enumerate().any(moved);
+        is_constant.then_some([count, self.span?[1][0] - since])
     }
 }
 

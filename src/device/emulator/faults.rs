@@ -1,5 +1,5 @@
 //! Faults of the emulator, on request: `NAME[=VALUE]@SECONDS[/DURATION]`, separated by commas, as in
-//! `vanish@5,garbage@7/2,stuck=2@10`.
+//! `vanish@5,garbage@7/2,stuck=2@10`; a gain has a factor, `gain=2*0.5@3`.
 
 use super::event::EmulatorError;
 use std::fmt;
@@ -15,6 +15,8 @@ pub enum FaultKind {
     Open,
     /// A channel is printed as `nan`.
     Nan,
+    /// The voltage of a channel is multiplied by a factor.
+    Gain,
     /// Each channel takes a share of the one read before it.
     Crosstalk,
     /// The converter is left at its default of 10 bits.
@@ -59,16 +61,19 @@ struct Row {
 }
 
 const FOR_EVER: f64 = f64::INFINITY;
+/// Usual factor of a gain.
+const HALF: f64 = 0.5;
 
 const fn row(kind: FaultKind, name: &'static str, value: f64, duration_s: f64, words: &'static str) -> Row {
     Row { kind, name, value, duration_s, words }
 }
 
-const TABLE: [Row; 20] = [
+const TABLE: [Row; 21] = [
     row(FaultKind::Stuck, "stuck", 0.0, FOR_EVER, "channel VALUE is stuck at its reading"),
     row(FaultKind::Saturated, "saturation", 0.0, FOR_EVER, "channel VALUE is saturated at full scale"),
     row(FaultKind::Open, "open", 0.0, FOR_EVER, "the sensor of channel VALUE is disconnected"),
     row(FaultKind::Nan, "nan", 0.0, FOR_EVER, "channel VALUE is printed as nan"),
+    row(FaultKind::Gain, "gain", 0.0, FOR_EVER, "channel VALUE reads a half, or with VALUE*FACTOR another share"),
     row(FaultKind::Crosstalk, "crosstalk", 0.2, FOR_EVER, "each channel picks up a share VALUE of the one before"),
     row(FaultKind::TenBit, "tenbit", 0.0, FOR_EVER, "the converter gives 10 bits"),
     row(FaultKind::Clock, "clock", 200.0, FOR_EVER, "the board's clock is fast by VALUE ppm"),
@@ -100,6 +105,8 @@ pub struct EmulatedFault {
     pub kind: FaultKind,
     /// Its parameter; see [`fault_help`].
     pub value: f64,
+    /// Factor of a gain; 1 for others.
+    pub factor: f64,
     /// Start (s since the first host).
     pub from_s: f64,
     /// End (s).
@@ -115,7 +122,8 @@ impl EmulatedFault {
 
 impl fmt::Display for EmulatedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}@{}", self.kind.name(), self.value, self.from_s)?;
+        let factor = if self.kind == FaultKind::Gain { format!("*{}", self.factor) } else { String::new() };
+        write!(f, "{}={}{factor}@{}", self.kind.name(), self.value, self.from_s)?;
         if self.until_s.is_finite() { write!(f, "/{}", self.until_s - self.from_s) } else { Ok(()) }
     }
 }
@@ -148,13 +156,18 @@ fn parse_fault(text: &str) -> Result<EmulatedFault, String> {
     let unknown = || format!("is not one of {}", TABLE.map(|row| row.name).join(", "));
     let row = TABLE.iter().find(|row| row.name == name).ok_or_else(unknown)?;
     let (from, duration) = times.split_once('/').map_or((times, None), |(from, lasts)| (from, Some(lasts)));
+    let (value, factor) = match value.filter(|_| row.kind == FaultKind::Gain).and_then(|value| value.split_once('*')) {
+        Some((channel, factor)) => (Some(channel), Some(factor)),
+        None => (value, None),
+    };
     let number = |text: Option<&str>, usual: f64| match text {
         Some(text) => text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0).ok_or("has an invalid number"),
         None => Ok(usual),
     };
     let from_s = number(Some(from), 0.0)?;
     let until_s = from_s + number(duration, row.duration_s)?;
-    Ok(EmulatedFault { kind: row.kind, value: number(value, row.value)?, from_s, until_s })
+    let factor = number(factor, if row.kind == FaultKind::Gain { HALF } else { 1.0 })?;
+    Ok(EmulatedFault { kind: row.kind, value: number(value, row.value)?, factor, from_s, until_s })
 }
 
 #[cfg(test)]
@@ -164,13 +177,15 @@ mod tests {
     #[test]
     fn a_list_of_faults_is_read() {
         let faults = parse_faults("vanish@5, garbage@7/2,stuck=2@10").expect("sound");
-        let garbage = EmulatedFault { kind: FaultKind::Garbage, value: 0.0, from_s: 7.0, until_s: 9.0 };
+        let garbage = EmulatedFault { kind: FaultKind::Garbage, value: 0.0, factor: 1.0, from_s: 7.0, until_s: 9.0 };
         assert_eq!((faults.len(), faults[1]), (3, garbage));
         assert_eq!((faults[0].kind, faults[0].until_s), (FaultKind::Vanish, 6.0));
         assert!(faults[2].value == 2.0 && faults[2].until_s.is_infinite() && faults[2].is_on(1e9));
         assert!(garbage.is_on(7.0) && !garbage.is_on(9.0) && !garbage.is_on(6.9));
         assert_eq!(parse_faults("rail=2@1"), parse_faults("saturation=2@1"));
-        for fault in faults {
+        let gains = parse_faults("gain=3*0.7@1,gain=1@2").expect("sound");
+        assert_eq!(gains.iter().map(|gain| (gain.value, gain.factor)).collect::<Vec<_>>(), [(3.0, 0.7), (1.0, HALF)]);
+        for fault in faults.into_iter().chain(gains) {
             assert_eq!(parse_faults(&fault.to_string()), Ok(vec![fault]));
         }
     }
@@ -185,7 +200,13 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_fault_is_said() {
-        for (text, word) in [("vanish", "time"), ("vnish@3", "vanish"), ("loss=x@3", "number"), ("loss@-1", "number")] {
+        for (text, word) in [
+            ("vanish", "time"),
+            ("vnish@3", "vanish"),
+            ("loss=x@3", "number"),
+            ("loss@-1", "number"),
+            ("gain=2*x@1", "number"),
+        ] {
             let found = parse_faults(text).expect_err(text).to_string();
             assert!(found.contains(word) && found.contains(text), "{found}");
         }

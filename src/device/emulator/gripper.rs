@@ -245,8 +245,10 @@ impl EmulatedGripper {
             self.sensors.shares(stimuli).into_iter().chain((0..self.board_setup.channels.len()).map(spare)).collect();
         for fault in self.faults.iter().filter(|fault| fault.is_on(self.now_s)) {
             let channel = fault.value as usize;
-            if let (FaultKind::Open, Some(share)) = (fault.kind, shares.get_mut(channel)) {
-                *share = self.sensors.share_when_open(channel);
+            match (fault.kind, shares.get_mut(channel)) {
+                (FaultKind::Open, Some(share)) => *share = self.sensors.share_when_open(channel),
+                (FaultKind::Gain, Some(share)) => *share = (*share * fault.factor).min(1.0),
+                _ => {}
             }
         }
         shares

@@ -193,6 +193,16 @@ fn a_stuck_channel_keeps_its_reading_while_the_others_go_on() {
 }
 
 #[test]
+fn a_gain_changes_one_channel_by_its_factor() {
+    let found = text(setup("load=0.5kg hold=4", "gain=2*0.7@2,gain=0@3"), 4.0);
+    let lines = samples(&found);
+    let count = |k: usize, key: &str| number(lines[k], key).expect("printed");
+    assert!((count(110, "fsrL") - 0.7 * count(90, "fsrL")).abs() <= 1.0 && count(90, "fsrL") > 1000.0);
+    assert!((count(170, "flexL") - 0.5 * count(90, "flexL")).abs() <= 1.0 && count(110, "flexL") == count(90, "flexL"));
+    assert_eq!((count(170, "flexR"), count(170, "fsrR")), (count(90, "flexR"), count(90, "fsrR")));
+}
+
+#[test]
 fn a_thousand_samples_a_second_on_eight_channels() {
     let setup = EmulatorSetup { rate_hz: 1000, channels: 8, parts: HiddenParts::drawn(1), ..setup("", "") };
     let found = text(setup, 1.0);

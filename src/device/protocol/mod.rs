@@ -32,4 +32,4 @@ pub use decoder::{BoardEvent, Decoder};
 pub use line_log::{ConsoleLine, LineKind};
 pub use lines::MAX_LINE;
 pub use reply::BoardReply;
-pub use saturation::{AdcRange, Saturation};
+pub use saturation::{AdcRange, Saturation, SaturationWatch};

@@ -47,7 +47,7 @@ pub enum AdcRange {
 
 /// Watches the counts.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SaturationWatch {
+pub struct SaturationWatch {
     channels: Vec<Channel>,
     now_s: f64,
     /// First reading (s).
@@ -67,7 +67,7 @@ struct Channel {
 
 impl SaturationWatch {
     /// Takes in counts of a converter with this full scale. A channel that was not sent is not saturated.
-    pub(super) fn add(&mut self, counts: &[Option<f32>], sent: &[bool], t_s: f64, full_scale: u32) {
+    pub fn add(&mut self, counts: &[Option<f32>], sent: &[bool], t_s: f64, full_scale: u32) {
         self.channels.resize(counts.len(), Channel::default());
         self.now_s = t_s;
         let full = full_scale as f32;
@@ -90,7 +90,12 @@ impl SaturationWatch {
 
     /// Saturation of each channel.
     pub(super) fn at(&self) -> Vec<Option<Saturation>> {
-        let found = |(state, since): (Saturation, f64)| (self.now_s - since > AFTER_S).then_some(state);
+        self.lasting(AFTER_S)
+    }
+
+    /// Saturation of each channel that has lasted for so long (s).
+    pub fn lasting(&self, after_s: f64) -> Vec<Option<Saturation>> {
+        let found = |(state, since): (Saturation, f64)| (self.now_s - since > after_s).then_some(state);
         self.channels.iter().map(|channel| channel.at.and_then(found)).collect()
     }
 

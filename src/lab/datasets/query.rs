@@ -2,14 +2,17 @@
 
 use super::origin::TrialOrigin;
 use super::sampling::{Cut, resampled};
+use crate::labelling::SensorWatch;
 use palpate_learn::{Class, Labels, ModelCard, Sequence};
 use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_store::labels::{ClassClash, compared};
-use palpate_store::{CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow};
+use palpate_store::labels::{ClassClash, Flag, compared};
+use palpate_store::{
+    BoardSignals, CalibrationId, Day, Store, StoreError, TrialColumn, TrialOrder, TrialQuery, TrialRow,
+};
 use palpate_tactile::board::SensorList;
 use palpate_tactile::model::SensorModel;
-use palpate_tactile::trial::{SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
+use palpate_tactile::trial::{BoardCourse, SimulatedTrial, Trial, TrialData, TrialHeader, TrialId, TrialSource};
 use palpate_tactile::{Channel, LayoutError, Quantity, SensorLayout, Sensors, SignalDefinition, Signals};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -304,6 +307,33 @@ pub(super) fn none_calibrated(left_out: usize, why: &str) -> DatasetError {
     ))
 }
 
+/// Puts what the other sensors foretell in place of what failed ones read, in a trial that was flagged for it.
+fn mend(store: &Store, id: TrialId, read: &mut BoardSignals) -> Result<(), StoreError> {
+    let info = store.board_info(id)?;
+    let is_flagged = info.is_some_and(|info| info.flags.iter().any(|found| found.flag == Flag::SensorFault));
+    let Some(log) = is_flagged.then(|| store.board_log(id)).transpose()?.flatten() else { return Ok(()) };
+    let BoardCourse { board, phases, began_s, .. } = &log.course;
+    let closing_s = read.closing_s.map_or(f64::NEG_INFINITY, |closing_s| began_s + closing_s);
+    let rest = &log.readings[..log.readings.partition_point(|reading| reading.t_s < closing_s)];
+    let watch = SensorWatch::of_trial(board, [rest, &log.readings], phases, &read.serving.calibrations);
+    let (channels, old) = (board.sensors.channels(), &read.derived.signals);
+    let columns: Vec<Option<usize>> =
+        channels.iter().map(|own| old.channels.iter().position(|name| *name == own.name())).collect();
+    let mut signals = Signals { channels: channels.iter().map(Channel::name).collect(), ..Signals::default() };
+    for (sample, t_s) in old.t_s.iter().enumerate() {
+        let last = read.line.partition_point(|(from_s, _)| from_s <= t_s).checked_sub(1);
+        let mut row: Vec<f32> =
+            columns.iter().map(|column| column.map_or(f32::NAN, |column| old.row(sample)[column])).collect();
+        watch.mend(&channels, &mut row, last.map_or(f64::NAN, |last| read.line[last].1));
+        signals.push(*t_s, &row);
+    }
+    // What nothing foretells is left out.
+    let known = |k: &usize| (0..signals.t_s.len()).any(|sample| signals.row(sample)[*k].is_finite());
+    let known: Vec<String> = (0..channels.len()).filter(known).map(|k| signals.channels[k].clone()).collect();
+    read.derived.signals = signals.chosen(&known).unwrap_or_default();
+    Ok(())
+}
+
 /// Reads the signals of a real gripper, calibrated, in the channels of the layout.
 fn board_signals(
     store: &Store,
@@ -316,7 +346,8 @@ fn board_signals(
         return Err(DatasetError::OnlySimulated { id, choice });
     }
     let read = store.board_signals(id, calibrations)?;
-    let read = read.ok_or_else(|| none_calibrated(1, "its board sent no data"))?;
+    let mut read = read.ok_or_else(|| none_calibrated(1, "its board sent no data"))?;
+    mend(store, id, &mut read)?;
     let layout = view.sensor_layout()?;
     let channels = match layout.list {
         Some(list) => list.channels().into_iter().filter(|channel| channel.quantity != Quantity::Force).collect(),

@@ -10,6 +10,7 @@ mod collect;
 mod controller;
 mod error_band;
 mod felt_geometry;
+mod felt_rows;
 mod guidance;
 mod identify;
 mod known_geometry;
@@ -36,6 +37,7 @@ pub use collect::{
 pub use controller::{GraspController, GraspPlan, GraspStage, LEAD_S, PressureCommand};
 pub(crate) use error_band::RefinedRun;
 pub use error_band::{ErrorBand, ErrorNorms, band_half_width, error_band};
+pub(crate) use felt_rows::FeltRows;
 pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance, TouchLibrary, TouchesError};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};

@@ -7,7 +7,9 @@
 //! | saturated | a channel was at an end of its range for more than 2 % of that time |
 //! | interrupted | the connection broke, readings are missing for over 0.1 s, or a sensor is missing in most readings |
 //! | cadence | readings were lost, the rate is off by more than 2 %, or the jitter is above half a period |
+//! | sensor fault | a sensor failed, as [`SensorWatch`] finds |
 
+use super::sensor_watch::SensorWatch;
 use palpate_sim::gripper::Phase;
 use palpate_store::labels::{Flag, FlagRemark};
 use palpate_tactile::board::{Board, Gap, Reading, Sensor, SensorKind};
@@ -61,6 +63,7 @@ pub fn flags_of(trial: &Observed<'_>) -> Vec<FlagRemark> {
         (Flag::Saturated, trial.saturated()),
         (Flag::Interrupted, trial.interrupted()),
         (Flag::Cadence, trial.bad_cadence()),
+        (Flag::SensorFault, trial.sensor_fault()),
     ];
     raised.into_iter().filter_map(|(flag, remark)| Some(FlagRemark { flag, remark: remark? })).collect()
 }
@@ -185,6 +188,12 @@ impl Observed<'_> {
             faults.push(format!("jitter {jitter_p95_ms:.1} ms, limit {half_period_ms:.1} ms (half a period)"));
         }
         joined(faults.into_iter())
+    }
+
+    fn sensor_fault(&self) -> Option<String> {
+        let began = self.readings.first().map_or(0.0, |reading| reading.t_s);
+        let watch = SensorWatch::of_trial(self.board, [self.split().0, self.readings], self.phases, self.calibrations);
+        joined(watch.faults().map(|fault| format!("{}, found at {:.2} s", fault.words(), fault.found_s - began)))
     }
 
     /// Readings per second: as the board states, otherwise as measured.

@@ -10,6 +10,7 @@
 //! | `flags` | faults of a trial, from its readings |
 //! | `decimated` | a trial of any length in bounded memory, and its small picture |
 //! | `segmentation` | beginning, phases and end of grasps in a stream |
+//! | `sensor_watch` | sensors that fail, and what they should read |
 //! | `disagreement` | trials to look at again |
 
 mod disagreement;
@@ -17,9 +18,11 @@ mod flags;
 mod segmentation;
 #[cfg(test)]
 mod segmentation_tests;
+mod sensor_watch;
 mod sparkline;
 
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
 pub use segmentation::{PRE_ROLL_S, SegmentEvent, Segmenter};
+pub use sensor_watch::{SensorFault, SensorTrouble, SensorWatch};
 pub use sparkline::{decimated, sparkline, stored_sparkline};

@@ -1,9 +1,9 @@
 //! Replay of a stored trial or of captured bytes: the rows and the recognition of the live gripper, event by event.
 
 use super::recent::RecentEvents;
-use crate::grasping::{GraspController, GraspPlan, Identification, IdentifyError, Row};
+use crate::grasping::{FeltRows, GraspController, GraspPlan, Identification, IdentifyError, Row};
 use crate::gripper::{Gripper, GripperError, GripperEvent, ReplayedGripper, SerialGripper};
-use crate::labelling::{SegmentEvent, Segmenter};
+use crate::labelling::{SegmentEvent, Segmenter, SensorWatch};
 use palpate_device::protocol::BoardEvent;
 use palpate_learn::{Model, StopRule};
 use palpate_sim::gripper::Phase;
@@ -72,6 +72,9 @@ struct BoardReader {
     marks: VecDeque<PhaseMark>,
     /// Detects the phases where the trial has none.
     segmenter: Option<Segmenter>,
+    felt: FeltRows,
+    /// A sensor failed in the newest reading.
+    failed: bool,
 }
 
 impl Replay {
@@ -138,7 +141,9 @@ impl Replay {
         let (readout, recent) = (Readout::default(), RecentEvents::default());
         let channels = SensorList::default().channels();
         let names = channels.iter().map(Channel::name).collect();
-        let reader = BoardReader { serving, readout, channels, recent, line_bar: None, marks, segmenter };
+        let felt = FeltRows::default();
+        let reader =
+            BoardReader { serving, readout, channels, recent, line_bar: None, marks, segmenter, felt, failed: false };
         Self {
             controller: untimed(gripper.now_s()),
             gripper,
@@ -206,16 +211,33 @@ impl Replay {
                     return Ok(None);
                 }
             };
-            self.recognise(&row);
+            self.recognise(row.clone());
+            self.recognise_anew();
             return Ok(Some(row));
         }
     }
 
-    fn recognise(&mut self, row: &Row) {
+    fn recognise(&mut self, row: Row) {
         if let Some(closing_s) = self.controller.closing_s().filter(|closing_s| row.t_s >= *closing_s)
             && let Some(identification) = &mut self.identification
         {
-            identification.push(row.t_s - closing_s, row);
+            let t = row.t_s - closing_s;
+            let row = match &mut self.reader {
+                RowReader::Board(reader) => reader.felt.push(t, row, &reader.channels),
+                RowReader::Frames(_) | RowReader::Signals => row,
+            };
+            identification.push(t, &row);
+        }
+    }
+
+    /// Recognises the running grasp anew where a sensor has failed.
+    fn recognise_anew(&mut self) {
+        let (RowReader::Board(reader), Some(identification)) = (&mut self.reader, &mut self.identification) else {
+            return;
+        };
+        if std::mem::take(&mut reader.failed) && identification.view().listening {
+            self.off = identification.begin_grasp(reader.columns(&self.channels)).err();
+            reader.felt.anew(&reader.channels).iter().for_each(|(t, row)| _ = identification.push(*t, row));
         }
     }
 
@@ -253,7 +275,9 @@ impl Replay {
                         Some(Phase::Hold) | None => {}
                     }
                 }
-                let RowReader::Board(reader) = &self.reader else { return None };
+                let RowReader::Board(reader) = &mut self.reader else { return None };
+                let (estimate, line_bar) = (reader.readout.estimate(reading), reading.line_bar.or(reader.line_bar));
+                reader.failed = reader.felt.watch.add(reading, &estimate, line_bar);
                 Some(reader.row(reading))
             }
             BoardEvent::Gap(_) | BoardEvent::Reply(_) | BoardEvent::Captured(_) => None,
@@ -265,15 +289,14 @@ impl Replay {
         let RowReader::Board(reader) = &mut self.reader else { return };
         let rest = reader.recent.between(closing_s - REST_S, closing_s);
         reader.readout = reader.readout.clone().with_zero(reader.readout.zero_from(&rest));
-        let calibrated: Vec<String> = reader.readout.channels().iter().map(Channel::name).collect();
-        let columns = self.channels.iter().cloned().enumerate().filter(|(_, name)| calibrated.contains(name));
+        reader.felt.begin();
         if let Some(identification) = &mut self.identification {
             identification.start_over();
-            self.off = identification.begin_grasp(columns).err();
+            self.off = identification.begin_grasp(reader.columns(&self.channels)).err();
         }
         let rows: Vec<Row> =
             reader.recent.between(closing_s, now_s).iter().map(|reading| reader.row(reading)).collect();
-        rows.iter().for_each(|row| self.recognise(row));
+        rows.into_iter().for_each(|row| self.recognise(row));
     }
 }
 
@@ -282,9 +305,16 @@ impl BoardReader {
         // Calibrations that do not fit this board give no values; its counts still do.
         self.readout = Readout::new(board, &self.serving.calibrations).unwrap_or_default();
         self.channels = board.sensors.channels();
+        self.felt.watch = SensorWatch::new(board);
         if let Some(segmenter) = &mut self.segmenter {
             segmenter.set_board(board);
         }
+    }
+
+    /// Those of these channels that are calibrated, with their columns.
+    fn columns(&self, channels: &[String]) -> Vec<(usize, String)> {
+        let calibrated: Vec<String> = self.readout.channels().iter().map(Channel::name).collect();
+        channels.iter().cloned().enumerate().filter(|(_, name)| calibrated.contains(name)).collect()
     }
 
     /// Whether a trial began, and the phases that began, up to this reading.

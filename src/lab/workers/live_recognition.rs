@@ -62,6 +62,11 @@ impl LiveRecognition {
         asked
     }
 
+    /// Names of the channels that the model reads.
+    pub(super) fn channels(&self) -> &[String] {
+        &self.identification.model().card.channels
+    }
+
     /// The channels that the model reads on this gripper; none where it cannot.
     pub(super) fn channels_on(&self, gripper: &GripperModel) -> Vec<Channel> {
         self.identification.channels_on(gripper).unwrap_or_default()

@@ -18,13 +18,16 @@ pub enum Flag {
     Interrupted,
     /// The board's sample times are irregular.
     Cadence,
+    /// A sensor failed.
+    SensorFault,
     /// Another trial holds the same grasp.
     Duplicate,
 }
 
 impl Flag {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence, Self::Duplicate];
+    pub const ALL: [Self; 6] =
+        [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence, Self::SensorFault, Self::Duplicate];
 
     /// Name on screen.
     pub fn label(self) -> &'static str {
@@ -33,6 +36,7 @@ impl Flag {
             Self::Saturated => "saturated",
             Self::Interrupted => "interrupted",
             Self::Cadence => "cadence",
+            Self::SensorFault => "sensor fault",
             Self::Duplicate => "duplicate",
         }
     }

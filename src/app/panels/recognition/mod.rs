@@ -15,7 +15,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{accented, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::number_field;
+use crate::app::widgets::{failed_sensors_ui, number_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
@@ -125,6 +125,9 @@ pub(super) fn ui(
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
+                if let Some(gripper) = data.gripper.filter(|_| data.source == ViewSource::Gripper) {
+                    failed_sensors_ui(ui, gripper);
+                }
                 let mut part = Part { data, pictures, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
                 let advised = part.advice_ui(ui, &tools.advice);

@@ -175,6 +175,8 @@ pub struct GripperView {
     pub identification: Option<Arc<IdentificationView>>,
     /// Reason why recognition is off.
     pub recognition_off: Option<Arc<str>>,
+    /// Sensors that have failed, and from what is answered: `left pad silent: answering from 3 channels`.
+    pub failed: Option<Arc<str>>,
     /// Name of the recognition model.
     pub model: Option<String>,
     /// A calibration.

@@ -10,7 +10,7 @@ use super::guided::{CalibrationView, CrosstalkView};
 use super::messages::{EndedTrial, GripperCommand, GripperSetup, GripperView, LatestReading};
 use super::observing::Observing;
 use super::plotted::Plotted;
-use crate::grasping::{GraspController, Row};
+use crate::grasping::{FeltRows, GraspController, Row};
 use crate::gripper::{Gripper, GripperEvent, Listen, NotOpened, SerialGripper};
 use crate::labelling::Segmenter;
 use crate::recording::{BoardTrialRecording, RecentEvents, Recorder, RecorderNotice, TrialRequest};
@@ -54,6 +54,8 @@ struct Connection {
     borrowed: bool,
     /// Detects begin and end of grasps.
     segmenter: Segmenter,
+    /// Detects sensors that fail, and keeps what they felt.
+    felt: FeltRows,
 }
 
 /// State of the thread.
@@ -255,6 +257,7 @@ impl GripperSession {
             plotted: Plotted::new(Vec::new(), 0),
             borrowed: false,
             segmenter: Segmenter::new(&Board { sensors: self.sensors, ..Board::default() }),
+            felt: FeltRows::default(),
         });
         self.read_calibrations();
         self.begin_stretch(0.0);
@@ -355,11 +358,15 @@ impl GripperSession {
         self.observing.iter_mut().for_each(|observing| observing.add(reading));
         let row = connection.plotted.row(reading, &estimate, commanded);
         let rows = connection.plotted.push(row.clone());
+        let failed = connection.felt.watch.add(reading, &estimate, reading.line_bar.or(commanded));
         let (counts, beyond) = (reading.counts.clone(), connection.readout.beyond(&estimate));
         connection.latest = Some(LatestReading { counts, estimate, beyond, line_bar: reading.line_bar.or(commanded) });
         self.plot(rows);
         self.watch(reading);
-        self.recognise(&row);
+        self.recognise(row);
+        if failed {
+            self.recognise_anew();
+        }
         if let (Some(calibrating), Some(connection)) = (&mut self.calibration.running, &self.connection)
             && let Err(cause) = calibrating.feed(reading, &connection.board)
         {
@@ -411,6 +418,7 @@ impl GripperSession {
             grasp: self.stretch.0,
             identification: self.recognition.as_ref().and_then(LiveRecognition::view),
             recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
+            failed: self.failed_sensors(),
             model: self.model.clone(),
             calibration: self.calibration.clone(),
             crosstalk: self.crosstalk.clone(),

@@ -23,6 +23,14 @@ impl GripperSession {
     }
 
     pub(super) fn begin_recognition(&mut self) {
+        if let Some(connection) = &mut self.connection {
+            connection.felt.begin();
+        }
+        self.begin_answer();
+    }
+
+    /// Begins the answer to a grasp.
+    fn begin_answer(&mut self) {
         let (Some(recognition), Some(connection)) = (&mut self.recognition, &self.connection) else { return };
         // The empty hand that calibrates the sensors.
         if self.adapting {
@@ -38,14 +46,30 @@ impl GripperSession {
     }
 
     /// Passes a row to the model, from the closing on.
-    pub(super) fn recognise(&mut self, row: &Row) {
-        let (Some(recognition), Some(recording)) = (&mut self.recognition, &self.recording) else { return };
+    pub(super) fn recognise(&mut self, row: Row) {
+        let Some(recording) = &self.recording else { return };
         let since = recording.controller.closing_s().map(|closing_s| row.t_s - closing_s);
-        if let Some(t) = since.filter(|t| *t >= 0.0)
-            && let Some(warning) = recognition.push(t, row)
-        {
+        let Some(t) = since.filter(|t| *t >= 0.0) else { return };
+        let (Some(recognition), Some(connection)) = (&mut self.recognition, &mut self.connection) else { return };
+        if let Some(warning) = recognition.push(t, &connection.felt.push(t, row, &self.channels)) {
             self.publisher.notify(Notice::Warning(warning));
         }
+    }
+
+    /// Recognises the running grasp anew, because a sensor has failed.
+    pub(super) fn recognise_anew(&mut self) {
+        if self.recognition.as_ref().and_then(LiveRecognition::view).is_none_or(|view| !view.listening) {
+            return;
+        }
+        self.begin_answer();
+        let (Some(recognition), Some(connection)) = (&mut self.recognition, &self.connection) else { return };
+        connection.felt.anew(&self.channels).iter().for_each(|(t, row)| _ = recognition.push(*t, row));
+    }
+
+    /// Sensors that have failed, and from what is answered.
+    pub(super) fn failed_sensors(&self) -> Option<Arc<str>> {
+        let model = self.recognition.as_ref().map(LiveRecognition::channels).unwrap_or_default();
+        Some(self.connection.as_ref()?.felt.watch.words(&self.channels, model)?.into())
     }
 
     /// Recognises the readings since the closing began, where that was detected later.
@@ -53,6 +77,6 @@ impl GripperSession {
         let Some(connection) = &self.connection else { return };
         let row = |reading: &Reading| connection.plotted.row(reading, &connection.readout.estimate(reading), None);
         let rows: Vec<Row> = connection.recent.between(closing_s, until_s).iter().map(row).collect();
-        rows.iter().for_each(|row| self.recognise(row));
+        rows.into_iter().for_each(|row| self.recognise(row));
     }
 }

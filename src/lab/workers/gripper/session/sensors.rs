@@ -2,6 +2,7 @@
 
 use super::{Connection, GripperSession};
 use crate::gripper::Gripper;
+use crate::labelling::SensorWatch;
 use crate::recording::REST_S;
 use crate::workers::Notice;
 use crate::workers::gripper::calibrating::{CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup};
@@ -62,6 +63,7 @@ impl GripperSession {
         if let Some(connection) = &mut self.connection {
             connection.plotted = Plotted::new(self.channels.to_vec(), board.channels.len());
             connection.segmenter.set_board(&board);
+            connection.felt.watch = SensorWatch::new(&board);
             connection.readout = readout;
             connection.remarks = remarks;
             connection.drift.clear();
