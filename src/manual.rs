@@ -49,7 +49,7 @@ topics! {
     studies
     sensors
     gripper
-    serve
+    control
     labelling
     objects
     inspect

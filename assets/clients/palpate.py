@@ -6,7 +6,7 @@
         print(palpate.grasp(object="lemon")["verdict"]["class"])
         print(palpate.advise()["advice"]["text"])
 
-`palpate help serve` lists all requests. `python palpate.py --grasps 50` grasps, labels and records unattended.
+`palpate help control` lists all requests. `python palpate.py --grasps 50` grasps, labels and records unattended.
 """
 
 import argparse

@@ -74,7 +74,7 @@ struct Arguments {
     /// Recognition model for the real gripper in the window (.safetensors); remembered.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Let other programs control the real gripper beside the window, over this TCP port (default: 4747; `palpate help serve`).
+    /// Let other programs control the real gripper beside the window, over this TCP port (default: 4747; `palpate help control`).
     #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "4747")]
     serve: Option<u16>,
     /// File of the token for them; made where there is none (default: a new token, printed at the start).

@@ -31,7 +31,7 @@ const CLIENT: &str = include_str!("../../assets/clients/palpate.py");
   palpate serve --stdio --token token.txt
   palpate serve --schema
 
-See also: palpate help serve")]
+See also: palpate help control")]
 pub(super) struct ServeArguments {
     /// Port of the real gripper (default: the emulated gripper, with a store of its own).
     #[arg(long, value_name = "PORT", conflicts_with_all = ["object", "seed", "speed"])]

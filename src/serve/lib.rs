@@ -1,5 +1,5 @@
 //! Control of the gripper from other programs: JSON lines over TCP on this computer, or over standard input and output. The
-//! messages are in `palpate help serve`.
+//! messages are in `palpate help control`.
 //!
 //! ```text
 //!  client --lines--> reader thread --requests--> "serve"  --commands--> GripperWorker

@@ -31,6 +31,9 @@ pub struct ImportedTrial {
     pub signals: Signals,
 }
 
+/// Trials that begin later than this count their time from a clock of their own (s).
+const LATE_S: f64 = 0.5;
+
 const MAGIC: &[u8; 4] = b"PPS1";
 const HEADER: usize = 12;
 
@@ -135,8 +138,8 @@ impl Store {
         let channels = serde_json::from_slice(&channels).map_err(|e| bad(e.to_string()))?;
         let signals = decode(&samples, channels).ok_or_else(|| bad("its readings are cut short".to_owned()))?;
         all_there(id, "samples", signals.len(), count)?;
-        // Times may be those of a clock that ran before the trial; a rest before a known closing has negative ones.
-        let late = signals.t_s.first().copied().filter(|first| *first > 0.0);
+        // A rest before a known closing has negative times.
+        let late = signals.t_s.first().copied().filter(|first| *first > LATE_S);
         Ok(Some(match late {
             Some(first) => signals.since(first),
             None => signals,
