@@ -39,7 +39,7 @@ pub struct Mapping {
     /// Columns that are left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignore: Vec<String>,
-    /// Subtract each channel's mean over the first [`REZERO_S`] of its trial.
+    /// Subtract each channel's mean over the first 0.15 s of its trial.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rezero: bool,
     /// In a table with a row for each value: the columns of the channel's name and of the value.

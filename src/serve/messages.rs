@@ -330,8 +330,9 @@ pub fn schema() -> Value {
 /// Reads a line; on a fault, with the id that the line has.
 pub(crate) fn parse(line: &[u8]) -> Result<Message, (Value, Fault)> {
     let read: Result<Map<String, Value>, _> = serde_json::from_slice(line);
-    let mut fields = read
-        .map_err(|e| (Value::Null, Fault::from(format!("the line is no JSON object: {e}. See palpate help control"))))?;
+    let mut fields = read.map_err(|e| {
+        (Value::Null, Fault::from(format!("the line is no JSON object: {e}. See palpate help control")))
+    })?;
     let id = fields.remove("id").unwrap_or_default();
     let message = (|| {
         let token = match fields.remove("token") {

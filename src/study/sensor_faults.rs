@@ -190,7 +190,9 @@ fn watched(hand: &EmulatedHand<'_>, log: &BoardLog) -> SensorWatch {
 }
 
 /// A fault of a gripper's grasp: words, the sensor, and what the emulator does.
-fn fault_cases(left: bool) -> Result<Vec<([String; 3], Option<Sensor>, EmulatedFault)>, StudyError> {
+type FaultCase = ([String; 3], Option<Sensor>, EmulatedFault);
+
+fn fault_cases(left: bool) -> Result<Vec<FaultCase>, StudyError> {
     let mut cases = Vec::new();
     let mut add = |name: &str, text: String, sensor: Option<(&str, Sensor)>, (begins, from_s): (&str, f64)| {
         let faults =
