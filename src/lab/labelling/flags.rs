@@ -306,13 +306,14 @@ mod tests {
     #[test]
     fn a_pad_at_its_end_is_saturated_only_while_it_is_pressed() {
         let found = flags(&readings(4095.0), &[], &[], &good());
-        assert_eq!((found.len(), found[0].flag), (1, Flag::Saturated));
+        // For so long, it has failed as well.
+        assert_eq!(found.iter().map(|found| found.flag).collect::<Vec<_>>(), [Flag::Saturated, Flag::SensorFault]);
         assert!(found[0].remark.contains("left pad") && found[0].remark.contains("75 %"), "{found:?}");
         let mut strip = readings(1500.0);
         strip.iter_mut().for_each(|reading| reading.counts[1] = Some(4095.0));
         assert!(flags(&strip, &[], &[], &good())[0].remark.contains("right flex strip"));
         let mut before = readings(1500.0);
-        before[..20].iter_mut().for_each(|reading| reading.counts[3] = Some(4095.0));
+        before[..12].iter_mut().for_each(|reading| reading.counts[3] = Some(4095.0));
         assert_eq!(flags(&before, &[], &[], &good()), []);
     }
 
