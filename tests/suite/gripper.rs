@@ -25,6 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
+use tempfile::TempDir;
 
 /// A worker on the emulated gripper, and what it has said.
 pub(crate) struct Desk {
@@ -33,7 +34,7 @@ pub(crate) struct Desk {
     store: PathBuf,
     notices: Vec<Notice>,
     rows: Vec<TraceRow>,
-    folder: tempfile::TempDir,
+    folder: TempDir,
 }
 
 /// Views after which something that was waited for will not come any more.
@@ -85,11 +86,10 @@ fn setup(parts: &HiddenParts, grasp_every_s: Option<f64>, most_steps: u8) -> Emu
 
 impl Desk {
     pub(crate) fn on(listen: Listen) -> Self {
-        Self::with(listen, "trials.sqlite")
+        Self::with(listen, tempfile::tempdir().unwrap(), "trials.sqlite")
     }
 
-    fn with(listen: Listen, store: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
+    fn with(listen: Listen, folder: TempDir, store: &str) -> Self {
         let store = folder.path().join(store);
         let (wake, woken) = channel();
         let worker = GripperWorker::start(GripperSetup {
@@ -526,8 +526,10 @@ fn zeros_are_taken_from_open_hands_alone() {
 
 #[test]
 fn a_store_that_cannot_be_written_ends_a_trial_before_the_fingers_close() {
-    let mut desk = Desk::with(board(&parts(1, false)), "notes.txt");
-    std::fs::write(&desk.store, "not a store".repeat(100)).unwrap();
+    // Written before the thread starts, which looks into the store at once.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("notes.txt"), "not a store".repeat(100)).unwrap();
+    let mut desk = Desk::with(board(&parts(1, false)), folder, "notes.txt");
     desk.connect();
     desk.command(GripperCommand::Begin(TrialRequest {
         object: None,
