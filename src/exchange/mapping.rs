@@ -2,6 +2,7 @@
 //! and which ones are channels. A mapping is given by options, or read from a profile (TOML).
 
 use palpate_geometry::read_text;
+use palpate_learn::LEAK_REST_S;
 use palpate_store::FileKind;
 use palpate_tactile::Signals;
 use serde::{Deserialize, Serialize};
@@ -58,8 +59,6 @@ pub const PROFILES: [(&str, &str); 5] = [
 
 /// Largest profile (bytes).
 const LARGEST: u64 = 1 << 20;
-/// Rest by whose mean trials are re-zeroed: half of what the leak check reads (s).
-pub(crate) const REZERO_S: f64 = 0.15;
 /// Pause that begins a new trial where no other length is given (s).
 pub const SPLIT_GAP_S: f64 = 1.0;
 
@@ -128,7 +127,9 @@ impl Mapping {
     pub(crate) fn rezero(&self, signals: &mut Signals) {
         let Some(from) = signals.t_s.first().copied().filter(|_| self.rezero) else { return };
         let width = signals.channels.len();
-        let rest = signals.t_s.iter().take_while(|t| **t <= from + REZERO_S).count();
+        // As `evaluate --rezero`: half of what the leak check reads.
+        let until = from + 0.5 * f64::from(LEAK_REST_S);
+        let rest = signals.t_s.iter().take_while(|t| **t <= until).count();
         for channel in 0..width {
             let own = || signals.values.iter().skip(channel).step_by(width);
             let [count, sum] = own()

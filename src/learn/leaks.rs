@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 /// Longest part of a rest that is read (s).
-const REST_S: f32 = 0.3;
+pub const LEAK_REST_S: f32 = 0.3;
 /// Fewest trials of a class that is asked for, and of all.
 const FEWEST: [usize; 2] = [5, 20];
 /// Folds of the cross-validation.
@@ -172,7 +172,7 @@ impl Dataset {
         let whole = example.rest.as_ref().unwrap_or(&example.grasp);
         let from = whole.t_s.first().copied().unwrap_or(0.0);
         // A sample that rounding puts just beyond the end counts.
-        gaps::filled(whole).until(from + REST_S + 1e-4)
+        gaps::filled(whole).until(from + LEAK_REST_S + 1e-4)
     }
 }
 

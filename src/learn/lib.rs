@@ -104,7 +104,7 @@ pub use baselines::{
 pub use belief::{Belief, Rejection, Round, StopReason, StopRule};
 pub use data::{Class, DataCard, Dataset, Example, Labels, OTHER, Sequence, counted};
 pub use fitting::{Fitting, LearnError};
-pub use leaks::{LeakCheck, LeakSource};
+pub use leaks::{LEAK_REST_S, LeakCheck, LeakSource};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;

@@ -14,8 +14,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// A look at the emulated gripper, at its own speed (s).
-const LOOK_S: f64 = 0.01;
 /// Readings of its board (1/s), and its highest pressure in steps of 0.05 bar.
 const RATE_HZ: u32 = 50;
 const MOST_STEPS: u8 = 30;
@@ -72,7 +70,7 @@ impl EmulatedHand {
             seed,
         };
         let gripper = SharedEmulator::new(EmulatedGripper::new(setup)?);
-        let hand = Self { gripper, sensors, object, look: Duration::from_secs_f64(LOOK_S / speed) };
+        let hand = Self { gripper, sensors, object, look: Duration::from_secs_f64(EmulatedStream::LOOK_S / speed) };
         if adapts {
             hand.adapt(scene, store)?;
         }

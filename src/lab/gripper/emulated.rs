@@ -9,9 +9,6 @@ use palpate_tactile::capture::Captured;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Time of the gripper that passes with each look at it (s).
-const LOOK_S: f64 = 0.01;
-
 /// An emulated gripper that a stream shares with who puts objects into its hand.
 #[derive(Clone)]
 pub struct SharedEmulator(Arc<Mutex<EmulatedGripper>>);
@@ -39,6 +36,9 @@ pub struct EmulatedStream {
 }
 
 impl EmulatedStream {
+    /// Time of the gripper that passes with each look at it (s).
+    pub const LOOK_S: f64 = 0.01;
+
     /// A host connects. A look takes the time `look` in truth.
     pub fn new(gripper: SharedEmulator, sensors: SensorList, look: Duration) -> Self {
         let t_s = gripper.lock().now_s();
@@ -59,7 +59,7 @@ impl EmulatedStream {
 impl BoardStream for EmulatedStream {
     fn take(&mut self, _patience: Duration) -> Vec<BoardEvent> {
         std::thread::sleep(self.look);
-        self.t_s += LOOK_S;
+        self.t_s += Self::LOOK_S;
         let (mut gripper, mut decoded) = (self.gripper.lock(), Vec::new());
         gripper.advance(self.t_s);
         let (printed, bytes) = (gripper.take_printed(), gripper.take_bytes());
