@@ -27,20 +27,13 @@ fn tables_in_manual_and_readme_are_those_of_the_stored_results() -> TestResult {
     Ok(())
 }
 
-/// Studies of recognition that were last run with older physics, which their pages say. The list only becomes shorter.
-const NOT_REPEATED: [&str; 1] = ["recognition"];
-
 #[test]
 fn results_stored_for_the_page_of_the_paper_are_of_this_version() -> TestResult {
     for study in PAPER_STUDIES {
         let Some(ShownStudy { stored, .. }) = study.shipped()? else { continue };
         let key = study.card().key;
-        let is_older = NOT_REPEATED.contains(&key);
-        assert_eq!(stored.program != program(), is_older, "{key}: {}; run the study again", stored.program);
-        assert_eq!(stored.origin().contains("not repeated with"), is_older);
-        if is_older {
-            continue;
-        }
+        assert_eq!(stored.program, program(), "{key}: run the study again");
+        assert!(!stored.origin().contains("not repeated with"), "{key}");
         let plan = StudyPlan::of_size(StudySize::Full);
         let today = study_fingerprint(*study, &plan);
         assert!(is_current(&stored.result, *study, &plan), "{key}: other recognisers ({today}); run the study again");
