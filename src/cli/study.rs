@@ -1,6 +1,7 @@
 //! `palpate study`: experiments, one file each.
 
 mod accuracy;
+mod added_sensors;
 mod effects;
 mod merge;
 mod output;
@@ -25,6 +26,7 @@ use std::path::Path;
   palpate study promises --quick
   palpate study public --data icub.csv
   palpate study sensor-faults --quick
+  palpate study added-sensors --quick
   palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
     #[command(subcommand)]
@@ -45,6 +47,8 @@ enum Study {
     Public(public::PublicArguments),
     /// Let sensors of emulated grippers fail in the middle of a grasp: which are found, and what recognition loses; resumes.
     SensorFaults(sensor_faults::SensorFaultArguments),
+    /// Measure what sensors beyond the paper's four are worth to recognition, in simulation; resumes.
+    AddedSensors(added_sensors::AddedSensorArguments),
     /// Join the parts of a study that `--shard` measured on several machines.
     Merge(merge::MergeArguments),
     /// Studies of the paper.
@@ -60,6 +64,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Promises(arguments) => promises::run(arguments),
         Study::Public(arguments) => public::run(arguments),
         Study::SensorFaults(arguments) => sensor_faults::run(arguments),
+        Study::AddedSensors(arguments) => added_sensors::run(arguments),
         Study::Merge(arguments) => merge::run(arguments),
         Study::Paper(command) => paper::run(command, store),
     }

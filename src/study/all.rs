@@ -2,11 +2,12 @@
 
 use crate::frame::ListedStudy;
 use crate::paper::PAPER_STUDIES;
-use crate::{accuracy, effects, promises, public, sensor_faults, stability};
+use crate::{accuracy, added_sensors, effects, promises, public, sensor_faults, stability};
 
 /// The studies of the paper, then those of answers and of the simulation.
 pub fn all_studies() -> impl DoubleEndedIterator<Item = &'static dyn ListedStudy> {
-    let own: [&dyn ListedStudy; 4] = [&promises::LISTED, &accuracy::LISTED, &effects::LISTED, &stability::LISTED];
+    let own: [&dyn ListedStudy; 5] =
+        [&promises::LISTED, &added_sensors::LISTED, &accuracy::LISTED, &effects::LISTED, &stability::LISTED];
     PAPER_STUDIES.iter().map(|study| *study as &dyn ListedStudy).chain(own)
 }
 

@@ -20,12 +20,14 @@
 //! | 3 | [`accuracy`] | what accuracy costs, and what it is worth for recognition |
 //! | 3 | `public` | recordings of others |
 //! | 3 | `sensor_faults` | sensors that fail in the middle of a grasp |
+//! | 3 | `added_sensors` | what sensors beyond the paper's four are worth |
 //! | 3 | `promises` | whether answers keep their promise |
 //! | 4 | `generated` | sections of manual and README, written from stored results |
 //! | 4 | `all` | the list of all studies |
 //! | 5 | [`jobs`] | background tasks of the window |
 
 pub mod accuracy;
+mod added_sensors;
 mod all;
 mod effects;
 mod emulated;
@@ -42,6 +44,7 @@ mod sensor_faults;
 mod shipped;
 pub mod stability;
 
+pub use added_sensors::added_sensor_study;
 pub use all::{all_studies, listed_study, study_title};
 pub use effects::{
     AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectChange, EffectSize, ExplainedEffect,

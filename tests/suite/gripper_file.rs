@@ -1,7 +1,7 @@
 //! A gripper that only its file describes: two pads on each finger and the pressure in the chambers, from its board's lines to
 //! a model that recognises with them.
 
-use palpate_device::emulator::{EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts};
+use palpate_device::emulator::{EmulatedFault, EmulatedGripper, EmulatorSetup, HandPlan, HiddenParts};
 use palpate_device::protocol::{BoardEvent, Decoder};
 use palpate_lab::datasets::{DatasetQuery, SensorView, trial_signals};
 use palpate_lab::grasping::{Adaptation, GraspController, GraspPlan, Identification, Row};
@@ -22,8 +22,14 @@ fn sensors() -> SensorList {
     SensorList::parse(GRIPPER).unwrap()
 }
 
-/// Records one grasp of an emulated gripper of this file.
-fn recorded(store: &mut Store, parts: &HiddenParts, object: &str, seed: u64) -> TrialId {
+/// Records one grasp of an emulated gripper of this file, whose board has faults.
+pub(crate) fn recorded(
+    store: &mut Store,
+    parts: &HiddenParts,
+    object: &str,
+    seed: u64,
+    faults: Vec<EmulatedFault>,
+) -> TrialId {
     let mut scene = Scene::default();
     scene.solver.accuracy = Accuracy::Draft;
     let (sensors, objects) = (sensors(), vec![object.to_owned()]);
@@ -36,7 +42,7 @@ fn recorded(store: &mut Store, parts: &HiddenParts, object: &str, seed: u64) -> 
         channels,
         most_steps: 30,
         clock_start_us: 0,
-        faults: Vec::new(),
+        faults,
         seed,
     })
     .unwrap();
@@ -62,13 +68,24 @@ fn recorded(store: &mut Store, parts: &HiddenParts, object: &str, seed: u64) -> 
     id
 }
 
+/// Lets a recogniser feel a stored grasp as if it were live.
+pub(crate) fn feel(identification: &mut Identification, store: &Store, id: TrialId, view: &SensorView) {
+    let read = trial_signals(store, id, TrialSource::Recorded, view).unwrap();
+    identification.begin_grasp(read.signals.channels.iter().cloned().enumerate()).unwrap();
+    for (k, t_s) in read.signals.t_s.iter().enumerate() {
+        let values = read.signals.row(k).into();
+        identification.push(*t_s, &Row { t_s: *t_s, line_bar: f64::NAN, phase: Some(Phase::Close), values });
+    }
+    identification.end_grasp();
+}
+
 #[test]
 fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     store.calibrations().set_sensors(sensors()).unwrap();
     let parts = HiddenParts::drawn(7);
-    let empty = recorded(&mut store, &parts, EMPTY, 1);
+    let empty = recorded(&mut store, &parts, EMPTY, 1, Vec::new());
     let adaptation = Adaptation::from_trial(&store, empty, &Scene::default(), &[], false).unwrap();
     assert!(adaptation.is_complete() && adaptation.sensors.len() == 6, "{adaptation:?}");
     adaptation.keep(&store).unwrap();
@@ -76,7 +93,7 @@ fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
     let trials: Vec<(TrialId, &str)> = ["ball", "box", "syringe"]
         .into_iter()
         .flat_map(|object| (0..6).map(move |k| (object, k)))
-        .map(|(object, k)| (recorded(&mut store, &parts, object, 20 + k), object))
+        .map(|(object, k)| (recorded(&mut store, &parts, object, 20 + k, Vec::new()), object))
         .collect();
     let view = SensorView::default().of_store(&store).unwrap();
     let query = DatasetQuery { source: Some(TrialSource::Recorded), without_empty: true, ..DatasetQuery::default() };
@@ -101,14 +118,7 @@ fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
     assert_eq!(SensorView::of_model(&model.card).gripper, Some(sensors()));
     for (id, object) in trials.iter().skip(5).step_by(6) {
         let mut identification = Identification::new(Arc::clone(&model), StopRule::default());
-        let read = trial_signals(&store, *id, TrialSource::Recorded, &SensorView::of_model(&model.card)).unwrap();
-        identification.begin_grasp(read.signals.channels.iter().cloned().enumerate()).unwrap();
-        for (k, t_s) in read.signals.t_s.iter().enumerate() {
-            let row =
-                Row { t_s: *t_s, line_bar: f64::NAN, phase: Some(Phase::Close), values: read.signals.row(k).into() };
-            identification.push(*t_s, &row);
-        }
-        identification.end_grasp();
+        feel(&mut identification, &store, *id, &SensorView::of_model(&model.card));
         let belief = identification.view().beliefs.last().cloned().unwrap();
         assert_eq!(model.card.labels.classes[belief.top().0].name, *object);
     }

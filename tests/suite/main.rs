@@ -26,6 +26,7 @@
 //! - `gripper`: the thread that shares the real gripper's board between trials, recognition and calibration.
 //! - `gripper_tools`: doctor and fit in the window.
 //! - `training`: training on labelled trials of the board, in the window.
+//! - `lab_day`: a day in a lab with a gripper of its own, from the doctor to taxels for another program.
 //! - `desk`: a labelling afternoon in the window, by keys alone.
 //! - `one_path`: the same fault recorded from the command line and from the window.
 //! - `one_signal`: pads and strips measure the same in simulated, physical-like, emulated and recorded grasps.
@@ -67,6 +68,7 @@ mod gripper_file;
 mod gripper_tools;
 mod imports;
 mod inspect;
+mod lab_day;
 mod labelling;
 mod learning;
 mod library;

@@ -51,7 +51,9 @@ pub enum PromiseError {
     TooFew(usize),
 }
 
-/// Seeds of the rounds of a class, and of the grasps of a round: far apart.
+/// Distances between seeds, of which each counts from its own: sets of rounds, the rounds of a class, the grasps of a round. They
+/// are far apart, so that neighbouring seeds share no grasp.
+const NEXT_SEED: u64 = 0xbf58_476d_1ce4_e5b9;
 const NEXT_CLASS: u64 = 0x9e37_79b9_7f4a_7c15;
 const NEXT_GRASP: u64 = 0xd1b5_4a32_d192_ed03;
 
@@ -90,7 +92,7 @@ impl GraspRounds<'_> {
             let object = scene.load_object()?;
             let sampler = PoseSampler::new(&scene, object.as_ref());
             let own = ObjectRounds { views, sampler, object: object.as_ref() };
-            let first = self.seed.wrapping_add((*class as u64 + 1).wrapping_mul(NEXT_CLASS));
+            let first = self.seed.wrapping_mul(NEXT_SEED).wrapping_add((*class as u64 + 1).wrapping_mul(NEXT_CLASS));
             let round = |number: usize| {
                 let grasps = own.grasps(first.wrapping_add(number as u64), self.grasps, self.stop)?;
                 (self.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, of);
@@ -155,5 +157,28 @@ impl ObjectRounds<'_> {
             grasps.push(self.views.iter().map(read).collect::<Result<_, LayoutError>>()?);
         }
         Ok(grasps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_of_neighbouring_seeds_share_no_grasp() {
+        let stop = AtomicBool::new(false);
+        let grasps = |seed: u64| {
+            let rounds = GraspRounds { rounds: 3, grasps: 2, seed, progress: &|_, _| (), stop: &stop };
+            let mut scene = Scene::default();
+            scene.solver.accuracy = palpate_sim::scene::Accuracy::Draft;
+            scene.pose.shift = [0.008; 3];
+            let all = rounds.simulated(&scene, &[SensorView::default()], &[(0, "box".to_owned())]).expect("grasped");
+            all.into_iter().flat_map(|round| round.grasps).map(|grasp| grasp[0].clone()).collect::<Vec<_>>()
+        };
+        let (mut all, other) = (grasps(1), grasps(2));
+        all.extend(other);
+        for (k, own) in all.iter().enumerate() {
+            assert!(all[..k].iter().all(|before| before != own), "grasp {k} comes twice");
+        }
     }
 }

@@ -118,29 +118,61 @@ fn forget_after(view: &mut [f32], felt: usize) {
     view.chunks_exact_mut(STEPS).for_each(|input| input[felt.min(STEPS)..].fill(0.0));
 }
 
-/// Columns in which the channels of a network stand, each with the factor to its unit.
-pub(super) struct Columns(Vec<(usize, f32)>);
+/// Columns in which the channels of a network stand: one, or those of the parts of a finger, with the factor from their mean to
+/// its unit.
+pub(super) struct Columns(Vec<(Vec<usize>, f32)>);
 
 /// Sensing area of a pad (m²): force and pressure of one pad are two units of one reading.
 const PAD_AREA: f32 = 1.697e-4;
 
 impl Columns {
-    /// Finds channels among others; none where one is missing.
+    /// Finds channels among others; none where one is missing. Where a finger has several strips or pads in place of a channel,
+    /// it is the mean of their curvatures or pressures, or the sum of their forces, as if they were equal parts of one.
     pub(super) fn of(wanted: &[String], found: &[String]) -> Option<Self> {
-        let at = |name: &str| found.iter().position(|own| own == name);
+        let at = |name: &str| found.iter().position(|own| own == name).map(|column| vec![column]);
+        let parts = |name: &str| -> Option<Vec<usize>> {
+            let is_part = |own: &String| own.strip_prefix(name).is_some_and(|rest| rest.starts_with('_'));
+            let parts: Vec<usize> = (0..found.len()).filter(|column| is_part(&found[*column])).collect();
+            (!parts.is_empty()).then_some(parts)
+        };
         let column = |channel: &String| {
-            let as_force = || {
-                let column = at(&format!("force_{}", channel.strip_prefix("pressure_")?))?;
-                Some((column, 1.0 / PAD_AREA))
-            };
-            at(channel).map(|column| (column, 1.0)).or_else(as_force)
+            let force = channel.strip_prefix("pressure_").map(|side| format!("force_{side}"));
+            let as_force = |columns: Vec<usize>| (columns.len() as f32 / PAD_AREA, columns);
+            let own = at(channel).map(|columns| (1.0, columns));
+            let own = own.or_else(|| at(force.as_ref()?).map(as_force));
+            let own = own.or_else(|| parts(channel).map(|columns| (1.0, columns)));
+            own.or_else(|| parts(force.as_ref()?).map(as_force)).map(|(factor, columns)| (columns, factor))
         };
         wanted.iter().map(column).collect::<Option<_>>().map(Self)
     }
 
     /// The readings of these channels.
     pub(super) fn pick(&self, grasp: &Sequence) -> Sequence {
-        let values = grasp.rows().flat_map(|(_, row)| self.0.iter().map(|(column, factor)| row[*column] * factor));
+        let values = grasp.rows().flat_map(|(_, row)| {
+            let mean = |columns: &[usize]| columns.iter().map(|own| row[*own]).sum::<f32>() / columns.len() as f32;
+            self.0.iter().map(move |(columns, factor)| mean(columns) * factor)
+        });
         Sequence { t_s: grasp.t_s.clone(), values: values.collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_finger_stand_for_the_whole() {
+        let names = |all: &[&str]| -> Vec<String> { all.iter().map(|own| (*own).to_owned()).collect() };
+        let wanted = names(&["curvature_left", "pressure_left"]);
+        let picked = |found: &[&str], values: &[f32]| {
+            let columns = Columns::of(&wanted, &names(found))?;
+            Some(columns.pick(&Sequence { t_s: vec![0.0], values: values.to_vec() }).values)
+        };
+        let parts = ["pressure_left_distal", "curvature_left", "pressure_left_proximal", "chamber [Pa]"];
+        assert_eq!(picked(&parts, &[300.0, 5.0, 100.0, 9e4]), Some(vec![5.0, 200.0]));
+        // 1 N and 2 N on halves of a pad press like 3 N on the whole.
+        let forces = ["curvature_left", "force_left_distal", "force_left_proximal"];
+        assert_eq!(picked(&forces, &[5.0, 1.0, 2.0]), Some(vec![5.0, 3.0 / PAD_AREA]));
+        assert_eq!(picked(&["curvature_left", "pressure_leftover"], &[5.0, 1.0]), None);
     }
 }
