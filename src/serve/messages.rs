@@ -248,6 +248,8 @@ pub struct VerdictMessage {
     pub pmf: BTreeMap<String, f64>,
     /// Class, or `unknown`, once the model is sure or the limit of grasps is reached.
     pub decided: Option<String>,
+    /// Classes that are left after the finished grasps, by a model with a promise (`palpate promise`).
+    pub left: Option<Vec<String>>,
     /// Finished grasps of this object.
     pub grasps: usize,
     /// The fingers close or hold, and the answer still changes.
@@ -265,6 +267,9 @@ impl VerdictMessage {
             probability,
             pmf: classes.iter().map(|class| class.name.clone()).zip(pmf.probabilities().iter().copied()).collect(),
             decided: view.decided().map(str::to_owned),
+            left: view.left.as_ref().map(|left| {
+                classes.iter().zip(left).filter(|(_, left)| **left).map(|(class, _)| class.name.clone()).collect()
+            }),
             grasps: view.beliefs.len(),
             listening: view.listening,
         })
