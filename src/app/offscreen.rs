@@ -9,7 +9,7 @@ use crate::app::workbench::{Workbench, WorkbenchSetup};
 use egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
-use palpate_render::{Picture, PictureError, describe_adapter, offscreen_backends, wgpu};
+use palpate_render::{DriverChoice, Picture, PictureError, describe_adapter, wgpu};
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::TrialId;
 use serde::Serialize;
@@ -33,6 +33,8 @@ pub struct OffscreenWindow {
     pub trial: Option<TrialId>,
     /// Time of the simulated grasp, or of the trial (s).
     pub at_s: f64,
+    /// Driver that draws it.
+    pub driver: DriverChoice,
 }
 
 /// Reason why there is no picture of the window.
@@ -63,12 +65,12 @@ const QUIET: Duration = Duration::from_millis(400);
 const LAST_FRAMES: usize = 12;
 const FRAME_S: f64 = 0.1;
 
-/// Draws the window once it shows the grasp at its time, or the trial.
-pub fn window_picture(window: &OffscreenWindow) -> Result<Picture, OffscreenError> {
+/// Draws the window once it shows the grasp at its time, or the trial. Returns the driver's name, too.
+pub fn window_picture(window: &OffscreenWindow) -> Result<(Picture, String), OffscreenError> {
     let mut drawn = start(window, RendererOptions::PREDICTABLE)?;
     drawn.show(window)?;
     drawn.settle();
-    drawn.picture()
+    Ok((drawn.picture()?, describe_adapter(&drawn.state.adapter.get_info())))
 }
 
 /// Films presenter mode: so many pictures, `step_s` of its time apart. `add` receives their number and each picture; an error
@@ -103,7 +105,7 @@ pub fn film_presentation<E: From<OffscreenError>>(
 
 /// Starts the window, which stands still.
 fn start(window: &OffscreenWindow, drawing: RendererOptions) -> Result<Drawn, OffscreenError> {
-    let state = render_state(window.size, drawing)?;
+    let state = render_state(window, drawing)?;
     let ctx = egui::Context::default();
     let (wake, woken) = channel();
     let wake = Arc::new(move || {
@@ -183,7 +185,7 @@ fn p95(mut costs: Vec<f64>) -> f64 {
     costs.get((costs.len() * 95).div_ceil(100).saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
-fn render_state(size: [u32; 2], drawing: RendererOptions) -> Result<RenderState, OffscreenError> {
+fn render_state(window: &OffscreenWindow, drawing: RendererOptions) -> Result<RenderState, OffscreenError> {
     let failed = |cause: &dyn std::fmt::Display| OffscreenError::Driver(cause.to_string());
     let create = async |backends| {
         let options = wgpu_options(backends);
@@ -191,15 +193,19 @@ fn render_state(size: [u32; 2], drawing: RendererOptions) -> Result<RenderState,
         RenderState::create(&options, &instance, None, drawing).await
     };
     let mut found = Err(failed(&"there is none"));
-    for backends in offscreen_backends() {
+    for backends in window.driver.backends() {
         found = pollster::block_on(create(Some(backends))).map_err(|e| failed(&e));
+        let allowed = |state: &RenderState| window.driver.allows(&state.adapter.get_info());
+        if found.as_ref().is_ok_and(|state| !allowed(state)) {
+            found = Err(failed(&"it is none of the kind asked for"));
+        }
         if found.is_ok() {
             break;
         }
     }
     let state = found?;
     let most = state.device.limits().max_texture_dimension_2d;
-    if size.iter().any(|side| *side > most) {
+    if window.size.iter().any(|side| *side > most) {
         return Err(failed(&format!("it draws at most {most} x {most} pixels")));
     }
     Ok(state)

@@ -9,7 +9,7 @@ use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::OpenTrial;
 use palpate_lab::picture::PictureView;
-use palpate_render::{MovieFormat, MovieWriter, Picture};
+use palpate_render::{DriverChoice, MovieFormat, MovieWriter, Picture};
 use palpate_sim::scene::Scene;
 use palpate_store::{NewFile, NewFolder};
 
@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &MovieArguments, store: Option<&Path>) -> Result<()
     let open = open_drawable(&store, id)?;
     let times = times(arguments, &open.trial)?;
     let full_scale = open.stage.full_scale_of(open.trial.frames.iter().map(AsRef::as_ref));
-    let mut shot = Shot { drawer: Drawer::new()?, open: &open, full_scale, arguments };
+    let mut shot = Shot { drawer: Drawer::new(DriverChoice::Any)?, open: &open, full_scale, arguments };
     write(arguments, times.len(), |add| {
         times.iter().enumerate().try_for_each(|(number, t_s)| add(number, &shot.picture(*t_s)?))
     })
@@ -92,6 +92,7 @@ fn film(arguments: &MovieArguments) -> Result<(), Failure> {
         size: arguments.size,
         trial: None,
         at_s: 0.0,
+        driver: DriverChoice::Any,
     };
     write(arguments, pictures, |add| film_presentation(&window, pictures, step_s, add))
 }

@@ -13,6 +13,30 @@ pub enum DriverChoice {
     Any,
     /// OpenGL only: the same software rasteriser on every machine, for pictures that tests compare.
     OpenGl,
+    /// Vulkan only.
+    Vulkan,
+    /// The processor only, through any interface: the same on machines with and without a graphics card.
+    Software,
+}
+
+impl DriverChoice {
+    /// All, with their names on the command line.
+    pub const NAMED: [(&str, Self); 4] =
+        [("any", Self::Any), ("software", Self::Software), ("gl", Self::OpenGl), ("vulkan", Self::Vulkan)];
+
+    /// Interfaces in the order in which they are tried.
+    pub fn backends(self) -> Vec<Backends> {
+        match self {
+            Self::OpenGl => vec![Backends::GL],
+            Self::Vulkan => vec![Backends::VULKAN],
+            Self::Any | Self::Software => offscreen_backends(),
+        }
+    }
+
+    /// True for an adapter that may be chosen.
+    pub fn allows(self, info: &AdapterInfo) -> bool {
+        self != Self::Software || draws_in_software(info)
+    }
 }
 
 /// Error of opening a graphics device.
@@ -24,6 +48,11 @@ pub enum GpuError {
          pacman -S vulkan-icd-loader vulkan-swrast"
     )]
     NoDriver,
+    #[error("there is no graphics driver of the kind asked for: {wanted}; leave out --driver, or choose another")]
+    NoSuchDriver {
+        /// Name of the kind.
+        wanted: &'static str,
+    },
     #[error("the graphics driver {driver} cannot be used: {cause}; update the driver")]
     NoDevice {
         /// Its name.
@@ -47,11 +76,11 @@ pub struct Gpu {
 impl Gpu {
     /// Finds a device for drawing off-screen.
     pub fn headless(choice: DriverChoice) -> Result<Self, GpuError> {
-        let rounds = match choice {
-            DriverChoice::OpenGl => vec![Backends::GL],
-            DriverChoice::Any => offscreen_backends(),
+        let none = || match DriverChoice::NAMED.iter().find(|(_, own)| *own == choice && choice != DriverChoice::Any) {
+            Some((wanted, _)) => GpuError::NoSuchDriver { wanted },
+            None => GpuError::NoDriver,
         };
-        let adapter = rounds.into_iter().find_map(best_adapter).ok_or(GpuError::NoDriver)?;
+        let adapter = choice.backends().into_iter().find_map(|b| best_adapter(b, choice)).ok_or_else(none)?;
         Self::from_adapter(&adapter)
     }
 
@@ -86,12 +115,13 @@ fn backends_for(named: Option<Backends>, wayland_folder: Option<&OsStr>) -> Vec<
     }
 }
 
-fn best_adapter(backends: Backends) -> Option<Adapter> {
+fn best_adapter(backends: Backends, choice: DriverChoice) -> Option<Adapter> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
     let instance = Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(backends));
-    adapters.into_iter().min_by_key(|adapter| preference(&adapter.get_info()))
+    let allowed = adapters.into_iter().filter(|adapter| choice.allows(&adapter.get_info()));
+    allowed.min_by_key(|adapter| preference(&adapter.get_info()))
 }
 
 /// WebGL2's limits, but pictures as large as the adapter can make them.

@@ -52,6 +52,7 @@ mod targets;
 mod text;
 
 pub use blit::Blit;
+pub use difference::THRESHOLDS;
 pub use difference::{PictureDifference, SizeMismatch};
 pub use figure::{FigureError, figure_picture, figure_svg};
 pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, draws_in_software, offscreen_backends, wanted_limits};

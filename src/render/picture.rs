@@ -104,6 +104,24 @@ impl Picture {
         Ok(Self { width: pixels.width(), height: pixels.height(), rgba: pixels.into_raw() })
     }
 
+    /// The bytes of a PNG file with texts, each with its key.
+    pub fn to_png_with(&self, texts: &[(&str, String)]) -> Result<Vec<u8>, PictureError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgba);
+        let added = texts.iter().try_for_each(|(key, text)| encoder.add_itxt_chunk((*key).to_owned(), text.clone()));
+        let written = added.and_then(|()| encoder.write_header()?.write_image_data(&self.rgba));
+        written.map_err(|cause| PictureError::Encode { cause: cause.to_string() })?;
+        Ok(bytes)
+    }
+
+    /// Text of a PNG file under this key, before its pixels.
+    pub fn text_of_png(bytes: &[u8], key: &str) -> Option<String> {
+        let reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
+        let texts = &reader.info().utf8_text;
+        texts.iter().find(|text| text.keyword == key).and_then(|text| text.get_text().ok())
+    }
+
     /// The bytes of a PNG file.
     pub fn to_png(&self) -> Result<Vec<u8>, PictureError> {
         let mut bytes = std::io::Cursor::new(Vec::new());

@@ -57,7 +57,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ("parquet", &["src/exchange"]),
     ("parry3d", &["src/geometry"]),
     ("plotters", &["src/render/figure"]),
-    ("png", &["src/render/movie.rs"]),
+    ("png", &["src/render/movie.rs", "src/render/picture.rs"]),
     ("pollster", &["src/render/gpu.rs", "src/app/offscreen.rs"]),
     ("quick_xml", &["src/sim/objects/xml.rs"]),
     ("rand", RANDOM),

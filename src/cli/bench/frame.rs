@@ -6,12 +6,22 @@ use super::super::terminal::{Page, Report};
 use crate::app::{FrameCosts, Mode, OffscreenWindow, frame_costs};
 use cpu_time::ThreadTime;
 use palpate_geometry::palette::Theme;
+use palpate_render::DriverChoice;
 use palpate_sim::scene::Scene;
 
 pub(super) fn measure(size: [u32; 2], seconds: f64) -> Result<FrameCosts, Failure> {
     let folder = TemporaryFolder::new()?;
     let (scene, store) = (Scene::default(), folder.path().join("trials.sqlite"));
-    let window = OffscreenWindow { scene, store, mode: Mode::Demo, theme: Theme::Dark, size, trial: None, at_s: 0.0 };
+    let window = OffscreenWindow {
+        scene,
+        store,
+        mode: Mode::Demo,
+        theme: Theme::Dark,
+        size,
+        trial: None,
+        at_s: 0.0,
+        driver: DriverChoice::Any,
+    };
     let began = ThreadTime::now();
     Ok(frame_costs(&window, seconds, &|| began.elapsed().as_secs_f64())?)
 }

@@ -13,6 +13,7 @@ use palpate_geometry::units::{mm, three_digits};
 use palpate_lab::grasping::{Advisor, GraspSummary, Identification, Recompute, Row, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::Shipped;
+use palpate_render::DriverChoice;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
@@ -59,7 +60,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
     warn_unless_learned(&model, nominal.holds_object());
     let drawer = (!arguments.no_pictures)
-        .then(Drawer::new)
+        .then(|| Drawer::new(DriverChoice::Any))
         .and_then(|drawer| drawer.inspect_err(|error| warn(&format!("no pictures: {error}"))).ok());
     if drawer.is_some() {
         make_folder(&arguments.out)?;
