@@ -30,7 +30,23 @@ pub enum ExportRequest {
     Labelled(PathBuf),
 }
 
+/// Longest name that is made of a title (characters).
+const LONGEST_NAME: usize = 60;
+
 impl ExportRequest {
+    /// Name of its file, without ending: what it shows, in lower case.
+    pub(super) fn name(&self) -> String {
+        let Self::Figure(figure, ..) = self else { return "palpate".to_owned() };
+        let plot = match figure.plots.as_slice() {
+            [one] => one.y.title.split(" (").next().unwrap_or_default(),
+            _ => "",
+        };
+        let shown = format!("{} {plot}", figure.title).to_lowercase();
+        let words: Vec<&str> = shown.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+        let name: String = words.join("_").chars().take(LONGEST_NAME).collect();
+        if name.is_empty() { "palpate".to_owned() } else { name }
+    }
+
     /// Writes it and says so; the file appears whole or not at all. `stop` ends an export of trials.
     pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<String, JobError> {
         let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
@@ -115,6 +131,22 @@ mod tests {
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export-2").join(name).is_file(), "{name}");
         }
+    }
+
+    #[test]
+    fn a_file_is_named_after_what_it_shows() {
+        let plot = |title: &str| palpate_geometry::drawing::Plot {
+            y: palpate_geometry::drawing::PlotAxis::linear(title),
+            ..Default::default()
+        };
+        let name = |title: &str, plots: &[&str]| {
+            let plots = plots.iter().map(|title| plot(title)).collect();
+            let figure = Figure { title: title.to_owned(), plots, ..Figure::default() };
+            ExportRequest::Figure(figure, Theme::Light, [1, 1]).name()
+        };
+        assert_eq!(name("Lemon (2), Tomato (1)", &["pressure (kPa)"]), "lemon_2_tomato_1_pressure");
+        assert_eq!(name("Lemon, trial 7", &["force (N)", "line"]), "lemon_trial_7");
+        assert_eq!(name("", &[]), "palpate");
     }
 
     #[test]

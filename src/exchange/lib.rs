@@ -12,6 +12,7 @@
 //! | 0 | `mapping` | which columns of a table are which, profiles of other programs |
 //! | 0 | `series` | readings of channels at their own times, and their table |
 //! | 0 | `parquet_table` | tables of Parquet, written |
+//! | 0 | `glb` | a grasp as an animated model of glTF |
 //! | 0 | `taxels` | force on every taxel of both pads, and its place |
 //! | 1 | `format` | the trait [`TrialFormat`], what is written and read, errors |
 //! | 2 | `content` | a stored trial as other programs see it |
@@ -40,6 +41,7 @@ mod card;
 mod content;
 mod csv_files;
 mod format;
+mod glb;
 mod lerobot;
 mod mapping;
 mod mcap;
@@ -58,6 +60,7 @@ pub use csv_files::{
     write_trial_csv,
 };
 pub use format::{ExchangeError, Import, ImportError, TrialExport, TrialFormat, Written};
+pub use glb::glb;
 pub use lerobot::write_lerobot;
 pub use mapping::{Mapping, PROFILES, SPLIT_GAP_S, plain_name};
 pub use parquet::is_contained;

@@ -245,10 +245,14 @@ impl Trace {
 /// Colour of a series of a figure, by its number; from [`SERIES_COLOURS`] on they repeat.
 pub const fn series_colour(number: usize, theme: Theme) -> Rgb {
     match theme {
+        _ if number == NO_SERIES => theme.colours().quiet_text,
         Theme::Dark => SERIES_DARK[number % SERIES_COLOURS],
         Theme::Light => SERIES_LIGHT[number % SERIES_COLOURS],
     }
 }
+
+/// Number of the colour of what stands for no series of its own, such as the key of line styles.
+pub const NO_SERIES: usize = usize::MAX;
 
 /// Number of different series colours.
 pub const SERIES_COLOURS: usize = 7;

@@ -25,6 +25,11 @@ impl NewFile {
         Ok(Self { path: path.to_owned(), kind, unfinished, out: Some(BufWriter::new(file)) })
     }
 
+    /// Name that it has until it is finished, for another program to write.
+    pub fn unfinished(&self) -> &Path {
+        &self.unfinished
+    }
+
     /// Gives the file its name, replacing one of its kind, or a symbolic link, that had it.
     pub fn finish(self) -> io::Result<()> {
         self.appear().map(drop)

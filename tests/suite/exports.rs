@@ -141,10 +141,108 @@ fn movies_hold_every_picture() {
     let apng = std::fs::read(at.join("grasp.apng")).unwrap();
     assert_eq!(apng.windows(4).filter(|window| window == b"fcTL").count(), 5);
     assert!(std::fs::read(at.join("grasp.gif")).unwrap().starts_with(b"GIF89a"));
-    misused(at, &["movie", "1", "--out", "a.mp4"], &["choose .apng, .png, .gif, a folder"]);
+    misused(at, &["movie", "1", "--out", "a.avi"], &["choose .apng, .png, .gif, .mp4, .glb, a folder"]);
     refused(at, &["movie", "1", "--to", "9", "--out", "a.gif"], &["runs from", "--to within it"]);
     refused(at, &["movie", "1", "--out", "frames"], &["is not empty"]);
     assert_eq!(files(at), ["frames", "grasp.apng", "grasp.gif"]);
+}
+
+/// Numbers of an accessor of a glTF file whose components are floats.
+fn floats(document: &serde_json::Value, bytes: &[u8], accessor: &serde_json::Value) -> Vec<f32> {
+    let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+    assert_eq!(accessor["componentType"], 5126);
+    let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+    let [from, length] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
+    let size = match accessor["type"].as_str().unwrap() {
+        "SCALAR" => 1,
+        "VEC3" => 3,
+        "VEC4" => 4,
+        _ => 16,
+    };
+    assert_eq!(length, 4 * size * accessor["count"].as_u64().unwrap() as usize);
+    bytes[from..from + length].chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect()
+}
+
+#[test]
+fn a_model_has_the_fingers_where_the_frames_have_them() {
+    let folder = folder();
+    let at = folder.path();
+    done(at, &["movie", "1", "--from", "0.8", "--to", "1.2", "--fps", "10", "--out", "grasp.glb"]);
+    let file = std::fs::read(at.join("grasp.glb")).unwrap();
+    let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&file[..4], word(4), word(8)), (&b"glTF"[..], 2, file.len()));
+    let document: serde_json::Value = serde_json::from_slice(&file[20..20 + word(12)]).unwrap();
+    let bytes = &file[28 + word(12)..];
+    assert_eq!(document["buffers"][0]["byteLength"], bytes.len());
+
+    // 41 rings: ten stretches between eleven joints, four each. Of the nine corners of a ring four are edges, which both
+    // sides have for themselves; each end has its own nine.
+    let left = document["meshes"].as_array().unwrap().iter().find(|mesh| mesh["name"] == "left").unwrap();
+    let attributes = &left["primitives"][0]["attributes"];
+    for (name, size) in [("POSITION", 3), ("NORMAL", 3), ("COLOR_0", 3), ("WEIGHTS_0", 4)] {
+        assert_eq!(floats(&document, bytes, &attributes[name]).len(), size * (41 * 13 + 2 * 9), "{name}");
+    }
+    let weights = floats(&document, bytes, &attributes["WEIGHTS_0"]);
+    assert!(weights.chunks(4).all(|four| (four.iter().sum::<f32>() - 1.0).abs() < 1e-6));
+
+    let store = palpate_store::Store::open(&at.join("trials.sqlite")).unwrap();
+    let trial = store.load(1).unwrap();
+    let palpate_tactile::trial::TrialData::Simulated(data) = &trial.data else { panic!("simulated") };
+    let gripper = &trial.header.scene.gripper;
+    let frame = data.frames.iter().rev().find(|frame| frame.t <= 1.2).unwrap();
+    let names: Vec<&str> = document["nodes"].as_array().unwrap().iter().map(|n| n["name"].as_str().unwrap()).collect();
+    let channels = document["animations"][0]["channels"].as_array().unwrap();
+    let moved = |name: &str, path: &str| {
+        let node = names.iter().position(|own| *own == name).unwrap();
+        let own = |channel: &&serde_json::Value| channel["target"]["node"] == node && channel["target"]["path"] == path;
+        let sampler = channels.iter().find(own).unwrap()["sampler"].as_u64().unwrap() as usize;
+        let sampler = &document["animations"][0]["samplers"][sampler];
+        [&sampler["input"], &sampler["output"]].map(|accessor| floats(&document, bytes, accessor))
+    };
+    for (side, name) in palpate_sim::gripper::Side::BOTH.into_iter().zip(["left tip", "right tip"]) {
+        let placed = frame.placed(gripper, side);
+        let last = placed.lengths.len() - 1;
+        let tip = placed.point(last, placed.lengths[last], 0.0, 0.0);
+        let tip = frame.world_from_gripper(&data.world_from_gripper).point(tip).as_vec3();
+        let [times, positions] = moved(name, "translation");
+        assert_eq!(times.len(), 5);
+        assert!(times.iter().enumerate().all(|(k, t)| (t - 0.1 * k as f32).abs() < 1e-6), "{times:?}");
+        let shown = glam::Vec3::from_slice(&positions[12..]);
+        assert!(shown.distance(tip) < 1e-5, "{name}: {shown} m in the model, {tip} m in the frame");
+    }
+    // One shape of the pad at a time: the rows of the unit matrix.
+    let [times, shapes] = moved("left finger", "weights");
+    assert_eq!((times.len(), shapes.len()), (5, 25));
+    assert!(shapes.iter().enumerate().all(|(k, weight)| *weight == if k % 6 == 0 { 1.0 } else { 0.0 }));
+    refused(at, &["movie", "--demo", "1", "--out", "b.glb"], &["a .glb holds one grasp"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn mp4_is_written_by_ffmpeg_where_it_is_installed() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = folder();
+    let at = folder.path();
+    let movie = ["movie", "1", "--from", "0.8", "--to", "1.2", "--fps", "10", "--size", "160x100", "--out", "a.mp4"];
+    let with_path = |path: &std::path::Path| {
+        let mut command = crate::program::palpate(&at.join("trials.sqlite"));
+        crate::program::ran(&command.env("PATH", path).args(movie).current_dir(at).output().unwrap())
+    };
+    let without = with_path(&at.join("nothing"));
+    assert!(without.code == Some(1) && without.err.contains("sudo apt install ffmpeg"), "{without:?}");
+    assert!(!at.join("a.mp4").exists());
+    // In its place a script that keeps what it is given.
+    let tools = tempfile::tempdir().unwrap();
+    let script = "#!/bin/sh\n[ \"$1\" = -version ] && exit\nfor last; do :; done\n/bin/cat > \"$last\"\n";
+    std::fs::write(tools.path().join("ffmpeg"), script).unwrap();
+    std::fs::set_permissions(tools.path().join("ffmpeg"), std::fs::Permissions::from_mode(0o755)).unwrap();
+    let ran = with_path(tools.path());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(
+        std::fs::metadata(at.join("a.mp4")).unwrap().len(),
+        5 * 160 * 100 * 4,
+        "five pictures, four bytes a pixel"
+    );
 }
 
 #[test]
@@ -179,6 +277,67 @@ fn pictures_are_compared_with_golden_ones() {
     refused(at, &["snapshot", "ball", "--at", "9", "--out", "a.png"], &["beyond the end: the grasp lasts 4.00 s"]);
     let ran = run(at, &[&shot[..], &["--compare", "none.png"]].concat());
     assert!(ran.code == Some(3) && ran.err.contains("not compared: cannot read \"none.png\""), "{ran:?}");
+    assert!(ran.err.contains("--bless makes it"), "{ran:?}");
+    done(at, &[&shot[..], &["--at", "1.2", "--compare", "none.png", "--bless"]].concat());
+    done(at, &[&shot[..], &["--at", "1.2", "--compare", "none.png"]].concat());
+    let small = ["snapshot", "--trial", "1", "--size", "100 x 60", "--compare", "golden.png"];
+    let ran = run(at, &small);
+    assert_eq!(ran.code, Some(3));
+    assert!(ran.err.contains("the picture has 100 x 60 pixels, the golden one 200 x 120"), "{ran:?}");
+    misused(at, &["snapshot", "ball", "--compare", "golden.jpg"], &["choose .png"]);
+    misused(at, &["snapshot", "ball", "--out", "now.jpg"], &["choose .png"]);
+    misused(at, &["snapshot", "ball", "--out", "a.png", "--driver", "metal"], &["choose any, software, gl or vulkan"]);
+}
+
+#[test]
+fn a_picture_says_what_drew_it_and_a_comparison_what_has_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let shot = ["snapshot", "ball", "--size", "200x120", "--at", "0.1", "--driver", "software"];
+    done(at, &[&shot[..], &["--compare", "golden.png", "--bless"]].concat());
+    let bytes = std::fs::read(at.join("golden.png")).unwrap();
+    let text = |key: &str| Picture::text_of_png(&bytes, key).unwrap();
+    assert_eq!(text("Software"), format!("Palpate {}", env!("CARGO_PKG_VERSION")));
+    assert_eq!(text("Physics"), palpate_sim::PHYSICS_VERSION.to_string());
+    assert!(text("Driver").contains("software rendering") && text("Scene").contains("source = \"ball\""));
+    let ran = run(at, &[&shot[..], &["--set", "gripper.finger.joints=6", "--compare", "golden.png"]].concat());
+    assert_eq!(ran.code, Some(1));
+    let line = ran.err.lines().find_map(|line| line.strip_prefix("Pixels that differ: ")).unwrap();
+    let counts: Vec<usize> = line.split(", ").map(|part| part.split(' ').next().unwrap().parse().unwrap()).collect();
+    assert!(line.ends_with("by more than 16") && counts.len() == 5 && counts[0] > 0, "{line}");
+    assert!(counts.windows(2).all(|pair| pair[0] >= pair[1]), "{counts:?}");
+    assert!(ran.err.contains("The scenes differ: joints = 6."), "{ran:?}");
+    assert!(ran.err.contains(&format!("Both were drawn by {}.", text("Driver"))), "{ran:?}");
+    // A picture of another program says nothing.
+    let plain = Picture { width: 200, height: 120, rgba: vec![0; 4 * 200 * 120] };
+    std::fs::write(at.join("plain.png"), plain.to_png().unwrap()).unwrap();
+    let ran = run(at, &[&shot[..], &["--compare", "plain.png"]].concat());
+    assert!(ran.code == Some(1) && ran.err.contains("The golden picture does not name its driver."), "{ran:?}");
+}
+
+#[test]
+fn a_list_draws_many_pictures_and_ends_with_the_greatest_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let size = "--size 160x100 --at 0.1";
+    std::fs::write(
+        at.join("a.txt"),
+        format!("# two\nball {size} --out ball.png\n\ncube {size} --out cube.png # cube\n"),
+    )
+    .unwrap();
+    done(at, &["snapshot", "--list", "a.txt"]);
+    assert_eq!(files(at), ["a.txt", "ball.png", "cube.png"]);
+    let code = |lines: &str| {
+        std::fs::write(at.join("b.txt"), lines).unwrap();
+        let ran = run(at, &["snapshot", "--list", "b.txt"]);
+        (ran.code.unwrap(), ran.err)
+    };
+    assert_eq!(code(&format!("ball {size} --compare ball.png")).0, 0);
+    assert_eq!(code(&format!("cube {size} --compare ball.png\nball {size} --compare ball.png")).0, 1);
+    assert_eq!(code(&format!("cube {size} --compare none.png\ncube {size} --compare ball.png")).0, 3);
+    let (wrong, said) = code("ball --out c.png\nball --nonsense");
+    assert!(wrong == 2 && said.contains("line 2 of b.txt") && !at.join("c.png").exists(), "{said}");
+    misused(at, &["snapshot", "--list", "a.txt", "--out", "a.png"], &["--list"]);
 }
 
 #[test]

@@ -77,7 +77,7 @@ impl FileFeature {
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
             ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
         };
-        let name = Some(format!("palpate.{}", extensions[0]));
+        let name = Some(format!("{}.{}", request.name(), extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
     }
 }

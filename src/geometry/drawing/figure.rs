@@ -17,6 +17,8 @@ pub struct Figure {
     pub plots: Vec<Plot>,
     /// Plots in a row; all of them where zero.
     pub columns: usize,
+    /// One legend above all plots, in place of each plot's own; these series have no points.
+    pub legend: Vec<DataSeries>,
     /// Remark below all plots, such as the command that repeats the measurement.
     pub note: String,
 }

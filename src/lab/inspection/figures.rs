@@ -9,6 +9,7 @@ use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time};
 use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
+use palpate_geometry::palette::NO_SERIES;
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_tactile::SignalDefinition;
@@ -107,7 +108,25 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
         }
     };
     let columns = if options.heat.is_some() { 2 } else { plots.len().min(if plots.len() == 4 { 2 } else { 3 }) };
-    Ok(Figure { title, plots, columns, note: caption(trials) })
+    let legend = legend(&plots, trials.len());
+    Ok(Figure { title, plots, columns, legend, note: caption(trials) })
+}
+
+/// One legend of all plots: each series once, and with several trials the line style of each finger.
+fn legend(plots: &[Plot], trials: usize) -> Vec<DataSeries> {
+    let mut legend: Vec<DataSeries> = Vec::new();
+    let all = || plots.iter().flat_map(|plot| &plot.series);
+    for series in all().filter(|series| !series.name.is_empty()) {
+        let entry = DataSeries { points: Vec::new(), ..series.clone() };
+        if !legend.contains(&entry) {
+            legend.push(entry);
+        }
+    }
+    if trials > 1 && all().any(|series| series.line == LineStyle::Dashed) {
+        let key = |(name, dashed): (&str, bool)| line(name.to_owned(), NO_SERIES, dashed, std::iter::empty());
+        legend.extend([("left finger", false), ("right finger", true)].map(key));
+    }
+    legend
 }
 
 /// Only others have what was asked for.
@@ -377,6 +396,8 @@ mod tests {
         let figure = comparison_figure(&[one], &FigureOptions::default())?;
         let titles: Vec<&str> = figure.plots.iter().map(|plot| plot.y.title.as_str()).collect();
         assert_eq!(titles, ["curvature (1/m)", "pressure (kPa)", "force (N)"]);
+        let legend: Vec<&str> = figure.legend.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(legend, ["left", "right"], "one for three plots");
         let pressure = &figure.plots[1];
         assert_eq!(pressure.series.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["left", "right"]);
         assert_eq!(pressure.series.iter().map(|s| s.line).collect::<Vec<_>>(), [LineStyle::Thin, LineStyle::Dashed]);
@@ -410,6 +431,11 @@ mod tests {
         assert_eq!((series[0].colour, series[1].colour, series[4].colour), (0, 0, 2));
         let contact = trials[2].phase_from(TouchPhase::Contact).expect("it touched");
         assert!((series[4].points[0].at[0] - (trials[2].t_s[0] - contact)).abs() < 1e-12);
+        let named = |figure: &Figure| figure.legend.iter().map(|s| (s.name.clone(), s.line)).collect::<Vec<_>>();
+        let legend = named(&figure);
+        assert_eq!(legend.len(), 5, "three trials and two line styles");
+        assert_eq!(legend[0], (series[0].name.clone(), LineStyle::Thin));
+        assert_eq!(legend[3..], [("left finger".into(), LineStyle::Thin), ("right finger".into(), LineStyle::Dashed)]);
         let mean = comparison_figure(&trials, &FigureOptions { mean: true, ..options.clone() })?;
         let plot = &mean.plots[0];
         assert_eq!((plot.series.len(), plot.bands.len()), (4, 4));

@@ -1,4 +1,4 @@
-//! Outline of a bent finger as one mesh, for the ghost of another run of the same scene.
+//! Skin of a bent finger as one mesh: for the ghost of another run of the same scene, and for models of other programs.
 
 use glam::Mat4;
 use palpate_geometry::drawing::{FingerFrame, Section, SoftFinger, Solid};
@@ -11,8 +11,13 @@ const CROWN_POINTS: u32 = 7;
 /// Frames between two of the finger's own, so that its skin is as smooth as the one it is compared with.
 const BETWEEN: u32 = 3;
 
-/// The skin of a finger in one colour, swept along its axis and closed at both ends.
+/// A finger in one colour.
 pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> Solid {
+    Solid { mesh: Arc::new(skin_mesh(finger, colour)), world_from_mesh: Mat4::IDENTITY, tint: Some(colour) }
+}
+
+/// The skin of a finger in one colour, swept along its axis and closed at both ends.
+pub fn skin_mesh(finger: &SoftFinger, colour: Rgb) -> SurfaceMesh {
     let outline = outline(&finger.section);
     let mut mesh = TriMesh::default();
     for frame in refined(&finger.frames) {
@@ -43,7 +48,7 @@ pub(super) fn finger(finger: &SoftFinger, colour: Rgb) -> Solid {
     }
     let mut surface = SurfaceMesh::default();
     surface.add(&mesh, colour, Finish::Matt);
-    Solid { mesh: Arc::new(surface), world_from_mesh: Mat4::IDENTITY, tint: Some(colour) }
+    surface
 }
 
 /// Corners of the cross-section, once around: across the finger and inward (m).

@@ -17,6 +17,7 @@ mod touch;
 
 pub use annotations::{SCALE_STEPS, legend_room};
 pub use contact_path::{ContactPath, PathColour, TouchedPlace, contact_path};
+pub use ghost::skin_mesh;
 pub use heat_maps::{
     BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
     pad_rows_over_time, pads_at, whole_pads,
@@ -26,7 +27,7 @@ pub(crate) use reconstructed::evenly_bent;
 
 use annotations::Annotator;
 use glam::{Mat4, Vec2, Vec3};
-use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, Solid, StandardView};
+use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, SoftFinger, Solid, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
@@ -160,7 +161,7 @@ impl Stage {
         if view.forces && view.annotations {
             forces::label(&mut annotator, &self.gripper, &world_from_gripper, frame);
         }
-        let mut fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, view.full_scale);
+        let mut fingers = self.fingers(frame, view.full_scale);
         if let Some(layout) = &view.layout {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
             fingers.iter_mut().for_each(|finger| finger.sensors = drawn.clone());
@@ -175,7 +176,7 @@ impl Stage {
                 grid: colours.grid,
                 radius: 0.45,
             }),
-            solids: self.solids(frame),
+            solids: self.solids(frame).into_iter().map(|(_, solid)| solid).collect(),
             ghosts: Vec::new(),
             fingers,
             arrows: if view.forces {
@@ -191,10 +192,9 @@ impl Stage {
 
     /// Outlines of another run of the same scene, for [`DrawList::ghosts`].
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
-        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        let fingers = fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, 1.0);
         let colour = GhostKind::Engine.colour(theme);
-        let mut ghosts: Vec<Solid> = fingers.iter().map(|finger| ghost::finger(finger, colour)).collect();
+        let mut ghosts: Vec<Solid> =
+            self.fingers(frame, 1.0).iter().map(|finger| ghost::finger(finger, colour)).collect();
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
             ghosts.push(Solid { mesh: Arc::clone(mesh), world_from_mesh: matrix(pose), tint: Some(colour) });
         }
@@ -229,16 +229,23 @@ impl Stage {
         read.map(|(finger, _)| ghost::finger(finger, colour)).collect()
     }
 
-    fn solids(&self, frame: &Frame) -> Vec<Solid> {
+    /// Both fingers of a frame, left and right, without sensors; `full_scale` has the brightest colour (Pa).
+    pub fn fingers(&self, frame: &Frame, full_scale: f32) -> Vec<SoftFinger> {
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        fingers::soft_fingers(&self.gripper, &world_from_gripper, frame, full_scale)
+    }
+
+    /// Rigid things of a frame, with their names.
+    pub fn solids(&self, frame: &Frame) -> Vec<(&'static str, Solid)> {
         let solid = |mesh: &Arc<SurfaceMesh>, pose: &Pose| Solid {
             mesh: Arc::clone(mesh),
             world_from_mesh: matrix(pose),
             tint: None,
         };
-        let mut solids = vec![solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper))];
-        solids.extend(self.pedestal.as_ref().map(|mesh| solid(mesh, &Pose::IDENTITY)));
+        let mut solids = vec![("palm", solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper)))];
+        solids.extend(self.pedestal.as_ref().map(|mesh| ("pedestal", solid(mesh, &Pose::IDENTITY))));
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
-            solids.push(solid(mesh, pose));
+            solids.push(("object", solid(mesh, pose)));
         }
         solids
     }

@@ -35,6 +35,10 @@ pub(super) fn draw<B: DrawingBackend>(
         canvas.text(&Text { text: &figure.title, at: [MARGIN, top], align: Align::Left, size: TITLE, colour })?;
         top += 10.0;
     }
+    let shared = legend_rows(canvas, &figure.legend, width - 2.0 * MARGIN)?;
+    draw_legend(canvas, &shared, [MARGIN, top])?;
+    top += shared.len() as f64 * LINE + if shared.is_empty() { 0.0 } else { 8.0 };
+    let own = |plot: &'_ Plot| -> usize { if figure.legend.is_empty() { plot.series.len() } else { 0 } };
     let mut bottom = height - MARGIN;
     for line in figure.note.lines().rev() {
         let colour = canvas.colours.quiet_text;
@@ -50,26 +54,30 @@ pub(super) fn draw<B: DrawingBackend>(
     let each = [share(width - 2.0 * MARGIN, columns), share(bottom - top, rows)];
     for (row, plots) in figure.plots.chunks(columns).enumerate() {
         // Legends of a row take the same height, so that its axes are in line.
-        let lines = plots.iter().map(|plot| Ok(legend_rows(canvas, plot, each[0])?.len()));
+        let lines = plots.iter().map(|plot| Ok(legend_rows(canvas, &plot.series[..own(plot)], each[0])?.len()));
         let lines = lines.collect::<Result<Vec<usize>, FigureError>>()?.into_iter().max().unwrap_or(0);
         for (column, plot) in plots.iter().enumerate() {
             let left = MARGIN + column as f64 * (each[0] + BETWEEN);
             let top = top + row as f64 * (each[1] + BETWEEN);
-            draw_plot(canvas, plot, [[left, top], [left + each[0], top + each[1]]], lines)?;
+            let legend = legend_rows(canvas, &plot.series[..own(plot)], each[0])?;
+            draw_plot(canvas, plot, [[left, top], [left + each[0], top + each[1]]], (&legend, lines))?;
         }
     }
     Ok(())
 }
 
+/// Rows of a legend: its series, each with the width that it takes.
+type LegendRows<'a> = Vec<Vec<(&'a DataSeries, f64)>>;
+
 /// Series of the legend in rows that fit.
 fn legend_rows<'a, B: DrawingBackend>(
     canvas: &Canvas<B>,
-    plot: &'a Plot,
+    series: &'a [DataSeries],
     width: f64,
-) -> Result<Vec<Vec<(&'a DataSeries, f64)>>, FigureError> {
-    let mut rows: Vec<Vec<(&DataSeries, f64)>> = Vec::new();
+) -> Result<LegendRows<'a>, FigureError> {
+    let mut rows: LegendRows<'_> = Vec::new();
     let mut used = f64::INFINITY;
-    for series in plot.series.iter().filter(|series| !series.name.is_empty()) {
+    for series in series.iter().filter(|series| !series.name.is_empty()) {
         let needed = SAMPLE + 6.0 + canvas.width(&series.name, SMALL)? + 12.0;
         if used + needed > width {
             rows.push(Vec::new());
@@ -83,11 +91,30 @@ fn legend_rows<'a, B: DrawingBackend>(
     Ok(rows)
 }
 
+fn draw_legend<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    rows: &LegendRows<'_>,
+    [left, top]: [f64; 2],
+) -> Result<(), FigureError> {
+    let colour = canvas.colours.text;
+    for (n, row) in rows.iter().enumerate() {
+        let middle = top + (n as f64 + 0.5) * LINE;
+        let mut x = left;
+        for (series, width) in row {
+            draw_sample(canvas, series, [x, middle])?;
+            let at = [x + SAMPLE + 6.0, middle + 0.34 * SMALL];
+            canvas.text(&Text { text: &series.name, at, align: Align::Left, size: SMALL, colour })?;
+            x += width;
+        }
+    }
+    Ok(())
+}
+
 fn draw_plot<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
     plot: &Plot,
     [[left, top], [right, bottom]]: Box2,
-    legend_height: usize,
+    (legend, legend_height): (&LegendRows<'_>, usize),
 ) -> Result<(), FigureError> {
     let (text, quiet) = (canvas.colours.text, canvas.colours.quiet_text);
     let mut y = top;
@@ -96,16 +123,7 @@ fn draw_plot<B: DrawingBackend>(
         canvas.text(&Text { text: &plot.title, at: [left, y], align: Align::Left, size: PLOT_TITLE, colour: text })?;
         y += 6.0;
     }
-    for (n, row) in legend_rows(canvas, plot, right - left)?.into_iter().enumerate() {
-        let middle = y + (n as f64 + 0.5) * LINE;
-        let mut x = left;
-        for (series, width) in row {
-            draw_sample(canvas, series, [x, middle])?;
-            let at = [x + SAMPLE + 6.0, middle + 0.34 * SMALL];
-            canvas.text(&Text { text: &series.name, at, align: Align::Left, size: SMALL, colour: text })?;
-            x += width;
-        }
-    }
+    draw_legend(canvas, legend, [left, y])?;
     y += legend_height as f64 * LINE + 6.0;
     // The title of the vertical axis stands above it, where it can be read without turning the head.
     y += SMALL;

@@ -91,7 +91,12 @@ mod tests {
             series: vec![series],
             ..Plot::default()
         };
-        Figure { title: "Two plots".to_owned(), plots: vec![plot.clone(), plot], columns: 0, note: "a note".to_owned() }
+        Figure {
+            title: "Two plots".to_owned(),
+            plots: vec![plot.clone(), plot],
+            note: "a note".to_owned(),
+            ..Figure::default()
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ impl AccuracyStudy {
             self.poses
         );
         let title = "What accuracy costs, and what it is worth".to_owned();
-        LinkedFigure::plain("accuracy", Figure { title, plots, columns: 2, note })
+        LinkedFigure::plain("accuracy", Figure { title, plots, columns: 2, note, ..Figure::default() })
     }
 }
 

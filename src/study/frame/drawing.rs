@@ -224,7 +224,7 @@ impl<'a> LinkedPlots<'a> {
 
     /// The figure.
     pub(crate) fn figure(self, name: &str, columns: usize, size: [u32; 2], note: impl Into<String>) -> LinkedFigure {
-        let figure = Figure { title: self.title, plots: self.plots, columns, note: note.into() };
+        let figure = Figure { title: self.title, plots: self.plots, columns, note: note.into(), ..Figure::default() };
         LinkedFigure { name: name.to_owned(), figure, size, links: self.links }
     }
 }

@@ -127,7 +127,7 @@ impl StabilityReport {
             "What it costs to be wrong less often without noticing".to_owned(),
             format!("{} random scenes.", random.scenes),
         );
-        LinkedFigure::plain("stability", Figure { title, plots, columns: 1, note })
+        LinkedFigure::plain("stability", Figure { title, plots, columns: 1, note, ..Figure::default() })
     }
 }
 

@@ -133,6 +133,7 @@ impl AuditReport {
             columns: 1,
             plots: plots_of(&axes, marks),
             note: "90th percentile of the scenes; crosses: missed.".to_owned(),
+            ..Figure::default()
         };
         LinkedFigure::plain("effects", figure)
     }
