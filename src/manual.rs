@@ -53,6 +53,7 @@ topics! {
     labelling
     objects
     inspect
+    testing
     store
     formats
     keys

@@ -3,6 +3,7 @@
 mod adapt;
 mod bench;
 mod calibrate;
+mod check;
 mod collect;
 mod demo;
 mod doctor;
@@ -113,6 +114,8 @@ enum Command {
     Replay(replay::ReplayArguments),
     /// Draw a scene, a stored trial or the whole window to a PNG file, or compare it with a golden one.
     Snapshot(snapshot::SnapshotArguments),
+    /// Compare the signals and verdicts of a grasp with golden ones, within the stated accuracy.
+    Check(check::CheckArguments),
     /// Draw curves or heat maps of stored trials to an SVG or PNG file.
     Plot(plot::PlotArguments),
     /// Write a stored trial as a movie: animated PNG, GIF or a folder of pictures.
@@ -268,6 +271,7 @@ fn dispatch(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Some(Command::Record(record)) => record::run(record, store)?,
         Some(Command::Replay(replay)) => replay::run(replay, store)?,
         Some(Command::Snapshot(snapshot)) => return snapshot::run(snapshot, store),
+        Some(Command::Check(check)) => return check::run(check),
         Some(Command::Plot(plot)) => plot::run(plot, store)?,
         Some(Command::Movie(movie)) => movie::run(movie, store)?,
         Some(Command::Scene(scene)) => scene::run(scene)?,

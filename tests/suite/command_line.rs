@@ -154,7 +154,7 @@ fn wrong_use_exits_with_2() {
 }
 
 /// Every command: what succeeds, and what fails. `--help` succeeds and an unknown option is wrong use for all.
-const EXIT_CODES: [(&str, &str, &str); 25] = [
+const EXIT_CODES: [(&str, &str, &str); 26] = [
     ("grasp", "ball --no-store", "nothing.urdf"),
     ("demo", "--object ball --grasps 1 --no-store", "--object nothing"),
     ("collect", "--objects empty --trials 1", "--objects nothing"),
@@ -166,6 +166,7 @@ const EXIT_CODES: [(&str, &str, &str); 25] = [
     ("record", "--list", "--port nothing"),
     ("replay", "1 --speed 0", "99"),
     ("snapshot", "ball --out a.png --size 64x64", "nothing.urdf --out b.png"),
+    ("check", "a.json ball --bless", "nowhere/a.json ball --bless"),
     ("plot", "1 --out a.svg", "99 --out b.svg"),
     ("movie", "", "99 --out a.gif"),
     ("scene", "explain empty", "explain nothing.urdf"),

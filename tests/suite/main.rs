@@ -15,6 +15,7 @@
 //! - `serving`: the gripper controlled by other programs: every request, errors, lost connections, slow readers, random lines.
 //! - `store`: kills and second programs.
 //! - `command_line`: exit codes, messages, JSON.
+//! - `checking`: golden signals of `palpate check`.
 //! - `exports`: trials as MCAP, NPZ, figures, movies and pictures of the window.
 //! - `outputs`: what is written replaces nothing else, and is what its name says.
 //! - `packaging`: packages of a release, and the sources of the documentation site.
@@ -51,6 +52,7 @@ mod architecture_app;
 mod bench;
 mod calibration;
 mod cases;
+mod checking;
 mod command_line;
 mod cpu_renderer;
 mod datasets;

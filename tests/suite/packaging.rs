@@ -109,6 +109,18 @@ fn the_action_draws_a_missing_picture_and_then_finds_it_the_same() -> Result<(),
     assert_eq!(compare("ball")?.0, Some(0));
     assert_eq!(compare("lemon")?.0, Some(1));
     assert_eq!(compare("lemon --nonsense")?.0, Some(2));
+    // Signals beside it, and the one or the other alone.
+    let signals = |object: &str| -> std::io::Result<(Option<i32>, String)> {
+        let mut command = Command::new(root().join(".github/actions/snapshot/compare"));
+        command.arg(folder.path().join("new")).env("SIGNALS", folder.path().join("golden.json")).env("GOLDEN", "");
+        let output = command.env("ARGUMENTS", object).env("PATH", &path).output()?;
+        Ok((output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned()))
+    };
+    let (code, told) = signals("ball")?;
+    assert!(code == Some(3) && told.contains("There is nothing to compare with"), "{code:?} {told}");
+    std::fs::copy(folder.path().join("new/golden.json"), folder.path().join("golden.json"))?;
+    assert_eq!(signals("ball")?.0, Some(0));
+    assert_eq!(signals("lemon")?.0, Some(1));
     Ok(())
 }
 

@@ -48,6 +48,5 @@ pub use promise::{GraspRounds, GraspedRound, PromiseError};
 pub use row::Row;
 pub use run::{GraspRun, grasp, prepare, prepare_refined};
 pub use shuffled_objects::ShuffledObjects;
-pub(crate) use summary::CONTACT_FORCE;
-pub use summary::{GraspSummary, HoldSummary, OutOfPlaneSummary, ShakenSummary};
+pub use summary::{CONTACT_FORCE, GraspSummary, HoldSummary, OutOfPlaneSummary, ShakenSummary};
 pub use timed_grasp::{posed_object, timed_grasp, truth_of};

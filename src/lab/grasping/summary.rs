@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// Normal force on a pad that counts as contact (N): below the 0.15 N at which the real force sensor wakes, well above
 /// rounding.
-pub(crate) const CONTACT_FORCE: f64 = 1e-3;
+pub const CONTACT_FORCE: f64 = 1e-3;
 
 /// A grasp in a few numbers. Pairs are left, right.
 #[derive(Clone, Debug, PartialEq, Serialize)]

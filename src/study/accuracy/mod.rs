@@ -13,6 +13,7 @@ mod measure;
 mod plan;
 mod recognition;
 mod report;
+mod stated;
 mod tables;
 
 pub use continuum::{Continuum, ContinuumPair, FingerRow, PadRow};
@@ -22,6 +23,7 @@ pub use plan::{AccuracyPlan, AccuracySetting, RecognitionPlan, SettingFamily};
 pub use report::{
     AccuracyRow, AccuracyStudy, FAILED_SHARE, GroupCost, MethodScore, RecognitionRow, SceneGroup, Spread,
 };
+pub use stated::{StatedError, stated_error};
 
 use super::frame::{
     Experiment, LinkedFigure, OWN_PHYSICS, PlainStudy, StoredStudy, StudyCard, StudyCell, StudyCommand, StudyError,
