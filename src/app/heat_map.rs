@@ -10,7 +10,7 @@ use egui::{
 };
 use palpate_geometry::drawing::{ColourScale, HeatMap};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{SPACE, mark, shown as with_unit, symbol};
 use palpate_lab::inspection::PhaseSpan;
 use palpate_lab::picture::LoadUnit;
 use std::ops::RangeInclusive;
@@ -83,9 +83,9 @@ pub(super) fn colour_bar(ui: &Ui, theme: Theme, right: Pos2, width: f32, scale: 
     const HEIGHT: f32 = 8.0;
     let ink = colour(theme.colours().quiet_text);
     let font = FontId::proportional(11.5);
-    let [low, high] = scale.limits().map(|value| plain(f64::from(value)));
+    let [low, high] = scale.limits().map(|value| mark(f64::from(value)));
     let painter = ui.painter();
-    let end = painter.text(right, Align2::RIGHT_CENTER, format!("{high}\u{2009}{unit}"), font.clone(), ink);
+    let end = painter.text(right, Align2::RIGHT_CENTER, format!("{high}{SPACE}{}", symbol(unit)), font.clone(), ink);
     let bar = Rect::from_min_size(pos2(end.left() - 4.0 - width, right.y - 0.5 * HEIGHT), vec2(width, HEIGHT));
     let [from, to] = scale.limits();
     let steps = width.max(1.0) as usize;
@@ -96,12 +96,6 @@ pub(super) fn colour_bar(ui: &Ui, theme: Theme, right: Pos2, width: f32, scale: 
         painter.rect_filled(cell, 0.0, scale.colour(value).map_or(Color32::TRANSPARENT, colour));
     }
     painter.text(pos2(bar.left() - 4.0, right.y), Align2::RIGHT_CENTER, low, font, ink).left()
-}
-
-/// Number without trailing zeros.
-pub(super) fn plain(value: f64) -> String {
-    let text = three_digits(value);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// Draws the cells of one map into a rectangle: all of them, or those in a range of the horizontal axis.
@@ -210,7 +204,7 @@ pub(super) fn over_time_ui(ui: &mut Ui, over_time: &OverTime<'_>, height: f32) -
         }
         let id = egui::Id::unique(("over time", ui.scope_id(), &map.quantity, side));
         let response = ui.interact(strip, id, Sense::click_and_drag());
-        let cursor = cursor_s.map(|t| format!(", cursor at {}\u{2009}s", three_digits(t))).unwrap_or_default();
+        let cursor = cursor_s.map(|t| format!(", cursor at {}", with_unit(t, "s"))).unwrap_or_default();
         let name = format!("{} over time, {} finger{cursor}", capital(&map.quantity), map.title);
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &name));
         let pointer = response.interact_pointer_pos().or(response.hover_pos());
@@ -232,7 +226,7 @@ pub(super) fn over_time_ui(ui: &mut Ui, over_time: &OverTime<'_>, height: f32) -
             ui.painter().vline(x(t), below - 2.0..=below + 1.0, Stroke::new(1.0, quiet));
             let near_end = x(t) > room.end() - 14.0;
             let (place, align) = if near_end { (*room.end(), Align2::RIGHT_TOP) } else { (x(t), Align2::CENTER_TOP) };
-            let text = if text.is_empty() { text } else { format!("{text}\u{2009}s") };
+            let text = if text.is_empty() { text } else { format!("{text}{SPACE}s") };
             ui.painter().text(pos2(place, below), align, text, font.clone(), quiet);
         }
     }

@@ -375,7 +375,7 @@ fn import_ui(ui: &mut Ui, import: &Import) {
         );
         let theme = theme::of(ui);
         let seconds = AxisHints::new_x()
-            .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", (mark.value * 1e9).round() / 1e9));
+            .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{a0}s", (mark.value * 1e9).round() / 1e9));
         let plot = static_plot(theme, "import preview", 130.0, "", seconds, 0.0).legend(Legend::default());
         plot.show_axes([true, false]).show(ui, |plot| {
             let signals = &trial.signals;

@@ -279,7 +279,7 @@ impl<'a> DisplayedData<'a> {
                     view: trial.at(cursor_s).and_then(|now| now.answer),
                     off: trial.recognition_off.as_deref(),
                     truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
-                    waiting: "no contact yet",
+                    waiting: "No contact yet",
                     again: GRASPING_AGAIN,
                     finished: true,
                 }
@@ -291,7 +291,7 @@ impl<'a> DisplayedData<'a> {
                     view: self.past_answer().or(snapshot.identification.as_ref()),
                     off: snapshot.recognition_off.as_deref(),
                     truth: Some((truth, title)),
-                    waiting: if snapshot.status.playing { "fingers closing" } else { "press play to start a grasp" },
+                    waiting: if snapshot.status.playing { "Fingers closing" } else { "Press play to start a grasp" },
                     again: GRASPING_AGAIN,
                     finished: snapshot.status.finished,
                 }
@@ -300,7 +300,7 @@ impl<'a> DisplayedData<'a> {
                 view: self.past_answer().or(gripper.identification.as_ref()),
                 off: gripper.recognition_off.as_deref(),
                 truth: None,
-                waiting: if gripper.trial.is_some() { "fingers closing" } else { "press R to start a grasp" },
+                waiting: if gripper.trial.is_some() { "Fingers closing" } else { "Press R to start a grasp" },
                 again: "press R to grasp again",
                 finished: false,
             }),

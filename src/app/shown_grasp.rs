@@ -5,7 +5,7 @@ use crate::app::heat_map::{MapsKey, ShownMaps, shown_maps};
 use crate::app::shown::DisplayedData;
 use crate::app::traces::GraspTrace;
 use egui::Ui;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units;
 use palpate_lab::inspection::PhaseSpan;
 use palpate_lab::picture::{
     BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
@@ -174,12 +174,12 @@ impl<'a> ShownGrasp<'a> {
 impl PadLoad {
     /// `1.23 N`.
     pub(super) fn force_text(&self) -> String {
-        format!("{}\u{2009}N", three_digits(self.force))
+        units::shown(self.force, "N")
     }
 
     /// `peak 31.0 kPa`.
     pub(super) fn peak_text(&self) -> Option<String> {
-        self.peak.map(|peak| format!("peak {}\u{2009}kPa", three_digits(1e-3 * peak)))
+        self.peak.map(|peak| format!("peak {}", units::shown(1e-3 * peak, "kPa")))
     }
 
     /// `left pad: 1.23 N, peak 31.0 kPa`.

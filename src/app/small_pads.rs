@@ -6,6 +6,7 @@ use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, FontId, Rect, Ui, pos2, vec2};
+use palpate_geometry::units::SPACE;
 use palpate_lab::picture::{LoadUnit, PictureView, legend_room};
 
 /// Least and largest height of a pad, and its width as a share of its height (points).
@@ -45,7 +46,7 @@ pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &P
     let (ink, font) = (colour(theme.colours().text), FontId::proportional(12.0));
     if legends.y < LEGEND {
         let [_, full] = shown.maps[0].scale.limits();
-        let text = format!("0 to {full:.0}\u{2009}kPa");
+        let text = format!("0 to {full:.0}{SPACE}kPa");
         ui.painter().text(pos2(right - EACH, top + height + 40.0), Align2::CENTER_CENTER, text, font.clone(), ink);
     }
     for (side, pad) in grasp.pads().iter().enumerate() {

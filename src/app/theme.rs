@@ -24,6 +24,13 @@ pub(super) fn accented(theme: Theme) -> Color32 {
     colour(colours.raised.mix(colours.accent, 0.35))
 }
 
+/// Gives the window its fonts: those of egui, and another for characters that they lack, as the minus of "m⁻¹".
+pub(super) fn install_fonts(ctx: &egui::Context) {
+    let mut fonts = egui::FontDefinitions::default();
+    fonts.families.entry(FontFamily::Proportional).or_default().push("Hack".to_owned());
+    ctx.set_fonts(fonts);
+}
+
 /// Applies a theme to the whole window.
 pub(super) fn apply(ctx: &egui::Context, theme: Theme) {
     ctx.set_theme(match theme {

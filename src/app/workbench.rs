@@ -151,6 +151,7 @@ impl Workbench {
         });
         // Layouts of other versions are forgotten.
         view.layouts.retain(|mode, layout| modes::is_complete(*mode, layout));
+        theme::install_fonts(ctx);
         theme::apply(ctx, view.theme);
         // Keys for the scale are ours, so that it is remembered.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);

@@ -42,9 +42,67 @@ fn digits(value: f64, count: u8) -> String {
     text
 }
 
+/// Space between a number and its unit: it is seen, and no line ends there.
+pub const SPACE: char = '\u{a0}';
+
+/// A unit as the window and pictures write it: `m⁻¹` for the `1/m` of files.
+pub fn symbol(unit: &str) -> String {
+    unit.replace("1/m", "m\u{207b}\u{b9}")
+}
+
+/// Decimals of numbers in a unit, or in the change of it per second; none where their size decides.
+fn decimals(unit: &str) -> Option<usize> {
+    match unit.strip_suffix("/s").unwrap_or(unit) {
+        "N" | "1/m" | "bar" | "s" => Some(2),
+        "kPa" | "mm" | "°" => Some(1),
+        "Hz" | "%" | "counts" => Some(0),
+        _ => None,
+    }
+}
+
+/// A number with a true minus and so many decimals; never `−0.0`, and an en dash where it is not finite.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if value.is_finite() { true_minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
+}
+
+/// A printed number with a true minus; without one where it is zero. Nothing printed is a dash.
+pub fn true_minus(text: &str) -> String {
+    match text.strip_prefix('-') {
+        Some("") => "–".to_owned(),
+        Some(size) if size.chars().all(|c| c == '0' || c == '.') => size.to_owned(),
+        Some(size) => format!("\u{2212}{size}"),
+        None => text.to_owned(),
+    }
+}
+
+/// A value in a unit as people read it, without the unit: with the decimals of its quantity, or with three digits.
+pub fn number(value: f64, unit: &str) -> String {
+    decimals(unit).map_or_else(|| true_minus(&three_digits(value)), |decimals| fixed(value, decimals))
+}
+
+/// The same with its unit: `0.57 N`, `31.0 kPa`, `7.29 m⁻¹`.
+pub fn shown(value: f64, unit: &str) -> String {
+    format!("{}{SPACE}{}", number(value, unit), symbol(unit))
+}
+
+/// A number at an axis: without trailing zeros.
+pub fn mark(value: f64) -> String {
+    let text = true_minus(&three_digits(value));
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_quantity_has_its_decimals_and_a_true_minus() {
+        let texts = [(0.5749, "N"), (-0.00201, "N"), (31.04, "kPa"), (-7.286, "1/m"), (-1.5, "1/m/s"), (0.00412, "V")]
+            .map(|(value, unit)| shown(value, unit).replace(SPACE, " "));
+        assert_eq!(texts, ["0.57 N", "0.00 N", "31.0 kPa", "−7.29 m⁻¹", "−1.50 m⁻¹/s", "0.00412 V"]);
+        assert_eq!([mark(-0.5), mark(20.0), mark(0.25), mark(-1e-9)], ["−0.5", "20", "0.25", "0"]);
+        assert_eq!(number(f64::NAN, "N"), "–");
+    }
 
     #[test]
     fn read_outs_have_three_digits() {

@@ -8,8 +8,6 @@ use wgpu::{Device, Queue, Texture, TextureView};
 
 /// Side of the atlas (texels): several hundred glyphs at the sizes that overlays use.
 const SIDE: u32 = 512;
-/// Between a number and its unit.
-const THIN_SPACE: char = '\u{2009}';
 /// Free texels between glyphs.
 const GAP: u32 = 1;
 
@@ -35,11 +33,12 @@ struct Stored {
 
 #[derive(Debug)]
 pub(crate) struct Glyphs {
-    font: FontRef<'static>,
+    /// The font of the window, and that of the characters that it lacks.
+    fonts: [FontRef<'static>; 2],
     texture: Texture,
     view: TextureView,
     texels: Vec<u8>,
-    stored: HashMap<(GlyphId, u32), Option<Stored>>,
+    stored: HashMap<(usize, GlyphId, u32), Option<Stored>>,
     /// Position of the next glyph: x, y, and the height of the row.
     free: [u32; 3],
     changed: bool,
@@ -58,10 +57,11 @@ impl Glyphs {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let font = FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT)
-            .expect("the font is compiled into the program and its crate tests it");
+        let fonts = [epaint_default_fonts::UBUNTU_LIGHT, epaint_default_fonts::HACK_REGULAR].map(|bytes| {
+            FontRef::try_from_slice(bytes).expect("the font is compiled into the program and its crate tests it")
+        });
         Self {
-            font,
+            fonts,
             texture,
             view,
             texels: vec![0; (SIDE * SIDE) as usize],
@@ -77,11 +77,14 @@ impl Glyphs {
 
     /// Places a line of text `size` pixels high, centred vertically on `at`.
     pub(crate) fn lay_out(&mut self, at: Vec2, align: Align, size: f32, text: &str) -> Vec<PlacedGlyph> {
-        let font = self.font.clone();
-        let scaled = font.as_scaled(PxScale::from(size));
-        // The font has no thin space; a fifth of its height is what one is.
-        let advance = |c: char| if c == THIN_SPACE { 0.2 * size } else { scaled.h_advance(scaled.glyph_id(c)) };
-        let width: f32 = text.chars().map(advance).sum();
+        let fonts = self.fonts.clone();
+        let glyph = |c: char| {
+            let font = usize::from(fonts[0].glyph_id(c) == GlyphId(0));
+            let scaled = fonts[font].as_scaled(PxScale::from(size));
+            (font, scaled.glyph_id(c), scaled.h_advance(scaled.glyph_id(c)))
+        };
+        let glyphs: Vec<(usize, GlyphId, f32)> = text.chars().map(glyph).collect();
+        let width: f32 = glyphs.iter().map(|(.., advance)| advance).sum();
         let start = match align {
             Align::Left => at.x,
             Align::Centre => at.x - 0.5 * width,
@@ -90,26 +93,24 @@ impl Glyphs {
         let baseline = at.y + 0.36 * size; // capitals of this font are 0.72 of its height
         let mut pen = start;
         let mut placed = Vec::new();
-        for c in text.chars() {
-            if c != THIN_SPACE
-                && let Some(glyph) = self.stored(scaled.glyph_id(c), size)
-            {
+        for (font, id, advance) in glyphs {
+            if let Some(glyph) = self.stored((font, id), size) {
                 // Whole pixels keep stems sharp.
                 let corner = (Vec2::new(pen, baseline) + glyph.bearing).round();
                 placed.push(PlacedGlyph { at: corner, size: glyph.size, texel: glyph.texel });
             }
-            pen += advance(c);
+            pen += advance;
         }
         placed
     }
 
-    fn stored(&mut self, id: GlyphId, size: f32) -> Option<Stored> {
-        let key = (id, (size * 8.0).round() as u32);
+    fn stored(&mut self, (font, id): (usize, GlyphId), size: f32) -> Option<Stored> {
+        let key = (font, id, (size * 8.0).round() as u32);
         if let Some(known) = self.stored.get(&key) {
             return *known;
         }
         let glyph = id.with_scale(PxScale::from(size));
-        let made = self.font.outline_glyph(glyph).and_then(|outline| self.store(&outline));
+        let made = self.fonts[font].outline_glyph(glyph).and_then(|outline| self.store(&outline));
         self.stored.insert(key, made);
         made
     }

@@ -286,7 +286,7 @@ impl SimRun {
     /// Remarks on the frames so far.
     pub fn notes(&self) -> Vec<String> {
         let turned_on = self.engine.get().finger_contact_turned_on();
-        let note = |t| format!("finger-contact was turned on at {t:.2} s: the fingers came near each other after all");
+        let note = |t| format!("finger contact switched on at {t:.2} s (fingers about to touch)");
         turned_on.map(note).into_iter().collect()
     }
 }

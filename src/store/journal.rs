@@ -105,7 +105,13 @@ impl Change {
             Self::ReturnedToLog => "back in the demo log".to_owned(),
             Self::Note { to, .. } if to.is_empty() => "note removed".to_owned(),
             Self::Note { to, .. } => format!("note \"{to}\""),
-            Self::Tags { from, to } => format!("tags [{}] -> [{}]", from.join(", "), to.join(", ")),
+            Self::Tags { from, to } => {
+                let quoted = |tags: &[String], others: &[String], done: &str| {
+                    let new = tags.iter().filter(|tag| !others.contains(tag));
+                    new.map(|tag| format!("tag \"{tag}\" {done}")).collect::<Vec<_>>()
+                };
+                [quoted(to, from, "added"), quoted(from, to, "removed")].concat().join(", ")
+            }
             Self::Unsure { to: true, .. } => "label marked as unsure".to_owned(),
             Self::Unsure { to: false, .. } => "label no longer unsure".to_owned(),
             Self::Phases { to: Some(_), .. } => "phases corrected".to_owned(),

@@ -76,7 +76,7 @@ fn the_terminal_lists_and_changes_what_matches() {
     assert_eq!((list(&["--tag", "wet"]), list(&["--search", "late"])), (vec![1, 3], vec![1, 3]));
     said(&["trials", "tag", "1-3", "wet", "--remove"]);
     assert_eq!((list(&["--tag", "wet"]), list(&["--tag", "late"])), (vec![], vec![1, 3]));
-    assert!(said(&["trials", "undo"]).0.contains("undone: trials 1, 3: tags [wet, late] -> [late]"));
+    assert!(said(&["trials", "undo"]).0.contains("Undone: trials 1, 3: tag \"wet\" removed"));
     assert_eq!(list(&["--tag", "wet"]), [1, 3]);
     // A label leaves simulated and imported trials alone.
     let (out, _) = said(&["trials", "label", "1,3-6", "tomato"]);
@@ -267,7 +267,7 @@ fn keys_walk_through_the_library_and_open_trials() {
     press(&mut bench, Modifiers::NONE, Key::Delete);
     bench.until_told("1 trial discarded");
     press(&mut bench, Modifiers::COMMAND, Key::Z);
-    bench.until_told("undone: trial 2: discarded");
+    bench.until_told("Undone: trial 2: discarded");
     until_rows(&mut bench, &["2"]);
 }
 
@@ -289,7 +289,7 @@ fn the_terminal_lists_and_keeps_grasps_of_the_demo_log() {
     assert!(run(at, &["trials", "show", "2"]).out.contains("in the demo log"));
     let out = run(at, &["trials", "keep", "1-3"]);
     assert!(out.out.contains("2 trials kept in the store"), "{out:?}");
-    assert!(run(at, &["trials", "undo"]).out.contains("undone: trials 2, 3: kept in the store"));
+    assert!(run(at, &["trials", "undo"]).out.contains("Undone: trials 2, 3: kept in the store"));
     assert_eq!(list(&["--place", "demo-log"]), [2, 3]);
     // A note keeps.
     assert_eq!(run(at, &["trials", "note", "3", "slipped"]).code, Some(0));

@@ -56,7 +56,7 @@ fn every_panel_in_both_themes() {
                     let text = match panel.name {
                         "study-figure" => "than today's",
                         "study-tables" => "Row virtual, svm",
-                        _ => "Claims of the paper",
+                        _ => " claim",
                     };
                     bench.until_shown(true, text);
                     bench.harness.run_steps(8);
@@ -136,7 +136,7 @@ fn a_grasp_is_computed_again_by_a_button() {
     let (mut bench, _) = shown_light(Theme::Dark, 100);
     assert!(bench.harness.query_by_label("Trust light: green").is_some());
     let before = bench.workbench().snapshot().unwrap();
-    bench.harness.get_by_label("Compute again").click();
+    bench.harness.get_by_label("Verify at finer accuracy").click();
     let after = bench.until(|s| s.last.as_ref().is_some_and(|last| last.accuracy != Accuracy::Standard));
     let [before, after] = [before, after].map(|snapshot| snapshot.last.clone().unwrap());
     assert_eq!((after.grasp, after.accuracy), (before.grasp, Accuracy::Reference));
@@ -230,9 +230,9 @@ fn scene_settings_reach_the_simulation() {
     let mut bench = whole_window();
     bench.harness.get_by_label("Scene").click();
     bench.harness.run_steps(2);
-    bench.harness.get_by_role_and_label(Role::ComboBox, "held").click();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "support").click();
     bench.harness.run_steps(3);
-    bench.harness.get_by_label("fixed in place").click();
+    bench.harness.get_by_label("fixed").click();
     bench.until(|s| s.scene.object.fixed);
     bench.harness.get_by_role_and_label(Role::ComboBox, "accuracy").click();
     bench.harness.run_steps(3);
@@ -276,9 +276,9 @@ fn turning_the_accuracy_dial_moves_both_numbers() {
     let sliders = |bench: &Bench| bench.harness.query_all_by_role(Role::Slider).count();
     assert_eq!(sliders(&bench), 1, "a name needs no slider; the time bar is one");
     // Held in place: a free object may slip one way or the other, and its error then does not shrink with the tolerance.
-    bench.harness.get_by_role_and_label(Role::ComboBox, "held").click();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "support").click();
     bench.harness.run_steps(3);
-    bench.harness.get_by_label("fixed in place").click();
+    bench.harness.get_by_label("fixed").click();
     bench.until(|s| s.scene.object.fixed);
     let standard = measured(&mut bench);
     bench.harness.get_by_role_and_label(Role::ComboBox, "accuracy").click();

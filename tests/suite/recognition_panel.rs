@@ -45,20 +45,20 @@ fn says(bench: &Bench, label: &str) -> bool {
 #[test]
 fn a_grasp_is_followed_until_it_is_sure() {
     let mut bench = alone(Theme::Dark);
-    assert!(says(&bench, "Ready") && says(&bench, "press play to start a grasp"));
+    assert!(says(&bench, "Ready") && says(&bench, "Press play to start a grasp"));
     bench.advance_to(0.5);
     assert!(says(&bench, "Sensing .."));
     bench.advance_to(2.6);
-    assert!(says(&bench, "Lemon, 61 %") && says(&bench, "grasp 1 of at most 4; threshold 90 %"));
+    assert!(says(&bench, "Lemon, 61 %") && says(&bench, "Grasp 1 of up to 4, needed 90 %"));
     assert!(says(&bench, "large 95 %") && says(&bench, "spherical 86 %"));
     assert!(says(&bench, "Tomato 24 %") && says(&bench, "Empty hand 0 %"));
     assert!(says(&bench, "Grasp 1, running: Lemon 61 %") && says(&bench, "Grasp 2: not yet"));
-    assert!(says(&bench, "Truth: shown after the decision"));
+    assert!(says(&bench, "Truth: answer hidden until it decides"));
     bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
     bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| beliefs(s) == 1 && s.identification.as_ref().is_some_and(|view| !view.listening));
     assert!(
-        says(&bench, "grasping again: lemon 61 %, tomato 24 %") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
+        says(&bench, "Not sure yet (lemon 61 %, tomato 24 %): grasping again") || beliefs(&bench.workbench().snapshot().unwrap()) > 1
     );
     run_out(&mut bench);
     let end = bench.workbench().snapshot().unwrap();
@@ -236,7 +236,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.until_shown(true, "Learning carton");
     bench.harness.get_by_label("Stop").click();
     bench.until_shown(false, "Learning carton");
-    assert!(!knows(&bench) && bench.workbench().messages().iter().any(|text| text == "The model stays as it is."));
+    assert!(!knows(&bench) && bench.workbench().messages().iter().any(|text| text == "Model unchanged."));
 
     bench.tell(|app| app.teach_object());
     bench.until_told("The model knows carton now.");

@@ -103,7 +103,7 @@ fn undo_acts_on_what_the_mode_shows() {
     bench.tell(|app| app.set_mode(Mode::Label));
     bench.harness.step();
     press(&mut bench, Modifiers::COMMAND, Key::Z);
-    bench.until_told("undone: trial 1: label");
+    bench.until_told("Undone: trial 1: label");
     assert_eq!(label(&bench), None);
 }
 
@@ -113,7 +113,7 @@ fn keys_without_effect_say_why() {
     for (key, told) in [
         (Key::Q, "No trial of the real gripper is running"),
         (Key::D, "No trial to discard"),
-        (Key::W, "W acts in Label mode"),
+        (Key::W, "W works in Label mode"),
     ] {
         press(&mut bench, Modifiers::NONE, key);
         bench.until_told(told);

@@ -16,6 +16,7 @@ use crate::app::widgets::{choice_ui, number_field, stop_button};
 use egui::{Align, Layout, RichText, Ui};
 use palpate_device::serial::LinkState;
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_geometry::units::{SPACE, shown as with_unit};
 use palpate_lab::workers::{Command, GripperView, Status};
 use palpate_store::TrialPlace;
 
@@ -65,8 +66,8 @@ fn drawn_by(app: &App, driver: &str) -> String {
     let Some(rate) = app.frame_rate.per_second() else { return driver.to_owned() };
     let resolution = app.resolution();
     let coarse =
-        if resolution < 1.0 { format!(", 3-D view at {:.0}\u{2009}%", 100.0 * resolution) } else { String::new() };
-    format!("{rate:.0}\u{2009}frames/s{coarse} \u{b7} {driver}")
+        if resolution < 1.0 { format!(", 3-D view at {:.0}{SPACE}%", 100.0 * resolution) } else { String::new() };
+    format!("{rate:.0}{SPACE}frames/s{coarse} \u{b7} {driver}")
 }
 
 /// Settings of the window.
@@ -191,7 +192,7 @@ fn drive_text(app: &App, gripper: &GripperView, narrow: bool) -> String {
         return control.to_owned();
     }
     match gripper.latest.as_ref().and_then(|latest| latest.line_bar) {
-        Some(bar) => format!("drive: {control}, {bar:.2} bar"),
+        Some(bar) => format!("drive: {control}, {}", with_unit(bar, "bar")),
         None => format!("drive: {control}"),
     }
 }
@@ -205,7 +206,7 @@ fn simulated_ui(ui: &mut Ui, app: &App) {
     if let Some(snapshot) = app.snapshot().filter(|_| ui.available_width() > 120.0) {
         let status = &snapshot.status;
         // With a model, grasping ends as soon as the object is recognised.
-        let of = if snapshot.identification.is_some() { "of at most" } else { "of" };
+        let of = if snapshot.identification.is_some() { "of up to" } else { "of" };
         let grasp = status.grasp_of_round.max(1);
         ui.weak(format!("grasp {grasp} {of} {}", status.grasps.max(grasp)));
     }

@@ -117,7 +117,7 @@ impl App {
     /// Cancels the lesson.
     pub(in crate::app) fn stop_teaching(&mut self) {
         self.tools.teaching.stop();
-        self.notices.info("The model stays as it is.");
+        self.notices.info("Model unchanged.");
     }
 
     /// Uses a model in the simulation from now on, for grasps of objects that are held as it learned them; the shipped models

@@ -131,7 +131,7 @@ pub(in crate::app) static COMMANDS: &[Act] = &[
     command("Show each compared trial", |app| app.inspect.spread = false),
     command("Show the whole grasp in all plots", |app| app.view.time_window = None),
     command("Measure effects of the scene", |app| app.simulation.measure_effects()),
-    command("Compute the last grasp again", |app| app.simulation.send(Command::ComputeAgain)),
+    command("Verify the last grasp at finer accuracy", |app| app.simulation.send(Command::ComputeAgain)),
     command("Use the shipped model for the real gripper", |app| app.use_model(None)),
     command("Teach the model the object file in the hand", App::teach_object),
     command("Detect trials automatically, or by key", App::toggle_watch),

@@ -55,7 +55,7 @@ pub(super) fn pressed(app: &App, actions: &mut Actions) {
             Pressed::Elsewhere(act, mode) => {
                 let kind = modes::kind(mode);
                 let [key, open] = [act, &kind.open].map(|act| act.key_text(&app.ctx));
-                app.notices.info(format!("{key} acts in {} mode ({open}): {}.", kind.title, act.does));
+                app.notices.info(format!("{key} works in {} mode ({open}): {}", kind.title, act.does));
             }
         });
     }

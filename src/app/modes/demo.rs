@@ -23,7 +23,7 @@ const NONE: Modifiers = Modifiers::NONE;
 
 const KEYS: &[Act] = &[
     key(NONE, Key::N, "next object", App::next_object),
-    key_where(NONE, Key::M, "one more grasp, where the threshold is raised after a verdict", |app| {
+    key_where(NONE, Key::M, "one more grasp (raise the threshold first)", |app| {
         if !app.shown().one_more() {
             return Err("One more grasp follows a higher threshold: raise it after a verdict, above the probability \
                         reached.");

@@ -6,7 +6,7 @@ use crate::app::figure_plot::{self, ShownPlot};
 use crate::app::theme::{self, colour};
 use egui::{Button, Pos2, RichText, ScrollArea, Tooltip, Ui};
 use palpate_geometry::drawing::Plot;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{symbol, three_digits};
 use palpate_sim::scene::Scene;
 use palpate_study::accuracy::{
     AccuracySetting, AccuracyStudy, GroupCost, SceneGroup, SettingFamily, Spread, accuracy_plot,
@@ -118,10 +118,10 @@ fn about_ui(ui: &mut Ui, setting: &AccuracySetting, cost: &GroupCost) {
     ui.label(RichText::new(setting.on_command_line()).small().monospace());
     let range = |spread: Spread, factor: f64, unit: &str| {
         let [low, median, high] = [spread.low, spread.median, spread.high].map(|v| three_digits(factor * v));
-        format!("{median} {unit} ({low} to {high})")
+        format!("{median} {} ({low} to {high})", symbol(unit))
     };
     small(ui, format!("CPU {}", range(cost.cpu_ms, 1.0, "ms")));
-    let errors = [range(cost.curvature_per_m, 1e3, "1/km"), range(cost.force_n, 1e3, "mN")];
+    let errors = [range(cost.curvature_per_m, 1.0, "1/m"), range(cost.force_n, 1e3, "mN")];
     small(ui, format!("error {}", errors.join(", ")));
     if cost.failed > 0 {
         small(ui, format!("{} of {} grasps fail", cost.failed, cost.grasps));
@@ -139,7 +139,7 @@ fn front_ui(
 ) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
-        ui.weak("front").on_hover_text("Nothing cheaper is as accurate");
+        ui.weak("Pareto front").on_hover_text("No other setting is cheaper and as accurate");
         for (setting, cost) in study.front(group) {
             let current = is_current(setting, &simulation.scene);
             let euler = if setting.family == SettingFamily::Tolerance { "" } else { " Euler" };

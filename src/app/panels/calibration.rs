@@ -7,7 +7,7 @@ use crate::app::widgets::{ANY_PORT, failure_ui, remark_ui, text_field, warning_u
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{self, three_digits};
 use palpate_lab::workers::{CalibrationCommand, CalibrationPlan, CalibrationSession, GripperCommand, GripperView};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, Curve, Record, SensorKind};
@@ -193,14 +193,14 @@ fn bending_plot(ui: &mut Ui, calibration: &Calibration, theme: Theme) {
     let accent = colour(theme.colours().accent);
     let (Curve::Pad(curve), Some(bending)) = (&calibration.curve, &calibration.record.bending) else { return };
     let reaches = bending.reaches();
-    ui.weak(format!("zero shift by bending, up to {} 1/m", three_digits(reaches)));
+    ui.weak(format!("zero shift by bending, up to {}", units::shown(reaches, "1/m")));
     let line: PlotPoints<'_> = (0..=60)
         .map(|k| {
             let kappa = reaches * f64::from(k) / 60.0;
             [kappa, bending.preload(curve, kappa)]
         })
         .collect();
-    plot(theme, "bending zero", 90.0, "N", "1/m").include_y(0.0).include_y(0.1).show(ui, |plot| {
+    plot(theme, "bending zero", 90.0, "N", &units::symbol("1/m")).include_y(0.0).include_y(0.1).show(ui, |plot| {
         plot.line(Line::new("load", line).color(accent).width(1.5));
     });
 }

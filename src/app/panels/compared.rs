@@ -49,7 +49,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
             let (id, trial) = (pinned.trial.id, &pinned.trial);
             ui.horizontal(|ui| {
                 let colour = if comparison.spread { None } else { Some(pinned.colour) };
-                let remove = format!("No longer compare trial {}", trial.id);
+                let remove = format!("Remove trial {} from the comparison", trial.id);
                 actions.on(&icons::button(ui, Icon::Cross, &remove, &remove), move |app| app.inspect.unpin(id));
                 if let Some(colour) = colour {
                     stroke_ui(ui, ink_of(data, colour));

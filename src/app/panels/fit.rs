@@ -9,7 +9,7 @@ use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui
 use egui::{Align, Button, Layout, RichText, ScrollArea, Sense, Ui};
 use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints};
 use palpate_geometry::palette::{Theme, Trace};
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{self, three_digits};
 use palpate_sim::gripper::Side;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -141,7 +141,7 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 // Some room for the scroll bar.
                 ui.add_space(6.0);
-                ui.label(format!("{} {}", three_digits(estimate.value), estimate.unit));
+                ui.label(format!("{} {}", three_digits(estimate.value), units::symbol(&estimate.unit)));
             });
         });
         ui.horizontal(|ui| {
@@ -208,7 +208,7 @@ fn courses_ui(ui: &mut Ui, theme: Theme, fit: &FingerFit) {
 
 fn remainder_text(left: &Remainder) -> String {
     let force = left.force_share.map_or_else(String::new, |share| format!(", force within {:.1} %", 100.0 * share));
-    format!("{}: curvature within {} 1/m{force} (RMS)", left.name, three_digits(left.curvature_per_m))
+    format!("{}: curvature within {}{force} (RMS)", left.name, units::shown(left.curvature_per_m, "1/m"))
 }
 
 fn line<'a>(course: &FingerMotion, values: &[f64], name: &str) -> Line<'a> {
@@ -221,6 +221,6 @@ fn line<'a>(course: &FingerMotion, values: &[f64], name: &str) -> Line<'a> {
 }
 
 fn plot(theme: Theme, id: &str, height: f32) -> Plot<'static> {
-    let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{2009}s", mark.value));
-    static_plot(theme, id, height, "1/m", seconds, 0.0)
+    let seconds = AxisHints::new_x().formatter(|mark: egui_plot::GridMark, _| format!("{}\u{a0}s", mark.value));
+    static_plot(theme, id, height, &units::symbol("1/m"), seconds, 0.0)
 }

@@ -7,7 +7,7 @@ use crate::app::theme::colour;
 use crate::app::widgets::wrapped;
 use egui::{Button, Grid, RichText, ScrollArea, Sense, Shape, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::{mm, three_digits};
+use palpate_geometry::units::{mm, number, shown as with_unit, symbol, three_digits};
 use palpate_lab::workers::{Checking, Command, FinishedGrasp, ObjectCard, Snapshot};
 use palpate_sim::frame::TrustLevel;
 use palpate_sim::gripper::Side;
@@ -65,15 +65,15 @@ fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
         ui.weak("left");
         ui.weak("right");
         ui.end_row();
-        for (name, quantity, factor) in [
-            ("curvature, 1/m", Quantity::Curvature, 1.0),
-            ("pressure, kPa", Quantity::Pressure, 1e-3),
-            ("force, N", Quantity::Force, 1.0),
+        for (name, unit, quantity, factor) in [
+            ("curvature", "1/m", Quantity::Curvature, 1.0),
+            ("pressure", "kPa", Quantity::Pressure, 1e-3),
+            ("force", "N", Quantity::Force, 1.0),
         ] {
-            ui.label(name);
+            ui.label(format!("{name}, {}", symbol(unit)));
             for side in Side::BOTH {
                 // A fixed width: columns do not move while digits change.
-                let text = newest(quantity, side).map_or("–".to_owned(), |v| three_digits(v * factor));
+                let text = newest(quantity, side).map_or("–".to_owned(), |v| number(v * factor, unit));
                 ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(text).monospace()));
             }
             ui.end_row();
@@ -110,7 +110,7 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
     } else {
         "Not possible: the object was pulled by hand, or this engine controls no error"
     };
-    let button = ui.add_enabled(free, Button::new("Compute again"));
+    let button = ui.add_enabled(free, Button::new("Verify at finer accuracy"));
     actions.on(&button.on_hover_text(about).on_disabled_hover_text(about), |app| {
         app.simulation.send(Command::ComputeAgain);
     });
@@ -149,15 +149,15 @@ fn last_ui(ui: &mut Ui, last: &FinishedGrasp) {
         line("first contact", onset);
         if let Some(hold) = &summary.hold {
             let pair = |values: [f64; 2], unit: &str| {
-                let [left, right] = values.map(three_digits);
-                format!("{left} | {right} {unit}")
+                let [left, right] = values.map(|value| number(value, unit));
+                format!("{left} | {right} {}", symbol(unit))
             };
             line("hold force", pair(hold.force_n, "N"));
             line("hold curvature", pair(hold.curvature_per_m, "1/m"));
             line("hold pressure", pair(hold.pressure_pa.map(|p| p * 1e-3), "kPa"));
         }
         if let Some(moved) = summary.object_moved_m {
-            line("object moved", format!("{} mm", three_digits(mm(moved))));
+            line("object moved", with_unit(mm(moved), "mm"));
         }
         let quality = &summary.quality;
         line("solver", format!("{:.2} Newton/step", quality.newton_mean));

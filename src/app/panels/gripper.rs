@@ -9,7 +9,7 @@ use crate::app::widgets::{
 };
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{number, shown as with_unit, three_digits, true_minus};
 use palpate_lab::workers::{GripperCommand, GripperView, LatestReading};
 use palpate_tactile::board::{Sensor, SensorKind};
 use palpate_tactile::calibration::{Drift, DriftLevel};
@@ -187,9 +187,9 @@ fn readings_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus) {
 /// Calibrated value with its unit.
 fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
     let text = latest.estimate.value(sensor).map(|value| match sensor.kind() {
-        SensorKind::Flex => format!("{:6.1}°", value.to_degrees()),
-        SensorKind::Pad => format!("{:>5} N", three_digits(value)),
-        SensorKind::Raw => format!("{:>5} {}", three_digits(value), sensor.raw_unit_name()),
+        SensorKind::Flex => format!("{:>6}°", number(value.to_degrees(), "°")),
+        SensorKind::Pad => format!("{:>7}", with_unit(value, "N")),
+        SensorKind::Raw => format!("{:>5} {}", true_minus(&three_digits(value)), sensor.raw_unit_name()),
     });
     text.unwrap_or_else(|| "–".to_owned())
 }

@@ -8,6 +8,7 @@ use crate::app::traces::GraspTrace;
 use egui::{Color32, Ui};
 use egui_plot::{GridInput, Line, LineStyle, Plot, PlotPoints, Points};
 use palpate_geometry::palette::series_colour;
+use palpate_geometry::units::symbol;
 use palpate_sim::gripper::Side;
 use palpate_tactile::{Channel, Quantity};
 
@@ -39,7 +40,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     ui.weak("Pressure over curvature. Left finger solid, right finger dashed; the dot is the cursor.");
     let now = data.sample();
     Plot::new("hysteresis")
-        .x_axis_label("curvature (1/m)")
+        .x_axis_label(format!("curvature ({})", symbol("1/m")))
         .y_axis_label("pressure (kPa)")
         .x_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
         .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))

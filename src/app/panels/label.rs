@@ -105,15 +105,15 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
 
 /// Pose of the object, in words.
 fn cue(next: &NextTrial) -> String {
-    let turn = format!("turn by {:.0}°", next.cue.turn_deg);
+    let turn = format!("turn {:.0}°", next.cue.turn_deg);
     let [along, across] = next.cue.shift_mm;
     let part = |by: f64, positive: &str, negative: &str| match by.round() {
         by if by > 0.0 => format!(", {by:.0} mm {positive}"),
         by if by < 0.0 => format!(", {:.0} mm {negative}", -by),
         _ => String::new(),
     };
-    let shifts = part(along, "to the right finger", "to the left finger") + &part(across, "back", "forward");
-    format!("trial {}: {turn}{shifts}", next.number)
+    let shifts = part(along, "towards the right finger", "towards the left finger") + &part(across, "back", "forward");
+    format!("Placement {}: {turn}{shifts}", next.number)
 }
 
 fn running_ui(ui: &mut Ui, pictures: &Thumbnails, view: &LabelView, trial: &TrialView) {

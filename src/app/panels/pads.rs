@@ -6,7 +6,7 @@ use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units;
 
 /// Least height of a pad, and most width for its height.
 const LOWEST: f32 = 60.0;
@@ -59,7 +59,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         let text = match share {
             0.0 => "palm".to_owned(),
             1.0 => "tip".to_owned(),
-            _ => format!("{}\u{2009}{}", three_digits(value), axis.unit),
+            _ => units::shown(value, &axis.unit),
         };
         ui.painter().text(pos2(begin - 6.0, y), align, text, font.clone(), quiet);
     }

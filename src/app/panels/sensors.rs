@@ -65,7 +65,7 @@ pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), Tr
             }
         });
         ui.horizontal_wrapped(|ui| {
-            ui.label("Stored trials through");
+            ui.label("Sensor model for stored trials");
             for model in SensorModel::BOTH {
                 let hint = match model {
                     SensorModel::Virtual => "Ideal sensors, as in the paper's simulation",
@@ -76,7 +76,11 @@ pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), Tr
                         "Those of another gripper for each grasp, whose strips an empty close has calibrated"
                     }
                 };
-                let label = format!("{} sensors", model.name());
+                let label = match model {
+                    SensorModel::Virtual => "ideal",
+                    SensorModel::PhysicalLike => "realistic",
+                    SensorModel::Noisy | SensorModel::Adapted | SensorModel::Drawn => model.name(),
+                };
                 if ui.selectable_label(sensors.sensors == model, label).on_hover_text(hint).clicked() {
                     sensors.sensors = model;
                     if sensors.is_physical() {

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
-use crate::app::widgets::wrapped;
+use crate::app::widgets::{capital, wrapped};
 use egui::{Grid, RichText, ScrollArea, Ui};
 use palpate_lab::inspection::OpenTrial;
 use palpate_sim::frame::TrustLevel;
@@ -30,7 +30,8 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                 TrustLevel::Amber => colours.warning,
                 TrustLevel::Red => colours.error,
             };
-            wrapped(ui, RichText::new(format!("Trust {}: {why}.", level.name())).color(colour(ink)));
+            let text = RichText::new(format!("{}.", capital(&why))).color(colour(ink));
+            ui.add(egui::Label::new(text).wrap()).on_hover_text(format!("Trust: {}", level.name()));
         }
         ui.add_space(6.0);
         ui.strong("Phases");
@@ -53,7 +54,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         facts_ui(ui, trial);
         ui.add_space(6.0);
         if trial.source == TrialSource::Simulated
-            && ui.button("Grasp this scene again").on_hover_text("Take the trial's scene as the live one").clicked()
+            && ui.button("Re-simulate this trial").on_hover_text("Take the trial's scene as the live one").clicked()
         {
             let scene = trial.header.scene.clone();
             actions.push(|app| app.set_scene(scene));

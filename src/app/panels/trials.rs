@@ -116,7 +116,7 @@ fn row_ui(
         if !trial.discarded && ui.button("Inspect").clicked() {
             actions.push(move |app| app.open_trial(id));
         }
-        if disagrees.is_some() && ui.button("Keep its label (reviewed)").clicked() {
+        if disagrees.is_some() && ui.button("Label is right").clicked() {
             actions.push(move |app| app.edit_labels(LabelCommand::Reviewed(id)));
         }
         actions.on(&ui.button("Discard"), move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Discard)));

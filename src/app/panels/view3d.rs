@@ -275,7 +275,7 @@ fn caption(own: &View3d<'_>, key: &PictureKey) -> (String, Option<Rgb>) {
     if let Some(inspected) = own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
         return (inspected.trial.remarks.join(" "), None);
     }
-    let held = own.data.held_s().map(|t| format!("As it was held, at {t:.1}\u{2009}s"));
+    let held = own.data.held_s().map(|t| format!("As it was held, at {t:.1}\u{a0}s"));
     if key.real.is_some() {
         ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
     } else if key.ghost.is_some() {

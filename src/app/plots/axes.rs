@@ -3,13 +3,13 @@
 use crate::app::theme::colour;
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{SPACE, mark as plain};
 
 /// Time at the axis of a plot so many points wide. Empty near the end of the axis, where it would be cut off, and where it
 /// would crowd its neighbours: then every fifth mark of its kind has a label.
 pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, width: f64) -> String {
     let range = shown.end() - shown.start();
-    let text = format!("{}\u{2009}s", plain(mark.value));
+    let text = format!("{}{SPACE}s", plain(mark.value));
     let spacing = mark.step_size / range * width;
     let crowded = spacing < LETTER * text.chars().count() as f64 + BETWEEN_LABELS;
     let fifth = (mark.value / mark.step_size).round() % 5.0 == 0.0;
@@ -43,12 +43,6 @@ pub(in crate::app) fn static_plot(
         .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
         .set_margin_fraction(egui::vec2(air_beside, 0.12))
-}
-
-/// Number at an axis, without trailing zeros.
-pub(super) fn plain(value: f64) -> String {
-    let text = three_digits(value);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// About four marks at round values.
@@ -91,7 +85,7 @@ mod tests {
             let mark = |k: i32| GridMark { value: 0.1 * f64::from(k), step_size: if k % 10 == 0 { 1.0 } else { 0.1 } };
             (0..=40).map(|k| seconds_at(mark(k), &(0.0..=4.0), width)).filter(|text| !text.is_empty()).collect()
         };
-        let seconds = |texts: &[&str]| texts.iter().map(|text| format!("{text}\u{2009}s")).collect::<Vec<_>>();
+        let seconds = |texts: &[&str]| texts.iter().map(|text| format!("{text}{SPACE}s")).collect::<Vec<_>>();
         assert_eq!(labels(1200.0), seconds(&["0", "0.5", "1", "1.5", "2", "2.5", "3", "3.5"]));
         // With room for all of them, all but the last, which would be cut off.
         assert_eq!(labels(2400.0).len(), 40);

@@ -4,7 +4,7 @@
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Pos2, Rect, Ui, pos2};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::number;
 
 /// Width of the names beside a plot (points).
 pub(super) const WIDTH: f32 = 132.0;
@@ -12,9 +12,11 @@ pub(super) const WIDTH: f32 = 132.0;
 const LINE: f32 = 14.0;
 
 /// Name of a curve, and its values.
-pub(super) struct CurveLabel {
+pub(super) struct CurveLabel<'a> {
     pub(super) name: String,
     pub(super) ink: Color32,
+    /// Unit of its values.
+    pub(super) unit: &'a str,
     /// Value at the cursor; none where it is undefined.
     pub(super) value: Option<f64>,
     /// Value at mark B less that at mark A, where both are set.
@@ -23,13 +25,13 @@ pub(super) struct CurveLabel {
     pub(super) y: Option<f32>,
 }
 
-impl CurveLabel {
+impl CurveLabel<'_> {
     fn text(&self) -> String {
-        let value = self.value.map_or("–".to_owned(), three_digits);
+        let value = self.value.map_or("–".to_owned(), |value| number(value, self.unit));
         match self.difference {
             Some(difference) => {
                 let sign = if difference > 0.0 { "+" } else { "" };
-                format!("{} {value}  Δ {sign}{}", self.name, three_digits(difference))
+                format!("{} {value}  Δ {sign}{}", self.name, number(difference, self.unit))
             }
             None => format!("{} {value}", self.name),
         }
@@ -37,7 +39,7 @@ impl CurveLabel {
 }
 
 /// Draws the labels beside a plot whose frame this is; those that do not fit are left out, the last first.
-pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel>) {
+pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<'_>>) {
     let room = ((frame.height() / LINE).floor().max(1.0)) as usize;
     let hidden = labels.len().saturating_sub(room);
     labels.truncate(if hidden > 0 { room.saturating_sub(1) } else { room });
@@ -98,11 +100,12 @@ mod tests {
         let label = CurveLabel {
             name: "left".to_owned(),
             ink: Color32::WHITE,
+            unit: "N",
             value: Some(1.234),
             difference: Some(0.5),
             y: None,
         };
-        assert_eq!(label.text(), "left 1.23  Δ +0.500");
+        assert_eq!(label.text(), "left 1.23  Δ +0.50");
         assert_eq!(CurveLabel { value: None, difference: None, ..label }.text(), "left –");
     }
 }

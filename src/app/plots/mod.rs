@@ -22,6 +22,7 @@ use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;
 use palpate_geometry::palette::{Trace, series_colour};
+use palpate_geometry::units::{self, mark as plain};
 use palpate_tactile::trial::TrialSource;
 
 /// Value of one row of a trace; `None` where it is undefined.
@@ -94,12 +95,12 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .show_x(false)
         .show_y(false)
         .y_axis_min_width(Y_AXIS)
-        .y_axis_label(unit.clone())
+        .y_axis_label(units::symbol(&unit))
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
         .y_grid_spacer(|grid: GridInput| axes::value_marks(grid.bounds.0, grid.bounds.1))
         .custom_x_axes(vec![seconds])
-        .y_axis_formatter(|mark: GridMark, _| axes::plain(mark.value))
+        .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .set_margin_fraction(egui::Vec2::ZERO);
     let gaps = layers::gaps(data);
     let response = widget.show(ui, |plot_ui| {
@@ -164,7 +165,11 @@ fn own_ink(data: &DisplayedData<'_>, curve: &PlotCurve) -> Color32 {
 }
 
 /// Names of all curves, with their values at the cursor.
-fn curve_labels(data: &DisplayedData<'_>, plot: &TimePlot<'_>, transform: &PlotTransform) -> Vec<CurveLabel> {
+fn curve_labels<'a>(
+    data: &DisplayedData<'_>,
+    plot: &TimePlot<'a>,
+    transform: &PlotTransform,
+) -> Vec<CurveLabel<'a>> {
     let theme = data.view.theme;
     let Some(now) = data.time_s() else { return Vec::new() };
     let marks = data.playback.marks;
@@ -173,7 +178,7 @@ fn curve_labels(data: &DisplayedData<'_>, plot: &TimePlot<'_>, transform: &PlotT
         let value = at(now);
         let difference = marks[0].and_then(at).zip(marks[1].and_then(at)).map(|(a, b)| b - a);
         let y = value.map(|value| transform.position_from_point(&PlotPoint::new(now, value)).y);
-        CurveLabel { name: curve.name.clone(), ink, value, difference, y }
+        CurveLabel { name: curve.name.clone(), ink, unit: plot.unit, value, difference, y }
     };
     let own = data.traces.current().into_iter();
     let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));
@@ -200,8 +205,7 @@ fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'stati
     nothing.then_some(if plot.id == "line pressure" {
         "The board does not report line pressure."
     } else {
-        "Sensors not calibrated: Adapt in the Gripper panel does it by one close of the empty hand, the Calibration panel by \
-         references. Raw counts: Counts panel."
+        "Sensors not calibrated. Adapt (closes the empty hand once) or calibrate with reference weights and angles."
     })
 }
 

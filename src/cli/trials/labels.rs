@@ -90,7 +90,7 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
             say(store.labels().edit(&ids, &TrialEdit::Keep)?.sentence(&TrialEdit::Keep))
         }
         LabelCommand::Undo => match store.journal().undo()? {
-            Some(entry) => say(format!("undone: {}", entry.sentence())),
+            Some(entry) => say(format!("Undone: {}", entry.sentence())),
             None => say("nothing to undo"),
         },
         LabelCommand::Redo => match store.journal().redo()? {

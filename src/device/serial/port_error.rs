@@ -125,9 +125,9 @@ impl PortError {
     pub(super) fn no_board(ports: &[PortInfo]) -> Self {
         Self {
             trouble: PortTrouble::NoBoard,
-            what: "cannot choose a port".to_owned(),
-            cause: "none looks like the gripper's board".to_owned(),
-            fix: format!("Plug it in, or name a port{}", listing(ports)),
+            what: "no gripper found".to_owned(),
+            cause: "no port looks like its board".to_owned(),
+            fix: format!("Plug it in, or choose a port{}", listing(ports)),
             command: None,
         }
     }

@@ -1,5 +1,6 @@
 //! An axis of a plot: its scale, range and marks.
 
+use crate::units::fixed;
 use std::ops::RangeInclusive;
 
 /// An axis.
@@ -100,7 +101,7 @@ fn linear_marks(bounds: &RangeInclusive<f64>) -> Vec<(f64, String)> {
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power).find(|step| *step >= least).unwrap_or(least);
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     let (first, last) = ((bounds.start() / step).ceil() as i64, (bounds.end() / step).floor() as i64);
-    (first..=last).map(|n| (n as f64 * step, format!("{:.decimals$}", n as f64 * step))).collect()
+    (first..=last).map(|n| (n as f64 * step, fixed(n as f64 * step, decimals))).collect()
 }
 
 /// Number at a mark of a logarithmic axis.

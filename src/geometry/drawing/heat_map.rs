@@ -3,7 +3,7 @@
 
 use super::PlotAxis;
 use crate::palette::{Rgb, load_colour, signed_colour};
-use crate::units::three_digits;
+use crate::units::{SPACE, symbol, three_digits, true_minus};
 
 /// Grid of values as colours.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl CellAxis {
         if unit.is_empty() {
             format!("{name} {middle:.0}")
         } else {
-            format!("{name} {}\u{2009}{unit}", three_digits(middle))
+            format!("{name} {}{SPACE}{unit}", three_digits(middle))
         }
     }
 
@@ -110,7 +110,7 @@ impl HeatMap {
         let value = if value.is_nan() {
             "no value".to_owned()
         } else {
-            format!("{}\u{2009}{}", three_digits(f64::from(value)), self.unit)
+            format!("{}{SPACE}{}", true_minus(&three_digits(f64::from(value))), symbol(&self.unit))
         };
         format!("{}, {}: {value}", self.y.text(row), self.x.text(column))
     }
@@ -165,8 +165,8 @@ mod tests {
             [-0.1, 0.0, 0.99, 1.0, 4.0, 4.1].map(|t| map.x.cell(t)),
             [None, Some(0), Some(0), Some(1), Some(3), None]
         );
-        assert_eq!(map.text(1, 1), "joint 2, time 1.50\u{2009}s: -5.00\u{2009}°");
-        assert_eq!(map.text(1, 2), "joint 2, time 2.50\u{2009}s: no value");
+        assert_eq!(map.text(1, 1), "joint 2, time 1.50\u{a0}s: −5.00\u{a0}°");
+        assert_eq!(map.text(1, 2), "joint 2, time 2.50\u{a0}s: no value");
         assert!(map.value(0, 4).is_nan() && map.value(2, 0).is_nan());
         assert_eq!(map.x.plot_axis().title, "time (s)");
         assert_eq!(map.y.plot_axis().range, Some([0.5, 2.5]));

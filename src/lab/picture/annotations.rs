@@ -5,7 +5,7 @@ use super::{PictureView, ink};
 use glam::{Vec2, Vec3};
 use palpate_geometry::drawing::{Align, Camera, Inset, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{SPACE, mark};
 
 /// Distance of annotations from the edges (points).
 pub(super) const MARGIN: f32 = 18.0;
@@ -180,7 +180,7 @@ fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [
         Align::Centre,
         letters,
         colour,
-        format!("{mm}\u{2009}mm"),
+        format!("{mm}{SPACE}mm"),
     );
 }
 
@@ -224,10 +224,8 @@ fn add_legend(overlay: &mut Overlay, view: &PictureView, from_top: f32, title: &
         } else {
             Align::Centre
         };
-        let value = three_digits(low + (high - low) * f64::from(share));
-        let shown = value.trim_end_matches('0').trim_end_matches('.');
-        let shown = if shown.is_empty() || !value.contains('.') { &value } else { shown };
-        overlay.text(at + Vec2::new(0.0, 12.0), align, TEXT, colour, shown);
+        let value = mark(low + (high - low) * f64::from(share));
+        overlay.text(at + Vec2::new(0.0, 12.0), align, TEXT, colour, value);
     }
 }
 
@@ -262,7 +260,7 @@ mod tests {
             let mut view = PictureView::default();
             view.camera.distance = distance;
             let label = texts(&view).into_iter().find(|t| t.contains("mm")).expect("a scale bar");
-            let mm: f32 = label.split('\u{2009}').next().and_then(|n| n.parse().ok()).expect("a number");
+            let mm: f32 = label.split(SPACE).next().and_then(|n| n.parse().ok()).expect("a number");
             assert!(SCALE_STEPS.contains(&mm));
             let points = mm * view.size.y / (view.camera.height_at_target() * 1e3);
             assert!((40.0..160.0).contains(&points), "{points} points at {distance} m");

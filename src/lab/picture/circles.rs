@@ -8,6 +8,7 @@ use glam::{DVec3, Vec2};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::Align;
 use palpate_geometry::palette::{Rgb, Trace};
+use palpate_geometry::units;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_tactile::{Quantity, SensorLayout, Sensors, SignalDefinition};
@@ -89,7 +90,7 @@ fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], 
 
 /// Writes the curvature outside of a place at the finger's back, inside the picture, where it covers nothing.
 fn number(annotator: &mut Annotator<'_>, [back, outward]: [Vec2; 2], curvature: f64, colour: Rgb) {
-    let text = format!("{curvature:.2}\u{2009}1/m");
+    let text = units::shown(curvature, "1/m");
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
     let low = half + Vec2::splat(10.0);
     let aside = outward * (GAP + half.dot(outward.abs()));

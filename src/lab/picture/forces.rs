@@ -6,6 +6,7 @@ use glam::{DVec3, Vec2, Vec3};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Align, Arrow};
 use palpate_geometry::palette::{Rgb, Theme, pressure_colour};
+use palpate_geometry::units;
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 
@@ -94,7 +95,7 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
             Side::Left => "L",
             Side::Right => "R",
         };
-        let line = |name: &str, force: DVec3| format!("{letter}  {name} {:.2}\u{2009}N", force.length());
+        let line = |name: &str, force: DVec3| format!("{letter}  {name} {}", units::shown(force.length(), "N"));
         let mut lines = vec![(line("normal", forces.normal), colours.text)];
         lines.extend(forces.friction.map(|force| (line("friction", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.

@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(left.values.iter().filter(|value| **value != 0.0).count(), 1);
         assert_eq!(
             (left.y.text(1), left.x.text(2)),
-            ("from palm 3.75\u{2009}mm".into(), "across 2.50\u{2009}mm".into())
+            ("from palm 3.75\u{a0}mm".into(), "across 2.50\u{a0}mm".into())
         );
         // 0.25 N on 2.5 mm by 5 mm.
         let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure, PAD_FULL_SCALE)[0];

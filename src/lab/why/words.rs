@@ -6,8 +6,8 @@ use palpate_sim::objects::object_title;
 use palpate_tactile::{Quantity, unit_of_channel};
 
 /// How evidence is measured, in one sentence.
-pub const MEASURED_HOW: &str = "Each part is replaced by its mean over all classes, and the model answers again; points \
-     are the percent points that the answer then loses. Parts overlap, so points do not add up.";
+pub const MEASURED_HOW: &str = "How much the answer's probability drops when this part is replaced by an average \
+     (percentage points; they overlap).";
 
 /// Evidence below this is not worth a sentence (percent points).
 const WORTH_NAMING: f64 = 1.0;

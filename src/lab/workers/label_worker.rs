@@ -108,7 +108,7 @@ impl LabelService {
     /// Handles a command; returns its outcome where it is worth a notice.
     fn handle(&mut self, command: &LabelCommand) -> Result<Option<String>, JobError> {
         let store = self.store.open()?;
-        let undone = |entry: JournalEntry| format!("undone: {}", entry.sentence());
+        let undone = |entry: JournalEntry| format!("Undone: {}", entry.sentence());
         let redone = |entry: JournalEntry| format!("redone: {}", entry.restored());
         let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done = match command {
@@ -198,7 +198,7 @@ mod tests {
         told_of(&labels, &woken, is_done("redone: ", format!("label unlabelled -> {}", shown_title(&next))));
         labels.send(LabelCommand::Undo);
         shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
-        told_of(&labels, &woken, is_done("undone: ", String::new()));
+        told_of(&labels, &woken, is_done("Undone: ", String::new()));
         labels.send(LabelCommand::Want("mug".to_owned(), 3));
         shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
         labels.send(LabelCommand::Want("mug".to_owned(), 0));

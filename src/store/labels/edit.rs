@@ -43,7 +43,8 @@ impl Edited {
         let done = match edit {
             TrialEdit::Label(object) => format!("labelled {}", object.trim()),
             TrialEdit::Note(note) if note.trim().is_empty() => "without note now".to_owned(),
-            TrialEdit::Note(_) => "given a note".to_owned(),
+            TrialEdit::Note(_) if changed == 1 && known == 0 => return "Note saved".to_owned(),
+            TrialEdit::Note(_) => "with the note now".to_owned(),
             TrialEdit::Tags(tags) => format!("tagged [{}]", tags.join(", ")),
             TrialEdit::Tag(tags) => format!("tagged {}", tags.join(", ")),
             TrialEdit::Untag(tags) => format!("no longer tagged {}", tags.join(", ")),

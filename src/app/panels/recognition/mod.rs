@@ -154,7 +154,7 @@ pub(super) fn ui(
 fn lesson_ui(ui: &mut Ui, teaching: &Job<TeachRequest, TrainedModel>, actions: &mut Actions) {
     let Some(progress) = teaching.running().map(|running| running.progress) else { return };
     ui.horizontal(|ui| {
-        actions.on(&ui.button("Stop").on_hover_text("Leave the model as it is"), App::stop_teaching);
+        actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
         ui.add(ProgressBar::new(progress.share as f32).desired_width(ui.available_width()).text(progress.words));
     });
 }
@@ -314,7 +314,7 @@ impl Part<'_, '_> {
             // A stored trial keeps no secret.
             None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
             None => {
-                let text = if shown { "shown after the decision" } else { "hidden" };
+                let text = if shown { "answer hidden until it decides" } else { "hidden" };
                 (text.to_owned(), format!("Truth: {text}"), None)
             }
         };

@@ -1,6 +1,7 @@
 //! Texts of the recognition panel.
 
 use crate::app::shown::Recognised;
+use crate::app::widgets::capital;
 use palpate_lab::grasping::IdentificationView;
 pub(in crate::app) use palpate_lab::why::percent;
 use palpate_learn::{Labels, OTHER, Pmf, StopReason};
@@ -60,7 +61,7 @@ const NAMED: usize = 3;
 /// Reason for another grasp, or for the decision, and the classes that are left.
 pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let why = why(view, recognised);
-    left(view).map_or_else(|| why.clone(), |left| format!("{left}; {why}"))
+    left(view).map_or_else(|| why.clone(), |left| format!("{why}. {}", capital(&left)))
 }
 
 /// Classes that are left after finished grasps, where the model's sets are calibrated.
@@ -79,37 +80,41 @@ fn left(view: &IdentificationView) -> Option<String> {
 fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
-        let failed = "grasp failed: no answer";
+        let failed = "Grasp failed: no answer";
         return if recognised.finished { failed } else { recognised.waiting }.to_owned();
     };
     let p = now.top().1;
     let certain = p >= view.rule.threshold;
-    let grasp = format!("grasp {} of at most {most}", view.beliefs.len() + 1);
+    let again = recognised.again;
+    let grasp = format!("Grasp {} of up to {most}", view.beliefs.len() + 1);
     let is_other = view.labels.other() == Some(now.top().0);
     match view.decision {
-        Some(StopReason::Sure) if is_other => "none of the known objects".to_owned(),
-        Some(StopReason::Sure) if certain => format!("{} reaches the threshold of {threshold}", percent(p)),
-        Some(StopReason::Sure) => format!("{} reached the former threshold", percent(p)),
-        Some(StopReason::GraspLimit) => format!("grasp limit reached ({}): best guess", view.beliefs.len()),
-        Some(StopReason::Unknown) => "the grasps agree on no known object".to_owned(),
-        None if view.listening => match view.beliefs.last() {
-            Some(before) => format!("{grasp}; before: {}", leaders(&view.labels, before)),
-            None if view.rule.threshold >= 1.0 => format!("{grasp}; no automatic stop"),
-            None => format!("{grasp}; threshold {threshold}"),
+        Some(StopReason::Sure) if is_other => "None of the known objects".to_owned(),
+        Some(StopReason::Sure) if certain => format!("Certain: {} (needed {threshold})", percent(p)),
+        Some(StopReason::Sure) => format!("Certain: {} reached the threshold of then", percent(p)),
+        Some(StopReason::GraspLimit) => match view.beliefs.len() {
+            1 => "Best guess after one grasp".to_owned(),
+            many => format!("Best guess after {many} grasps"),
         },
-        None if recognised.finished => format!("stopped below the threshold: {}", leaders(&view.labels, now)),
+        Some(StopReason::Unknown) => "The grasps agree on no known object".to_owned(),
+        None if view.listening => match view.beliefs.last() {
+            Some(before) => format!("{grasp}. So far: {}", leaders(&view.labels, before)),
+            None if view.rule.threshold >= 1.0 => format!("{grasp}, without automatic stop"),
+            None => format!("{grasp}, needed {threshold}"),
+        },
+        None if recognised.finished => format!("Stopped below {threshold}: {}", leaders(&view.labels, now)),
         None if certain && view.beliefs.len() == 1 => {
-            format!("{}, but unlike any known object: {}", percent(p), recognised.again)
+            format!("{}, but unlike any known object: {again}", percent(p))
         }
-        None if certain => format!("{}, but the grasps disagree: {}", percent(p), recognised.again),
-        None => format!("{}: {}", recognised.again, leaders(&view.labels, now)),
+        None if certain => format!("{}, but the grasps disagree: {again}", percent(p)),
+        None => format!("Not sure yet ({}): {again}", leaders(&view.labels, now)),
     }
 }
 
 /// Title of a class.
 pub(in crate::app) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| match class.name.as_str() {
-        OTHER => "Other object".to_owned(),
+        OTHER => "Other".to_owned(),
         name => object_title(name),
     })
 }
@@ -173,7 +178,7 @@ mod tests {
 
     fn said(view: &IdentificationView) -> (String, String) {
         let text = Headline::of(view).text(&view.labels).0;
-        let (waiting, again) = ("fingers closing", "grasping again");
+        let (waiting, again) = ("Fingers closing", "grasping again");
         (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, again, finished: false }))
     }
 
@@ -182,17 +187,17 @@ mod tests {
         let listening =
             |now: f64, beliefs: &[f64]| IdentificationView { listening: true, ..view(Some(now), beliefs, None) };
         let cases = [
-            (view(None, &[], None), "Ready", "fingers closing"),
-            (listening(0.35, &[]), "Tomato", "grasp 1 of at most 4; threshold 90 %"),
-            (listening(0.61, &[]), "Lemon", "grasp 1 of at most 4; threshold 90 %"),
-            (listening(0.7, &[0.61]), "Lemon", "grasp 2 of at most 4; before: lemon 61 %, tomato 35 %"),
-            (view(Some(0.61), &[0.61], None), "Lemon", "grasping again: lemon 61 %, tomato 35 %"),
+            (view(None, &[], None), "Ready", "Fingers closing"),
+            (listening(0.35, &[]), "Tomato", "Grasp 1 of up to 4, needed 90 %"),
+            (listening(0.61, &[]), "Lemon", "Grasp 1 of up to 4, needed 90 %"),
+            (listening(0.7, &[0.61]), "Lemon", "Grasp 2 of up to 4. So far: lemon 61 %, tomato 35 %"),
+            (view(Some(0.61), &[0.61], None), "Lemon", "Not sure yet (lemon 61 %, tomato 35 %): grasping again"),
             (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but unlike any known object: grasping again"),
             (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps disagree: grasping again"),
-            (view(Some(0.92), &[0.92], Some(StopReason::Sure)), "Lemon", "92 % reaches the threshold of 90 %"),
-            (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "80 % reached the former threshold"),
-            (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "grasp limit reached (4): best guess"),
-            (view(Some(0.6), &[0.6], Some(StopReason::Unknown)), "Unknown", "the grasps agree on no known object"),
+            (view(Some(0.92), &[0.92], Some(StopReason::Sure)), "Lemon", "Certain: 92 % (needed 90 %)"),
+            (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "Certain: 80 % reached the threshold of then"),
+            (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "Best guess after 4 grasps"),
+            (view(Some(0.6), &[0.6], Some(StopReason::Unknown)), "Unknown", "The grasps agree on no known object"),
         ];
         for (view, headline, reason) in cases {
             assert_eq!(said(&view), (headline.to_owned(), reason.to_owned()));
@@ -211,16 +216,16 @@ mod tests {
             let left = labels.classes.iter().map(|class| names.contains(&class.name.as_str())).collect();
             said(&IdentificationView { left: Some(left), ..view(Some(0.61), &[0.61], None) }).1
         };
-        let why = "grasping again: lemon 61 %, tomato 35 %";
-        assert_eq!(of(&["lemon", "tomato"]), format!("lemon or tomato; {why}"));
-        assert_eq!(of(&["lemon"]), format!("only lemon left; {why}"));
-        assert_eq!(of(&[]), format!("like no known object; {why}"));
-        assert_eq!(of(&["lemon", "tomato", "ball", "cube"]), format!("4 objects left; {why}"));
+        let why = "Not sure yet (lemon 61 %, tomato 35 %): grasping again";
+        assert_eq!(of(&["lemon", "tomato"]), format!("{why}. Lemon or tomato"));
+        assert_eq!(of(&["lemon"]), format!("{why}. Only lemon left"));
+        assert_eq!(of(&[]), format!("{why}. Like no known object"));
+        assert_eq!(of(&["lemon", "tomato", "ball", "cube"]), format!("{why}. 4 objects left"));
         let first = IdentificationView { left: Some(vec![true; 17]), ..view(Some(0.3), &[], None) };
         assert!(!said(&first).1.contains("left"), "before the first grasp ends");
         let rule = StopRule { threshold: 1.0, most_grasps: 4 };
         let never = IdentificationView { rule, listening: true, ..view(Some(0.5), &[], None) };
-        assert_eq!(said(&never).1, "grasp 1 of at most 4; no automatic stop");
+        assert_eq!(said(&never).1, "Grasp 1 of up to 4, without automatic stop");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::app::features::App;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::widgets::number_field;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
+use palpate_geometry::units::SPACE;
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
 use palpate_sim::scene::{Auto, EngineKind, SCENES, Scene, SupportKind};
 
@@ -76,7 +77,7 @@ impl Number<'_> {
             .clamp_existing_to_range(false)
             .speed(self.speed)
             .max_decimals(3)
-            .suffix(format!("\u{2009}{}", self.unit));
+            .suffix(format!("{SPACE}{}", self.unit));
         if number_field(ui, self.name, drag).labelled_by(label.id).changed() {
             *value = shown / self.factor;
         }
@@ -99,7 +100,7 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
             .clamp_existing_to_range(false)
             .speed(number.speed)
             .max_decimals(3)
-            .suffix(format!("\u{2009}{}", number.unit));
+            .suffix(format!("{SPACE}{}", number.unit));
         let enabled = |ui: &mut Ui| ui.add_enabled(own, drag);
         if number_field(ui, number.name, enabled).labelled_by(label.id).changed() {
             *value = Auto::Value(shown / number.factor);
@@ -110,7 +111,7 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
 
 fn object_ui(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature) {
     let mut fixed = scene.holds_object();
-    choice(ui, "held", &mut fixed, &[(false, "resting freely"), (true, "fixed in place")]);
+    choice(ui, "support", &mut fixed, &[(false, "free"), (true, "fixed")]);
     if fixed != scene.holds_object() {
         scene.set_object_fixed(fixed);
     }
@@ -162,7 +163,7 @@ fn solver_ui(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature, act
     accuracy_dial::rows(ui, scene, simulation, actions);
     let label = ui.label("sampling");
     let rate = DragValue::new(&mut scene.timing.sample_hz);
-    let rate = rate.range(1..=1000).clamp_existing_to_range(false).suffix("\u{2009}Hz");
+    let rate = rate.range(1..=1000).clamp_existing_to_range(false).suffix("\u{a0}Hz");
     number_field(ui, "sampling", rate).labelled_by(label.id);
     ui.end_row();
 }

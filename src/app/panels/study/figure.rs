@@ -65,9 +65,9 @@ fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize
     });
     let warning = match result.origin {
         _ if !result.current => "From other settings, methods or physics than today's: run the study again.",
-        StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "A short form: do not quote its numbers.",
+        StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "Quick run: do not quote.",
         StudyOrigin::Shipped => {
-            "Not run here: the result that comes with the program. Run the study to open its trials."
+            "Shipped result. Run the study to open its trials."
         }
         StudyOrigin::Run(StudySize::Full) => return,
     };

@@ -7,6 +7,7 @@ use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_geometry::units::{SPACE, symbol, true_minus};
 use palpate_study::{Agreement, Cell, Finding};
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
@@ -14,10 +15,16 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     let findings = &result.stored.result.findings;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let count = |verdict: Agreement| findings.iter().filter(|finding| finding.verdict == verdict).count();
-        let counts = [Agreement::Agrees, Agreement::Partly, Agreement::Disagrees, Agreement::NotMeasured]
-            .map(|verdict| (count(verdict), verdict.name()));
+        let counts = [
+            (Agreement::Agrees, "confirmed"),
+            (Agreement::Partly, "in part"),
+            (Agreement::Disagrees, "not"),
+            (Agreement::NotMeasured, "not measured"),
+        ]
+        .map(|(verdict, name)| (count(verdict), name));
         let shown = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
-        let text = format!("Claims of the paper: {}", shown.collect::<Vec<_>>().join(", "));
+        let plural = if findings.len() == 1 { "claim" } else { "claims" };
+        let text = format!("{} {plural}: {}", findings.len(), shown.collect::<Vec<_>>().join(", "));
         wrapped(
             ui,
             RichText::new(if findings.is_empty() { "The paper has no claim about this.".to_owned() } else { text })
@@ -80,8 +87,8 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
             ui.painter().hline(low..=high, rect.center().y, Stroke::new(2.5, ink));
             ui.painter().circle_filled(pos2(estimate, rect.center().y), 3.0, ink);
             response.on_hover_text(text);
-            let estimate = Cell::from(own.value.value()).shown(&own.unit);
-            ui.add(Label::new(RichText::new(format!("{estimate} {}", own.unit)).small()).extend());
+            let estimate = true_minus(&Cell::from(own.value.value()).shown(&own.unit));
+            ui.add(Label::new(RichText::new(format!("{estimate}{SPACE}{}", symbol(&own.unit))).small()).extend());
             ui.add(Label::new(RichText::new(&own.what).small().weak()).truncate());
         });
     }

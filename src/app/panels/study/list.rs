@@ -97,15 +97,15 @@ fn state(studies: &Studies, key: &str, colours: &ThemeColours) -> (String, Rgb) 
     let Some(StudyFiles { results, begun, .. }) = studies.files(key) else {
         return ("..".to_owned(), colours.quiet_text);
     };
-    let stopped = if begun.is_empty() { "" } else { ", another stopped" };
+    let stopped = if begun.is_empty() { "" } else { "; your run is paused" };
     let text = match results.first() {
         None if !begun.is_empty() => return ("stopped, can be resumed".to_owned(), colours.warning),
         None => return ("not run".to_owned(), colours.quiet_text),
         Some(result) => match result.origin {
             StudyOrigin::Run(StudySize::Full) => "run in full",
-            StudyOrigin::Run(StudySize::Quick) => "quick form run",
+            StudyOrigin::Run(StudySize::Quick) => "quick run done",
             StudyOrigin::Run(StudySize::Sample { .. }) => "sample run",
-            StudyOrigin::Shipped => "not run here; result of the program",
+            StudyOrigin::Shipped => "shipped result",
         },
     };
     (format!("{text}{stopped}"), colours.quiet_text)

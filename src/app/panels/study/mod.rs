@@ -11,8 +11,9 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::widgets::{just_opened, wrapped};
 use egui::{RichText, Ui};
+use palpate_geometry::units::{symbol, true_minus};
 use palpate_study::jobs::{StudyOrigin, StudyResult};
-use palpate_study::{Cell, StudyRow, StudyTable};
+use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
 use palpate_tactile::trial::TrialId;
 use std::sync::Arc;
 
@@ -44,6 +45,12 @@ fn result_ui(
     result
 }
 
+/// Text of a cell, with a true minus before numbers.
+fn cell_text(cell: &Cell, column: &StudyColumn) -> String {
+    let text = cell.shown(&column.unit);
+    if matches!(cell, Cell::Text(_)) { text } else { true_minus(&text).replace("(-", "(−").replace(" -", " −") }
+}
+
 /// The trials behind a row; none where they are not in the store of the window.
 fn opening(result: &StudyResult, row: &StudyRow) -> Option<Vec<TrialId>> {
     let own = !row.trials.is_empty() && result.origin != StudyOrigin::Shipped;
@@ -67,8 +74,8 @@ fn about_row_ui(ui: &mut Ui, result: &StudyResult, table: &StudyTable, row: &Stu
     ui.spacing_mut().item_spacing.y = 2.0;
     for (cell, column) in row.cells.iter().zip(&table.columns) {
         if *cell != Cell::Missing {
-            let unit = if column.unit.is_empty() { String::new() } else { format!(" {}", column.unit) };
-            ui.label(RichText::new(format!("{}: {}{unit}", column.name, cell.shown(&column.unit))).small());
+            let unit = if column.unit.is_empty() { String::new() } else { format!(" {}", symbol(&column.unit)) };
+            ui.label(RichText::new(format!("{}: {}{unit}", column.name, cell_text(cell, column))).small());
         }
     }
     ui.label(RichText::new(hint(result, row)).small().weak());

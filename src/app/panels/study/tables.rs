@@ -1,13 +1,14 @@
 //! Tables of the chosen study; a click on a row opens its trials.
 
-use super::{about_row_ui, opening, result_ui};
+use super::{about_row_ui, cell_text, opening, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
+use palpate_geometry::units::symbol;
 use palpate_study::jobs::StudyResult;
-use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
+use palpate_study::{Cell, StudyRow, StudyTable};
 
 /// Height of a row, room between columns, widest column (points).
 const ROW: f32 = 21.0;
@@ -51,7 +52,7 @@ fn columns(ui: &Ui, table: &StudyTable) -> Vec<(f32, f32, bool)> {
     let mut places = Vec::new();
     for (k, column) in table.columns.iter().enumerate() {
         let cells = || table.rows.iter().take(MEASURED).filter_map(move |row| row.cells.get(k));
-        let widest = cells().map(|cell| width(cell.shown(&column.unit))).fold(width(column.titled()), f32::max);
+        let widest = cells().map(|cell| width(cell_text(cell, column))).fold(width(symbol(&column.titled())), f32::max);
         let right = left + widest.min(WIDEST);
         places.push((left, right, cells().all(|cell| !matches!(cell, Cell::Text(_)))));
         left = right + GAP;
@@ -66,7 +67,7 @@ fn table_ui(ui: &mut Ui, theme: Theme, result: &StudyResult, table: &StudyTable,
         ui.spacing_mut().item_spacing.y = 0.0;
         let whole = places.last().map_or(0.0, |(_, right, _)| right + GAP).max(ui.available_width());
         let (header, _) = ui.allocate_exact_size(vec2(whole, ROW), Sense::hover());
-        let titles = table.columns.iter().map(StudyColumn::titled);
+        let titles = table.columns.iter().map(|column| symbol(&column.titled()));
         texts(ui, header, &places, titles, colour(colours.quiet_text));
         ScrollArea::vertical().auto_shrink(false).show_rows(ui, ROW, table.rows.len(), |ui, rows| {
             for at in rows {
@@ -89,8 +90,7 @@ fn row_ui(
     let colours = theme.colours();
     let trials = opening(result, row);
     let (rect, response) = ui.allocate_exact_size(vec2(whole, ROW), Sense::click());
-    let cells: Vec<String> =
-        row.cells.iter().zip(&table.columns).map(|(cell, column)| cell.shown(&column.unit)).collect();
+    let cells: Vec<String> = row.cells.iter().zip(&table.columns).map(|(cell, own)| cell_text(cell, own)).collect();
     let label = format!("Row {}", cells.join(", "));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, trials.is_some(), &label));
     if response.hovered() || response.has_focus() {

@@ -4,6 +4,7 @@ use super::GripperSession;
 use crate::grasping::{AdaptError, Adaptation, AdaptedSensor};
 use crate::recording::TrialRequest;
 use crate::workers::Notice;
+use palpate_geometry::units::shown;
 use palpate_sim::objects::EMPTY;
 use palpate_store::Store;
 use palpate_tactile::trial::{Control, TrialId};
@@ -46,13 +47,13 @@ fn notice_of(adaptation: &Adaptation) -> Notice {
     });
     let kept = adaptation.sensors.iter().filter(|(_, adapted)| matches!(adapted, AdaptedSensor::Kept(_))).count();
     let (bar, modelled) = (adaptation.bar, adaptation.modelled);
-    let assumed = format!("assumed: nominal pads, and fingers that bend to {modelled:.1} 1/m at {bar:.2} bar");
+    let assumed = format!("Assumes nominal pads and a bend of {} at {bar:.2} bar", shown(modelled, "1/m"));
     match (failed, kept) {
         (Some(failed), _) => Notice::Failed(failed),
-        (None, 0) => Notice::Info(format!("Adapted; {assumed}.")),
+        (None, 0) => Notice::Info(format!("Adapted. {assumed}.")),
         (None, kept) if kept == adaptation.sensors.len() => {
             Notice::Info("Nothing to adapt: all sensors are calibrated by hand.".to_owned())
         }
-        (None, kept) => Notice::Info(format!("Adapted, {kept} sensors calibrated by hand kept; {assumed}.")),
+        (None, kept) => Notice::Info(format!("Adapted, {kept} sensors calibrated by hand kept. {assumed}.")),
     }
 }
