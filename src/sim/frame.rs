@@ -262,7 +262,9 @@ impl Quality {
         match (diverged.or_else(|| self.misses()), self.agrees) {
             (Some(cause), _) => (TrustLevel::Red, cause),
             (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
-            (None, None | Some(false)) => (TrustLevel::Amber, "not verified: no other simulation to compare with".to_owned()),
+            (None, None | Some(false)) => {
+                (TrustLevel::Amber, "not verified: no other simulation to compare with".to_owned())
+            }
             (None, Some(true)) => (TrustLevel::Green, "another simulation gives the same result".to_owned()),
         }
     }

@@ -173,7 +173,7 @@ fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
     assert_eq!(tags(&store)?, [vec!["wet", "late"], vec!["wet"], vec![], vec!["wet"]]);
     store.labels().edit(&[1, 2, 3], &TrialEdit::Untag(vec!["wet".to_owned()]))?;
     assert_eq!(tags(&store)?, [vec!["late"], vec![], vec![], vec!["wet"]]);
-    assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), "trials 1, 2: tags changed");
+    assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), "trials 1, 2: tag \"wet\" removed");
     assert_eq!(store.journal().undo()?.ok_or("tags")?.sentence(), format!("trials 2, {simulated}: tag \"wet\" added"));
     assert_eq!(tags(&store)?, [vec!["wet", "late"], vec![], vec![], vec![]]);
     // Deleting is one step, and one that cannot be undone whole changes nothing.

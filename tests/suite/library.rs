@@ -221,7 +221,7 @@ fn what_the_terminal_changes_shows_in_the_window_and_the_other_way_round() {
     until_rows(&mut bench, &["3", "1"]);
     bench.tell(|app| app.library.select_all());
     bench.tell(|app| app.library.edit(TrialEdit::Note("ripe".to_owned())));
-    bench.until_told("2 trials given a note");
+    bench.until_told("2 trials with the note now");
     assert!(run(&at, &["trials", "list", "--search", "ripe"]).out.lines().count() == 3);
 }
 

@@ -102,7 +102,9 @@ impl Observed<'_> {
             return None;
         }
         let each: Vec<String> = rises.iter().map(PadRise::summary).collect();
-        Some(format!("no pad was loaded: {}", each.join(", ")))
+        let mut least: Vec<String> = rises.iter().map(PadRise::needed).collect();
+        least.dedup();
+        Some(format!("{} (needs {})", each.join(", "), least.join(" and ")))
     }
 
     /// Rise of a pad: in newtons if it is calibrated, otherwise in counts.
@@ -212,9 +214,16 @@ struct PadRise {
 
 impl PadRise {
     fn summary(&self) -> String {
+        format!("{} {}", self.pad.label(), self.shown(self.rise))
+    }
+
+    fn needed(&self) -> String {
+        self.shown(self.least)
+    }
+
+    fn shown(&self, value: f64) -> String {
         let digits = if self.unit == "N" { 2 } else { 0 };
-        let Self { pad, rise, least, unit } = self;
-        format!("{} {rise:.digits$} {unit} (contact from {least:.digits$} {unit})", pad.label())
+        format!("{value:.digits$} {}", self.unit)
     }
 }
 
@@ -297,7 +306,7 @@ mod tests {
         }] {
             let found = flags(&missed, &[], &[], &good());
             assert_eq!(found.iter().map(|found| found.flag).collect::<Vec<_>>(), [Flag::NoContact]);
-            assert!(found[0].remark.starts_with("no pad was loaded: left pad "), "{found:?}");
+            assert!(found[0].remark.starts_with("left pad ") && found[0].remark.contains("(needs "), "{found:?}");
             assert_eq!(flaws(found.clone(), Some("lemon")), found);
             assert_eq!(flaws(found, Some(EMPTY)), []);
         }

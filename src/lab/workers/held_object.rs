@@ -26,10 +26,16 @@ pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
     ObjectCard {
         content: model.content,
         name: model.name.clone(),
-        title: object_title(&model.name),
+        title: capital(&object_title(&model.name)),
         class: model.class,
         mass: model.mass.mass,
         friction: scene.object.friction.value().unwrap_or(model.friction),
         size: model.bounds.size(),
     }
+}
+
+/// A title begins with a capital, that of a file too.
+fn capital(title: &str) -> String {
+    let mut letters = title.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
