@@ -1,13 +1,14 @@
 //! A plot of a figure in the window: the same data as in the files that studies write.
 
 use crate::app::theme::{colour, veil};
-use egui::{Align2, Color32, FontId, Rect, Response, RichText, Ui};
+use egui::{Align2, Color32, FontId, Rect, Response, RichText, Sense, Stroke, Ui, vec2};
 use egui_plot::{
     FilledArea, GridInput, GridMark, HLine, Legend, Line, LineStyle as Dashes, MarkerShape, Plot as PlotWidget,
     PlotPoint, PlotTransform, Points, Text, VLine,
 };
 use palpate_geometry::drawing::{CellAxis, DataSeries, HeatMap, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, Theme, series_colour};
+use palpate_geometry::units::symbol;
 use std::ops::RangeInclusive;
 
 /// A plot on the screen.
@@ -81,10 +82,11 @@ pub(super) fn show(
         .y_axis_formatter(texts(&known[1]))
         .set_margin_fraction(egui::Vec2::ZERO);
     if height > ROOM_FOR_TITLES {
-        widget = widget.x_axis_label(plot.x.title.clone()).y_axis_label(plot.y.title.clone());
+        widget = widget.x_axis_label(symbol(&plot.x.title)).y_axis_label(symbol(&plot.y.title));
     } else {
         let titles = [plot.y.title.as_str(), plot.x.title.as_str()];
-        let axes = titles.into_iter().filter(|title| !title.is_empty()).collect::<Vec<_>>().join(" against ");
+        let axes =
+            titles.into_iter().filter(|title| !title.is_empty()).map(symbol).collect::<Vec<_>>().join(" against ");
         ui.add(egui::Label::new(RichText::new(axes).small().weak()).truncate());
     }
     if legend && ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
@@ -136,6 +138,60 @@ pub(super) fn show(
         cells(ui, &shown, plot, heat);
     }
     shown
+}
+
+/// Names of all series with their colours and signs.
+pub(super) fn legend_ui<'a>(ui: &mut Ui, theme: Theme, series: impl Iterator<Item = &'a DataSeries>) {
+    let mut seen = Vec::new();
+    for series in series.filter(|series| !series.name.is_empty()) {
+        let key = (series.name.as_str(), series.colour, series.marker, series.line);
+        if !seen.contains(&key) {
+            seen.push(key);
+        }
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
+        for (name, number, marker, line) in seen {
+            let ink = colour(series_colour(number, theme));
+            let font = egui::TextStyle::Small.resolve(ui.style());
+            // A sign and its name stay together.
+            let text = ui.painter().layout_no_wrap(name.to_owned(), font, Color32::PLACEHOLDER);
+            if text.size().x + 24.0 > ui.available_size_before_wrap().x {
+                ui.end_row();
+            }
+            let (rect, _) = ui.allocate_exact_size(vec2(16.0, 14.0), Sense::hover());
+            let (painter, at) = (ui.painter(), rect.center());
+            if line != LineStyle::None {
+                let width = if line == LineStyle::Bold { 3.0 } else { 1.3 };
+                let ends = [rect.left_center(), rect.right_center()];
+                if line == LineStyle::Dashed {
+                    painter.extend(egui::Shape::dashed_line(&ends, Stroke::new(width, ink), 4.0, 3.0));
+                } else {
+                    painter.line_segment(ends, Stroke::new(width, ink));
+                }
+            }
+            match marker {
+                Marker::None => {}
+                Marker::Dot => {
+                    painter.circle_filled(at, 3.5, ink);
+                }
+                Marker::Ring => {
+                    painter.circle_stroke(at, 3.5, Stroke::new(1.3, ink));
+                }
+                Marker::Square => {
+                    painter.rect_filled(Rect::from_center_size(at, vec2(7.0, 7.0)), 0.0, ink);
+                }
+                Marker::Cross => {
+                    for side in [1.0, -1.0] {
+                        let reach = vec2(3.5, 3.5 * side);
+                        painter.line_segment([at - reach, at + reach], Stroke::new(1.3, ink));
+                    }
+                }
+            }
+            ui.label(RichText::new(name).small());
+            ui.add_space(6.0);
+        }
+    });
 }
 
 /// Opacity of a band.

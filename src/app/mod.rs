@@ -20,9 +20,10 @@
 //! | maps | `shown_grasp.rs` | heat maps of a grasp |
 //! | layers | `contact_path.rs` `small_pads.rs` | layers of the 3-D view |
 //! | modes | `modes/` | layout and keys of each mode |
-//! | panels | `panels/` `bars/` | one file per panel |
+//! | panels | `panels/` | one file per panel |
+//! | bars | `bars/` | bars above and below the panels |
 //! | keys | `keys/` | keys of all modes, and their sheet |
-//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `import_dialog.rs` `presenter/` | panels beside each other; command palette; file and import dialogs; presenter mode |
+//! | tiles | `tiling.rs` `palette.rs` `path_dialog.rs` `import_dialog.rs` `manual.rs` `presenter/` | panels beside each other; command palette; file and import dialogs; manual; presenter mode |
 //! | workbench | `workbench.rs` | draws the window |
 //! | picture | `offscreen.rs` | the window as a picture, without a display, and what its frames cost |
 //! | window | `mod.rs` | the window |
@@ -45,6 +46,7 @@ mod heat_map;
 mod icons;
 mod import_dialog;
 mod keys;
+mod manual;
 mod modes;
 mod offscreen;
 mod palette;
@@ -80,10 +82,11 @@ pub use startup::{Surroundings, ThreadError, WindowError, check_surroundings};
 pub use viewport::Viewport;
 pub use workbench::{Workbench, WorkbenchSetup};
 
+use palpate_geometry::palette::Theme;
 use palpate_serve::{Clients, DeskSetup};
 use palpate_sim::scene::Scene;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Options that the window opens with.
 pub struct WindowOptions {
@@ -121,47 +124,88 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         event_loop_builder: surroundings.event_loop_hook(),
         ..Default::default()
     };
+    let failed: Arc<Mutex<Option<ThreadError>>> = Arc::default();
+    let failure = Arc::clone(&failed);
     let creator: eframe::AppCreator<'_> = Box::new(move |creation| {
-        let render_state = creation.wgpu_render_state.as_ref().ok_or("the window has no graphics device")?;
+        let render_state = creation.wgpu_render_state.clone().ok_or("the window has no graphics device")?;
         let mut view: ViewState = creation.storage.and_then(|s| eframe::get_value(s, VIEW_KEY)).unwrap_or_default();
         view.gripper_model = options.model.or(view.gripper_model);
         let wake_context = creation.egui_ctx.clone();
         let wake = Arc::new(move || wake_context.request_repaint());
-        let setup = WorkbenchSetup {
-            render_state: Some(render_state),
-            cleared: true,
-            ..WorkbenchSetup::new(options.scene, options.store, view, wake)
+        let theme = view.theme;
+        let start = move |ctx: &egui::Context| {
+            let setup = WorkbenchSetup {
+                render_state: Some(&render_state),
+                cleared: true,
+                ..WorkbenchSetup::new(options.scene, options.store, view, wake)
+            };
+            let mut workbench = Workbench::new(ctx, setup)?;
+            if let Some(port) = options.port {
+                workbench.act(|app| app.connect(Some(port)));
+            }
+            if let Some((desk, clients)) = options.serve {
+                workbench.act(|app| app.serve(desk, clients));
+            }
+            Ok(workbench)
         };
-        let mut workbench = Workbench::new(&creation.egui_ctx, setup)?;
-        if let Some(port) = options.port {
-            workbench.act(|app| app.connect(Some(port)));
-        }
-        if let Some((desk, clients)) = options.serve {
-            workbench.act(|app| app.serve(desk, clients));
-        }
-        Ok(Box::new(Window { workbench }))
+        theme::apply(&creation.egui_ctx, theme);
+        Ok(Box::new(Window { workbench: None, start: Some(Box::new(start)), frames: 0, theme, failure }))
     });
-    eframe::run_native("palpate", native, creator).map_err(|error| surroundings.explain(&error))
+    eframe::run_native("palpate", native, creator).map_err(|error| surroundings.explain(&error))?;
+    let failed = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
+    failed.map_or(Ok(()), |error| Err(WindowError::Other(error.to_string())))
 }
 
 /// Key of the view state in eframe's storage.
 const VIEW_KEY: &str = "view";
 
+type Start = Box<dyn FnOnce(&egui::Context) -> Result<Workbench, ThreadError>>;
+
+/// Frames with a line in place of the workbench, so that the line is seen while shaders are compiled.
+const FIRST_FRAMES: u32 = 2;
+
 struct Window {
-    workbench: Workbench,
+    /// None before the first frames.
+    workbench: Option<Workbench>,
+    start: Option<Start>,
+    frames: u32,
+    theme: Theme,
+    /// Why the workbench could not be started.
+    failure: Arc<Mutex<Option<ThreadError>>>,
 }
 
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        self.workbench.ui(ui);
+        self.frames += 1;
+        if let Some(start) = self.start.take_if(|_| self.frames > FIRST_FRAMES) {
+            match start(ui.ctx()) {
+                Ok(workbench) => self.workbench = Some(workbench),
+                Err(error) => {
+                    *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                    ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+                }
+            }
+        }
+        match &mut self.workbench {
+            Some(workbench) => workbench.ui(ui),
+            None => {
+                let ink = theme::colour(self.theme.colours().quiet_text);
+                let (middle, font) = (ui.max_rect().center(), egui::FontId::proportional(16.0));
+                ui.painter().text(middle, egui::Align2::CENTER_CENTER, "Palpate: preparing the graphics ..", font, ink);
+                ui.ctx().request_repaint();
+            }
+        }
     }
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
-        theme::colour(self.workbench.view().theme.colours().background).to_normalized_gamma_f32()
+        theme::colour(self.workbench.as_ref().map_or(self.theme, |own| own.view().theme).colours().background)
+            .to_normalized_gamma_f32()
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, VIEW_KEY, self.workbench.view());
+        if let Some(workbench) = &self.workbench {
+            eframe::set_value(storage, VIEW_KEY, workbench.view());
+        }
     }
 
     /// The layout is stored in the view state, not in egui's memory.

@@ -122,7 +122,8 @@ fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Respo
 fn entries(app: &App) -> Vec<Entry> {
     let mode = app.view.mode;
     let mut all = Vec::new();
-    let named = |acts: Vec<&'static Act>| acts.into_iter().filter(|act| !act.does.is_empty());
+    let is_own = |act: &&'static Act| act.does.is_empty() || act.does.starts_with("command palette");
+    let named = |acts: Vec<&'static Act>| acts.into_iter().filter(move |act| !is_own(act));
     let commands = [("Command", keys::COMMANDS.iter().collect())];
     for (group, acts) in keys::groups(mode).into_iter().chain(commands) {
         for act in named(acts) {

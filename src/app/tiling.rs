@@ -5,13 +5,62 @@ use crate::app::features::App;
 use crate::app::panels::{self, PanelKind};
 use crate::app::theme::colour;
 use egui::{Frame, Margin, Ui};
-use egui_tiles::{Behavior, ResizeState, SimplificationOptions, TabState, TileId, Tiles, UiResponse};
+use egui_tiles::{
+    Behavior, Container, Linear, LinearDir, ResizeState, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree,
+    UiResponse,
+};
 use palpate_geometry::palette::Theme;
 
 /// Margin of a panel. Its background is that of the window.
 pub(super) fn panel_frame(panel: &PanelKind) -> Frame {
     let margin = if panel.name == "view" { Margin::ZERO } else { Margin::same(8) };
     Frame::new().inner_margin(margin)
+}
+
+/// Greatest width of the panels at either side (points): beyond, the room is for what stands between them.
+const WIDEST_SIDE: f32 = 430.0;
+
+/// Shares of the columns of a layout: as they were, and as they are drawn in a wide window.
+pub(super) struct Shares {
+    root: TileId,
+    before: Vec<(TileId, f32)>,
+    drawn: Vec<(TileId, f32)>,
+}
+
+/// Columns of a layout.
+fn columns(layout: &mut Tree<String>) -> Option<(TileId, &mut Linear)> {
+    let root = layout.root()?;
+    match layout.tiles.get_mut(root)? {
+        Tile::Container(Container::Linear(linear)) if linear.dir == LinearDir::Horizontal => Some((root, linear)),
+        Tile::Container(_) | Tile::Pane(_) => None,
+    }
+}
+
+/// Narrows the panels at both sides of a window of that width.
+pub(super) fn narrow_sides(layout: &mut Tree<String>, width: f32) -> Option<Shares> {
+    let (root, linear) = columns(layout)?;
+    let [left, middle, right] = <[TileId; 3]>::try_from(linear.children.clone()).ok()?;
+    let before: Vec<(TileId, f32)> = [left, middle, right].map(|id| (id, linear.shares[id])).to_vec();
+    let total: f32 = before.iter().map(|(_, share)| share).sum();
+    let most = total * WIDEST_SIDE / width.max(1.0);
+    let sides = [before[0].1.min(most), before[2].1.min(most)];
+    let drawn = vec![(left, sides[0]), (middle, total - sides[0] - sides[1]), (right, sides[1])];
+    for (id, share) in &drawn {
+        linear.shares.set_share(*id, *share);
+    }
+    Some(Shares { root, before, drawn })
+}
+
+impl Shares {
+    /// Puts the shares back, unless they were changed by hand meanwhile: a smaller window has them again.
+    pub(super) fn restore(self, layout: &mut Tree<String>) {
+        let Some((root, linear)) = columns(layout) else { return };
+        if root == self.root && self.drawn.iter().all(|(id, share)| linear.shares[*id] == *share) {
+            for (id, share) in self.before {
+                linear.shares.set_share(id, share);
+            }
+        }
+    }
 }
 
 /// Drawing of all panels: what they read, and where their actions go.

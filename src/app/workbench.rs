@@ -13,7 +13,7 @@ use crate::app::features::recognition::RecognitionFeature;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::features::studies::Studies;
 use crate::app::features::tools::{GripperTools, GripperToolsSetup};
-use crate::app::features::view::ViewState;
+use crate::app::features::view::{Mode, ViewSource, ViewState};
 use crate::app::frame_rate::FrameRate;
 use crate::app::import_dialog::{Asked, ImportDialog};
 use crate::app::panels::PanelKind;
@@ -22,11 +22,12 @@ use crate::app::shown::Inspected;
 use crate::app::startup::ThreadError;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::tiling::{Tiling, panel_frame};
+use crate::app::tiling::{self, Tiling, panel_frame};
 use crate::app::viewport::Viewport;
-use crate::app::{bars, keys, modes, palette, presenter};
+use crate::app::{bars, keys, manual, modes, palette, presenter};
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 use egui_tiles::Tile;
+use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::workers::{
@@ -103,6 +104,21 @@ pub struct Workbench {
     path_dialog: Option<PathDialog>,
     import_dialog: Option<ImportDialog>,
     cleared: bool,
+    /// Title of the window.
+    title: String,
+}
+
+/// Width of the ring around the widget that has the keyboard (points).
+const RING: f32 = 2.0;
+
+/// Rings the widget that has the keyboard, whatever it is.
+fn focus_ring(ctx: &egui::Context, theme: Theme) {
+    let Some(focused) = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id)) else { return };
+    if focused.interact_rect.is_positive() {
+        let stroke = egui::Stroke::new(RING, colour(theme.colours().accent));
+        let ring = focused.interact_rect.expand(0.5);
+        ctx.layer_painter(focused.layer_id).rect_stroke(ring, 4.0, stroke, egui::StrokeKind::Inside);
+    }
 }
 
 impl Workbench {
@@ -185,7 +201,7 @@ impl Workbench {
         if let Some(cause) = without {
             app.notices.error(format!("Recognition is off: {cause}"));
         }
-        Ok(Self { app, path_dialog: None, import_dialog: None, cleared: setup.cleared })
+        Ok(Self { app, path_dialog: None, import_dialog: None, cleared: setup.cleared, title: String::new() })
     }
 
     /// View state, to be remembered.
@@ -250,21 +266,47 @@ impl Workbench {
         let colours = app.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
         Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, app, &mut actions));
-        Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, app, &mut actions));
+        // Studies have no time to move through.
+        if mode != Mode::Study {
+            Panel::bottom("bottom").exact_size(44.0).frame(bar).show(ui, |ui| bars::bottom(ui, app, &mut actions));
+        }
         CentralPanel::default().frame(Frame::NONE).show(ui, |ui| {
             let mut tiling = Tiling { app, actions: &mut actions, chosen: None };
+            let wide = tiling::narrow_sides(&mut layout, ui.available_width());
             layout.ui(&mut tiling, ui);
+            wide.into_iter().for_each(|shares| shares.restore(&mut layout));
             if let Some(chosen) = tiling.chosen {
                 layout.make_active(|id, _| id == chosen);
             }
         });
         keys::sheet(app, mode, &mut actions);
+        manual::ui(app, &mut actions);
         palette::ui(app, &mut actions);
         drop_hint(&ctx);
+        focus_ring(&ctx, app.view.theme);
+        self.title(&ctx);
         self.app.view.layouts.insert(mode, layout);
         self.run(actions);
         self.ask_for_file();
         self.import_trials();
+    }
+
+    /// Names the object or the trial in the title of the window.
+    fn title(&mut self, ctx: &egui::Context) {
+        let shown = self.app.shown();
+        let subject = match shown.source {
+            ViewSource::Trial => shown.inspected.map(|own| format!("{}, trial {}", own.trial.title, own.trial.id)),
+            ViewSource::Gripper => Some("Real gripper".to_owned()),
+            ViewSource::Simulation if !shown.view.truth_shown => None,
+            ViewSource::Simulation => shown.snapshot.map(|snapshot| {
+                snapshot.object.as_ref().map_or("Empty hand".to_owned(), |object| object.title.clone())
+            }),
+        };
+        let title = subject.map_or_else(|| "Palpate".to_owned(), |subject| format!("{subject} - Palpate"));
+        if title != self.title {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
+        }
     }
 
     /// Draws presenter mode.

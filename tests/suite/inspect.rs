@@ -166,7 +166,7 @@ fn compared_trials_have_a_line_each_or_a_mean() {
     bench.tell(|app| app.inspect.spread = true);
     bench.look();
     bench.until_shown(true, "Lemon, simulated, mean of 1");
-    bench.harness.get_by_label("No longer compare trial 3").click();
+    bench.harness.get_by_label("Remove trial 3 from the comparison").click();
     bench.look();
     bench.until_shown(false, "Lemon, trial 3");
     // A trial that does not exist is refused, and what is open stays.

@@ -35,6 +35,7 @@
 //! - `study_mode`: studies of the paper run, stopped, resumed and looked at in the window.
 //! - `inspect`: stored trials opened, replayed and compared, as they were live.
 //! - `panels`: the window by its labels, and small pictures of its panels.
+//! - `keyboard`: every control by Tab, and keys of the widget that has the keyboard.
 //! - `typing`: words typed into every text field.
 //! - `window`: command palette, undo, keys without effect, files without a system dialog, sizes.
 //! - `recognition_panel`: live recognition in the window, with a recogniser that follows a script.
@@ -70,6 +71,7 @@ mod gripper_file;
 mod gripper_tools;
 mod imports;
 mod inspect;
+mod keyboard;
 mod lab_day;
 mod labelling;
 mod learning;

@@ -24,7 +24,7 @@ fn a_click_in_a_heat_map_over_time_moves_the_cursor() {
         [("Joint angle over time, left finger", "2.00"), ("Row pressure over time, right finger", "2.00")]
     {
         bench.harness.get_by_label_contains(map).click();
-        bench.until_shown(true, &format!("cursor at {shown}\u{2009}s"));
+        bench.until_shown(true, &format!("cursor at {shown}\u{a0}s"));
     }
 }
 
@@ -32,7 +32,7 @@ fn a_click_in_a_heat_map_over_time_moves_the_cursor() {
 fn units_are_switched() {
     let mut bench = panel("signature", Theme::Light, [280.0, 300.0]);
     bench.advance_to(1.0);
-    for (unit, map) in [("N", "Row force over time"), ("1/m", "Joint curvature over time")] {
+    for (unit, map) in [("N", "Row force over time"), ("m\u{207b}\u{b9}", "Joint curvature over time")] {
         bench.harness.get_by_label(unit).click();
         bench.harness.step();
         bench.harness.step();
@@ -49,11 +49,7 @@ fn pads_say_their_force_in_words() {
         let wanted = format!("{side} pad: ");
         let pad = bench.harness.get_by_label_contains(&wanted);
         let text = pad.accesskit_node().label().expect("a label");
-        text.split(": ")
-            .nth(1)
-            .and_then(|rest| rest.split('\u{2009}').next())
-            .and_then(|n| n.parse().ok())
-            .expect(&text)
+        text.split(": ").nth(1).and_then(|rest| rest.split('\u{a0}').next()).and_then(|n| n.parse().ok()).expect(&text)
     };
     assert_eq!(force(&bench, "left"), 0.0);
     bench.advance_to(2.6);

@@ -122,15 +122,15 @@ fn until_open(bench: &mut Bench) -> i64 {
 #[test]
 fn a_study_is_run_stopped_resumed_and_its_trials_are_opened() {
     let mut bench = bench(Theme::Dark, [1600.0, 1800.0], |_| ());
-    bench.until_shown(true, "not run here; result of the program");
+    bench.until_shown(true, "shipped result");
     bench.tell(|app| app.run_study(request(false)));
     bench.until_shown(true, "measuring, ");
     bench.harness.get_by_label("Stop study").click();
     bench.until_told("Study stopped: ");
-    bench.until_shown(true, "result of the program, another stopped");
+    bench.until_shown(true, "shipped result; your run is paused");
     bench.tell(|app| app.run_study(request(false)));
     bench.until_told("Study finished: ");
-    bench.until_shown(true, "A short form: do not quote its numbers.");
+    bench.until_shown(true, "Quick run: do not quote.");
     // The same files as those of the command line.
     let folder = SAMPLE.folder(bench.store().path());
     let stored = folder.read::<StudyReport>("models").unwrap().expect("a result");
@@ -154,7 +154,7 @@ fn findings_are_told_by_words_and_rows_open_trials() {
         scripted_result(store);
     };
     let mut bench = bench(Theme::Light, [1400.0, 1000.0], fill);
-    bench.until_shown(true, "Claims of the paper: 1 agrees, 1 partly, 1 disagrees, 1 not measured");
+    bench.until_shown(true, "4 claims: 1 confirmed, 1 in part, 1 not, 1 not measured");
     for word in ["✔ agrees", "✖ disagrees", "± partly", "– not measured"] {
         assert!(bench.harness.query_by_label(word).is_some(), "{word}");
     }
@@ -201,7 +201,7 @@ fn the_mode_is_drawn_in_both_themes_and_small() {
     ] {
         let mut bench = bench(theme, size, scripted_result);
         bench.tell(|app| app.show_panel("study-figure"));
-        bench.until_shown(true, "Claims of the paper: ");
+        bench.until_shown(true, " claims: ");
         bench.harness.run_steps(8);
         let picture: RgbaImage = bench.picture();
         assert_eq!([picture.width() as f32, picture.height() as f32], size);

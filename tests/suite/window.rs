@@ -329,7 +329,7 @@ fn a_warning_carries_the_button_that_helps() {
     bench.until(|s| s.object.as_ref().is_some_and(|object| object.name == "bin"));
     // An open mesh has its picture in the list of objects.
     bench.tell(|app| app.show_panel("objects"));
-    bench.until_shown(true, "Picture of bin.obj");
+    bench.until_shown(true, "Picture of Bin");
     // What was refused leaves nothing to undo; the hull does.
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until(|s| s.truth() == "lemon");

@@ -10,13 +10,15 @@ use crate::app::features::simulation::LoggedGrasp;
 use crate::app::features::view::{Mode, ViewSource};
 use crate::app::icons::{self, Icon};
 use crate::app::modes;
+use crate::app::panels::view3d;
 use crate::app::playback::{SPEEDS, Seek};
 use crate::app::theme::{accented, colour, veil};
-use crate::app::widgets::{choice_ui, number_field, stop_button};
-use egui::{Align, Layout, RichText, Ui};
+use crate::app::widgets::{chip, choice_ui, number_field, stop_button};
+use egui::{Align, Layout, RichText, Ui, vec2};
 use palpate_device::serial::LinkState;
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units::{SPACE, shown as with_unit};
+use palpate_lab::inspection::FigureOptions;
 use palpate_lab::workers::{Command, GripperView, Status};
 use palpate_store::TrialPlace;
 
@@ -30,14 +32,13 @@ fn speed_text(speed: f64) -> String {
 }
 
 pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
-    // From the right, so that buttons stay in sight where there is no room for everything.
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        actions.on(&ui.button("?").on_hover_text("Keys (F1)"), |app| app.view.keys_shown = !app.view.keys_shown);
-        menu_ui(ui, app, actions);
-        if app.gripper_view().is_some_and(GripperView::is_connected) {
-            stop_button(ui, actions);
-        }
-        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+    // Buttons at the right stay in sight where there is no room for everything. They are added last, as Tab runs.
+    let id = egui::Id::unique("buttons at the right");
+    let right = ui.data(|data| data.get_temp::<f32>(id)).unwrap_or(RIGHT);
+    ui.horizontal_centered(|ui| {
+        let room = vec2((ui.available_width() - right - ui.spacing().item_spacing.x).max(0.0), ui.available_height());
+        ui.allocate_ui_with_layout(room, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_size(room);
             ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
             if ui.available_width() > 780.0 {
                 ui.label(RichText::new("Palpate").heading().strong());
@@ -58,7 +59,42 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
                 });
             }
         });
+        let buttons = ui.scope(|ui| {
+            activity_ui(ui, app, actions);
+            if app.gripper_view().is_some_and(GripperView::is_connected) {
+                stop_button(ui, actions);
+            }
+            menu_ui(ui, app, actions);
+            actions.on(&ui.button("?").on_hover_text("Keys (F1)"), |app| app.view.keys_shown = !app.view.keys_shown);
+        });
+        let width = buttons.response.rect.width();
+        if (width - right).abs() > 0.5 {
+            ui.data_mut(|data| data.insert_temp(id, width));
+            ui.ctx().request_repaint();
+        }
     });
+}
+
+/// Width of the buttons at the right before they were drawn (points).
+const RIGHT: f32 = 140.0;
+
+/// What runs in the background, whatever mode is open: a chip each, with its progress and a button that stops it.
+fn activity_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    let tools = &app.tools;
+    let study = app.studies.running().map(|running| ("Study", running.progress));
+    let training = tools.training.running().map(|running| ("Training", running.progress));
+    let lesson = tools.teaching.running().map(|running| ("Learning", running.progress));
+    let fit = tools.fit.running().map(|running| ("Fit", running.progress));
+    let stops: [fn(&mut App); 4] =
+        [|app| app.studies.stop(), |app| app.tools.training.stop(), App::stop_teaching, |app| app.tools.fit.stop()];
+    for (running, stop) in [study, training, lesson, fit].into_iter().zip(stops) {
+        let Some((name, progress)) = running else { continue };
+        let text = format!("{name} {:.0}{SPACE}%", 100.0 * progress.share);
+        chip(ui, &text, app.view.theme.colours().accent).on_hover_text(&progress.words);
+        let button = ui.small_button("Stop");
+        button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Stop: {name}")));
+        actions.on(&button, stop);
+    }
 }
 
 /// Driver that draws, and while the view moves how often and how finely.
@@ -80,7 +116,27 @@ fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         actions.push(move |app| app.set_theme(other));
     }
     let menu = ui.menu_button("Menu", |ui| {
-        actions.on(&ui.button("Find an action ..  Ctrl+K"), |app| app.view.palette_shown = true);
+        let mut item = |ui: &mut Ui, name: &str, key: &str, action: fn(&mut App)| {
+            actions.on(&ui.add(egui::Button::new(name).shortcut_text(key)), action);
+        };
+        item(ui, "Find an action ..", "Ctrl+K", |app| app.view.palette_shown = true);
+        ui.separator();
+        item(ui, "Open an object ..", "Ctrl+O", App::ask_for_object);
+        item(ui, "Import trials ..", "", App::ask_for_trials);
+        item(ui, "Save the scene ..", "Ctrl+S", App::save_scene);
+        item(ui, "Save a picture ..", "Ctrl+P", |app| {
+            if let Err(why) = view3d::save_picture(app) {
+                app.notices.info(why);
+            }
+        });
+        item(ui, "Export ..", "Ctrl+E", |app| match app.view.mode {
+            Mode::Demo | Mode::Inspect => app.export_figure(FigureOptions::default()),
+            Mode::Label => app.export_labelled(),
+            Mode::Study => app.export_study_figure(),
+        });
+        ui.separator();
+        item(ui, "Undo", "Ctrl+Z", |app| app.undo(false));
+        item(ui, "Redo", "Ctrl+Shift+Z", |app| app.undo(true));
         ui.separator();
         ui.label("UI scale");
         ui.horizontal(|ui| {
@@ -95,9 +151,14 @@ fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
             app.view.layouts.clear();
         });
         let hint = "Full screen: object after object, with large letters and a score";
-        actions.on(&ui.button("Presenter mode  F11").on_hover_text(hint), |app| app.present(true));
+        let presenter = egui::Button::new("Presenter mode").shortcut_text("F11");
+        actions.on(&ui.add(presenter).on_hover_text(hint), |app| app.present(true));
+        ui.separator();
+        actions.on(&ui.add(egui::Button::new("Keys").shortcut_text("F1")), |app| app.view.keys_shown = true);
+        actions.on(&ui.button("Manual"), |app| app.view.manual_shown = true);
+        actions.on(&ui.button("About"), |app| app.view.about_shown = true);
     });
-    menu.response.on_hover_text("Actions, UI scale, layout");
+    menu.response.on_hover_text("Open, save, export, undo, keys, manual");
 }
 
 /// Tabs of the modes.
@@ -177,11 +238,12 @@ fn gripper_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         false => "Trials begin with R. W in Label mode, or a click, detects them automatically",
     };
     let text = RichText::new(trials).small().color(colour(ink));
-    actions.on(&ui.selectable_label(watching, text).on_hover_text(about), App::toggle_watch);
+    let button = egui::Button::selectable(watching, text).frame_when_inactive(true);
+    actions.on(&ui.add(button).on_hover_text(about), App::toggle_watch);
     let text = RichText::new(drive_text(app, gripper, narrow)).small().color(colour(colours.text));
     let about = "Who sets the pressure of the next trial: you by hand, or the board; untimed trials last until Q. \
                  M in Label mode, or a click, changes it";
-    actions.on(&ui.selectable_label(false, text).on_hover_text(about), App::next_control);
+    actions.on(&ui.button(text).on_hover_text(about), App::next_control);
 }
 
 /// Actuation, and line pressure where it is known.
@@ -191,7 +253,7 @@ fn drive_text(app: &App, gripper: &GripperView, narrow: bool) -> String {
     if narrow {
         return control.to_owned();
     }
-    match gripper.latest.as_ref().and_then(|latest| latest.line_bar) {
+    match gripper.latest.as_ref().filter(|_| app.gripper.silent_s().is_none()).and_then(|latest| latest.line_bar) {
         Some(bar) => format!("drive: {control}, {}", with_unit(bar, "bar")),
         None => format!("drive: {control}"),
     }

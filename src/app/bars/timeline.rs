@@ -29,6 +29,15 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         let share = f64::from((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
         actions.push(move |app| app.seek(Seek::To(first + share * length)));
     }
+    if response.has_focus() {
+        let arrows = egui::EventFilter { horizontal_arrows: true, ..egui::EventFilter::default() };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+        for (key, by) in [(egui::Key::ArrowLeft, -0.1), (egui::Key::ArrowRight, 0.1)] {
+            if ui.input(|input| input.key_pressed(key)) {
+                actions.push(move |app| app.seek(Seek::By(by)));
+            }
+        }
+    }
     let colours = data.view.theme.colours();
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, colour(colours.background));

@@ -105,8 +105,11 @@ impl App {
     pub(super) fn poll_files(&mut self) {
         for ended in self.files.exports.take() {
             match ended.outcome {
-                Ok(said) => self.notices.info(said.as_str()),
-                Err(cause) => self.notices.error(cause.to_string()),
+                Ok(said) => {
+                    self.notices.done("file");
+                    self.notices.info(said.as_str());
+                }
+                Err(cause) => self.notices.failed("file", cause.to_string()),
             }
         }
         if self.files.labelled && self.labelling.is_settled() {
@@ -152,8 +155,11 @@ impl App {
         let name = Some(format!("{stem}_scene.toml"));
         self.files.ask("Save scene", &["toml"], name, move |app, path| {
             match write_whole(&path, FileKind::Scene, scene.to_toml().as_bytes()) {
-                Ok(()) => app.notices.info(format!("Scene saved as {}.", path.display())),
-                Err(error) => app.notices.error(format!("Cannot write {}: {error}", path.display())),
+                Ok(()) => {
+                    app.notices.done("file");
+                    app.notices.info(format!("Scene saved as {}.", path.display()));
+                }
+                Err(error) => app.notices.failed("file", format!("Cannot write {}: {error}", path.display())),
             }
         });
     }
@@ -171,7 +177,7 @@ impl App {
                 |text: String| write_whole(&path, Mapping::FILE, text.as_bytes()).map_err(|error| error.to_string());
             match text.and_then(write) {
                 Ok(()) => app.notices.info(format!("Import profile saved as {}.", path.display())),
-                Err(cause) => app.notices.error(format!("Cannot write {}: {cause}", path.display())),
+                Err(cause) => app.notices.failed("file", format!("Cannot write {}: {cause}", path.display())),
             }
         });
     }

@@ -3,6 +3,7 @@
 use super::App;
 use super::view::ViewSource;
 use crate::app::traces::TraceHistory;
+use palpate_device::serial::LinkState;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, Notice, TrialView};
@@ -17,6 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
 
 /// State of the real gripper in the window.
 pub struct GripperFeature {
@@ -27,6 +29,8 @@ pub struct GripperFeature {
     pub(in crate::app) view: Option<Arc<GripperView>>,
     pub(in crate::app) traces: TraceHistory,
     connected: bool,
+    /// When the last reading came.
+    heard: Instant,
     /// Part of the trial at the last look.
     part: Option<GraspStage>,
     /// Recording and number of grasps of the simulation before it began to follow the gripper.
@@ -60,6 +64,7 @@ impl GripperFeature {
             view: None,
             traces: TraceHistory::default(),
             connected: false,
+            heard: Instant::now(),
             part: None,
             before_following: None,
             scene,
@@ -72,8 +77,14 @@ impl GripperFeature {
         self.worker.send(command)
     }
 
+    /// Time for which a connected board has sent no readings (s); none while they come. What was read before is not so any more.
+    pub(in crate::app) fn silent_s(&self) -> Option<u64> {
+        let link = self.view.as_ref()?.link.as_ref()?;
+        (link.state != LinkState::Listening).then(|| self.heard.elapsed().as_secs())
+    }
+
     /// Vents the fingers, where a board is connected.
-    pub(super) fn stop(&self) {
+    pub(in crate::app) fn stop(&self) {
         if self.connected {
             self.worker.send(GripperCommand::Vent);
         }
@@ -100,21 +111,30 @@ impl App {
             gripper.traces.clear();
         }
         for row in gripper.worker.rows() {
+            gripper.heard = Instant::now();
             gripper.traces.push(&row);
         }
-        gripper.worker.notices().for_each(|notice| notices.show(notice));
+        for notice in gripper.worker.notices() {
+            match notice {
+                Notice::Failed(text) => notices.failed("gripper", text),
+                other => notices.show(other),
+            }
+        }
         gripper.view = gripper.worker.view();
         let Some(now) = gripper.view.clone() else { return };
         if gripper.connected != now.is_connected() {
             gripper.connected = now.is_connected();
+            if now.is_connected() {
+                self.notices.done("gripper");
+            }
             self.view.source = if now.is_connected() { ViewSource::Gripper } else { ViewSource::Simulation };
             self.hand_over();
         }
         self.show_empty(now.trial.as_ref().is_some_and(|trial| trial.adapting));
         let part = now.trial.as_ref().map(|trial| trial.stage);
         let begins = std::mem::replace(&mut self.gripper.part, part) != part;
-        if begins && part == Some(GraspStage::Phase(Phase::Close)) {
-            // The simulated fingers lie over the real ones.
+        if begins && part == Some(GraspStage::Phase(Phase::Close)) && self.view.ghost {
+            // The simulated fingers close beside the real ones.
             for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {
                 self.simulation.send(command);
             }

@@ -235,12 +235,14 @@ impl InspectFeature {
     }
 
     fn means(&self, key: &ComparisonKey) -> Vec<ComparedTrace> {
-        let mut classes: BTreeMap<(&str, bool), Vec<&OpenTrial>> = BTreeMap::new();
+        let mut classes: BTreeMap<(&str, bool), (usize, Vec<&OpenTrial>)> = BTreeMap::new();
         for pinned in &self.pinned {
             let real = pinned.trial.source != TrialSource::Simulated;
-            classes.entry((pinned.trial.title.as_str(), real)).or_default().push(&pinned.trial);
+            // The first of its trials gives the colour.
+            let class = classes.entry((pinned.trial.title.as_str(), real)).or_insert((pinned.colour, Vec::new()));
+            class.1.push(&pinned.trial);
         }
-        let compared = |(colour, ((title, real), trials)): (usize, ((&str, bool), Vec<&OpenTrial>))| {
+        let compared = |((title, real), (colour, trials)): ((&str, bool), (usize, Vec<&OpenTrial>))| {
             let mean = MeanTrial::of(&trials, key.alignment)?;
             let empty = || vec![f32::NAN; mean.t_s.len()];
             let column = |name: &String| mean.columns.iter().find(|column| column.name == *name);
@@ -255,7 +257,7 @@ impl InspectFeature {
             let source = if real { "real" } else { "simulated" };
             Some(ComparedTrace { name: format!("{title}, {source}, mean of {}", trials.len()), colour, trace, spread })
         };
-        classes.into_iter().enumerate().filter_map(compared).collect()
+        classes.into_iter().filter_map(compared).collect()
     }
 }
 
@@ -274,7 +276,10 @@ impl App {
         for ended in inspect.opener.take() {
             let (id, scenery) = (ended.command.id, ended.command.options.keep == Keep::Scenery);
             match ended.outcome {
-                Ok(trial) if scenery => inspect.take_open(trial),
+                Ok(trial) if scenery => {
+                    self.notices.done("trial");
+                    inspect.take_open(trial);
+                }
                 Ok(trial) => inspect.take_pinned(trial),
                 Err(cause) => {
                     inspect.awaited.retain(|awaited| *awaited != id);
@@ -284,7 +289,7 @@ impl App {
                             inspect.show_live(view);
                         }
                     }
-                    self.notices.error(format!("Trial {id} cannot be opened: {cause}"));
+                    self.notices.failed("trial", format!("Trial {id} cannot be opened: {cause}"));
                 }
             }
         }

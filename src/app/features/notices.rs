@@ -47,6 +47,8 @@ enum Level {
 /// Message in the line.
 struct Shown {
     level: Level,
+    /// Action that has failed: when it succeeds, the message is no longer true.
+    failed: Option<&'static str>,
     text: String,
     until: Instant,
 }
@@ -71,7 +73,7 @@ impl Notices {
         let time = if text.contains(STORE_LOST) { LASTING } else { time };
         let time = if remedies(&text).next().is_some() { time.max(WITH_BUTTON) } else { time };
         self.shown.retain(|shown| shown.text != text);
-        self.shown.push(Shown { level, text: text.clone(), until: Instant::now() + time });
+        self.shown.push(Shown { level, failed: None, text: text.clone(), until: Instant::now() + time });
         self.messages.push_back(text);
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
@@ -104,6 +106,24 @@ impl Notices {
 
     pub(in crate::app) fn error(&mut self, text: impl Into<String>) {
         self.tell(Level::Error, text.into());
+    }
+
+    /// Shows why an action has failed, until it succeeds.
+    pub(in crate::app) fn failed(&mut self, attempt: &'static str, text: impl Into<String>) {
+        self.error(text);
+        if let Some(shown) = self.shown.last_mut() {
+            shown.failed = Some(attempt);
+        }
+    }
+
+    /// Takes errors of an action away: it has succeeded.
+    pub(in crate::app) fn done(&mut self, attempt: &'static str) {
+        let mut gone =
+            self.shown.extract_if(.., |shown| shown.failed == Some(attempt)).map(|shown| shown.text).peekable();
+        if gone.peek().is_some() {
+            let gone: Vec<String> = gone.collect();
+            self.messages.retain(|text| !gone.contains(text));
+        }
     }
 
     /// Last messages, oldest first.
@@ -198,6 +218,18 @@ mod tests {
         let hour = Instant::now() + Duration::from_secs(3600);
         notices.shown.retain(|shown| shown.until > hour);
         assert_eq!(notices.current(&ctx), Some(lost.as_str()));
+    }
+
+    #[test]
+    fn an_error_disappears_when_its_action_succeeds() {
+        let mut notices = Notices::default();
+        notices.failed("scene", "cannot read the mesh");
+        notices.failed("study", "the study failed");
+        notices.done("scene");
+        let ctx = egui::Context::default();
+        assert_eq!(notices.current(&ctx), Some("the study failed"));
+        notices.done("study");
+        assert!(notices.current(&ctx).is_none() && notices.messages().is_empty());
     }
 
     #[test]

@@ -3,12 +3,14 @@
 use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
-use palpate_lab::grasping::RecognisedGrasp;
+use palpate_lab::grasping::{LESSON_GRASPS, RecognisedGrasp};
 use palpate_lab::workers::{Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Model, Models, Shipped};
+use palpate_sim::objects::object_title;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// State of the recognition in the window.
 pub(in crate::app) struct RecognitionFeature {
@@ -18,12 +20,28 @@ pub(in crate::app) struct RecognitionFeature {
     loading: VecDeque<ViewSource>,
     /// Models in use.
     models: Models,
-    /// Object file that the model in use was last asked to learn.
+    /// Object file that the model in use was last asked to learn, and when.
     taught: Option<String>,
+    asked: Instant,
+    /// The last lesson, until it is dismissed.
+    pub(in crate::app) learned: Option<Learned>,
     /// Explanations of answers.
     pub(in crate::app) explainer: Explainer,
     /// Grasp on which advice was asked last.
     advised: Option<Arc<RecognisedGrasp>>,
+}
+
+/// An object that the model has just learned.
+pub(in crate::app) struct Learned {
+    /// Its title.
+    pub(in crate::app) title: String,
+    /// Number of simulated grasps, and the time that the lesson took (s).
+    pub(in crate::app) grasps: usize,
+    pub(in crate::app) seconds: f64,
+    /// File that the object is from.
+    source: String,
+    /// The model without it, and its file; none for a shipped one.
+    before: (Arc<Model>, Option<PathBuf>),
 }
 
 impl RecognitionFeature {
@@ -35,7 +53,16 @@ impl RecognitionFeature {
         view: &mut ViewState,
     ) -> Self {
         let models = shipped.clone();
-        let mut feature = Self { shipped, loading: VecDeque::new(), models, taught: None, explainer, advised: None };
+        let mut feature = Self {
+            shipped,
+            loading: VecDeque::new(),
+            models,
+            taught: None,
+            asked: Instant::now(),
+            learned: None,
+            explainer,
+            advised: None,
+        };
         for (path, gripper) in
             [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
         {
@@ -114,6 +141,29 @@ impl App {
         }
     }
 
+    /// Uses the model without the object that it has just learned.
+    pub(in crate::app) fn forget_learned(&mut self) {
+        let Some(Learned { title, source, before: (model, path), .. }) = self.recognition.learned.take() else {
+            return;
+        };
+        self.use_in_simulation(path.is_some().then_some(&model));
+        self.view.simulation_model = path;
+        // It is not learned again by itself.
+        self.recognition.taught = Some(source);
+        self.notices.info(format!("Forgot \"{title}\"."));
+    }
+
+    /// Says no more about the last lesson.
+    pub(in crate::app) fn dismiss_learned(&mut self) {
+        self.recognition.learned = None;
+    }
+
+    /// Names of the classes that the model in use was taught.
+    pub(in crate::app) fn learned_names(&self) -> &[String] {
+        let fixed = self.snapshot().is_some_and(|snapshot| snapshot.scene.holds_object());
+        self.recognition.models.of(Shipped::simulated(fixed)).map_or(&[], |model| &model.card.taught)
+    }
+
     /// Cancels the lesson.
     pub(in crate::app) fn stop_teaching(&mut self) {
         self.tools.teaching.stop();
@@ -163,7 +213,7 @@ impl App {
         if is_known || recognition.taught.as_ref() == Some(source) {
             return;
         }
-        recognition.taught = Some(source.clone());
+        (recognition.taught, recognition.asked) = (Some(source.clone()), Instant::now());
         if Path::new(source).is_file() {
             let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
             tools.teaching.start(TeachRequest { model: Arc::clone(model), name, object, recorded: false });
@@ -178,9 +228,17 @@ impl App {
         match outcome {
             Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&trained),
             Ok(trained) if simulated.iter().any(is_current) => {
-                self.view.simulation_model = Some(trained.path.clone());
+                let before = self.view.simulation_model.replace(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
-                self.notices.info(format!("The model knows {} now.", command.name));
+                let title = object_title(&command.name);
+                self.notices.info(format!("Learned \"{title}\"."));
+                self.recognition.learned = command.object.as_ref().map(|object| Learned {
+                    title,
+                    grasps: LESSON_GRASPS,
+                    seconds: self.recognition.asked.elapsed().as_secs_f64(),
+                    source: object.source.clone(),
+                    before: (Arc::clone(&command.model), before),
+                });
                 // What was decided without the new class is tried again.
                 if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
                     self.simulation.send(Command::Play);
@@ -209,11 +267,12 @@ impl App {
     pub(super) fn poll_recognition(&mut self) {
         match self.tools.trained() {
             Some(Ok(finished)) => {
+                self.notices.done("training");
                 let f1 = finished.judged.evaluation.f1_macro;
                 self.notices.info(format!("Trained: macro F1 {f1:.2} on held-back trials."));
                 self.use_file_for_gripper(&finished.trained);
             }
-            Some(Err(cause)) => self.notices.error(format!("Training failed: {cause}")),
+            Some(Err(cause)) => self.notices.failed("training", format!("Training failed: {cause}")),
             None => {}
         }
         for ended in self.tools.teaching.take() {
@@ -223,6 +282,9 @@ impl App {
         self.ask_for_advice();
         for ended in self.tools.load.take() {
             let gripper = self.recognition.loading.pop_front().unwrap_or(ViewSource::Gripper);
+            if ended.outcome.is_ok() {
+                self.notices.done("model");
+            }
             match (ended.outcome, gripper) {
                 (Ok(trained), ViewSource::Gripper) => self.use_file_for_gripper(&trained),
                 (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
@@ -230,7 +292,7 @@ impl App {
                     self.use_in_simulation(Some(&trained.model));
                     self.notices.info(format!("Model for the simulation: {}", trained.about));
                 }
-                (Err(cause), _) => self.notices.error(format!("Model not changed: {cause}")),
+                (Err(cause), _) => self.notices.failed("model", format!("Model not changed: {cause}")),
             }
         }
     }

@@ -13,6 +13,7 @@ use palpate_study::Explanation;
 use palpate_study::accuracy::{AccuracyStudy, stored_accuracy};
 use palpate_tactile::board::SensorList;
 use palpate_tactile::trial::TrialId;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,6 +35,8 @@ pub struct SimulationFeature {
     /// Scene as set by the user.
     pub(in crate::app) scene: Scene,
     pub(in crate::app) traces: TraceHistory,
+    /// Number of the grasp from which on this scene is grasped.
+    scene_since: u64,
     /// Object last seen in the hand: a built-in name or a file.
     seen: Option<String>,
     shuffled: ShuffledObjects,
@@ -64,6 +67,7 @@ impl SimulationFeature {
             stored_accuracy: stored_accuracy().map(|stored| stored.result),
             scene,
             traces: TraceHistory::default(),
+            scene_since: 0,
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
             changes: SceneChanges::default(),
@@ -139,7 +143,7 @@ impl App {
         let news: Vec<Notice> = simulation.worker.notices().collect();
         for notice in news {
             match notice {
-                Notice::SceneRefused(refusal) => notices.error(simulation.take_refusal(*refusal)),
+                Notice::SceneRefused(refusal) => notices.failed("scene", simulation.take_refusal(*refusal)),
                 // The bar offers to keep it.
                 Notice::Logged(id, place) => simulation.last_trial = Some((id, place)),
                 Notice::Stored(stored) => {
@@ -153,6 +157,9 @@ impl App {
         simulation.snapshot = simulation.worker.snapshot();
         if let Some(snapshot) = simulation.snapshot.clone() {
             simulation.traces.forget_before(snapshot.scene_since);
+            if std::mem::replace(&mut simulation.scene_since, snapshot.scene_since) != snapshot.scene_since {
+                notices.done("scene");
+            }
             self.take_note_of_object(&snapshot);
         }
         if self.simulation.worker.has_ended() && !std::mem::replace(&mut self.simulation.ended, true) {
@@ -162,7 +169,7 @@ impl App {
 
     /// Frames a new object and, where it came from a file, remembers that.
     fn take_note_of_object(&mut self, snapshot: &Snapshot) {
-        let Self { simulation, view, .. } = self;
+        let Self { simulation, view, notices, .. } = self;
         let source = &snapshot.scene.object.source;
         if simulation.seen.as_ref() == Some(source) {
             return;
@@ -172,6 +179,11 @@ impl App {
         }
         if source != EMPTY && !catalogue().iter().any(|b| b.name == *source) {
             view.remember_file(source);
+            if simulation.seen.is_some()
+                && let Some(object) = &snapshot.object
+            {
+                notices.info(format!("Opened {}.", object.title));
+            }
         }
         simulation.seen = Some(source.clone());
     }
@@ -179,7 +191,7 @@ impl App {
     /// Grasps this scene.
     pub fn set_scene(&mut self, scene: Scene) {
         if let Err(error) = scene.check() {
-            return self.notices.error(error.to_string());
+            return self.notices.failed("scene", error.to_string());
         }
         if scene != self.simulation.scene {
             self.simulation.changes.note(&self.simulation.scene);
@@ -195,7 +207,7 @@ impl App {
             }
             return match Scene::from_file(Path::new(source)) {
                 Ok(scene) => self.set_scene(scene),
-                Err(error) => self.notices.error(error.to_string()),
+                Err(error) => self.notices.failed("scene", error.to_string()),
             };
         }
         self.set_scene(self.simulation.scene_with(source));
@@ -231,7 +243,7 @@ impl App {
     /// Back to the scene before the last change.
     pub(in crate::app) fn undo_scene(&mut self) {
         match self.simulation.changes.undo(&self.simulation.scene) {
-            Some(scene) => self.take_back(scene, "Scene change undone"),
+            Some(scene) => self.take_back(scene, "Undone"),
             None => self.notices.info("No scene change to undo. Labels are undone in Label mode (Ctrl+3)."),
         }
     }
@@ -239,16 +251,43 @@ impl App {
     /// Forward again.
     pub(in crate::app) fn redo_scene(&mut self) {
         match self.simulation.changes.redo(&self.simulation.scene) {
-            Some(scene) => self.take_back(scene, "Scene change redone"),
+            Some(scene) => self.take_back(scene, "Redone"),
             None => self.notices.info("No scene change to redo."),
         }
     }
 
     fn take_back(&mut self, scene: Scene, done: &str) {
-        let object = object_title(&scene.object.source);
+        let changed = changes(&self.simulation.scene, &scene);
         self.simulation.use_scene(scene);
-        self.notices.info(format!("{done}: {object}."));
+        self.notices.info(format!("{done}: {changed}."));
     }
+}
+
+/// What differs between two scenes: `object lemon → tomato`, `yaw deg 30 → 0`.
+fn changes(from: &Scene, to: &Scene) -> String {
+    /// Most settings that are named.
+    const NAMED: usize = 2;
+    let settings = |scene: &Scene| -> BTreeMap<String, String> {
+        let lines = scene.differences();
+        lines.lines().filter_map(|line| line.split_once('=')).map(|(k, v)| (k.to_owned(), v.to_owned())).collect()
+    };
+    let (before, after) = (settings(from), settings(to));
+    let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
+    let value = |of: &BTreeMap<String, String>, key: &str| of.get(key).cloned().unwrap_or_else(|| "default".to_owned());
+    let named = |key: &str| key.rsplit('.').next().unwrap_or(key).replace('_', " ");
+    let titles = [from, to].map(|scene| object_title(&scene.object.source));
+    let mut texts: Vec<String> = Vec::new();
+    if titles[0] != titles[1] {
+        texts.push(format!("object {} \u{2192} {}", titles[0], titles[1]));
+    }
+    let changed = keys.into_iter().filter(|key| before.get(*key) != after.get(*key));
+    texts.extend(changed.map(|key| format!("{} {} \u{2192} {}", named(key), value(&before, key), value(&after, key))));
+    let more = texts.len().saturating_sub(NAMED);
+    texts.truncate(NAMED);
+    if more > 0 {
+        texts.push(format!("{more} more"));
+    }
+    texts.join(", ")
 }
 
 /// Changes of the scene, to be undone.

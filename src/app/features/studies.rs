@@ -150,6 +150,7 @@ impl App {
             studies.failed.remove(key);
             match ended.outcome {
                 Ok(end) => {
+                    notices.done("study");
                     studies.files = Arc::new(end.files.clone());
                     if !end.finished {
                         notices.info(format!("Study stopped: {title}. Run it again to resume."));
@@ -161,7 +162,7 @@ impl App {
                     }
                 }
                 Err(cause) => {
-                    notices.error(format!("Study {title} failed: {cause}"));
+                    notices.failed("study", format!("Study {title} failed: {cause}"));
                     studies.failed.insert(key.clone(), (*size, cause));
                     studies.looks.start(());
                 }

@@ -7,7 +7,7 @@ use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{BendUnit, LoadUnit};
-use palpate_lab::workers::{Command, Snapshot};
+use palpate_lab::workers::{Command, LabelCommand, Snapshot};
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,6 +31,8 @@ pub struct ViewState {
     pub forces: bool,
     /// The circle that each flex strip reads is drawn.
     pub circles: bool,
+    /// The picture of the touch within the 3-D view is enlarged.
+    pub inset_large: bool,
     /// Contact path on the object.
     pub path: PathLayer,
     /// Unit of loads in heat maps.
@@ -64,6 +66,12 @@ pub struct ViewState {
     /// The key sheet is open.
     #[serde(skip)]
     pub keys_shown: bool,
+    /// The manual is open.
+    #[serde(skip)]
+    pub manual_shown: bool,
+    /// What the program is stands in a window.
+    #[serde(skip)]
+    pub about_shown: bool,
     /// Sensors that plots and recognisers read of the simulation and of stored trials.
     pub sensors: SensorView,
     /// What each plot derives from its channels.
@@ -194,6 +202,7 @@ impl Default for ViewState {
             framed: None,
             forces: true,
             circles: true,
+            inset_large: false,
             path: PathLayer::default(),
             load_unit: LoadUnit::default(),
             bend_unit: BendUnit::default(),
@@ -209,6 +218,8 @@ impl Default for ViewState {
             simulation_model: None,
             time_window: None,
             keys_shown: false,
+            manual_shown: false,
+            about_shown: false,
             sensors: SensorView::default(),
             derived: BTreeMap::new(),
             class_bands: false,
@@ -250,6 +261,16 @@ impl App {
         self.enter_mode(mode);
     }
 
+    /// Takes the last change back, or makes it again: of the scene in Demo mode, of labels in the others.
+    pub(in crate::app) fn undo(&mut self, again: bool) {
+        match (self.view.mode, again) {
+            (Mode::Demo, false) => self.undo_scene(),
+            (Mode::Demo, true) => self.redo_scene(),
+            (_, false) => self.edit_labels(LabelCommand::Undo),
+            (_, true) => self.edit_labels(LabelCommand::Redo),
+        }
+    }
+
     /// Brings a panel to the front, in a mode that has it.
     pub fn show_panel(&mut self, name: &'static str) {
         self.wanted_panel = Some(name);
@@ -285,12 +306,17 @@ impl App {
         self.ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
     }
 
-    /// Vents the fingers, closes key sheet and palette, and ends presenter mode.
+    /// Vents the fingers, and closes what is topmost: palette, key sheet or manual; else it ends presenter mode.
     pub(in crate::app) fn stop(&mut self) {
-        (self.view.keys_shown, self.view.palette_shown) = (false, false);
+        self.gripper.stop();
+        let view = &mut self.view;
+        for shown in [&mut view.palette_shown, &mut view.keys_shown, &mut view.manual_shown, &mut view.about_shown] {
+            if std::mem::take(shown) {
+                return;
+            }
+        }
         if self.view.presents {
             self.present(false);
         }
-        self.gripper.stop();
     }
 }

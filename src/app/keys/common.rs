@@ -2,13 +2,13 @@
 
 use crate::app::actions::{Act, command, key, key_where};
 use crate::app::features::App;
-use crate::app::features::view::{Mode, ViewSource};
+use crate::app::features::view::ViewSource;
 use crate::app::panels::view3d;
 use crate::app::playback::{Seek, next_speed};
 use egui::{Key, Modifiers};
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
-use palpate_lab::workers::{Command, GripperCommand, LabelCommand, LabellingAction};
+use palpate_lab::workers::{Command, GripperCommand, LabellingAction};
 use palpate_store::TrialPlace;
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -24,34 +24,27 @@ const NOT_LOADED: &str = "The simulation has not loaded an object yet.";
 pub(super) static GROUPS: [(&str, &[Act]); 4] =
     [("General", GENERAL), ("View", VIEW), ("Time", TIME), ("Real gripper", GRIPPER)];
 
-const GENERAL: &[Act] =
-    &[
-        key(COMMAND, Key::K, "command palette: find and run any action", |app| {
-            app.view.palette_shown = !app.view.palette_shown;
-        }),
-        key(COMMAND_SHIFT, Key::Z, "redo", |app| match app.view.mode {
-            Mode::Demo => app.redo_scene(),
-            Mode::Inspect | Mode::Label | Mode::Study => app.edit_labels(LabelCommand::Redo),
-        }),
-        key(COMMAND, Key::Z, "undo the last change of the scene (Demo mode), or the last label or discard", |app| {
-            match app.view.mode {
-                Mode::Demo => app.undo_scene(),
-                Mode::Inspect | Mode::Label | Mode::Study => app.edit_labels(LabelCommand::Undo),
-            }
-        }),
-        key(COMMAND, Key::O, "open a URDF, OBJ or STL file", App::ask_for_object),
-        key(COMMAND, Key::S, "save the scene", App::save_scene),
-        key_where(COMMAND, Key::P, "save a picture of the 3-D view", |app| {
-            app.snapshot().ok_or(NOT_LOADED)?;
-            view3d::save_picture(app)
-        }),
-        key(COMMAND, Key::Plus, "larger texts and buttons", |app| scale(app, SCALE_STEP)),
-        key(COMMAND, Key::Equals, "", |app| scale(app, SCALE_STEP)),
-        key(COMMAND, Key::Minus, "smaller texts and buttons", |app| scale(app, -SCALE_STEP)),
-        key(COMMAND, Key::Num0, "texts and buttons at 100 %", |app| app.set_scale(1.0)),
-        key(NONE, Key::F1, "show or hide the keys", |app| app.view.keys_shown = !app.view.keys_shown),
-        key(NONE, Key::F11, "presenter mode", |app| app.present(!app.view.presents)),
-    ];
+const GENERAL: &[Act] = &[
+    key(COMMAND, Key::K, "command palette: find and run any action", |app| {
+        app.view.palette_shown = !app.view.palette_shown;
+    }),
+    key(COMMAND_SHIFT, Key::Z, "redo", |app| app.undo(true)),
+    key(COMMAND, Key::Z, "undo the last change of the scene (Demo mode), or the last label or discard", |app| {
+        app.undo(false);
+    }),
+    key(COMMAND, Key::O, "open a URDF, OBJ or STL file", App::ask_for_object),
+    key(COMMAND, Key::S, "save the scene", App::save_scene),
+    key_where(COMMAND, Key::P, "save a picture of the 3-D view", |app| {
+        app.snapshot().ok_or(NOT_LOADED)?;
+        view3d::save_picture(app)
+    }),
+    key(COMMAND, Key::Plus, "larger texts and buttons", |app| scale(app, SCALE_STEP)),
+    key(COMMAND, Key::Equals, "", |app| scale(app, SCALE_STEP)),
+    key(COMMAND, Key::Minus, "smaller texts and buttons", |app| scale(app, -SCALE_STEP)),
+    key(COMMAND, Key::Num0, "texts and buttons at 100 %", |app| app.set_scale(1.0)),
+    key(NONE, Key::F1, "show or hide the keys", |app| app.view.keys_shown = !app.view.keys_shown),
+    key(NONE, Key::F11, "presenter mode", |app| app.present(!app.view.presents)),
+];
 
 const VIEW: &[Act] = &[
     key(Modifiers::SHIFT, Key::Z, "show everything", App::frame_all),
@@ -64,6 +57,7 @@ const VIEW: &[Act] = &[
     key(NONE, Key::C, "contact path on the object: by time, by pressure, off", |app| {
         app.view.path = app.view.path.next();
     }),
+    key(NONE, Key::I, "enlarge the picture of the touch", |app| app.view.inset_large = !app.view.inset_large),
     key(NONE, Key::G, "ghost: result of the other engine", |app| app.set_ghost(!app.view.ghost)),
     key(Modifiers::ALT, Key::Num1, "front view", |app| turn(app, StandardView::Front)),
     key(Modifiers::ALT, Key::Num3, "right view", |app| turn(app, StandardView::Right)),
@@ -111,7 +105,7 @@ const GRIPPER: &[Act] = &[
     key(
         NONE,
         Key::Escape,
-        "STOP: vent the real gripper and end the trial; close the keys, end presenter mode",
+        "STOP: vent the real gripper and end the trial; close what is topmost, or end presenter mode",
         App::stop,
     ),
 ];

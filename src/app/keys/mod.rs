@@ -41,6 +41,13 @@ pub(super) fn pressed(app: &App, actions: &mut Actions) {
     if ctx.text_edit_focused() || app.view.palette_shown || dialog {
         return stop(ctx, actions);
     }
+    if egui::Popup::is_any_open(ctx) {
+        // Escape closes it, and vents all the same.
+        if ctx.input(|i| i.key_pressed(Key::Escape)) {
+            actions.push(|app| app.gripper.stop());
+        }
+        return;
+    }
     // Presenter mode demonstrates, whatever mode is behind it.
     let mode = if app.view.presents { Mode::Demo } else { app.view.mode };
     if let Some((waits, search)) = modes::kind(mode).search
@@ -68,12 +75,19 @@ enum Pressed {
     Elsewhere(&'static Act, Mode),
 }
 
+/// Keys that belong to the widget with the keyboard, where one has it.
+const OF_WIDGETS: [Key; 6] = [Key::Enter, Key::Space, Key::ArrowLeft, Key::ArrowRight, Key::ArrowUp, Key::ArrowDown];
+
 /// Actions of the keys pressed in this frame, in their order. The keys are consumed.
 fn bound(ctx: &egui::Context, mode: Mode) -> Vec<Pressed> {
     let mut pressed = Vec::new();
+    let focused = ctx.memory(|memory| memory.focused().is_some());
     ctx.input_mut(|input| {
         input.events.retain(|event| {
             let egui::Event::Key { key, modifiers, pressed: true, repeat, .. } = event else { return true };
+            if focused && modifiers.is_none() && OF_WIDGETS.contains(key) {
+                return true;
+            }
             let Some(act) = acts(mode).find(|act| act.is(*key, *modifiers)) else {
                 let others = modes::ALL.iter().filter(|kind| kind.mode != mode && !repeat);
                 let mut keys = others.flat_map(|kind| kind.keys.iter().map(|act| (act, kind.mode)));

@@ -24,10 +24,11 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
         .on_hover_text("palpate study accuracy; palpate help accuracy has its tables");
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let plot = accuracy_plot(study, group);
+        figure_plot::legend_ui(ui, theme::of(ui), plot.series.iter());
         let height = (ui.available_height() - FRONT_HEIGHT).max(LEAST_HEIGHT);
         let roomy = height > ROOM_FOR_LABELS;
         let labelled = |label: &str| roomy && (label.contains("(default)") || ["draft", "reference"].contains(&label));
-        let shown = figure_plot::show(ui, theme::of(ui), ("error against CPU time", &plot), height, true, labelled);
+        let shown = figure_plot::show(ui, theme::of(ui), ("error against CPU time", &plot), height, false, labelled);
         shown.response.widget_info(|| {
             let text = format!("Error against CPU time, {} settings", study.rows.len());
             egui::WidgetInfo::labeled(egui::Role::Figure, true, text)

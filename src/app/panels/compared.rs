@@ -4,11 +4,12 @@
 use crate::app::actions::Actions;
 use crate::app::features::view::ViewSource;
 use crate::app::icons::{self, Icon};
-use crate::app::shown::DisplayedData;
+use crate::app::shown::{DisplayedData, Pinned};
 use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
-use egui::{Color32, Label, ScrollArea, Sense, Ui, vec2};
+use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::series_colour;
+use palpate_geometry::units::{number, symbol};
 use palpate_lab::inspection::Alignment;
 
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
@@ -60,9 +61,50 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                 actions.on(&link.on_hover_text("Open this trial"), move |app| app.open_trial(id));
             });
         }
+        hold_ui(ui, data);
         if comparison.pinned.len() > 1 && ui.button("Remove all").clicked() {
             actions.push(|app| app.inspect.unpin_all());
         }
+    });
+}
+
+/// Most trials of the table of the hold.
+const MOST_IN_TABLE: usize = 4;
+
+/// Means over the hold, channel by channel: of the trial shown, and of those compared with the difference to it.
+fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
+    let Some(shown) = data.inspected.filter(|_| data.source == ViewSource::Trial).map(|own| own.trial) else { return };
+    let pinned = data.comparison.pinned.iter().filter(|pinned| pinned.trial.id != shown.id).take(MOST_IN_TABLE);
+    let pinned: Vec<&Pinned> = pinned.collect();
+    ui.separator();
+    ui.strong("Mean in the hold, and difference to the trial shown");
+    ScrollArea::horizontal().id_salt("hold").show(ui, |ui| {
+        Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]).show(ui, |ui| {
+            ui.weak("");
+            ui.weak(shown.id.to_string());
+            for own in &pinned {
+                ui.label(RichText::new(own.trial.id.to_string()).color(ink_of(data, own.colour)).strong());
+            }
+            ui.end_row();
+            for column in shown.columns.iter().filter(|column| column.channel.is_some()) {
+                let (unit, factor) = match column.unit {
+                    "Pa" => ("kPa", 1e-3),
+                    unit => (unit, 1.0),
+                };
+                let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
+                ui.weak(format!("{}, {}", column.name.replace('_', " "), symbol(unit)));
+                ui.monospace(number(own, unit));
+                for other in &pinned {
+                    let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
+                    let text = mean.map_or("–".to_owned(), |mean| {
+                        let sign = if mean > own { "+" } else { "" };
+                        format!("{} ({sign}{})", number(mean, unit), number(mean - own, unit))
+                    });
+                    ui.monospace(text);
+                }
+                ui.end_row();
+            }
+        });
     });
 }
 

@@ -141,7 +141,7 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 // Some room for the scroll bar.
                 ui.add_space(6.0);
-                ui.label(format!("{} {}", three_digits(estimate.value), units::symbol(&estimate.unit)));
+                ui.label(format!("{} {}", three_digits(estimate.value), units::symbol(estimate.unit)));
             });
         });
         ui.horizontal(|ui| {

@@ -16,15 +16,23 @@ use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
 use std::path::PathBuf;
 
-pub(super) fn ui(ui: &mut Ui, gripper: Option<&GripperView>, control: Control, actions: &mut Actions) {
+pub(super) fn ui(
+    ui: &mut Ui,
+    (gripper, silent_s): (Option<&GripperView>, Option<u64>),
+    control: Control,
+    actions: &mut Actions,
+) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let connected = gripper.and_then(|gripper| Some((gripper, gripper.link.as_ref()?)));
         match connected {
-            Some((gripper, link)) => connected_ui(ui, gripper, link, control, actions),
+            Some((gripper, link)) => connected_ui(ui, (gripper, silent_s), link, control, actions),
             None => ports_ui(ui, gripper, actions),
         }
     });
 }
+
+/// Opacity of values that were read in the past.
+const PAST: f32 = 0.45;
 
 /// Ports to connect to.
 fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
@@ -73,7 +81,13 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     actions.on(&button.on_hover_text(about), App::ask_for_sensors);
 }
 
-fn connected_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus, control: Control, actions: &mut Actions) {
+fn connected_ui(
+    ui: &mut Ui,
+    (gripper, silent_s): (&GripperView, Option<u64>),
+    link: &LinkStatus,
+    control: Control,
+    actions: &mut Actions,
+) {
     ui.horizontal_wrapped(|ui| {
         stop_button(ui, actions);
         if ui
@@ -99,7 +113,16 @@ fn connected_ui(ui: &mut Ui, gripper: &GripperView, link: &LinkStatus, control: 
     health_ui(ui, link);
     failed_sensors_ui(ui, gripper);
     ui.separator();
-    readings_ui(ui, gripper, link);
+    if let Some(silent_s) = silent_s.filter(|_| gripper.latest.is_some()) {
+        warning_ui(ui, format!("No readings for {silent_s}\u{a0}s. These are the last:"));
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(500));
+    }
+    ui.scope(|ui| {
+        if silent_s.is_some() {
+            ui.multiply_opacity(PAST);
+        }
+        readings_ui(ui, gripper, link);
+    });
     for remark in &gripper.remarks {
         wrapped(ui, RichText::new(remark).small().color(ui.visuals().warn_fg_color));
     }
@@ -122,11 +145,12 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
             let text = if bad { text.color(ui.visuals().error_fg_color) } else { text };
             ui.label(text).on_hover_text(about);
         };
-        pair(ui, "rate", format!("{:.1} Hz", cadence.rate_hz), false, "Readings per second");
+        let now = |text: String| if link.state == LinkState::Listening { text } else { "–".to_owned() };
+        pair(ui, "rate", now(format!("{:.1} Hz", cadence.rate_hz)), false, "Readings per second");
         pair(
             ui,
             "jitter",
-            format!("{:.1} ms", cadence.jitter_p95_ms),
+            now(format!("{:.1} ms", cadence.jitter_p95_ms)),
             false,
             "95th percentile of the deviation between readings",
         );

@@ -51,7 +51,8 @@ const fn panel(name: &'static str, title: &'static str, ui: fn(&mut Ui, &App, &m
 /// All panels, and what each of them reads.
 pub const ALL: [PanelKind; 35] = [
     panel("objects", "Objects", |ui, app, actions| {
-        objects::ui(ui, &app.simulation.scene.object.source, &app.view.recent, &app.thumbnails, actions);
+        let chosen = &app.simulation.scene.object.source;
+        objects::ui(ui, (chosen, &app.view.recent), app.learned_names(), &app.thumbnails, actions);
     }),
     panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
     panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),
@@ -60,7 +61,8 @@ pub const ALL: [PanelKind; 35] = [
     panel("other", "Other channels", |ui, app, actions| curves::other_ui(ui, &app.shown(), actions)),
     panel("line", "Line pressure", |ui, app, actions| curves::line_pressure_ui(ui, &app.shown(), actions)),
     panel("recognition", "Recognition", |ui, app, actions| {
-        recognition::ui(ui, &app.shown(), &app.tools, &app.thumbnails, actions);
+        let learned = app.recognition.learned.as_ref();
+        recognition::ui(ui, &app.shown(), &app.tools, learned, &app.thumbnails, actions);
     }),
     panel("why", "Why", |ui, app, actions| {
         why::ui(ui, &app.shown(), &app.recognition.explainer, &app.thumbnails, actions);
@@ -78,7 +80,9 @@ pub const ALL: [PanelKind; 35] = [
         library::ui(ui, &app.library, app.labels(), &app.thumbnails, actions);
     }),
     panel("journal", "Journal", |ui, app, actions| journal::ui(ui, app.labels(), actions)),
-    panel("gripper", "Gripper", |ui, app, actions| gripper::ui(ui, app.gripper_view(), app.view.control, actions)),
+    panel("gripper", "Gripper", |ui, app, actions| {
+        gripper::ui(ui, (app.gripper_view(), app.gripper.silent_s()), app.view.control, actions);
+    }),
     panel("counts", "Counts", |ui, app, actions| curves::counts_ui(ui, &app.shown(), actions)),
     panel("console", "Console", |ui, app, _| console::ui(ui, app.gripper_view())),
     panel("calibration", "Calibration", |ui, app, actions| calibration::ui(ui, app.gripper_view(), actions)),

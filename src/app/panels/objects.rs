@@ -4,21 +4,39 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{selectable_row, text_field};
+use crate::app::widgets::{capital, selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_sim::objects::{EMPTY, catalogue};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
-pub(super) fn ui(ui: &mut Ui, chosen: &str, recent: &[String], pictures: &Thumbnails, actions: &mut Actions) {
+pub(super) fn ui(
+    ui: &mut Ui,
+    (chosen, recent): (&str, &[String]),
+    taught: &[String],
+    pictures: &Thumbnails,
+    actions: &mut Actions,
+) {
+    // A choice made elsewhere comes into sight.
+    let seen = egui::Id::unique("object seen");
+    let before = ui.data(|data| data.get_temp::<String>(seen));
+    let moved = before.as_deref() != Some(chosen);
+    ui.data_mut(|data| data.insert_temp(seen, chosen.to_owned()));
+    let follow = |is_chosen: bool, row: &egui::Response| {
+        if is_chosen && moved && before.is_some() {
+            row.scroll_to_me(None);
+        }
+    };
     open_row(ui, actions);
     ui.add_space(2.0);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for path in recent {
-            let name = std::path::Path::new(path).file_name().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
+            let name = std::path::Path::new(path).file_stem().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
             let texture = pictures.get(path);
-            let clicked = row(ui, chosen == path, texture, name, path);
+            let learned = if taught.iter().any(|taught| taught == name) { "learned, " } else { "" };
+            let clicked = row(ui, chosen == path, texture, &capital(name), &format!("{learned}{path}"));
+            follow(chosen == path, &clicked);
             let source = path.clone();
             actions.on(&clicked, move |app| app.open(&source));
         }
@@ -26,6 +44,7 @@ pub(super) fn ui(ui: &mut Ui, chosen: &str, recent: &[String], pictures: &Thumbn
             let texture = pictures.get(&built_in.name);
             let class = built_in.class().to_string();
             let clicked = row(ui, chosen == built_in.name, texture, &built_in.title, &class);
+            follow(chosen == built_in.name, &clicked);
             actions.on(&clicked, |app| app.open(&built_in.name));
         }
         let clicked = row(ui, chosen == EMPTY, None, "Empty hand", "nothing to grasp");

@@ -22,7 +22,8 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         load_switch(ui, load_unit, actions);
         ui.separator();
         let abouts = [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")];
-        let units = abouts.map(|(unit, about)| (unit, unit.symbol(), about));
+        let name = |unit: BendUnit| if unit == BendUnit::Curvature { "m\u{207b}\u{b9}" } else { unit.symbol() };
+        let units = abouts.map(|(unit, about)| (unit, name(unit), about));
         if let Some(unit) = choice_ui(ui, Some(bend_unit), units) {
             actions.push(move |app| app.view.bend_unit = unit);
         }

@@ -15,7 +15,8 @@ use egui::{PointerButton, Pos2, Rect, Sense, Ui};
 use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Align, Camera, Detail, DrawList, Overlay, Shape2, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_lab::picture::{GhostKind, PAD_FULL_SCALE, PictureView, Stage};
+use palpate_geometry::units;
+use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
@@ -30,12 +31,15 @@ pub(in crate::app) struct View3d<'a> {
     /// Share of the pixels along each side.
     resolution: f32,
     has_driver: bool,
+    /// Time for which the real gripper has sent no readings (s).
+    silent_s: Option<u64>,
 }
 
 impl<'a> View3d<'a> {
     pub(in crate::app) fn of(app: &'a App) -> Self {
         let (data, ghost) = (app.shown(), app.simulation.ghost(&app.view));
-        Self { data, ghost, resolution: app.resolution(), has_driver: app.driver.is_some() }
+        let (resolution, has_driver) = (app.resolution(), app.driver.is_some());
+        Self { data, ghost, resolution, has_driver, silent_s: app.gripper.silent_s() }
     }
 }
 
@@ -44,6 +48,9 @@ const PULL: f64 = 3.0;
 
 /// Height of the inset with the touch in presenter mode, as a share of the picture's.
 const PRESENTED: f32 = 0.38;
+
+/// The same where it is enlarged.
+const LARGE: f32 = 0.62;
 
 /// Smallest visible change of curvature (1/m): 0.25 mm at the tip of a 100 mm finger.
 const SEEN_PER_M: f64 = 0.05;
@@ -143,6 +150,7 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         ViewSource::Gripper => 0.0,
         ViewSource::Trial if own.data.inspected.is_none_or(|own| own.trial.simulated.is_none()) => 0.0,
         ViewSource::Trial | ViewSource::Simulation if own.data.view.presents => PRESENTED,
+        ViewSource::Trial | ViewSource::Simulation if own.data.view.inset_large => LARGE,
         ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
     };
     let view = PictureView {
@@ -150,8 +158,10 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         theme: own.data.view.theme,
         size,
         forces: own.data.view.forces,
+        // Presenter mode is for people who read no units.
+        numbers: !own.data.view.presents,
         layout: own.data.view.sensors.sensor_layout().ok(),
-        circles: own.data.view.circles,
+        circles: own.data.view.circles && !own.data.view.presents,
         inset,
         ..PictureView::default()
     };
@@ -165,8 +175,8 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
 struct Drawn {
     list: DrawList,
     view: PictureView,
-    /// Time of the ghost's frame, where one is drawn (s).
-    ghost: Option<f64>,
+    /// Time of the ghost's frame (s), and how far its fingers are off (m, share of their length), where one is drawn.
+    ghost: Option<(f64, [f64; 2])>,
     /// Curvature of the real fingers, where they are drawn (1/m).
     real: Option<[Option<f64>; 2]>,
 }
@@ -179,14 +189,18 @@ fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) 
     let grasp_path = course.and_then(|shown| path_colour(own.data.view.path, &shown).map(|colour| (shown, colour)));
     let path = grasp_path.as_ref().map(|(_, colour)| *colour);
     let view = PictureView { full_scale, path, ..picture_view(own, moment, size) };
-    let ghost = ghost_frame(own.ghost.as_deref(), moment);
+    // Beside the real fingers stands the simulation itself, where it is asked for.
+    let ghost = match own.data.source {
+        ViewSource::Gripper => Some(frame).filter(|_| own.data.view.ghost),
+        ViewSource::Simulation | ViewSource::Trial => ghost_frame(own.ghost.as_deref(), moment),
+    };
     let real = real_curvature(own);
-    let mut list = stage.draw(frame, &view);
+    let mut list = match own.data.source {
+        ViewSource::Gripper => stage.draw_real(real.unwrap_or_default(), &view),
+        ViewSource::Simulation | ViewSource::Trial => stage.draw(frame, &view),
+    };
     if let Some(ghost) = ghost {
         list.ghosts = stage.ghosts(ghost, own.data.view.theme);
-    }
-    if let Some(curvature) = real {
-        list.ghosts.extend(stage.reconstructed(curvature, own.data.view.theme));
     }
     if let Some((shown, colour)) = &grasp_path {
         let path = stage.path(&path_mesh(ctx, stage, shown, *colour), frame);
@@ -196,7 +210,7 @@ fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) 
         list.solids.extend(path);
         Stage::unveil(&mut list, own.data.view.theme);
     }
-    Drawn { list, view, ghost: ghost.map(|ghost| ghost.t), real }
+    Drawn { list, view, ghost: ghost.map(|ghost| (ghost.t, stage.difference(frame, ghost))), real }
 }
 
 /// Frame of the other engine at the time of a moment, if it belongs to the same grasp.
@@ -249,9 +263,11 @@ fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32
     let pixels = [rect.width(), rect.height()].map(|side| (side * per_point).round().max(1.0) as u32);
     let pixels_per_point = per_point * letters;
     let (grasp, sample) = (moment.grasp, moment.frame.t);
+    let off = ghost.map(|(_, off)| off);
+    let ghost = ghost.map(|(t, _)| t);
     let key = PictureKey { grasp, sample, ghost, real, view: view.clone(), pixels, pixels_per_point };
     let theme = own.data.view.theme;
-    let (caption, ghosted) = caption(own, &key);
+    let (caption, ghosted) = caption(own, &key, off);
     // Texts keep their sharpness where the picture has fewer pixels.
     let mut overlays = vec![(rect.min, std::mem::take(&mut list.overlay))];
     if let Some(inset) = &mut list.inset {
@@ -269,21 +285,37 @@ fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32
     view
 }
 
+/// Line of the first start.
+const INVITATION: &str = "Drop an object of yours here (URDF, OBJ or STL): it is grasped and learned";
+
 /// What is said about a picture, and the colour of the ghost in it.
-fn caption(own: &View3d<'_>, key: &PictureKey) -> (String, Option<Rgb>) {
+fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
     let theme = own.data.view.theme;
     if let Some(inspected) = own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
         return (inspected.trial.remarks.join(" "), None);
     }
     let held = own.data.held_s().map(|t| format!("As it was held, at {t:.1}\u{a0}s"));
-    if key.real.is_some() {
-        ("Real fingers, as their flex strips read".to_owned(), Some(GhostKind::RealFingers.colour(theme)))
+    if own.data.source == ViewSource::Gripper {
+        let text = match (own.silent_s, key.real) {
+            (_, None) => "The fingers are not drawn: their flex strips are not calibrated".to_owned(),
+            (Some(silent_s), _) => format!("No readings for {silent_s}\u{a0}s: real fingers as last read"),
+            (None, _) => "Real fingers, as their flex strips read".to_owned(),
+        };
+        match key.ghost {
+            Some(_) => (format!("{text}. Translucent: the simulation"), Some(ghost_colour(theme))),
+            None => (text, None),
+        }
     } else if key.ghost.is_some() {
         let engine = own.data.scene.solver.engine.other().name();
-        let texts: Vec<String> = std::iter::once(format!("The same grasp by {engine}")).chain(held).collect();
-        (texts.join(". "), Some(GhostKind::Engine.colour(theme)))
+        let off = off.map_or_else(String::new, |[far, share]| {
+            let (far, share) = (units::shown(units::mm(far), "mm"), 100.0 * share);
+            format!(": its fingers differ by up to {far}, {share:.1}{}% of their length", units::SPACE)
+        });
+        let texts: Vec<String> = std::iter::once(format!("The same grasp by {engine}{off}")).chain(held).collect();
+        (texts.join(". "), Some(ghost_colour(theme)))
     } else {
-        (held.unwrap_or_default(), None)
+        let begins = own.data.view.recent.is_empty() && own.data.source == ViewSource::Simulation;
+        (held.or_else(|| begins.then(|| INVITATION.to_owned())).unwrap_or_default(), None)
     }
 }
 
@@ -359,7 +391,12 @@ fn buttons(ui: &mut Ui, rect: Rect, own: &View3d<'_>, actions: &mut Actions) {
     let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
     bar.spacing_mut().item_spacing.x = 4.0;
     if place.width() < BUTTONS {
-        let menu = bar.menu_button("View", |ui| switches(ui, own, actions));
+        let menu = bar.menu_button("View", |ui| {
+            switches(ui, own, actions);
+            let large = ui.selectable_label(own.data.view.inset_large, "Large inset");
+            let large = large.on_hover_text("Enlarge the picture of the touch (I)");
+            actions.on(&large, |app| app.view.inset_large = !app.view.inset_large);
+        });
         menu.response.on_hover_text("Standard views, parallel projection, forces, ghost");
     } else {
         // Legible on whatever comes near.

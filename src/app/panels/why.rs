@@ -55,6 +55,8 @@ pub(super) fn ui(
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
+        // Numbers at the right end stay beside the scroll bar.
+        ui.set_max_width(ui.available_width() - 10.0);
         match &explained.outcome {
             Ok(why) => {
                 evidence_ui(ui, why);

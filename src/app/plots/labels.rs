@@ -63,6 +63,15 @@ pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<
 fn spread(wanted: &[f32], top: f32, bottom: f32, line: f32) -> Vec<f32> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));
+    // Those closer than a line keep their own order, so that they do not change places where curves cross.
+    for _ in 0..order.len() {
+        for k in 1..order.len() {
+            let (above, below) = (order[k - 1], order[k]);
+            if above > below && wanted[below] - wanted[above] < line {
+                order.swap(k - 1, k);
+            }
+        }
+    }
     let mut places = vec![0.0; wanted.len()];
     let mut above = f32::NEG_INFINITY;
     for k in &order {
@@ -92,6 +101,12 @@ mod tests {
             assert!(sorted[0] >= 6.99 && sorted[sorted.len() - 1] <= 93.01, "{places:?}");
         }
         assert_eq!(spread(&[50.0], 7.0, 93.0, 14.0), [50.0]);
+        // Curves that cross keep their order; those far apart have that of their heights.
+        for wanted in [[50.0, 52.0], [52.0, 50.0]] {
+            let places = spread(&wanted, 7.0, 93.0, 14.0);
+            assert!(places[0] < places[1], "{places:?}");
+        }
+        assert!(spread(&[80.0, 20.0], 7.0, 93.0, 14.0)[1] < 30.0);
         assert!(spread(&[], 7.0, 93.0, 14.0).is_empty());
     }
 

@@ -165,11 +165,7 @@ fn own_ink(data: &DisplayedData<'_>, curve: &PlotCurve) -> Color32 {
 }
 
 /// Names of all curves, with their values at the cursor.
-fn curve_labels<'a>(
-    data: &DisplayedData<'_>,
-    plot: &TimePlot<'a>,
-    transform: &PlotTransform,
-) -> Vec<CurveLabel<'a>> {
+fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &PlotTransform) -> Vec<CurveLabel<'a>> {
     let theme = data.view.theme;
     let Some(now) = data.time_s() else { return Vec::new() };
     let marks = data.playback.marks;

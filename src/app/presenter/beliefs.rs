@@ -28,10 +28,7 @@ impl Page<'_> {
         let (ink, quiet) = (colour(colours.text), colour(colours.quiet_text));
         let headline = Headline::of(view);
         let (text, p) = headline.text(&view.labels);
-        let class = match headline {
-            Headline::Leading(class, _) | Headline::Decided(class, _) => Some(&view.labels.classes[class].name),
-            Headline::Waiting | Headline::Sensing | Headline::Unknown => None,
-        };
+        let class = headline.class().map(|class| &view.labels.classes[class].name);
         let side = place.height();
         self.portrait(ui, class.map(String::as_str), Rect::from_min_size(place.min, vec2(side, side)));
         let lines = place.with_min_x(place.left() + side + unit);

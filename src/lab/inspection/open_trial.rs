@@ -192,6 +192,16 @@ impl OpenTrial {
         self.columns.iter().find(|column| column.name == name)
     }
 
+    /// Mean of a channel over the hold, in its unit; none without hold or values there.
+    pub fn hold_mean(&self, name: &str) -> Option<f64> {
+        let span = self.phases.iter().find(|span| span.phase == TouchPhase::Hold)?;
+        let held = |(t, value): (&f64, &f32)| {
+            ((span.from_s..span.to_s).contains(t) && value.is_finite()).then_some(f64::from(*value))
+        };
+        let values: Vec<f64> = self.t_s.iter().zip(&self.column(name)?.values).filter_map(held).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    }
+
     /// Beginning of a phase (s), where the grasp has it.
     pub fn phase_from(&self, phase: TouchPhase) -> Option<f64> {
         self.phases.iter().find(|span| span.phase == phase).map(|span| span.from_s)

@@ -57,7 +57,16 @@ pub(super) struct Annotator<'a> {
     pub(super) overlay: Overlay,
     /// What is taken already.
     plates: Vec<Plate>,
+    /// Points that stay in sight.
+    kept: Vec<Vec2>,
 }
+
+/// Distance of plates from the edges (points), height of the buttons above them, and of axes and scale bar below.
+const EDGE: f32 = 10.0;
+const HEAD: f32 = 48.0;
+const FOOT: f32 = 50.0;
+/// Distance of the places that are tried (points).
+const STEP: f32 = 9.0;
 
 impl<'a> Annotator<'a> {
     /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset.
@@ -71,12 +80,35 @@ impl<'a> Annotator<'a> {
         let legends = Plate::between(Vec2::new(size.x - legends.x, 0.0), Vec2::new(size.x, legends.y));
         let scale_bar = Plate::between(size - Vec2::new(SCALE_BAR_SHARE * size.x + MARGIN, SCALE_BAR), size);
         let inset = inset.map(|inset| Plate::between(inset.corner, inset.corner + inset.size));
-        Self { view, overlay, plates: [axes, legends, scale_bar].into_iter().chain(inset).collect() }
+        Self { view, overlay, plates: [axes, legends, scale_bar].into_iter().chain(inset).collect(), kept: Vec::new() }
     }
 
     /// True where a plate would cover nothing.
-    pub(super) fn is_free(&self, plate: &Plate) -> bool {
-        !self.plates.iter().any(|taken| plate.meets(taken))
+    fn is_free(&self, plate: &Plate) -> bool {
+        !self.plates.iter().any(|taken| plate.meets(taken)) && !self.kept.iter().any(|place| plate.covers(*place))
+    }
+
+    /// Keeps a line clear of plates.
+    pub(super) fn keep_clear(&mut self, from: Vec2, to: Vec2) {
+        let pieces = (from.distance(to) / STEP).ceil().max(1.0);
+        self.kept.extend((0..=pieces as u32).map(|k| from.lerp(to, k as f32 / pieces)));
+    }
+
+    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that. None where
+    /// all within `farthest` (points) is taken.
+    pub(super) fn place(&self, wanted: &[Vec2], half: Vec2, farthest: f32) -> Option<Plate> {
+        let low = half + Vec2::new(EDGE, HEAD);
+        let high = (self.view.size - half - Vec2::new(EDGE, FOOT)).max(low);
+        let plate = |middle: Vec2| Plate { middle, half };
+        let mut tried = wanted.iter().map(|place| plate(place.clamp(low, high)));
+        if let Some(free) = tried.find(|plate| self.is_free(plate)) {
+            return Some(free);
+        }
+        let first = wanted.first()?.clamp(low, high);
+        let count = ((high - low) / STEP).floor().as_uvec2();
+        let places = (0..=count.y).flat_map(|y| (0..=count.x).map(move |x| low + STEP * Vec2::new(x as f32, y as f32)));
+        let near = places.filter(|place| place.distance(first) <= farthest).map(plate).filter(|own| self.is_free(own));
+        near.min_by(|a, b| a.middle.distance(first).total_cmp(&b.middle.distance(first)))
     }
 
     /// Adds the ground of a text.
@@ -175,13 +207,7 @@ fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [
     for end in [left, right] {
         overlay.line(end - Vec2::new(0.0, 4.5), end + Vec2::new(0.0, 4.5), 1.6, colour);
     }
-    overlay.text(
-        (left + right) * 0.5 - Vec2::new(0.0, 12.0),
-        Align::Centre,
-        letters,
-        colour,
-        format!("{mm}{SPACE}mm"),
-    );
+    overlay.text((left + right) * 0.5 - Vec2::new(0.0, 12.0), Align::Centre, letters, colour, format!("{mm}{SPACE}mm"));
 }
 
 /// Room of the legends in the top right corner of a picture (points): width from the right edge, height from the top.

@@ -3,7 +3,7 @@
 //! Curvature is 1 / radius (paper, section IV-A1). The finger follows the circle where it bends evenly; where it does not,
 //! the gap between them is what the strip cannot tell.
 
-use super::annotations::{Annotator, Plate};
+use super::annotations::Annotator;
 use glam::{DVec3, Vec2};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::Align;
@@ -26,15 +26,24 @@ const GAP: f32 = 14.0;
 /// Least height of a picture with numbers (points).
 const LEAST_HEIGHT: f32 = 240.0;
 
-/// Draws the circle of each strip of a layout, dashed on the right finger as its curves are.
+/// Number of a circle: where it is wanted, outside of the finger's back.
+pub(super) struct CircleNumber {
+    back: Vec2,
+    outward: Vec2,
+    curvature: f64,
+    colour: Rgb,
+}
+
+/// Draws the circle of each strip of a layout, dashed on the right finger as its curves are; returns their numbers.
 pub(super) fn add(
     annotator: &mut Annotator<'_>,
     layout: &SensorLayout,
     gripper: &GripperModel,
     world_from_gripper: &Pose,
     frame: &Frame,
-) {
-    let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return };
+) -> Vec<CircleNumber> {
+    let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return Vec::new() };
+    let mut numbers = Vec::new();
     let view = annotator.view;
     let values = sensors.read(frame);
     let strips = sensors.channels().iter().zip(values).filter(|(channel, _)| channel.quantity == Quantity::Curvature);
@@ -59,9 +68,10 @@ pub(super) fn add(
         {
             let outward = (*middle - 0.5 * (*begin + *end)).normalize_or(Vec2::X);
             let back = (gripper.finger.back as f32) * view.size.y / view.camera.height_at_target();
-            number(annotator, [*middle + outward * back, outward], curvature, colour);
+            numbers.push(CircleNumber { back: *middle + outward * back, outward, curvature, colour });
         }
     }
+    numbers
 }
 
 /// Points of the circle of a curvature (1/m) that touches the finger in the middle of a stretch, from the palm's side to
@@ -88,17 +98,19 @@ fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], 
         .collect()
 }
 
-/// Writes the curvature outside of a place at the finger's back, inside the picture, where it covers nothing.
-fn number(annotator: &mut Annotator<'_>, [back, outward]: [Vec2; 2], curvature: f64, colour: Rgb) {
-    let text = units::shown(curvature, "1/m");
+/// Farthest that a number stands from where it is wanted (points).
+const FARTHEST: f32 = 110.0;
+
+/// Writes a curvature outside of the finger's back, or near by where it covers nothing.
+pub(super) fn number(annotator: &mut Annotator<'_>, own: &CircleNumber) {
+    let text = units::shown(own.curvature, "1/m");
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
-    let low = half + Vec2::splat(10.0);
-    let aside = outward * (GAP + half.dot(outward.abs()));
-    let middle = (back + aside).clamp(low, (annotator.view.size - low).max(low));
-    let plate = Plate { middle, half };
-    if annotator.view.size.y >= LEAST_HEIGHT && annotator.is_free(&plate) {
+    let wanted = own.back + own.outward * (GAP + half.dot(own.outward.abs()));
+    if annotator.view.size.y >= LEAST_HEIGHT
+        && let Some(plate) = annotator.place(&[wanted], half, FARTHEST)
+    {
         annotator.add_plate(plate);
-        annotator.overlay.text(middle, Align::Centre, TEXT, colour, text);
+        annotator.overlay.text(plate.middle, Align::Centre, TEXT, own.colour, text);
     }
 }
 

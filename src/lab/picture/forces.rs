@@ -1,13 +1,13 @@
 //! Contact forces on each finger, as arrows with numbers: the force across the pad, and the friction along it.
 
 use super::PictureView;
-use super::annotations::{Annotator, Plate};
+use super::annotations::Annotator;
 use glam::{DVec3, Vec2, Vec3};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Align, Arrow};
 use palpate_geometry::palette::{Rgb, Theme, pressure_colour};
 use palpate_geometry::units;
-use palpate_sim::frame::Frame;
+use palpate_sim::frame::{Frame, TaxelLoad};
 use palpate_sim::gripper::{GripperModel, Side};
 
 /// Length of the arrow of one newton, and the greatest and the least length, as shares of the height of the picture at the
@@ -25,13 +25,8 @@ const FULL_SCALE: f64 = 0.5;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Distance of the numbers from the edges (points), and height that is left to axes and scale bar below them.
-const MARGIN: f32 = 10.0;
-const FOOT: f32 = 50.0;
-/// Height that is left to what stands above.
-const HEAD: f32 = 48.0;
 /// Least height of a picture with numbers (points).
-const LEAST_HEIGHT: f32 = 260.0;
+const LEAST_HEIGHT: f32 = 220.0;
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
 fn friction_colour(theme: Theme) -> Rgb {
@@ -80,30 +75,37 @@ pub(super) fn arrows(
     arrows
 }
 
-/// Their numbers, beyond the tips: a plate for each finger.
+/// Their numbers, beyond the tips or near by: a plate for each finger.
 pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) {
     let view = annotator.view;
+    let height = f64::from(view.camera.height_at_target());
+    let all = on_fingers(gripper, world_from_gripper, frame);
+    let ends = |forces: &Forces, force: DVec3| {
+        let [from, to] = [forces.from.as_vec3(), tip(forces.from, force, height)];
+        view.camera.project(from, view.size).zip(view.camera.project(to, view.size))
+    };
+    for forces in &all {
+        for (from, to) in std::iter::once(forces.normal).chain(forces.friction).filter_map(|force| ends(forces, force))
+        {
+            annotator.keep_clear(from, to);
+        }
+    }
     if view.size.y < LEAST_HEIGHT {
         return;
     }
-    let height = f64::from(view.camera.height_at_target());
-    let colours = view.theme.colours();
-    for forces in on_fingers(gripper, world_from_gripper, frame) {
-        let ends = [forces.from.as_vec3(), tip(forces.from, forces.normal, height)];
-        let [Some(from), Some(to)] = ends.map(|point| view.camera.project(point, view.size)) else { continue };
+    for forces in all {
+        let Some((from, to)) = ends(&forces, forces.normal) else { continue };
         let letter = match forces.side {
             Side::Left => "L",
             Side::Right => "R",
         };
         let line = |name: &str, force: DVec3| format!("{letter}  {name} {}", units::shown(force.length(), "N"));
-        let mut lines = vec![(line("normal", forces.normal), colours.text)];
+        let mut lines = vec![(line("normal", forces.normal), view.theme.colours().text)];
         lines.extend(forces.friction.map(|force| (line("friction", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.
         let letters = lines.iter().map(|(text, _)| text.chars().count()).max().unwrap_or_default();
         let half = Vec2::new(0.25 * TEXT * letters as f32 + 7.0, 0.5 * LINE * lines.len() as f32 + 2.0);
         let along = (to - from).normalize_or(Vec2::Y);
-        let low = half + Vec2::new(MARGIN, HEAD);
-        let high = (view.size - half - Vec2::new(MARGIN, FOOT)).max(low);
         // Beyond the tip, or else on either side of the arrow.
         let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
         let aside = |sign: f32| {
@@ -112,17 +114,46 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         };
         let over = Vec2::new(0.0, -2.5 * half.y);
         let places = [beyond, aside(-1.0), aside(1.0), aside(-1.0) + over, aside(1.0) + over];
-        let plates = places.map(|place| Plate { middle: place.clamp(low, high), half });
-        let on_arrow = [from, to, 0.5 * (from + to)];
-        let suits = |plate: &&Plate| annotator.is_free(plate) && !on_arrow.iter().any(|place| plate.covers(*place));
-        let plate = plates.iter().find(suits).copied().unwrap_or(plates[0]);
-        let place = plate.middle;
+        let Some(plate) = annotator.place(&places, half, f32::INFINITY) else { continue };
         annotator.add_plate(plate);
         for (k, (text, ink)) in lines.into_iter().enumerate() {
-            let at = Vec2::new(place.x - half.x + 7.0, place.y - half.y + 2.0 + LINE * (k as f32 + 0.5));
+            let corner = plate.middle - half;
+            let at = Vec2::new(corner.x + 7.0, corner.y + 2.0 + LINE * (k as f32 + 0.5));
             annotator.overlay.text(at, Align::Left, TEXT, ink, text);
         }
     }
+}
+
+/// Most arrows of shear on a pad, length of the longest, and the radius of their shafts (m).
+const MOST_SHEAR: usize = 24;
+const LONGEST_SHEAR: f32 = 0.006;
+const SHEAR_RADIUS: f32 = 0.0003;
+/// Shear on a taxel below this is not drawn (N).
+const FAINTEST_SHEAR: f32 = 2e-4;
+
+/// Friction on the taxels that bear most of it, as small arrows along the pads: each as long as its share of the largest.
+pub(super) fn shear(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, theme: Theme) -> Vec<Arrow> {
+    let grid = gripper.taxels();
+    let mut loads = Vec::new();
+    for side in Side::BOTH {
+        let mut own: Vec<_> =
+            frame.loads(side, grid.count()).map(|own| (own.1.along.hypot(own.1.across), own)).collect();
+        own.sort_by(|a, b| b.0.total_cmp(&a.0));
+        own.truncate(MOST_SHEAR);
+        loads.extend(own.into_iter().map(|(size, (taxel, load))| (side, size, taxel, load)));
+    }
+    let largest = loads.iter().map(|(_, size, ..)| *size).fold(FAINTEST_SHEAR, f32::max);
+    let arrow = |(side, size, taxel, load): &(Side, f32, usize, TaxelLoad)| {
+        let placed = frame.placed(gripper, *side);
+        let (segment, along) = grid.place(*taxel, &gripper.finger);
+        let skin = grid.height(*taxel) - grid.compression(*taxel, f64::from(load.normal));
+        let from = world_from_gripper.point(placed.point(segment, along, grid.across(*taxel), skin)).as_vec3();
+        let force = placed.axes(segment) * DVec3::new(f64::from(load.along), f64::from(load.across), 0.0);
+        let along = world_from_gripper.direction(force).as_vec3().normalize_or_zero();
+        let to = from + along * (LONGEST_SHEAR * size / largest);
+        Arrow { from, to, radius: SHEAR_RADIUS, colour: friction_colour(theme) }
+    };
+    loads.iter().filter(|(_, size, ..)| *size >= FAINTEST_SHEAR).map(arrow).collect()
 }
 
 /// Point of the arrow of a force.

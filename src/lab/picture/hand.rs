@@ -125,6 +125,8 @@ impl Stage {
 
 /// Size of the inset of a view (points); none where it has none, or no room for one.
 fn inset_size(view: &PictureView) -> Option<Vec2> {
-    let height = (view.inset * view.size.y).max(LEAST).min(MOST[0] * view.size.y).min(MOST[1] * view.size.x);
+    // An enlarged one may take more.
+    let most = MOST.map(|share| share.max(0.8 * view.inset));
+    let height = (view.inset * view.size.y).max(LEAST).min(most[0] * view.size.y).min(most[1] * view.size.x);
     (view.inset > 0.0 && shows_legends(view)).then(|| Vec2::new(SHAPE * height, height))
 }

@@ -272,10 +272,7 @@ mod tests {
         let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force, PAD_FULL_SCALE);
         assert_eq!((left.y.count, left.x.count, left.value(1, 2), right.value(39, 3)), (40, 4, 0.25, 0.1));
         assert_eq!(left.values.iter().filter(|value| **value != 0.0).count(), 1);
-        assert_eq!(
-            (left.y.text(1), left.x.text(2)),
-            ("from palm 3.75\u{a0}mm".into(), "across 2.50\u{a0}mm".into())
-        );
+        assert_eq!((left.y.text(1), left.x.text(2)), ("from palm 3.75\u{a0}mm".into(), "across 2.50\u{a0}mm".into()));
         // 0.25 N on 2.5 mm by 5 mm.
         let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure, PAD_FULL_SCALE)[0];
         assert!((pressure.value(1, 2) - 20.0).abs() < 1e-5, "{}", pressure.value(1, 2));

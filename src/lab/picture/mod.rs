@@ -31,7 +31,7 @@ use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, SoftFinger, So
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::{Pose, SurfaceMesh};
 use palpate_sim::frame::Frame;
-use palpate_sim::gripper::GripperModel;
+use palpate_sim::gripper::{GripperModel, PlacedFinger, Side};
 use palpate_sim::objects::ObjectModel;
 use palpate_sim::scene::{Scene, SupportKind};
 use palpate_tactile::{CATALOGUE, SensorLayout};
@@ -48,6 +48,8 @@ pub struct PictureView {
     pub size: Vec2,
     /// Draw force arrows.
     pub forces: bool,
+    /// Write forces and curvatures beside arrows and circles.
+    pub numbers: bool,
     /// Draw the axis gizmo, scale bar and legend.
     pub annotations: bool,
     /// Pressure that has the brightest colour (Pa).
@@ -71,6 +73,7 @@ impl Default for PictureView {
             theme: Theme::Dark,
             size: Vec2::new(960.0, 600.0),
             forces: true,
+            numbers: true,
             annotations: true,
             full_scale: PAD_FULL_SCALE,
             badge: None,
@@ -85,24 +88,11 @@ impl Default for PictureView {
 /// Usual height of the inset with the touch, as a share of the picture's.
 const INSET: f32 = 0.27;
 
-/// What a ghost stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GhostKind {
-    /// The same scene in the other engine.
-    Engine,
-    /// Fingers of the real gripper.
-    RealFingers,
-}
-
-impl GhostKind {
-    /// Its colour, which no sensor has.
-    pub const fn colour(self, theme: Theme) -> Rgb {
-        match (self, theme) {
-            (Self::Engine, Theme::Dark) => Rgb(226, 132, 214),
-            (Self::Engine, Theme::Light) => Rgb(164, 44, 152),
-            (Self::RealFingers, Theme::Dark) => Rgb(94, 214, 190),
-            (Self::RealFingers, Theme::Light) => Rgb(0, 122, 104),
-        }
+/// Colour of the ghost of another run of the same scene, which no sensor has.
+pub const fn ghost_colour(theme: Theme) -> Rgb {
+    match theme {
+        Theme::Dark => Rgb(226, 132, 214),
+        Theme::Light => Rgb(164, 44, 152),
     }
 }
 
@@ -148,6 +138,17 @@ impl Stage {
         }
     }
 
+    /// Largest distance of the fingers in two frames, joint by joint (m), and as a share of a finger's length.
+    pub fn difference(&self, frame: &Frame, other: &Frame) -> [f64; 2] {
+        let far = |side: Side| {
+            let [a, b] = [frame, other].map(|frame| frame.placed(&self.gripper, side));
+            let end = |placed: &PlacedFinger, k: usize| placed.point(k, placed.lengths[k], 0.0, 0.0);
+            (0..a.lengths.len().min(b.lengths.len())).map(|k| end(&a, k).distance(end(&b, k))).fold(0.0, f64::max)
+        };
+        let most = Side::BOTH.map(far).into_iter().fold(0.0, f64::max);
+        [most, most / self.gripper.finger.length]
+    }
+
     /// Everything in one picture of a frame.
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
@@ -155,12 +156,13 @@ impl Stage {
         let mut annotator = Annotator::new(view, inset.as_ref());
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        if let Some(layout) = view.layout.as_ref().filter(|_| view.circles && view.annotations) {
-            circles::add(&mut annotator, layout, &self.gripper, &world_from_gripper, frame);
-        }
-        if view.forces && view.annotations {
+        let layout = view.layout.as_ref().filter(|_| view.circles && view.annotations);
+        let circled = |layout| circles::add(&mut annotator, layout, &self.gripper, &world_from_gripper, frame);
+        let numbers = layout.map(circled).unwrap_or_default();
+        if view.forces && view.annotations && view.numbers {
             forces::label(&mut annotator, &self.gripper, &world_from_gripper, frame);
         }
+        numbers.iter().filter(|_| view.numbers).for_each(|own| circles::number(&mut annotator, own));
         let mut fingers = self.fingers(frame, view.full_scale);
         if let Some(layout) = &view.layout {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
@@ -192,7 +194,7 @@ impl Stage {
 
     /// Outlines of another run of the same scene, for [`DrawList::ghosts`].
     pub fn ghosts(&self, frame: &Frame, theme: Theme) -> Vec<Solid> {
-        let colour = GhostKind::Engine.colour(theme);
+        let colour = ghost_colour(theme);
         let mut ghosts: Vec<Solid> =
             self.fingers(frame, 1.0).iter().map(|finger| ghost::finger(finger, colour)).collect();
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
@@ -219,14 +221,14 @@ impl Stage {
         list.ghosts.extend(fingers.iter().map(|finger| ghost::finger(finger, colour)));
     }
 
-    /// The real fingers from the curvature of their flex strips (1/m), left and right, for
-    /// [`DrawList::ghosts`]. A finger whose strip is not read is left out.
-    pub fn reconstructed(&self, curvature: [Option<f64>; 2], theme: Theme) -> Vec<Solid> {
+    /// The real hand: fingers bent evenly, as their flex strips read (1/m), left and right. A finger whose strip is not read is
+    /// left out, and so is whatever it holds: nothing is known of that.
+    pub fn draw_real(&self, curvature: [Option<f64>; 2], view: &PictureView) -> DrawList {
         let frame = reconstructed::evenly_bent(&self.gripper, curvature);
-        let colour = GhostKind::RealFingers.colour(theme);
-        let fingers = fingers::soft_fingers(&self.gripper, &self.world_from_gripper, &frame, 1.0);
-        let read = fingers.iter().zip(curvature).filter(|(_, kappa)| kappa.is_some());
-        read.map(|(finger, _)| ghost::finger(finger, colour)).collect()
+        let mut list = self.draw(&frame, &PictureView { forces: false, inset: 0.0, ..view.clone() });
+        let fingers = std::mem::take(&mut list.fingers);
+        list.fingers = fingers.into_iter().zip(curvature).filter_map(|(finger, kappa)| kappa.map(|_| finger)).collect();
+        list
     }
 
     /// Both fingers of a frame, left and right, without sensors; `full_scale` has the brightest colour (Pa).
@@ -299,11 +301,9 @@ mod tests {
     #[test]
     fn ghosts_stand_out_and_have_the_colour_of_no_sensor() {
         for theme in Theme::ALL {
-            for kind in [GhostKind::Engine, GhostKind::RealFingers] {
-                let colour = kind.colour(theme);
-                assert!(colour.contrast(theme.colours().horizon) >= 3.0, "{kind:?} {theme:?}");
-                assert!(Trace::ALL.iter().all(|trace| trace.colour(theme) != colour));
-            }
+            let colour = ghost_colour(theme);
+            assert!(colour.contrast(theme.colours().horizon) >= 3.0, "{theme:?}");
+            assert!(Trace::ALL.iter().all(|trace| trace.colour(theme) != colour));
         }
     }
 }

@@ -107,6 +107,8 @@ impl Stage {
             ..view.clone()
         };
         let mut list = self.draw_touch(frame, &inner);
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        list.arrows = super::forces::shear(&self.gripper, &world_from_gripper, frame, view.theme);
         let near = self.near_side(&inner.camera);
         super::annotations::frame_inset(&mut list.overlay, &inner, &format!("{} pad", near.name()));
         Some(Inset { list, corner, size })

@@ -1,7 +1,8 @@
-//! A bar for each class, always in the same order, and the threshold as a line across them that can be dragged.
+//! A bar for each class, in rows that never change: by shape, then the empty hand and all others; and the
+//! threshold as a line across them that can be dragged.
 
-use super::words::{newest, percent, ranked, title};
-use super::{LEAST_LETTERS, Part, eased, fitted, labelled, put};
+use super::words::{newest, percent, title};
+use super::{LEAST_LETTERS, Part, eased, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, CursorIcon, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_lab::workers::THRESHOLDS;
@@ -12,84 +13,97 @@ use palpate_sim::objects::{EMPTY, catalogue};
 const LETTERS: f32 = 12.5;
 /// Distance within which the line of the threshold can be dragged (points).
 const GRIP: f32 = 6.0;
+/// Distance between two columns (points).
+const GUTTER: f32 = 10.0;
 
 /// Columns of a line (points).
 #[derive(Clone, Copy)]
 struct Columns {
+    left: f32,
     bars: [f32; 2],
+    right: f32,
     line: f32,
-    /// Size of letters of all names.
+    /// Size of letters of all names and numbers.
     letters: f32,
 }
 
-/// Draws this many lines of this height.
-pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (lines, line): (usize, f32)) {
+/// Draws a line of this height for each class, in so many columns.
+pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, f32)) {
     let labels = &part.view.labels;
     let pmf = newest(part.view);
-    let shown = shown_classes(labels, lines, pmf);
-    let rest = labels.classes.len() - shown.len();
-    let width = ui.available_width();
-    let left = ui.cursor().left();
-    let names = (0.40 * width).min(104.0);
+    let order = by_shape(labels);
+    let rows = order.len().div_ceil(columns.max(1));
+    let size = vec2(ui.available_width(), line * rows as f32);
+    let (all, _) = ui.allocate_exact_size(size, Sense::hover());
+    let width = (all.width() - GUTTER * (columns as f32 - 1.0)) / columns as f32;
+    let names = (if columns > 1 { 0.56 } else { 0.40 } * width).min(104.0);
     let width_of = |class| fitted(ui, title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
-    let letters = LETTERS * (names / longest).min(1.0);
-    let columns = Columns { bars: [left + names + 4.0, left + width - 46.0], line, letters };
-    let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
-    let top = ui.cursor().top();
-    for class in &shown {
-        class_ui(ui, part, *class, pmf, columns);
+    let letters = (LETTERS * (names / longest).min(1.0)).max(LEAST_LETTERS).min(line);
+    let numbers = if columns > 1 { 24.0 } else { 46.0 };
+    let places: Vec<Columns> = (0..columns)
+        .map(|column| {
+            let left = all.left() + (width + GUTTER) * column as f32;
+            Columns { left, bars: [left + names + 4.0, left + width - numbers], right: left + width, line, letters }
+        })
+        .collect();
+    for (place, class) in order.iter().enumerate() {
+        let own = places[place / rows.max(1)];
+        let top = all.top() + line * (place % rows.max(1)) as f32;
+        // A thin line sets the shapes apart.
+        let before = place.checked_sub(1).filter(|_| place % rows != 0).map(|before| order[before]);
+        if before.is_some_and(|before| group(labels, before) != group(labels, *class)) {
+            let stroke = Stroke::new(1.0, colour(part.colours().border));
+            ui.painter().hline(own.left..=own.right, top, stroke);
+        }
+        class_ui(ui, part, *class, pmf, (own, top));
     }
-    let bottom = ui.cursor().top();
-    if rest > 0 {
-        let left_over: f64 = pmf.map_or(0.0, |pmf| 1.0 - shown.iter().map(|k| pmf.probabilities()[*k]).sum::<f64>());
-        let text = format!("and {rest} others, {}", percent(left_over));
-        let (rect, response) = labelled(ui, vec2(width, line), &text);
-        response.on_hover_text("Enlarge the panel to see all");
-        let quiet = colour(part.colours().quiet_text);
-        put(ui, fitted(ui, text, 11.5, width, quiet), rect, Align2::LEFT_CENTER);
-    }
-    ui.spacing_mut().item_spacing.y = gap;
-    threshold_ui(ui, part, columns, [top, bottom]);
+    let ends = [all.top(), all.bottom()];
+    places.iter().enumerate().for_each(|(column, own)| threshold_ui(ui, part, *own, ends, column == 0));
 }
 
-/// All classes or, with fewer lines, those that the model was taught and the most likely ones; one line is left for the number
-/// of the others.
-fn shown_classes(labels: &Labels, lines: usize, pmf: Option<&Pmf>) -> Vec<usize> {
-    let classes = labels.classes.len();
-    if classes <= lines {
-        return (0..classes).collect();
+/// Group of a class: its shape, then classes without one, then the empty hand and all other objects.
+fn group(labels: &Labels, class: usize) -> usize {
+    let class = &labels.classes[class];
+    match class.shape {
+        _ if [EMPTY, OTHER].contains(&class.name.as_str()) => labels.shapes.len() + 1,
+        shape => shape.unwrap_or(labels.shapes.len()),
     }
-    let is_usual = |class: &usize| {
-        let name = &labels.classes[*class].name;
-        [EMPTY, OTHER].contains(&name.as_str()) || catalogue().iter().any(|built_in| built_in.name == *name)
-    };
-    let (usual, mut shown): (Vec<usize>, Vec<usize>) =
-        pmf.map_or_else(|| (0..classes).collect(), ranked).into_iter().partition(is_usual);
-    shown.extend(usual);
-    shown.truncate(lines.saturating_sub(1));
-    shown.sort_unstable();
-    shown
 }
 
-fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, columns: Columns) {
+/// All classes by their groups, in each in the order of the model.
+fn by_shape(labels: &Labels) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..labels.classes.len()).collect();
+    order.sort_by_key(|class| group(labels, *class));
+    order
+}
+
+/// True for a class that the model has learned after its training: none of the built-in ones.
+fn is_taught(name: &str) -> bool {
+    ![EMPTY, OTHER].contains(&name) && !catalogue().iter().any(|built_in| built_in.name == *name)
+}
+
+fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (columns, top): (Columns, f32)) {
     let colours = part.colours();
-    let name = title(&part.view.labels, class);
+    let (name, taught) = (title(&part.view.labels, class), is_taught(&part.view.labels.classes[class].name));
     let p = pmf.map_or(0.0, |pmf| pmf.probabilities()[class]);
     let leads = pmf.is_some_and(|pmf| pmf.top().0 == class);
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), columns.line), Sense::hover());
+    let rect = Rect::from_min_max(pos2(columns.left, top), pos2(columns.right, top + columns.line));
     let is_gone = part.view.left.as_ref().is_some_and(|left| !left[class]) && !part.view.beliefs.is_empty();
-    let spoken = format!("{name} {}{}", percent(p), if is_gone { ", ruled out" } else { "" });
+    let learned = if taught { ", learned" } else { "" };
+    let spoken = format!("{name}{learned} {}{}", percent(p), if is_gone { ", ruled out" } else { "" });
+    let response = ui.interact(rect, ui.scope_id().with(("class line", class)), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
     let quiet = if is_gone { colours.background.mix(colours.quiet_text, 0.6) } else { colours.quiet_text };
     let ink = colour(if leads { colours.text } else { quiet });
     let [from, to] = columns.bars;
-    put(
-        ui,
-        fitted(ui, name, columns.letters.max(LEAST_LETTERS), from - 2.0 - rect.left(), ink),
-        rect,
-        Align2::LEFT_CENTER,
-    );
+    // A dot marks what was learned.
+    let dot = if taught { 8.0 } else { 0.0 };
+    if taught {
+        ui.painter().circle_filled(pos2(rect.left() + 3.0, rect.center().y), 3.0, colour(colours.good));
+    }
+    let room = rect.with_min_x(rect.left() + dot);
+    put(ui, fitted(ui, name, columns.letters, from - 2.0 - room.left(), ink), room, Align2::LEFT_CENTER);
     let track =
         Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
     ui.painter().rect_filled(track, 2.0, colour(colours.raised));
@@ -100,22 +114,27 @@ fn class_ui(ui: &mut Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, c
     }
     // An empty bar says "0 %" already.
     if p >= 0.01 {
-        put(ui, fitted(ui, percent(p), LETTERS, rect.right() - to - 4.0, ink), rect, Align2::RIGHT_CENTER);
+        let number = fitted(ui, percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
+        put(ui, number, rect, Align2::RIGHT_CENTER);
     }
 }
 
-/// Line of the threshold across the bars.
-fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom]: [f32; 2]) {
+/// Line of the threshold across the bars of a column; it can be dragged in the first one.
+fn threshold_ui(ui: &Ui, part: &mut Part<'_, '_>, columns: Columns, [top, bottom]: [f32; 2], dragged: bool) {
     let [from, to] = columns.bars;
     let threshold = part.view.rule.threshold;
     let x = from + (to - from) * threshold as f32;
+    let ink = colour(part.colours().text);
+    if !dragged {
+        ui.painter().vline(x, top..=bottom, Stroke::new(1.5, ink));
+        return;
+    }
     let grip = Rect::from_min_max(pos2(x - GRIP, top), pos2(x + GRIP, bottom));
     // For the mouse; the number below is for the keyboard.
     let response =
         ui.interact(grip, ui.scope_id().with("threshold"), Sense::DRAG).on_hover_cursor(CursorIcon::ResizeHorizontal);
     response.widget_info(|| WidgetInfo::labeled(Role::Splitter, true, "Threshold"));
     let held = response.hovered() || response.dragged();
-    let ink = colour(part.colours().text);
     ui.painter().vline(x, top..=bottom, Stroke::new(if held { 2.5 } else { 1.5 }, ink));
     ui.painter().circle_filled(pos2(x, bottom), if held { 5.0 } else { 4.0 }, ink);
     if let Some(pointer) = response.interact_pointer_pos().filter(|_| response.dragged()) {
@@ -144,18 +163,12 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_little_room_taught_classes_and_the_likeliest_stay_in_their_order() {
-        let labels = |names: [&str; 5]| {
-            let class = |name: &str| Class { name: name.to_owned(), size: None, shape: None };
-            Labels { classes: names.map(class).to_vec(), ..Labels::default() }
-        };
-        let usual = labels(["ball", "box", "case", EMPTY, OTHER]);
-        let pmf = Pmf::from_weights([0.1, 0.4, 0.0, 0.3, 0.2]);
-        assert_eq!(shown_classes(&usual, 5, Some(&pmf)), [0, 1, 2, 3, 4]);
-        assert_eq!(shown_classes(&usual, 4, Some(&pmf)), [1, 3, 4]);
-        assert_eq!(shown_classes(&usual, 4, None), [0, 1, 2]);
-        let taught = labels(["ball", "box", "mug", EMPTY, OTHER]);
-        assert_eq!(shown_classes(&taught, 4, Some(&pmf)), [1, 2, 3]);
-        assert_eq!(shown_classes(&taught, 2, None), [2]);
+    fn classes_stand_by_their_shape_and_what_is_none_stands_last() {
+        let class = |(name, shape): (&str, Option<usize>)| Class { name: name.to_owned(), size: None, shape };
+        let classes =
+            [(EMPTY, None), ("ball", Some(1)), (OTHER, None), ("box", Some(0)), ("mug", None), ("can", Some(0))];
+        let shapes = ["cubic", "spherical"].map(str::to_owned).to_vec();
+        let labels = Labels { classes: classes.map(class).to_vec(), shapes, ..Labels::default() };
+        assert_eq!(by_shape(&labels), [3, 5, 1, 4, 0, 2]);
     }
 }

@@ -9,20 +9,21 @@ pub(in crate::app) mod words;
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
+use crate::app::features::recognition::Learned;
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::ViewSource;
 use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
-use crate::app::theme::{accented, colour};
+use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{failed_sensors_ui, number_field};
+use crate::app::widgets::{capital, failed_sensors_ui, number_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
-use palpate_lab::workers::{Command, Job, THRESHOLDS, TeachRequest, TrainedModel};
+use palpate_lab::workers::{Command, Job, THRESHOLDS};
 use std::sync::Arc;
 use words::{FOREIGN, Headline, percent, reason};
 
@@ -73,8 +74,9 @@ const TIGHT: Measures = Measures {
 
 /// Height of the line with the threshold (points).
 const THRESHOLD_LINE: f32 = 24.0;
-/// Least number of classes; with less room the panel scrolls.
-const LEAST_CLASSES: usize = 4;
+/// Least height of the line of a class in one column, and in two; with less room the panel scrolls (points).
+const ONE_COLUMN: f32 = 11.5;
+const LEAST_CLASS: f32 = 8.0;
 
 impl Measures {
     /// True in a small window.
@@ -86,18 +88,14 @@ impl Measures {
         if room.x < 250.0 || room.y < 560.0 { &TIGHT } else { &ROOMY }
     }
 
-    /// Number of lines for classes, and the height of each.
+    /// Columns for classes, and the height of a line: all have one, in whatever window.
     fn lines(&self, height: f32, classes: usize, has_stage_one: bool, has_touch: bool) -> (usize, f32) {
         let properties = if has_stage_one { 2.0 * self.properties + self.gap } else { 0.0 };
         let touch = if has_touch { touch::height(self, has_stage_one) } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - touch - 7.0 * self.gap;
-        // All of them, if necessary in lines of a small window.
-        let line = (room / classes.max(1) as f32).floor().clamp(TIGHT.class, self.class);
-        let lines = (room / line).floor().max(0.0) as usize;
-        // A small window has room for the measured touch or for one more class.
-        let least = LEAST_CLASSES + usize::from(!has_touch);
-        (lines.clamp(least, classes.max(least)), line)
+        let line = |columns: usize| (room / classes.div_ceil(columns).max(1) as f32).floor();
+        if line(1) >= ONE_COLUMN { (1, line(1).min(self.class)) } else { (2, line(2).clamp(LEAST_CLASS, TIGHT.class)) }
     }
 }
 
@@ -105,6 +103,7 @@ pub(super) fn ui(
     ui: &mut Ui,
     data: &DisplayedData<'_>,
     tools: &GripperTools,
+    learned: Option<&Learned>,
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -121,16 +120,18 @@ pub(super) fn ui(
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let measures = Measures::fitting(room);
         ui.spacing_mut().item_spacing.y = measures.gap;
-        lesson_ui(ui, &tools.teaching, actions);
+        let top = ui.cursor().top();
+        lesson_ui(ui, tools, learned, actions);
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
                 if let Some(gripper) = data.gripper.filter(|_| data.source == ViewSource::Gripper) {
                     failed_sensors_ui(ui, gripper);
                 }
+                let told = ui.cursor().top() - top;
                 let mut part = Part { data, pictures, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
-                let advised = part.advice_ui(ui, &tools.advice);
+                let advised = part.advice_ui(ui, &tools.advice) + told;
                 if let Some(truth) = &recognised.truth {
                     part.truth_ui(ui, truth);
                 }
@@ -150,12 +151,36 @@ pub(super) fn ui(
     });
 }
 
-/// A lesson that is running: the object that the model learns, and how far it is.
-fn lesson_ui(ui: &mut Ui, teaching: &Job<TeachRequest, TrainedModel>, actions: &mut Actions) {
-    let Some(progress) = teaching.running().map(|running| running.progress) else { return };
-    ui.horizontal(|ui| {
-        actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
-        ui.add(ProgressBar::new(progress.share as f32).desired_width(ui.available_width()).text(progress.words));
+/// A lesson that is running, with its progress, or the last one, with its result: the object is known from now on.
+fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actions: &mut Actions) {
+    let (running, good) = (tools.teaching.running(), theme::of(ui).colours().good);
+    if running.is_none() && learned.is_none() {
+        return;
+    }
+    let frame = egui::Frame::new().fill(veil(good, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(8, 5));
+    frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.spacing_mut().item_spacing.y = 3.0;
+        if let Some(progress) = running.map(|running| running.progress) {
+            ui.horizontal(|ui| {
+                actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
+                let width = ui.available_width();
+                ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(progress.words));
+            });
+        } else if let Some(learned) = learned {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(
+                    RichText::new(format!("Learned {}", capital(&learned.title)))
+                        .heading()
+                        .strong()
+                        .color(colour(good)),
+                );
+                ui.label(format!("from {} simulated grasps in {:.0}\u{a0}s", learned.grasps, learned.seconds));
+                let hint = "Use the model without this object again";
+                actions.on(&ui.small_button("Forget").on_hover_text(hint), App::forget_learned);
+                actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
+            });
+        }
     });
 }
 
@@ -246,14 +271,11 @@ impl Part<'_, '_> {
         let (text, p) = headline.text(&self.view.labels);
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);
-        let ink = colour(match headline {
-            Headline::Decided(..) => colours.accent,
-            Headline::Unknown => colours.warning,
-            Headline::Leading(..) => colours.text,
-            Headline::Waiting | Headline::Sensing => colours.quiet_text,
-        });
+        let right = self.recognised.truth.as_ref().filter(|_| self.data.view.truth_shown);
+        let right = right.and_then(|(truth, _)| self.view.is_right(truth));
+        let ink = colour(headline.ink(&colours, right));
         let mut left = rect.left();
-        if let Headline::Leading(class, _) | Headline::Decided(class, _) = headline {
+        if let Some(class) = headline.class() {
             let side = measures.headline - 4.0;
             let place = Rect::from_min_size(pos2(left, rect.top() + 2.0), vec2(side, side));
             self.thumbnail(ui, &self.view.labels.classes[class].name, place);
@@ -309,13 +331,13 @@ impl Part<'_, '_> {
         let shown = self.data.view.truth_shown;
         let right = self.view.is_right(truth).filter(|_| shown);
         let (text, spoken, sign) = match right {
-            Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.accent))),
+            Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.good))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
             // A stored trial keeps no secret.
             None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
             None => {
-                let text = if shown { "answer hidden until it decides" } else { "hidden" };
-                (text.to_owned(), format!("Truth: {text}"), None)
+                let text = if shown { "Answer hidden until it decides" } else { "Answer hidden" };
+                (text.to_owned(), text.to_owned(), None)
             }
         };
         let size = vec2(ui.available_width(), self.measures.truth);
@@ -325,9 +347,13 @@ impl Part<'_, '_> {
         let row = Rect::from_min_max(rect.min, eye.left_bottom()).shrink2(vec2(6.0, 0.0));
         ui.interact(row, ui.scope_id().with("truth"), Sense::hover())
             .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
-        let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
-        let mut left = row.left() + label.size().x + 8.0;
-        put(ui, label, row, Align2::LEFT_CENTER);
+        let mut left = row.left();
+        // Without an answer the sentence says it all.
+        if right.is_some() || spoken.starts_with("Truth") {
+            let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
+            left += label.size().x + 8.0;
+            put(ui, label, row, Align2::LEFT_CENTER);
+        }
         if let Some((icon, ink)) = sign {
             icons::sign(
                 ui,

@@ -39,7 +39,8 @@ pub(super) fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers:
     let needed =
         |answer: &String| fitted(ui, format!("{answer} 99 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let numbered = answers.iter().map(needed).fold(0.0, f32::max) <= width - 10.0;
-    let best = pmf.map(|pmf| pmf.top().0);
+    // Below one half nothing is said.
+    let best = pmf.map(Pmf::top).filter(|(_, p)| *p > 0.5).map(|(best, _)| best);
     for (k, answer) in answers.iter().enumerate() {
         let corner = pos2(rect.left() + named + width * k as f32, rect.top());
         let place = Rect::from_min_size(corner, vec2(width, rect.height())).shrink2(vec2(2.0, 0.0));

@@ -2,6 +2,7 @@
 
 use crate::app::shown::Recognised;
 use crate::app::widgets::capital;
+use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_lab::grasping::IdentificationView;
 pub(in crate::app) use palpate_lab::why::percent;
 use palpate_learn::{Labels, OTHER, Pmf, StopReason};
@@ -24,16 +25,22 @@ pub(in crate::app) enum Headline {
     Leading(usize, f64),
     /// Decided class by index, and its probability.
     Decided(usize, f64),
+    /// Likeliest class at the limit of grasps by index, and its probability.
+    Guess(usize, f64),
     /// None of the known classes.
     Unknown,
 }
 
 impl Headline {
     pub(in crate::app) fn of(view: &IdentificationView) -> Self {
+        if view.listening && view.beliefs.is_empty() && !has_touched(view) {
+            return if view.verdict.is_some() { Self::Sensing } else { Self::Waiting };
+        }
         let Some((class, p)) = newest(view).map(Pmf::top) else { return Self::Waiting };
         match view.decision {
             Some(StopReason::Unknown) => Self::Unknown,
-            Some(StopReason::Sure | StopReason::GraspLimit) => Self::Decided(class, p),
+            Some(StopReason::Sure) => Self::Decided(class, p),
+            Some(StopReason::GraspLimit) => Self::Guess(class, p),
             None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Sensing,
             None => Self::Leading(class, p),
         }
@@ -45,14 +52,40 @@ impl Headline {
             Self::Waiting => ("Ready".to_owned(), None),
             Self::Sensing => ("Sensing ..".to_owned(), None),
             Self::Unknown => ("Unknown".to_owned(), None),
+            Self::Guess(class, p) => (format!("Best guess: {}", title(labels, class)), Some(p)),
             Self::Leading(class, p) | Self::Decided(class, p) => (title(labels, class), Some(p)),
+        }
+    }
+
+    /// The class that it names, by index.
+    pub(in crate::app) fn class(self) -> Option<usize> {
+        match self {
+            Self::Leading(class, _) | Self::Decided(class, _) | Self::Guess(class, _) => Some(class),
+            Self::Waiting | Self::Sensing | Self::Unknown => None,
+        }
+    }
+
+    /// Its colour: green for a decision, amber for a guess, red for a wrong answer.
+    pub(in crate::app) fn ink(self, colours: &ThemeColours, right: Option<bool>) -> Rgb {
+        match self {
+            Self::Decided(..) | Self::Guess(..) | Self::Unknown if right == Some(false) => colours.error,
+            Self::Decided(..) => colours.good,
+            Self::Guess(..) | Self::Unknown => colours.warning,
+            Self::Leading(..) => colours.text,
+            Self::Waiting | Self::Sensing => colours.quiet_text,
         }
     }
 }
 
-/// Newest answer: of the running grasp or, before its first one, of the grasp before.
+/// True once the running grasp has touched something, and where that cannot be told.
+pub(super) fn has_touched(view: &IdentificationView) -> bool {
+    !view.measures_geometry || view.measured.is_some()
+}
+
+/// Newest answer: of the running grasp or, before its first contact, of the grasps before.
 pub(in crate::app) fn newest(view: &IdentificationView) -> Option<&Pmf> {
-    view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())
+    let running = view.verdict.as_ref().filter(|_| !view.listening || has_touched(view));
+    running.map(|verdict| &verdict.pmf).or(view.beliefs.last())
 }
 
 /// Most classes that are named as left.
@@ -115,7 +148,7 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
 pub(in crate::app) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| match class.name.as_str() {
         OTHER => "Other".to_owned(),
-        name => object_title(name),
+        name => capital(&object_title(name)),
     })
 }
 
@@ -196,7 +229,11 @@ mod tests {
             (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps disagree: grasping again"),
             (view(Some(0.92), &[0.92], Some(StopReason::Sure)), "Lemon", "Certain: 92 % (needed 90 %)"),
             (view(Some(0.8), &[0.8], Some(StopReason::Sure)), "Lemon", "Certain: 80 % reached the threshold of then"),
-            (view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)), "Lemon", "Best guess after 4 grasps"),
+            (
+                view(Some(0.6), &[0.6; 4], Some(StopReason::GraspLimit)),
+                "Best guess: Lemon",
+                "Best guess after 4 grasps",
+            ),
             (view(Some(0.6), &[0.6], Some(StopReason::Unknown)), "Unknown", "The grasps agree on no known object"),
         ];
         for (view, headline, reason) in cases {
@@ -207,6 +244,10 @@ mod tests {
             ..listening(0.5, &[])
         };
         assert_eq!(Headline::of(&torn), Headline::Sensing);
+        // Before the contact the belief so far stands; readings of free fingers say nothing.
+        let free = IdentificationView { measures_geometry: true, ..listening(0.2, &[0.86]) };
+        assert_eq!(said(&free).0, "Lemon");
+        assert_eq!(Headline::of(&IdentificationView { beliefs: Vec::new(), ..free }), Headline::Sensing);
     }
 
     #[test]

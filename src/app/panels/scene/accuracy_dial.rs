@@ -98,7 +98,9 @@ fn measured_rows(ui: &mut Ui, simulation: &SimulationFeature) {
         row("reference", text, "CPU time of a grasp at accuracy reference, from the stored study (panel Accuracy)");
     }
     let hover = "Estimated numerical error over the grasp (RMS)";
-    let error = |size: f64, unit: &str, share: f64| format!("{}{SPACE}{}, {}{SPACE}%", two_digits(size), symbol(unit), short_percent(share));
+    let error = |size: f64, unit: &str, share: f64| {
+        format!("{}{SPACE}{}, {}{SPACE}%", two_digits(size), symbol(unit), short_percent(share))
+    };
     let errors = cost.map(|c| &c.error);
     row("± curvature", errors.map(|e| error(e.curvature_per_m, "1/m", e.curvature_share)), hover);
     row("± pressure", errors.map(|e| error(e.pressure_pa * 1e-3, "kPa", e.pressure_share)), hover);

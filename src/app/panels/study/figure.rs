@@ -5,14 +5,14 @@ use super::result_ui;
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::studies::Studies;
-use crate::app::theme::{self, colour};
+use crate::app::figure_plot::legend_ui;
+use crate::app::theme;
 use crate::app::widgets::wrapped;
-use egui::{RichText, ScrollArea, Sense, Stroke, Ui, vec2};
-use palpate_geometry::drawing::{Figure, LineStyle, Marker};
-use palpate_geometry::palette::{Theme, series_colour};
+use egui::{RichText, ScrollArea, Ui};
 use palpate_study::LinkedFigure;
 use palpate_study::StudySize;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
+use palpate_study::paper::paper_study;
 
 /// Least width of a plot (points).
 const LEAST_WIDTH: f32 = 300.0;
@@ -27,7 +27,8 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
         ui.weak("This result has no figure.");
         return;
     };
-    legend_ui(ui, theme::of(ui), &linked.figure);
+    let series = linked.figure.plots.iter().flat_map(|plot| &plot.series);
+    legend_ui(ui, theme::of(ui), series);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         plots_ui(ui, &result, linked, actions);
         for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
@@ -66,9 +67,8 @@ fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize
     let warning = match result.origin {
         _ if !result.current => "From other settings, methods or physics than today's: run the study again.",
         StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "Quick run: do not quote.",
-        StudyOrigin::Shipped => {
-            "Shipped result. Run the study to open its trials."
-        }
+        StudyOrigin::Shipped if paper_study(card.key).is_some() => "Shipped result. Run the study to open its trials.",
+        StudyOrigin::Shipped => "Shipped result.",
         StudyOrigin::Run(StudySize::Full) => return,
     };
     wrapped(ui, RichText::new(warning).small().color(ui.visuals().warn_fg_color));
@@ -81,54 +81,6 @@ fn about_origin(origin: StudyOrigin) -> &'static str {
         StudyOrigin::Run(StudySize::Sample { .. }) => "A sample of a few objects and grasps, run here",
         StudyOrigin::Shipped => "The full form, as it comes with the program",
     }
-}
-
-/// Names of all series with their colours and signs.
-fn legend_ui(ui: &mut Ui, theme: Theme, figure: &Figure) {
-    let mut seen = Vec::new();
-    for series in figure.plots.iter().flat_map(|plot| &plot.series).filter(|series| !series.name.is_empty()) {
-        let key = (series.name.as_str(), series.colour, series.marker, series.line);
-        if !seen.contains(&key) {
-            seen.push(key);
-        }
-    }
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
-        for (name, number, marker, line) in seen {
-            let ink = colour(series_colour(number, theme));
-            let (rect, _) = ui.allocate_exact_size(vec2(16.0, 14.0), Sense::hover());
-            let (painter, at) = (ui.painter(), rect.center());
-            if line != LineStyle::None {
-                let width = if line == LineStyle::Bold { 3.0 } else { 1.3 };
-                let ends = [rect.left_center(), rect.right_center()];
-                if line == LineStyle::Dashed {
-                    painter.extend(egui::Shape::dashed_line(&ends, Stroke::new(width, ink), 4.0, 3.0));
-                } else {
-                    painter.line_segment(ends, Stroke::new(width, ink));
-                }
-            }
-            match marker {
-                Marker::None => {}
-                Marker::Dot => {
-                    painter.circle_filled(at, 3.5, ink);
-                }
-                Marker::Ring => {
-                    painter.circle_stroke(at, 3.5, Stroke::new(1.3, ink));
-                }
-                Marker::Square => {
-                    painter.rect_filled(egui::Rect::from_center_size(at, vec2(7.0, 7.0)), 0.0, ink);
-                }
-                Marker::Cross => {
-                    for side in [1.0, -1.0] {
-                        let reach = vec2(3.5, 3.5 * side);
-                        painter.line_segment([at - reach, at + reach], Stroke::new(1.3, ink));
-                    }
-                }
-            }
-            ui.label(RichText::new(name).small());
-            ui.add_space(6.0);
-        }
-    });
 }
 
 /// All plots in rows, as many beside each other as there is room for.
