@@ -279,7 +279,8 @@ fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32
         overlay_ui(&ui.painter().with_clip_rect(rect), corner, &overlay, letters);
     }
     // Presenter mode says it in its own words.
-    if !caption.is_empty() && letters == 1.0 {
+    let covers = caption == INVITATION && rect.width() < INVITED;
+    if !caption.is_empty() && letters == 1.0 && !covers {
         caption_ui(ui, rect, theme, caption, ghosted);
     }
     view
@@ -287,6 +288,8 @@ fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32
 
 /// Line of the first start.
 const INVITATION: &str = "Drop an object of yours here (URDF, OBJ or STL): it is grasped and learned";
+/// Least width of the picture in which that is one line, below the object (points).
+const INVITED: f32 = 600.0;
 
 /// What is said about a picture, and the colour of the ghost in it.
 fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
