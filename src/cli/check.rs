@@ -23,10 +23,10 @@ use std::process::ExitCode;
   palpate check golden/mug.json parts/mug.urdf --scene gripper.toml
   palpate check golden/lemon.json lemon --seed 7 --json
 
-The file holds, with its tolerance, each finger's contact time, its force, curvature and pressure in the hold and its greatest
-force, and the verdicts: touched, held, sound, and the class that the shipped model recognises. Tolerances are twice the
-error of the scene's accuracy: that of the accuracy study, or the difference from a finer run of this grasp where that is
-larger. Edit them as you like.
+The file holds, with its tolerance, each finger's contact time, its force, curvature and pressure in the hold and its greatest \
+force, and the verdicts: touched, held, sound, and the class that the shipped model recognises. Tolerances are twice the error of \
+the scene's accuracy: that of the accuracy study, or the difference from a finer run of this grasp where that is larger. Edit \
+them as you like.
 
 Exit codes: 0 same, 1 differs, 2 wrong use, 3 not compared
 

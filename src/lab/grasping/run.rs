@@ -273,7 +273,7 @@ mod tests {
         let block = ObjectModel::from_primitive("block", Primitive::Sphere { radius: 0.03 }, 400.0, 0.6);
         let trial = grasp(&scene, Some(&block), 0);
         assert!(!trial.data.plan.is_on("finger-contact") && trial.data.quality.converged);
-        let noted = |w: &String| w.contains("finger-contact was turned on at");
+        let noted = |w: &String| w.contains("switched on at");
         assert_eq!(trial.header.warnings.iter().filter(|w| noted(w)).count(), 1, "{:?}", trial.header.warnings);
     }
 

@@ -114,7 +114,9 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     }
     // An empty bar says "0 %" already.
     if p >= 0.01 {
-        let number = fitted(ui, percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
+        // Where there is no room for decimals, nothing is surer than 99 %.
+        let shown = if rect.right() - to < 30.0 { p.min(0.99) } else { p };
+        let number = fitted(ui, percent(shown), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
         put(ui, number, rect, Align2::RIGHT_CENTER);
     }
 }
