@@ -2,8 +2,8 @@
 //! each list of sensors.
 
 use crate::frame::{
-    Column, Experiment, LinkedFigure, OWN_METHODS, PERCENT, POINTS, PlainStudy, StudyCard, StudyCell, StudyCommand,
-    StudyError, StudyReport, StudySize, TableRows,
+    Along, Column, Experiment, Facets, LinkedFigure, OWN_METHODS, PERCENT, POINTS, PlainStudy, StudyCard, StudyCell,
+    StudyCommand, StudyError, StudyReport, StudySize, TableLine, TableRows,
 };
 use crate::paper::{Pool, STUDY_PRESET, TestAnswers, judge};
 use palpate_lab::datasets::{SensorView, labels_of_catalogue};
@@ -214,7 +214,14 @@ impl Experiment for AddedSensorStudy {
         report.clone()
     }
 
-    fn figures(_: &StudyReport) -> Vec<LinkedFigure> {
-        Vec::new()
+    fn figures(report: &StudyReport) -> Vec<LinkedFigure> {
+        let added = |line: TableLine<'_>| line.text("added").to_owned();
+        let facets = Facets {
+            plot: &|line: TableLine<'_>| line.text("method").to_owned(),
+            series: &added,
+            along: Along::Rows(&added),
+            ..Facets::USUAL
+        };
+        facets.figure(report, LISTED.card.key).into_iter().collect()
     }
 }
