@@ -7,7 +7,7 @@ use crate::frame::{
 };
 use crate::paper::{Pool, STUDY_PRESET, TestAnswers, judge};
 use palpate_lab::datasets::{SensorView, labels_of_catalogue};
-use palpate_lab::grasping::{GraspRounds, GraspedRound, PromiseError};
+use palpate_lab::grasping::{GraspRounds, GraspedRound};
 use palpate_learn::metrics::Interval;
 use palpate_learn::{DataCard, Dataset, Example, Fitting, Labels, Method, method};
 use palpate_sim::gripper::GripperModel;
@@ -109,10 +109,7 @@ impl AddedSensorStudy {
             labels.classes.iter().enumerate().map(|(k, class)| (k, class.name.clone())).collect();
         let simulated = |rounds: usize, seed: u64| {
             let rounds = GraspRounds { rounds, grasps: 1, seed, progress: &|_, _| (), stop };
-            rounds.simulated(&scene, &views, &sources).map_err(|cause| match cause {
-                PromiseError::Stopped => StudyError::Stopped,
-                cause => StudyError::missing(cause),
-            })
+            rounds.simulated(&scene, &views, &sources)
         };
         let [train, test] = [simulated(self.train, SEEDS[0])?, simulated(self.test, SEEDS[1])?];
         let sets = views.iter().enumerate().map(|(number, view)| {

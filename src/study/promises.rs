@@ -59,6 +59,15 @@ pub struct PromiseStudy {
     quick: bool,
 }
 
+impl From<PromiseError> for StudyError {
+    fn from(cause: PromiseError) -> Self {
+        match cause {
+            PromiseError::Stopped => Self::Stopped,
+            cause => Self::missing(cause),
+        }
+    }
+}
+
 impl PromiseStudy {
     /// The study in a size.
     pub fn of_size(size: StudySize) -> Self {
@@ -221,10 +230,7 @@ impl Experiment for PromiseStudy {
         let views = [own.clone(), SensorView { cut: Cut::Whole, ..own }, view(case.shipped_sensors())];
         let simulated = |rounds: usize, grasps: usize, seed: u64| {
             let rounds = GraspRounds { rounds, grasps, seed, progress: &|_, _| (), stop };
-            rounds.simulated(&Self::scene(*case), &views, &sources).map_err(|cause| match cause {
-                PromiseError::Stopped => StudyError::Stopped,
-                cause => StudyError::missing(cause),
-            })
+            rounds.simulated(&Self::scene(*case), &views, &sources).map_err(StudyError::from)
         };
         let train = simulated(self.train, 1, SEEDS[0])?;
         let [calibrate, test] =
