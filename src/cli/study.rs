@@ -2,11 +2,11 @@
 
 mod accuracy;
 mod added_sensors;
+mod answers;
 mod effects;
 mod merge;
 mod output;
 mod paper;
-mod promises;
 mod public;
 mod sensor_faults;
 mod stability;
@@ -23,7 +23,7 @@ use std::path::Path;
   palpate study effects --quick
   palpate study effects --out studies/
   palpate study stability --quick
-  palpate study promises --quick
+  palpate study answers --quick
   palpate study public --data icub.csv
   palpate study sensor-faults --quick
   palpate study added-sensors --quick
@@ -42,7 +42,7 @@ enum Study {
     /// Run hard cases at every accuracy, search holds for chatter, and count silently wrong random scenes; resumes.
     Stability(stability::StabilityArguments),
     /// Measure whether sets of classes and automatic stops keep their promise, on rounds of simulated grasps; resumes.
-    Promises(promises::PromisesArguments),
+    Answers(answers::AnswersArguments),
     /// Fit and test all methods on recordings of others, beside what can be told without touch; resumes.
     Public(public::PublicArguments),
     /// Let sensors of emulated grippers fail in the middle of a grasp: which are found, and what recognition loses; resumes.
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Accuracy(arguments) => accuracy::run(arguments),
         Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
-        Study::Promises(arguments) => promises::run(arguments),
+        Study::Answers(arguments) => answers::run(arguments),
         Study::Public(arguments) => public::run(arguments),
         Study::SensorFaults(arguments) => sensor_faults::run(arguments),
         Study::AddedSensors(arguments) => added_sensors::run(arguments),

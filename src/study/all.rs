@@ -2,12 +2,12 @@
 
 use crate::frame::ListedStudy;
 use crate::paper::PAPER_STUDIES;
-use crate::{accuracy, added_sensors, effects, promises, public, sensor_faults, stability};
+use crate::{accuracy, added_sensors, answers, effects, public, sensor_faults, stability};
 
 /// The studies of the paper, then those of answers and of the simulation.
 pub fn all_studies() -> impl DoubleEndedIterator<Item = &'static dyn ListedStudy> {
     let own: [&dyn ListedStudy; 5] =
-        [&promises::LISTED, &added_sensors::LISTED, &accuracy::LISTED, &effects::LISTED, &stability::LISTED];
+        [&answers::LISTED, &added_sensors::LISTED, &accuracy::LISTED, &effects::LISTED, &stability::LISTED];
     PAPER_STUDIES.iter().map(|study| *study as &dyn ListedStudy).chain(own)
 }
 
@@ -29,7 +29,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// Studies that have not been run in full yet, which their page says. The list only becomes shorter.
-    const NOT_RUN: [&str; 2] = ["region", "promises"];
+    const NOT_RUN: [&str; 2] = ["region", "answers"];
 
     #[test]
     fn every_study_has_a_key_of_its_own_and_shows_its_full_result() -> Result<(), serde_json::Error> {

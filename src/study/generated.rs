@@ -2,7 +2,7 @@
 
 use super::frame::{GeneratedSection, ListedStudy, ShownStudy, grouped};
 use super::shipped::shipped_text;
-use super::{accuracy, added_sensors, effects, paper, promises, public, stability};
+use super::{accuracy, added_sensors, answers, effects, paper, public, stability};
 use palpate_learn::{METHODS, Method};
 
 /// All generated sections; a test checks that the documents hold them, and
@@ -11,13 +11,13 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
     let accuracy = section("assets/help/accuracy.md", "accuracy study", &accuracy::LISTED)?;
     let effects = section("assets/help/effects.md", "effects", &effects::LISTED)?;
     let added = section("assets/help/sensors.md", "added sensors", &added_sensors::LISTED)?;
-    let promises = section("assets/help/recognition.md", "promises", &promises::LISTED)?;
+    let answers = section("assets/help/recognition.md", "answers", &answers::LISTED)?;
     let shipped =
         GeneratedSection { document: "assets/help/recognition.md", name: "shipped model", text: shipped_text() };
     let deviations =
         GeneratedSection { document: "assets/help/recognition.md", name: "deviations", text: deviations_text() };
     Ok([
-        accuracy.into_iter().chain(effects).chain(added).chain(promises).chain([shipped, deviations]).collect(),
+        accuracy.into_iter().chain(effects).chain(added).chain(answers).chain([shipped, deviations]).collect(),
         stability::sections()?,
         paper::sections()?,
         paper::sections_in_short()?,

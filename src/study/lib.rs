@@ -21,7 +21,7 @@
 //! | 3 | `public` | recordings of others |
 //! | 3 | `sensor_faults` | sensors that fail in the middle of a grasp |
 //! | 3 | `added_sensors` | what sensors beyond the paper's four are worth |
-//! | 3 | `promises` | whether answers keep their promise |
+//! | 3 | `answers` | whether answers keep their promise |
 //! | 4 | `generated` | sections of manual and README, written from stored results |
 //! | 4 | `all` | the list of all studies |
 //! | 5 | [`jobs`] | background tasks of the window |
@@ -29,6 +29,7 @@
 pub mod accuracy;
 mod added_sensors;
 mod all;
+mod answers;
 mod effects;
 mod emulated;
 mod finger_fit;
@@ -38,7 +39,6 @@ pub mod jobs;
 mod network_cost;
 pub mod paper;
 mod physics_cost;
-mod promises;
 mod public;
 mod sensor_faults;
 mod shipped;
@@ -46,6 +46,7 @@ pub mod stability;
 
 pub use added_sensors::added_sensor_study;
 pub use all::{all_studies, listed_study, study_title};
+pub use answers::{AnswerCase, AnswerStudy, KeptPromise};
 pub use effects::{
     AuditReport, AuditRow, AuditedEffect, AuditedScene, EffectAudit, EffectChange, EffectSize, ExplainedEffect,
     Explanation, SEEN, SceneNumber, explain_effects,
@@ -66,6 +67,5 @@ pub use network_cost::{
     LiveCost, NetworkCost, StepSizes, answer_cost, candle_step_cost, kernel_step_cost, live_step_cost,
 };
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
-pub use promises::{KeptPromise, PromiseCase, PromiseStudy};
 pub use public::{PUBLIC, PublicData, PublishedResult, PublishedResults, public_study};
 pub use sensor_faults::{SENSOR_FAULTS, sensor_fault_study, sound_channels};

@@ -23,15 +23,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// The study in the list.
-pub(crate) const LISTED: PlainStudy<PromiseStudy> = PlainStudy {
+pub(crate) const LISTED: PlainStudy<AnswerStudy> = PlainStudy {
     card: StudyCard {
-        key: "promises",
+        key: "answers",
         title: "Answers that keep their promise",
         about: "sets of classes and automatic stops calibrated for nine of ten rounds, tested on 1500 others: how often the true class is lost, how large sets are, how many stops are wrong",
         paper: OWN_METHODS,
         budget: "about 90 CPU minutes",
     },
-    of_size: |size| Ok(PromiseStudy::of_size(size)),
+    of_size: |size| Ok(AnswerStudy::of_size(size)),
 };
 
 /// Promised share of rounds that may lose the true class.
@@ -47,7 +47,7 @@ const SEEDS: [u64; 3] = [21, 22, 23];
 
 /// The study: rounds of each object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct PromiseStudy {
+pub struct AnswerStudy {
     /// Training grasps of each object.
     train: usize,
     /// Rounds of each object to calibrate on, and to test with.
@@ -68,7 +68,7 @@ impl From<PromiseError> for StudyError {
     }
 }
 
-impl PromiseStudy {
+impl AnswerStudy {
     /// The study in a size.
     pub fn of_size(size: StudySize) -> Self {
         match size {
@@ -82,14 +82,14 @@ impl PromiseStudy {
 
 /// Grippers and sensors of the rounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PromiseCase {
+pub enum AnswerCase {
     Perfect,
     PhysicalLike,
     /// Another gripper in each round.
     Unknown,
 }
 
-impl PromiseCase {
+impl AnswerCase {
     const ALL: [Self; 3] = [Self::Perfect, Self::PhysicalLike, Self::Unknown];
 
     fn sensors(self) -> SensorModel {
@@ -111,7 +111,7 @@ impl PromiseCase {
     }
 }
 
-impl StudyCell for PromiseCase {
+impl StudyCell for AnswerCase {
     fn name(&self) -> String {
         match self {
             Self::Perfect => "perfect sensors",
@@ -152,14 +152,14 @@ pub struct KeptPromise {
     at_90: [usize; 2],
 }
 
-impl PromiseStudy {
+impl AnswerStudy {
     /// The scene of a case, without its object.
-    fn scene(case: PromiseCase) -> Scene {
+    fn scene(case: AnswerCase) -> Scene {
         let mut scene = Scene::default();
         if let Some(preset) = PosePreset::named(crate::paper::STUDY_PRESET) {
             scene.pose = preset.poses();
         }
-        scene.pose.build = if case == PromiseCase::Unknown { 1.0 } else { 0.0 };
+        scene.pose.build = if case == AnswerCase::Unknown { 1.0 } else { 0.0 };
         scene
     }
 
@@ -177,7 +177,7 @@ impl PromiseStudy {
         self,
         key: &str,
         grasps: &[GraspedRound],
-        case: PromiseCase,
+        case: AnswerCase,
         stop: &AtomicBool,
     ) -> Result<Model, StudyError> {
         let method = method(key).ok_or_else(|| StudyError::missing(key))?;
@@ -200,8 +200,8 @@ impl PromiseStudy {
     }
 }
 
-impl Experiment for PromiseStudy {
-    type Cell = PromiseCase;
+impl Experiment for AnswerStudy {
+    type Cell = AnswerCase;
     type Found = Vec<KeptPromise>;
     type Report = StudyReport;
 
@@ -217,11 +217,11 @@ impl Experiment for PromiseStudy {
         StudyCommand::new(self.key()).flag("quick", self.quick)
     }
 
-    fn grid(&self) -> Vec<PromiseCase> {
-        PromiseCase::ALL.to_vec()
+    fn grid(&self) -> Vec<AnswerCase> {
+        AnswerCase::ALL.to_vec()
     }
 
-    fn measure(&self, case: &PromiseCase, stop: &AtomicBool) -> Result<Vec<KeptPromise>, StudyError> {
+    fn measure(&self, case: &AnswerCase, stop: &AtomicBool) -> Result<Vec<KeptPromise>, StudyError> {
         let labels = self.labels();
         let sources: Vec<(usize, String)> =
             labels.classes.iter().enumerate().map(|(k, class)| (k, class.name.clone())).collect();
@@ -259,11 +259,11 @@ impl Experiment for PromiseStudy {
         Ok(kept)
     }
 
-    fn report(&self, found: Vec<(PromiseCase, Vec<KeptPromise>)>) -> StudyReport {
-        let rows: Vec<(PromiseCase, KeptPromise)> =
+    fn report(&self, found: Vec<(AnswerCase, Vec<KeptPromise>)>) -> StudyReport {
+        let rows: Vec<(AnswerCase, KeptPromise)> =
             found.into_iter().flat_map(|(case, kept)| kept.into_iter().map(move |own| (case, own))).collect();
         let cases = rows.len().max(1) as f64;
-        type Kept = (PromiseCase, KeptPromise);
+        type Kept = (AnswerCase, KeptPromise);
         let share = |count: usize, of: usize| (of > 0).then(|| Interval::of_share(count, of));
         let title = format!(
             "Promise: the true class is left in {:.0} % of rounds; automatic stops are wrong in {:.0} % at most",
@@ -384,9 +384,9 @@ mod tests {
 
     #[test]
     fn a_sample_has_objects_of_all_shapes() {
-        let labels = PromiseStudy::of_size(StudySize::Quick).labels();
+        let labels = AnswerStudy::of_size(StudySize::Quick).labels();
         let shapes: std::collections::BTreeSet<_> = labels.classes.iter().filter_map(|class| class.shape).collect();
         assert_eq!((labels.classes.len(), shapes.len()), (4, 3));
-        assert_eq!(PromiseStudy::of_size(StudySize::Full).labels().classes.len(), 16);
+        assert_eq!(AnswerStudy::of_size(StudySize::Full).labels().classes.len(), 16);
     }
 }

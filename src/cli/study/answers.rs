@@ -1,17 +1,17 @@
-//! `palpate study promises`: whether answers keep their promise.
+//! `palpate study answers`: whether answers keep their promise.
 
 use super::super::prelude::*;
 use super::output::StudyOutput;
-use palpate_study::{PromiseStudy, StudySize};
+use palpate_study::{AnswerStudy, StudySize};
 
-/// Arguments of `palpate study promises`.
+/// Arguments of `palpate study answers`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  palpate study promises --quick
-  palpate study promises --out studies/
+  palpate study answers --quick
+  palpate study answers --out studies/
 
 See also: palpate help recognition")]
-pub(super) struct PromisesArguments {
+pub(super) struct AnswersArguments {
     /// Take two minutes instead of more than an hour: four objects, few rounds, small networks.
     #[arg(long)]
     quick: bool,
@@ -19,9 +19,9 @@ pub(super) struct PromisesArguments {
     output: StudyOutput,
 }
 
-pub(super) fn run(arguments: &PromisesArguments) -> Result<(), Failure> {
-    let PromisesArguments { quick, output } = arguments;
+pub(super) fn run(arguments: &AnswersArguments) -> Result<(), Failure> {
+    let AnswersArguments { quick, output } = arguments;
     let size = if *quick { StudySize::Quick } else { StudySize::Full };
-    let stored = output.run(&PromiseStudy::of_size(size), *quick)?;
+    let stored = output.run(&AnswerStudy::of_size(size), *quick)?;
     stored.filter(|_| output.json).map_or(Ok(()), |stored| say_json(&stored))
 }
