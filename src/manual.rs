@@ -41,6 +41,7 @@ topics! {
     effects
     accuracy
     stability
+    promises
     engines
     datasets
     recordings

@@ -7,6 +7,7 @@ mod effects;
 mod merge;
 mod output;
 mod paper;
+mod promises;
 mod public;
 mod sensor_faults;
 mod stability;
@@ -27,6 +28,7 @@ use std::path::Path;
   palpate study public --data icub.csv
   palpate study sensor-faults --quick
   palpate study added-sensors --quick
+  palpate study promises
   palpate study stability --scenes 500 --seed 2 --json")]
 pub(super) struct StudyArguments {
     #[command(subcommand)]
@@ -43,6 +45,8 @@ enum Study {
     Stability(stability::StabilityArguments),
     /// Measure whether sets of classes and automatic stops keep their promise, on rounds of simulated grasps; resumes.
     Answers(answers::AnswersArguments),
+    /// Compare the numbers behind the three promises with those of the version before: cost of accuracy, hard cases, effects.
+    Promises(promises::PromisesArguments),
     /// Fit and test all methods on recordings of others, beside what can be told without touch; resumes.
     Public(public::PublicArguments),
     /// Let sensors of emulated grippers fail in the middle of a grasp: which are found, and what recognition loses; resumes.
@@ -62,6 +66,7 @@ pub(super) fn run(arguments: &StudyArguments, store: Option<&Path>) -> Result<()
         Study::Effects(arguments) => effects::run(arguments),
         Study::Stability(arguments) => stability::run(arguments),
         Study::Answers(arguments) => answers::run(arguments),
+        Study::Promises(arguments) => promises::run(arguments),
         Study::Public(arguments) => public::run(arguments),
         Study::SensorFaults(arguments) => sensor_faults::run(arguments),
         Study::AddedSensors(arguments) => added_sensors::run(arguments),

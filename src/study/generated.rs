@@ -2,7 +2,7 @@
 
 use super::frame::{GeneratedSection, ListedStudy, ShownStudy, grouped};
 use super::shipped::shipped_text;
-use super::{accuracy, added_sensors, answers, effects, paper, public, stability};
+use super::{accuracy, added_sensors, answers, effects, paper, promises, public, stability};
 use palpate_learn::{METHODS, Method};
 
 /// All generated sections; a test checks that the documents hold them, and
@@ -17,7 +17,13 @@ pub fn generated_sections() -> Result<Vec<GeneratedSection>, serde_json::Error> 
     let deviations =
         GeneratedSection { document: "assets/help/recognition.md", name: "deviations", text: deviations_text() };
     Ok([
-        accuracy.into_iter().chain(effects).chain(added).chain(answers).chain([shipped, deviations]).collect(),
+        accuracy
+            .into_iter()
+            .chain(effects)
+            .chain(added)
+            .chain(answers)
+            .chain([promises::section()?, shipped, deviations])
+            .collect(),
         stability::sections()?,
         paper::sections()?,
         paper::sections_in_short()?,

@@ -22,6 +22,7 @@
 //! | 3 | `sensor_faults` | sensors that fail in the middle of a grasp |
 //! | 3 | `added_sensors` | what sensors beyond the paper's four are worth |
 //! | 3 | `answers` | whether answers keep their promise |
+//! | 4 | `promises` | the numbers behind the program's promises, beside those of the version before |
 //! | 4 | `generated` | sections of manual and README, written from stored results |
 //! | 4 | `all` | the list of all studies |
 //! | 5 | [`jobs`] | background tasks of the window |
@@ -39,6 +40,7 @@ pub mod jobs;
 mod network_cost;
 pub mod paper;
 mod physics_cost;
+mod promises;
 mod public;
 mod sensor_faults;
 mod shipped;
@@ -67,5 +69,6 @@ pub use network_cost::{
     LiveCost, NetworkCost, StepSizes, answer_cost, candle_step_cost, kernel_step_cost, live_step_cost,
 };
 pub use physics_cost::{BenchScene, CostRow, bench_scenes, physics_cost, physics_truth};
+pub use promises::{Promise, PromiseNumber, Promises};
 pub use public::{PUBLIC, PublicData, PublishedResult, PublishedResults, public_study};
 pub use sensor_faults::{SENSOR_FAULTS, sensor_fault_study, sound_channels};

@@ -125,7 +125,7 @@ fn print_finding(finding: &Finding) -> Result<(), Failure> {
 /// Rows of long tables that are printed; the files have all.
 const MOST_ROWS: usize = 60;
 
-fn print_table(of: &StudyTable) -> Result<(), Failure> {
+pub(super) fn print_table(of: &StudyTable) -> Result<(), Failure> {
     let (header, mut rows) = of.shown();
     let more = rows.len().saturating_sub(MOST_ROWS);
     rows.truncate(MOST_ROWS);
