@@ -1,6 +1,7 @@
 //! Sentences of presenter mode, for people who have never heard of the project.
 
-use crate::app::panels::recognition::words::{newest, percent, ranked, title};
+use crate::app::panels::recognition::words::{left, newest, percent, ranked, title};
+use crate::app::widgets::capital;
 use palpate_geometry::units::mm;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::Snapshot;
@@ -51,7 +52,8 @@ pub(super) fn reason(view: &IdentificationView) -> String {
         }
         (None, _) => "It compares this touch with the grasps that it has learned from.".to_owned(),
     };
-    [felt(view), rival(view), follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    let others = left(view).map_or_else(|| rival(view), |left| format!("{}.", capital(&left)));
+    [felt(view), others, follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// The width that it has measured.

@@ -111,8 +111,6 @@ impl std::fmt::Debug for Identification {
 pub struct IdentificationView {
     /// Classes, sizes and shapes.
     pub labels: Arc<Labels>,
-    /// Whether the model estimates size and shape (stage one).
-    pub has_stage_one: bool,
     /// Stop rule.
     pub rule: StopRule,
     /// The newest verdict on the running or last grasp; none before the first readings.
@@ -369,7 +367,6 @@ impl Identification {
     pub fn view(&self) -> IdentificationView {
         IdentificationView {
             labels: Arc::clone(&self.labels),
-            has_stage_one: self.model.recogniser.has_stage_one(),
             rule: self.rule,
             verdict: self.verdict.clone(),
             measures_geometry: self.geometry.serves(),

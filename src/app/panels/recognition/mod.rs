@@ -24,6 +24,7 @@ use egui::{
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
 use palpate_lab::workers::{Command, Job, THRESHOLDS};
+use palpate_learn::Labels;
 use std::sync::Arc;
 use words::{FOREIGN, Headline, percent, reason};
 
@@ -89,9 +90,10 @@ impl Measures {
     }
 
     /// Columns for classes, and the height of a line: all have one, in whatever window.
-    fn lines(&self, height: f32, classes: usize, has_stage_one: bool, has_touch: bool) -> (usize, f32) {
-        let properties = if has_stage_one { 2.0 * self.properties + self.gap } else { 0.0 };
-        let touch = if has_touch { touch::height(self, has_stage_one) } else { 0.0 };
+    fn lines(&self, height: f32, labels: &Labels, has_touch: bool) -> (usize, f32) {
+        let (properties, classes) = (properties::rows(labels) as f32, labels.classes.len());
+        let properties = properties * self.properties + (properties - 1.0).max(0.0) * self.gap;
+        let touch = if has_touch { touch::height(self) } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - touch - 7.0 * self.gap;
         let line = |columns: usize| (room / classes.div_ceil(columns).max(1) as f32).floor();
@@ -137,7 +139,7 @@ pub(super) fn ui(
                 }
                 properties::ui(ui, &part);
                 let has_touch = touch::ui(ui, &part);
-                let lines = measures.lines(room.y - advised, view.labels.classes.len(), view.has_stage_one, has_touch);
+                let lines = measures.lines(room.y - advised, &view.labels, has_touch);
                 classes::ui(ui, &mut part, lines);
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);

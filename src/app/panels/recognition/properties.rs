@@ -1,10 +1,10 @@
-//! Stage one: size and shape, as bars with one segment for each answer.
+//! Size and shape, as bars with one segment for each answer.
 
 use super::words::{newest, whole_percent};
 use super::{Part, eased, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_learn::Pmf;
+use palpate_learn::{Class, Labels, Pmf};
 
 /// Height of the line that shows the probability of an answer (points).
 const UNDERLINE: f32 = 4.0;
@@ -14,20 +14,30 @@ const NARROW: f32 = 250.0;
 /// Size of letters (points).
 const LETTERS: f32 = 11.0;
 
+/// Size and shape of an answer: those of the classes, so that they never contradict it.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     let labels = &part.view.labels;
-    if !part.view.has_stage_one {
+    if rows(labels) == 0 {
         return;
     }
-    // An empty hand has neither, but that is known only after the grasp.
-    let leader = newest(part.view).map(|pmf| &labels.classes[pmf.top().0]);
-    let has_any = part.view.listening || leader.is_some_and(|class| class.size.is_some() || class.shape.is_some());
-    let properties = part.view.verdict.as_ref().and_then(|v| v.properties.as_ref()).filter(|_| has_any);
-    property_ui(ui, part, "size", &labels.sizes, properties.map(|p| &p.size));
-    property_ui(ui, part, "shape", &labels.shapes, properties.map(|p| &p.shape));
+    // An empty hand has neither, and nothing is known of other objects.
+    let has_any = |class: &Class| class.size.is_some() || class.shape.is_some();
+    let known = newest(part.view).filter(|pmf| has_any(&labels.classes[pmf.top().0]));
+    let properties = known.map(|pmf| labels.properties_of(pmf));
+    if !labels.sizes.is_empty() {
+        property_ui(ui, part, "size", &labels.sizes, properties.as_ref().map(|own| &own.size));
+    }
+    if !labels.shapes.is_empty() {
+        property_ui(ui, part, "shape", &labels.shapes, properties.as_ref().map(|own| &own.shape));
+    }
 }
 
-pub(super) fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String], pmf: Option<&Pmf>) {
+/// Number of lines.
+pub(super) fn rows(labels: &Labels) -> usize {
+    usize::from(!labels.sizes.is_empty()) + usize::from(!labels.shapes.is_empty())
+}
+
+fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String], pmf: Option<&Pmf>) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), part.measures.properties), Sense::hover());
     let named = if rect.width() < NARROW { 0.0 } else { NAME };
     if named > 0.0 {

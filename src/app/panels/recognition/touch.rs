@@ -1,11 +1,9 @@
-//! The measured touch: width and height of the object with their spread, and its kind, as the fingers feel them, before any
+//! The measured touch: width and height of the object with their spread, as the fingers feel them, before any
 //! class is named.
 
-use super::properties::property_ui;
 use super::{Measures, Part, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_lab::grasping::SHAPES;
 use palpate_learn::{Measure, MeasureEstimate};
 
 /// Longest length on the scale (mm).
@@ -27,10 +25,9 @@ const SHOWN: [(Measure, &str, &str); 2] = [
 ];
 
 /// Height of all lines (points).
-pub(super) fn height(measures: &Measures, has_stage_one: bool) -> f32 {
-    let shape = if has_stage_one { 0.0 } else { measures.properties + measures.gap };
+pub(super) fn height(measures: &Measures) -> f32 {
     // In a small window, one line with its gap takes the room of a class.
-    shape + if measures.is_tight() { measures.class } else { SHOWN.len() as f32 * (measures.class + measures.gap) }
+    if measures.is_tight() { measures.class } else { SHOWN.len() as f32 * (measures.class + measures.gap) }
 }
 
 /// Draws the lines; false where nothing can be measured.
@@ -40,10 +37,6 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
         return false;
     }
     let measured = part.view.measured.as_deref();
-    if !part.view.has_stage_one {
-        let shapes = SHAPES.map(|shape| shape.name().to_owned());
-        property_ui(ui, part, "shape", &shapes, measured.map(|measured| &measured.shape));
-    }
     let of = |measure: Measure| measured.and_then(|measured| measured.of(measure));
     if part.measures.is_tight() {
         let height = part.measures.class - part.measures.gap;

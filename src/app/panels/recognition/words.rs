@@ -98,7 +98,7 @@ pub(in crate::app) fn reason(view: &IdentificationView, recognised: &Recognised<
 }
 
 /// Classes that are left after finished grasps, where the model's sets are calibrated.
-fn left(view: &IdentificationView) -> Option<String> {
+pub(in crate::app) fn left(view: &IdentificationView) -> Option<String> {
     let left = view.left.as_ref().filter(|_| !view.beliefs.is_empty())?;
     let classes = (0..left.len()).filter(|class| left[*class]);
     let names: Vec<String> = classes.map(|class| title(&view.labels, class).to_lowercase()).collect();
@@ -193,7 +193,6 @@ mod tests {
     fn view(now: Option<f64>, beliefs: &[f64], decision: Option<StopReason>) -> IdentificationView {
         IdentificationView {
             labels: Arc::new(labels_of_catalogue()),
-            has_stage_one: true,
             rule: StopRule { threshold: 0.9, most_grasps: 4 },
             verdict: now.map(|p| Verdict { pmf: pmf(p), properties: None }),
             measures_geometry: false,
