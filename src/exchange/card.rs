@@ -1,7 +1,7 @@
 //! Cards of data sets, as hubs expect them: YAML, then text. All of it comes from what is stored of the trials.
 
 use crate::content::{TrialContent, channels_of};
-use palpate_store::labels::shown_name;
+use palpate_store::labels::{LabelledTrial, shown_name};
 use palpate_tactile::trial::TrialSource;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -10,13 +10,7 @@ use std::fmt::Write as _;
 /// Card of a LeRobot data set that `info.json` describes.
 pub(crate) fn data_set_card(trials: &[TrialContent], info: &Value) -> String {
     let frames = info["total_frames"].as_u64().unwrap_or(0);
-    let size = match frames {
-        0..1_000 => "n<1K",
-        1_000..10_000 => "1K<n<10K",
-        10_000..100_000 => "10K<n<100K",
-        100_000..1_000_000 => "100K<n<1M",
-        _ => "n>1M",
-    };
+    let size = size_category(frames);
     let (episodes, fps, version) = (trials.len(), &info["fps"], env!("CARGO_PKG_VERSION"));
     let mut text = format!(
         "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:\n- LeRobot\n- tactile\n- soft-gripper\nsize_categories:\n- \
@@ -62,6 +56,54 @@ pub(crate) fn data_set_card(trials: &[TrialContent], info: &Value) -> String {
     line("\n## Limits\n");
     limits(trials).iter().for_each(|limit| line(&format!("- {limit}")));
     text
+}
+
+/// Card of a folder of labelled trials of the real gripper, with the names of its channels and the trials whose channels
+/// could not be derived.
+pub(crate) fn labelled_card(rows: &[&LabelledTrial], channels: &[String], left_out: usize) -> String {
+    let samples = rows.iter().map(|row| row.samples).sum();
+    let (trials, size, version) = (rows.len(), size_category(samples), env!("CARGO_PKG_VERSION"));
+    let mut text = format!(
+        "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:\n- tactile\n- soft-gripper\nsize_categories:\n- {size}\nconfigs:\n- \
+         config_name: signals\n  data_files: signals.csv\n- config_name: trials\n  data_files: trials.csv\n---\n\n# Labelled grasps \
+         of a soft gripper\n\n{trials} grasps, {samples} readings, written by Palpate {version}. The licence is unknown: name one \
+         before you publish them.\n\n## Objects\n\n| label | grasps |\n|---|---|\n"
+    );
+    let mut line = |line: &str| {
+        // Writing to a text cannot fail.
+        let _written = writeln!(text, "{line}");
+    };
+    let labels = counts(rows.iter().map(|row| shown_name(row.object.as_deref().unwrap_or_default()).to_owned()));
+    labels.iter().for_each(|(label, count)| line(&format!("| {label} | {count} |")));
+    line("\n## How they were measured\n");
+    let days = counts(rows.iter().map(|row| row.created.chars().take(10).collect()));
+    let days: Vec<String> = days.iter().map(|(day, count)| format!("{day} ({count})")).collect();
+    line(&format!("- real gripper, on {} (UTC)", days.join(", ")));
+    line(&format!("- channels: {}", channels.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")));
+    line("- `raw/` has the counts of each reading, and the bytes as the board sent them\n\n## Limits\n");
+    let count = |is: fn(&LabelledTrial) -> bool| rows.iter().filter(|row| is(row)).count();
+    let found = [
+        (left_out, "have counts only: their channels could not be derived"),
+        (count(|row| !row.flags.is_empty()), "are flagged as faulty"),
+        (count(|row| row.unsure), "have a label that is marked as unsure"),
+    ];
+    found
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .for_each(|(count, what)| line(&format!("- {count} of {trials} grasps {what}.")));
+    line("- Grasps of one day share a tare and a mounting: test on other days than you train on.");
+    text
+}
+
+/// Number of rows, as hubs sort them.
+fn size_category(rows: u64) -> &'static str {
+    match rows {
+        0..1_000 => "n<1K",
+        1_000..10_000 => "1K<n<10K",
+        10_000..100_000 => "10K<n<100K",
+        100_000..1_000_000 => "100K<n<1M",
+        _ => "n>1M",
+    }
 }
 
 /// How often each text occurs.

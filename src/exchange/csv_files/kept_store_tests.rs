@@ -21,6 +21,8 @@ fn a_store_of_version_0_1_0_is_exported_with_the_same_numbers() -> Result<(), Bo
     let raw = std::fs::read_to_string(out.join("raw/trial_4_lemon.csv"))?;
     let row = "1.1599999999999997,1.1610256049999998,84,,1687.8,1618.1,842.3,946.1,0.6,close";
     assert_eq!((raw.lines().count(), raw.lines().nth(59)), (162, Some(row)));
+    let card = std::fs::read_to_string(out.join("README.md"))?;
+    assert!(card.starts_with("---\nlicense: unknown\n") && card.contains("\n| lemon | 1 |\n"), "{card}");
     // Means over all derived samples, as version 0.1.0 exported them.
     let mut reader = csv::Reader::from_path(out.join("signals.csv"))?;
     let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>()?;

@@ -1,6 +1,7 @@
 //! Export of all labelled trials of the real gripper into a folder for other programs:
 //!
 //! ```text
+//! README.md                card, as hubs for data sets expect it
 //! trials.csv               one row per trial: label, note, tags, flags, prediction, calibrations, cadence
 //! signals.csv              trial, label, size, shape, t_s, and curvature, pressure and force of each finger, closing
 //!                          and hold: input of `trials import`
@@ -13,6 +14,7 @@
 
 use super::board::write_board_csv;
 use super::writing::number;
+use crate::card::labelled_card;
 use crate::format::{ExchangeError, new_folder};
 use palpate_sim::objects::catalogue;
 use palpate_store::labels::LabelledTrial;
@@ -106,6 +108,9 @@ fn write_all(store: &Store, rows: &[&LabelledTrial], folder: &Path) -> Result<Ve
     }
     list_out.flush().map_err(|e| ExchangeError::cannot_write(&list, &e))?;
     signals_out.flush().map_err(|e| ExchangeError::cannot_write(&signals, &e))?;
+    let (card, names) = (folder.join("README.md"), channels.iter().map(with_unit).collect::<Vec<_>>());
+    let text = labelled_card(rows, &names, left_out.len());
+    std::fs::write(&card, text).map_err(|e| ExchangeError::cannot_write(&card, &e))?;
     Ok(left_out)
 }
 
