@@ -12,6 +12,7 @@ const SHIPPED: &[(&str, &str)] = &[
     ("drift", include_str!("../../../assets/studies/paper/drift.json")),
     ("shaking", include_str!("../../../assets/studies/paper/shaking.json")),
     ("recognition", include_str!("../../../assets/studies/paper/recognition.json")),
+    ("answers", include_str!("../../../assets/studies/answers.json")),
     ("added-sensors", include_str!("../../../assets/studies/added-sensors.json")),
     ("public", include_str!("../../../assets/studies/public.json")),
     ("accuracy", include_str!("../../../assets/studies/accuracy.json")),
