@@ -11,6 +11,7 @@ use egui::{
 use palpate_geometry::palette::{Rgb, Trace};
 use palpate_lab::workers::{GripperCommand, GripperView, Job, JobFailure};
 use palpate_store::labels::Sparkline;
+use palpate_tactile::trial::Control;
 use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -67,11 +68,11 @@ pub(super) fn selectable_row(ui: &mut Ui, height: f32, chosen: bool, name: &str)
 pub(super) fn choice_ui<T: PartialEq + Copy>(
     ui: &mut Ui,
     now: Option<T>,
-    choices: impl IntoIterator<Item = (T, &'static str, &'static str)>,
+    choices: impl IntoIterator<Item = (T, impl Into<String>, &'static str)>,
 ) -> Option<T> {
     let mut clicked = None;
     for (choice, name, hint) in choices {
-        if ui.selectable_label(now == Some(choice), name).on_hover_text(hint).clicked() {
+        if ui.selectable_label(now == Some(choice), name.into()).on_hover_text(hint).clicked() {
             clicked = Some(choice);
         }
     }
@@ -175,6 +176,17 @@ pub(super) fn stop_button(ui: &mut Ui, actions: &mut Actions) {
     let response = ui.add_sized([84.0, 26.0], button).on_hover_text("Vent the fingers and end the trial (Esc)");
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Stop and vent"));
     actions.on(&response, |app| _ = app.gripper.send(GripperCommand::Vent));
+}
+
+/// Button that calibrates the sensors by one close of the empty hand.
+pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: Control, actions: &mut Actions) {
+    let free = gripper.is_some_and(|gripper| gripper.trial.is_none()) && control != Control::Free;
+    let button = ui.add_enabled(free, Button::new("Adapt")).on_hover_text(
+        "Close the empty hand once and calibrate the sensors by it, so that objects are recognised without labels. Sensors \
+         that were calibrated by hand stay so",
+    );
+    let button = button.on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand");
+    actions.on(&button, |app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
 }
 
 /// Least range of a sparkline: a newton, or a count.

@@ -5,7 +5,8 @@ use crate::app::features::App;
 use crate::app::features::gripper::{CONTROLS, control_title};
 use crate::app::theme::{self, accented};
 use crate::app::widgets::{
-    chip, command_ui, failed_sensors_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui, wrapped,
+    adapt_button, chip, command_ui, failed_sensors_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui,
+    wrapped,
 };
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
@@ -97,18 +98,10 @@ fn connected_ui(
         {
             actions.push(|app| _ = app.gripper.send(GripperCommand::Tare));
         }
-        if ui
-            .add_enabled(gripper.trial.is_none() && control != Control::Free, Button::new("Adapt"))
-            .on_hover_text(
-                "Close the empty hand once and calibrate the sensors by it, so that objects are recognised without labels. \
-                 Sensors that were calibrated by hand stay so",
-            )
-            .on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand")
-            .clicked()
-        {
-            actions.push(|app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
-        }
-        actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| _ = app.gripper.send(GripperCommand::Disconnect));
+        adapt_button(ui, Some(gripper), control, actions);
+        actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| {
+            _ = app.gripper.send(GripperCommand::Disconnect);
+        });
     });
     health_ui(ui, link);
     failed_sensors_ui(ui, gripper);

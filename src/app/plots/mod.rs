@@ -18,6 +18,7 @@ use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
+use crate::app::widgets::adapt_button;
 use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;
@@ -76,7 +77,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let unit = derived.unit(plot.unit);
     let least = if derived == Derivation::Values { plot.least } else { [0.0, 0.0] };
     let plot = TimePlot { curves: derived::derive(derived, plot.curves), unit: &unit, least, ..plot };
-    let [low, high] = value_range(data, &plot, [from, to]);
+    let [low, high] = value_range(data, &plot, [from, to], ui.available_height());
     let labelled = ui.available_width() > ROOM_FOR_LABELS;
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
     let plotted = f64::from(width - Y_AXIS);
@@ -102,6 +103,9 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .custom_x_axes(vec![seconds])
         .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .set_margin_fraction(egui::Vec2::ZERO);
+    let nothing = nothing_read(data, &plot);
+    // No sentence across grid lines.
+    let widget = widget.show_grid(nothing.is_none()).show_axes(nothing.is_none());
     let gaps = layers::gaps(data);
     let response = widget.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(from..=to);
@@ -137,11 +141,21 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         let frame = *response.transform.frame();
         labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(data, &plot, &response.transform));
     }
-    if let Some(why) = nothing_read(data, &plot) {
+    if let Some(why) = nothing {
+        let rect = response.response.rect;
         let ink = colour(theme.colours().quiet_text);
-        let room = response.response.rect.width() - 60.0;
-        let galley = ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, room.max(60.0));
-        ui.painter().galley(response.response.rect.center() - 0.5 * galley.size(), galley, ink);
+        let galley =
+            ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, (rect.width() - 60.0).max(60.0));
+        let adapts = why == NOT_CALIBRATED && data.source == ViewSource::Gripper;
+        let above = if adapts { 18.0 } else { 0.0 };
+        let corner = rect.center() - 0.5 * galley.size() - egui::vec2(0.0, above);
+        let below = corner.y + galley.size().y + 8.0;
+        ui.painter().galley(corner, galley, ink);
+        if adapts {
+            let place = egui::Rect::from_center_size(egui::pos2(rect.center().x, below + 13.0), egui::vec2(80.0, 26.0));
+            let mut own = ui.new_child(egui::UiBuilder::new().id_salt((plot.id, "adapt")).max_rect(place));
+            adapt_button(&mut own, data.gripper, data.view.control, actions);
+        }
     }
     response
         .response
@@ -185,6 +199,9 @@ fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &P
     own.chain(others).collect()
 }
 
+const NOT_CALIBRATED: &str =
+    "Sensors not calibrated. Adapt (closes the empty hand once) or calibrate with reference weights and angles.";
+
 /// Text where a connected gripper gives no curve to draw.
 fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
     let real = match data.source {
@@ -201,12 +218,18 @@ fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'stati
     nothing.then_some(if plot.id == "line pressure" {
         "The board does not report line pressure."
     } else {
-        "Sensors not calibrated. Adapt (closes the empty hand once) or calibrate with reference weights and angles."
+        NOT_CALIBRATED
     })
 }
 
-/// Range of the curves within the time shown, with a margin, and at least the plot's least range.
-fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2]) -> [f64; 2] {
+/// Heights of the names of phases, and of the marks of time below a plot (points).
+const NAMES: f32 = 17.0;
+const TIMES: f32 = 20.0;
+/// Least share of the height that names have.
+const LEAST_SHARE: f32 = 0.165;
+
+/// Range of the curves within the time shown, with a margin, and at least the plot's least range; in a plot so high (points).
+fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2], height: f32) -> [f64; 2] {
     let [mut low, mut high] = plot.least;
     let compared = data.comparison.traces.iter().map(|compared| &compared.trace);
     for trace in data.traces.earlier().chain(data.traces.current()).chain(compared) {
@@ -220,7 +243,8 @@ fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 
     if low >= high {
         [low, high] = if low.is_finite() { [low - 0.5, high + 0.5] } else { [0.0, 1.0] };
     }
-    // The word "hold" has a place of its own above the curves.
     let air = 0.06 * (high - low);
-    [low - air, high + 3.5 * air]
+    // The word "hold" has a place of its own above the curves.
+    let share = f64::from((NAMES / (height - TIMES).max(2.5 * NAMES)).max(LEAST_SHARE));
+    [low - air, high + share / (1.0 - share) * (high - low + air)]
 }
