@@ -8,7 +8,7 @@ use egui::{
     Align2, Color32, ColorImage, FontId, Pos2, Rect, Response, Sense, Stroke, TextureFilter, TextureHandle,
     TextureOptions, Ui, WidgetInfo, pos2, vec2,
 };
-use palpate_geometry::drawing::{ColourScale, HeatMap};
+use palpate_geometry::drawing::{CellAxis, ColourScale, HeatMap};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{SPACE, mark, shown as with_unit, symbol};
 use palpate_lab::inspection::PhaseSpan;
@@ -110,6 +110,31 @@ fn cells(ui: &Ui, theme: Theme, rect: Rect, (map, texture): (&HeatMap, &TextureH
     painter.image(texture.id(), all, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
     let edge = Stroke::new(1.0, colour(theme.colours().border));
     ui.painter().rect_stroke(rect, 0.0, edge, egui::StrokeKind::Outside);
+    if map.x.is_cut() {
+        tear(ui, theme, rect.left_bottom(), rect.left_top());
+    } else if map.y.is_cut() {
+        tear(ui, theme, rect.left_top(), rect.right_top());
+    }
+}
+
+/// Width and depth of a tooth of a cut (points).
+const TOOTH: [f32; 2] = [8.0, 4.0];
+
+/// Tears an edge of a map off, from one corner to another with the map to the right: what is beyond is left out.
+fn tear(ui: &Ui, theme: Theme, from: Pos2, to: Pos2) {
+    let count = ((to - from).length() / TOOTH[0]).round().max(1.0);
+    let (along, inward) = ((to - from) / count, TOOTH[1] * (to - from).normalized().rot90());
+    let (ground, edge) = (ui.visuals().panel_fill, Stroke::new(1.0, colour(theme.colours().quiet_text)));
+    for k in 0..count as u32 {
+        let [low, high] = [from + along * k as f32, from + along * (k + 1) as f32];
+        let tip = low + 0.5 * along - inward;
+        ui.painter().add(egui::Shape::convex_polygon(
+            vec![low + inward, low, tip, high, high + inward],
+            ground,
+            Stroke::NONE,
+        ));
+        ui.painter().line(vec![low, tip, high], edge);
+    }
 }
 
 /// Hatches what has no value.
@@ -123,7 +148,7 @@ fn hatch(painter: &egui::Painter, rect: Rect, shade: Color32) {
     }
 }
 
-/// One pad unrolled. Returns the response of its rectangle, whose name is `about`.
+/// One pad unrolled, the tip to the right. Returns the response of its rectangle, whose name is `about`.
 pub(super) fn pad_ui(ui: &Ui, theme: Theme, rect: Rect, shown: &ShownMaps, side: usize, about: &str) -> Response {
     let map = &shown.maps[side];
     cells(ui, theme, rect, (map, &shown.textures[side]), map.x.range);
@@ -239,6 +264,11 @@ fn line(painter: &egui::Painter, x: f32, strip: Rect, width: f32, [rim, ink]: [C
     painter.vline(x, strip.y_range(), Stroke::new(width, ink));
 }
 
+/// First place along the finger that is shown: the palm, or how far it is off.
+pub(super) fn begin_of(axis: &CellAxis) -> String {
+    if axis.is_cut() { format!("{:.0}{SPACE}{}", axis.range[0], axis.unit) } else { "palm".to_owned() }
+}
+
 /// Side of the finger, and its ends where there is room.
 fn row_names(ui: &Ui, strip: Rect, map: &HeatMap, ink: Color32, font: &FontId) {
     let at = |y: f32, align: Align2, text: &str| {
@@ -246,7 +276,7 @@ fn row_names(ui: &Ui, strip: Rect, map: &HeatMap, ink: Color32, font: &FontId) {
     };
     at(strip.center().y, Align2::RIGHT_CENTER, &map.title);
     if strip.height() > 3.2 * LINE && map.y.count > 1 {
-        at(strip.top(), Align2::RIGHT_TOP, "palm");
+        at(strip.top(), Align2::RIGHT_TOP, &begin_of(&map.y));
         at(strip.bottom(), Align2::RIGHT_BOTTOM, "tip");
     }
 }

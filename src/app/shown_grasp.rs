@@ -9,12 +9,13 @@ use palpate_geometry::units;
 use palpate_lab::inspection::PhaseSpan;
 use palpate_lab::picture::{
     BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
-    pad_rows_over_time, pads_at, whole_pads,
+    pad_rows_over_time, pads_at, touched_rows, whole_pads,
 };
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use palpate_tactile::Quantity;
 use palpate_tactile::electronics::PadPart;
+use std::ops::Range;
 
 /// Most columns of a heat map over time.
 pub(super) const MAP_COLUMNS: usize = 600;
@@ -26,6 +27,8 @@ pub(super) struct ShownGrasp<'a> {
     pub(super) frames: Vec<&'a Frame>,
     /// Pressure on the pads that has the brightest colour (Pa).
     pub(super) full_scale: f32,
+    /// Rows of taxels that are shown: those touched so far, to the tip.
+    rows: Range<usize>,
     /// Frame at the time shown; none of a real gripper.
     frame: Option<&'a Frame>,
     trace: Option<&'a GraspTrace>,
@@ -79,10 +82,12 @@ impl<'a> ShownGrasp<'a> {
             [] => PAD_FULL_SCALE,
             frames => full_scale_of(gripper, frames.iter().copied()),
         };
+        let rows = touched_rows(gripper, frames.iter().copied().chain(frame));
         Some(Self {
             gripper,
             frames,
             full_scale,
+            rows,
             frame,
             trace,
             columns: data.channels().into_iter().enumerate().filter_map(column).collect(),
@@ -158,7 +163,7 @@ impl<'a> ShownGrasp<'a> {
     }
 
     /// Columns of the trace with a quantity of a finger.
-    fn rows(&self, wanted: Quantity, side: Side) -> Vec<&'a [f32]> {
+    fn columns_of(&self, wanted: Quantity, side: Side) -> Vec<&'a [f32]> {
         let Some(trace) = self.trace else { return Vec::new() };
         let own = self.columns.iter().filter(|(_, quantity, own)| *quantity == wanted && *own == side);
         own.filter_map(|(column, ..)| trace.channels.get(*column).map(Vec::as_slice)).collect()
@@ -166,7 +171,7 @@ impl<'a> ShownGrasp<'a> {
 
     fn sensed(&self, wanted: Quantity, rows: SensorRows, columns: usize) -> [palpate_geometry::drawing::HeatMap; 2] {
         let times = self.trace.map_or(&[][..], |trace| &trace.t);
-        let sides = Side::BOTH.map(|side| self.rows(wanted, side));
+        let sides = Side::BOTH.map(|side| self.columns_of(wanted, side));
         channels_over_time(times, [&sides[0], &sides[1]], rows, columns)
     }
 }
@@ -196,9 +201,9 @@ pub(super) fn shown_pads(ui: &Ui, name: &'static str, grasp: &ShownGrasp<'_>, un
         Some(frame) => [std::ptr::from_ref(frame) as usize, frame.t.to_bits() as usize],
         None => forces.map(|force| force.to_bits() as usize),
     };
-    let key = MapsKey { frames: identity, count: 1, unit: unit.symbol(), most: [usize::MAX; 2] };
+    let key = MapsKey { frames: identity, count: grasp.rows.len(), unit: unit.symbol(), most: [usize::MAX; 2] };
     shown_maps(ui, name, key, || match grasp.frame {
-        Some(frame) => pads_at(grasp.gripper, frame, unit, grasp.full_scale),
+        Some(frame) => pads_at(grasp.gripper, frame, unit, grasp.full_scale, &grasp.rows),
         None => whole_pads(grasp.gripper, forces, PadPart::ACTIVE_AREA, unit),
     })
 }
@@ -216,6 +221,6 @@ pub(super) fn shown_rows(ui: &Ui, grasp: &ShownGrasp<'_>, unit: LoadUnit, most: 
     shown_maps(ui, "rows", grasp.key(unit.symbol(), most), || match (grasp.frames.as_slice(), unit) {
         ([], LoadUnit::Pressure) => grasp.sensed(Quantity::Pressure, SensorRows::Pressure, most[0]),
         ([], LoadUnit::Force) => grasp.sensed(Quantity::Force, SensorRows::Force(PadPart::ACTIVE_AREA), most[0]),
-        (frames, _) => pad_rows_over_time(grasp.gripper, frames, unit),
+        (frames, _) => pad_rows_over_time(grasp.gripper, frames, unit, &grasp.rows),
     })
 }

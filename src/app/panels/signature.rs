@@ -9,6 +9,7 @@ use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
 use crate::app::widgets::choice_ui;
 use egui::{RichText, Ui, vec2};
+use palpate_geometry::units;
 use palpate_lab::inspection::{FigureOptions, HeatKind};
 use palpate_lab::picture::BendUnit;
 
@@ -22,8 +23,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         load_switch(ui, load_unit, actions);
         ui.separator();
         let abouts = [(BendUnit::Angle, "Bending as joint angle"), (BendUnit::Curvature, "Bending as curvature")];
-        let name = |unit: BendUnit| if unit == BendUnit::Curvature { "m\u{207b}\u{b9}" } else { unit.symbol() };
-        let units = abouts.map(|(unit, about)| (unit, name(unit), about));
+        let units = abouts.map(|(unit, about)| (unit, units::symbol(unit.symbol()), about));
         if let Some(unit) = choice_ui(ui, Some(bend_unit), units) {
             actions.push(move |app| app.view.bend_unit = unit);
         }

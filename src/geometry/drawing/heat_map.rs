@@ -46,6 +46,11 @@ pub enum ColourScale {
 }
 
 impl CellAxis {
+    /// True of a length that does not begin at zero: what lies before is left out.
+    pub fn is_cut(&self) -> bool {
+        self.unit == "mm" && self.range[0] > 0.0
+    }
+
     /// Middle of a cell, in the axis' unit.
     pub fn middle(&self, cell: usize) -> f64 {
         let [from, to] = self.range;
@@ -170,6 +175,9 @@ mod tests {
         assert!(map.value(0, 4).is_nan() && map.value(2, 0).is_nan());
         assert_eq!(map.x.plot_axis().title, "time (s)");
         assert_eq!(map.y.plot_axis().range, Some([0.5, 2.5]));
+        let [whole, cut] =
+            [0.0, 80.0].map(|from| CellAxis { unit: "mm".to_owned(), range: [from, 100.0], ..map.x.clone() });
+        assert!(cut.is_cut() && !whole.is_cut() && !map.y.is_cut());
     }
 
     #[test]

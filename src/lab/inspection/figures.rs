@@ -5,7 +5,7 @@ use super::comparison::{Alignment, MeanTrial};
 use super::open_trial::{Column, OpenTrial};
 use super::phases::TouchPhase;
 use crate::datasets::SensorView;
-use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time};
+use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time, touched_rows};
 use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
@@ -342,6 +342,10 @@ fn phases(trial: &OpenTrial, origin: f64) -> Vec<ReferenceLine> {
 /// Heat maps of each trial, the left finger beside the right one.
 fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, FigureDataError> {
     let mut plots = Vec::new();
+    // Pads of all trials are cut alike.
+    let rows =
+        |trial: &OpenTrial| touched_rows(&trial.header.scene.gripper, trial.frames.iter().map(std::ops::Deref::deref));
+    let first = trials.iter().map(|trial| rows(trial).start).min().unwrap_or(0);
     for trial in trials {
         let simulated = trial.source == TrialSource::Simulated && !trial.frames.is_empty();
         let what = match kind {
@@ -354,7 +358,10 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
         let gripper = &trial.header.scene.gripper;
         let maps: [HeatMap; 2] = match kind {
             HeatKind::Joints => joints_over_time(gripper, &trial.frames, BendUnit::Angle),
-            HeatKind::Pads => pad_rows_over_time(gripper, &trial.frames, LoadUnit::Pressure),
+            HeatKind::Pads => {
+                let shown = first..gripper.taxels().rows;
+                pad_rows_over_time(gripper, &trial.frames, LoadUnit::Pressure, &shown)
+            }
         };
         for map in maps {
             let title = if trials.len() == 1 {

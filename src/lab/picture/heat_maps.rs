@@ -1,7 +1,8 @@
 //! Tactile signatures as heat maps: a pad unrolled at one instant; joints, and rows of taxels, over time.
 //!
 //! Colours of loads stand for pressure, whichever unit the numbers have; on a pad at one instant, with the limit of the 3-D
-//! view. A row's pressure is its force over the area of all its taxels.
+//! view. A row's pressure is its force over the area of all its taxels. Rows between the palm and the first one that is
+//! touched are left out.
 
 use palpate_geometry::drawing::{CellAxis, ColourScale, HeatMap};
 use palpate_geometry::units::mm;
@@ -9,18 +10,41 @@ use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
 use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
+use std::ops::Range;
 
 /// Pressure that has the brightest colour (Pa): taxel pressures of an ordinary hold reach some 30 kPa.
 pub const PAD_FULL_SCALE: f32 = 40e3;
 /// Pressures that may have the brightest colour (Pa).
-const FULL_SCALES: [f32; 8] = [5e3, 10e3, 20e3, 40e3, 100e3, 200e3, 500e3, 1000e3];
+const FULL_SCALES: [f32; 10] = [1e3, 2e3, 5e3, 10e3, 20e3, 40e3, 100e3, 200e3, 500e3, 1000e3];
 
 /// Pressure that has the brightest colour (Pa) in pictures of these frames of a grasp: a round number that holds the highest
 /// pressure of any taxel.
 pub fn full_scale_of<'a>(gripper: &GripperModel, frames: impl IntoIterator<Item = &'a Frame>) -> f32 {
     let area = gripper.taxels().area() as f32;
     let highest = frames.into_iter().flat_map(|frame| &frame.taxels).map(|load| load.normal / area).fold(0.0, f32::max);
-    FULL_SCALES.into_iter().find(|full| highest <= *full).unwrap_or(FULL_SCALES[FULL_SCALES.len() - 1])
+    full_scale(highest, 5e3)
+}
+
+/// A round number that holds a pressure, of at least so much (Pa).
+fn full_scale(highest: f32, least: f32) -> f32 {
+    let holds = |full: &f32| *full >= least && highest <= *full;
+    FULL_SCALES.into_iter().find(holds).unwrap_or(FULL_SCALES[FULL_SCALES.len() - 1])
+}
+
+/// Rows of taxels are shown by so many, from the tip on.
+const ROWS_BY: usize = 4;
+/// Least rows that are shown.
+const LEAST_ROWS: usize = 8;
+
+/// Rows of taxels that any of these frames touches on either pad, with those from there to the tip: in even steps, so that
+/// few touches change them as a grasp goes on.
+pub fn touched_rows<'a>(gripper: &GripperModel, frames: impl IntoIterator<Item = &'a Frame>) -> Range<usize> {
+    let grid = gripper.taxels();
+    let taxels = frames.into_iter().flat_map(|frame| &frame.taxels).filter(|load| load.normal > 0.0);
+    let first = taxels.map(|load| usize::from(load.taxel) % grid.count() / grid.columns).min().unwrap_or(grid.rows);
+    // One untouched row beyond the first.
+    let count = (grid.rows - first + 1).max(LEAST_ROWS).next_multiple_of(ROWS_BY);
+    grid.rows.saturating_sub(count)..grid.rows
 }
 
 /// Curvature that has the strongest colour (1/m): a radius of 50 mm.
@@ -103,17 +127,28 @@ impl BendUnit {
     }
 }
 
-/// Both pads unrolled, left and right: rows from the palm to the tip, columns from negative to positive y of the gripper. The
-/// brightest colour is that of a pressure of `full_scale` (Pa), as in [`full_scale_of`].
-pub fn pads_at(gripper: &GripperModel, frame: &Frame, unit: LoadUnit, full_scale: f32) -> [HeatMap; 2] {
+/// Both pads unrolled and lying, left and right: columns from the palm to the tip, of the rows of taxels given, and rows from
+/// negative to positive y of the gripper. The brightest colour is that of a pressure of `full_scale` (Pa), as in
+/// [`full_scale_of`].
+pub fn pads_at(
+    gripper: &GripperModel,
+    frame: &Frame,
+    unit: LoadUnit,
+    full_scale: f32,
+    shown: &Range<usize>,
+) -> [HeatMap; 2] {
     let grid = gripper.taxels();
     let half_width = 0.5 * mm(gripper.finger.width);
     Side::BOTH.map(|side| {
-        let mut values = vec![0.0; grid.count()];
+        let mut values = vec![0.0; grid.columns * shown.len()];
         for (taxel, load) in frame.loads(side, grid.count()) {
-            values[taxel] = (f64::from(load.normal) * unit.factor(grid.area())) as f32;
+            let (row, column) = (taxel / grid.columns, taxel % grid.columns);
+            if shown.contains(&row) {
+                values[column * shown.len() + row - shown.start] =
+                    (f64::from(load.normal) * unit.factor(grid.area())) as f32;
+            }
         }
-        let axes = [axis("across", "mm", grid.columns, [-half_width, half_width]), rows(gripper)];
+        let axes = [rows(gripper, shown), axis("across", "mm", grid.columns, [-half_width, half_width])];
         let quantity = format!("taxel {}", unit.quantity());
         map(side, [&quantity, unit.symbol()], axes, values, unit.scale(grid.area(), full_scale))
     })
@@ -124,7 +159,7 @@ pub fn whole_pads(gripper: &GripperModel, force: [f64; 2], area: f64, unit: Load
     let half_width = 0.5 * mm(gripper.finger.width);
     Side::BOTH.map(|side| {
         let across = axis("across", "mm", 1, [-half_width, half_width]);
-        let axes = [across, axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)])];
+        let axes = [axis("from palm", "mm", 1, [0.0, mm(gripper.finger.length)]), across];
         let values = vec![(force[side.index()] * unit.factor(area)) as f32];
         let quantity = format!("pad {}", unit.quantity());
         map(side, [&quantity, unit.symbol()], axes, values, unit.scale(area, PAD_FULL_SCALE))
@@ -145,21 +180,35 @@ pub fn joints_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], 
     })
 }
 
-/// Load on every row of taxels over time, left and right: rows from the palm to the tip, a column for each frame.
-pub fn pad_rows_over_time<F: Borrow<Frame>>(gripper: &GripperModel, frames: &[F], unit: LoadUnit) -> [HeatMap; 2] {
+/// Load on the given rows of taxels over time, left and right: from the palm to the tip, a column for each frame. The
+/// brightest colour is that of a round pressure that none exceeds.
+pub fn pad_rows_over_time<F: Borrow<Frame>>(
+    gripper: &GripperModel,
+    frames: &[F],
+    unit: LoadUnit,
+    shown: &Range<usize>,
+) -> [HeatMap; 2] {
     let grid = gripper.taxels();
     let area = grid.area() * grid.columns as f64;
-    Side::BOTH.map(|side| {
-        let mut values = vec![0.0; grid.rows * frames.len()];
+    let forces = Side::BOTH.map(|side| {
+        let mut forces = vec![0.0_f32; shown.len() * frames.len()];
         for (column, frame) in frames.iter().enumerate() {
             for (taxel, load) in frame.borrow().loads(side, grid.count()) {
                 let row = taxel / grid.columns;
-                values[row * frames.len() + column] += (f64::from(load.normal) * unit.factor(area)) as f32;
+                if shown.contains(&row) {
+                    forces[(row - shown.start) * frames.len() + column] += load.normal;
+                }
             }
         }
-        let quantity = format!("row {}", unit.quantity());
-        let axes = [time_axis(frames), rows(gripper)];
-        map(side, [&quantity, unit.symbol()], axes, values, unit.scale(area, PAD_FULL_SCALE))
+        forces
+    });
+    let highest = forces.iter().flatten().copied().fold(0.0, f32::max) / area as f32;
+    let scale = unit.scale(area, full_scale(highest, FULL_SCALES[0]));
+    Side::BOTH.map(|side| {
+        let factor = unit.factor(area) as f32;
+        let values = forces[side.index()].iter().map(|force| force * factor).collect();
+        let axes = [time_axis(frames), rows(gripper, shown)];
+        map(side, [&format!("row {}", unit.quantity()), unit.symbol()], axes, values, scale)
     })
 }
 
@@ -221,8 +270,9 @@ fn axis(name: &str, unit: &str, count: usize, range: [f64; 2]) -> CellAxis {
 }
 
 /// Rows of taxels by their distance from the palm along the finger.
-fn rows(gripper: &GripperModel) -> CellAxis {
-    axis("from palm", "mm", gripper.taxels().rows, [0.0, mm(gripper.finger.length)])
+fn rows(gripper: &GripperModel, shown: &Range<usize>) -> CellAxis {
+    let each = mm(gripper.finger.length) / gripper.taxels().rows as f64;
+    axis("from palm", "mm", shown.len(), [shown.start, shown.end].map(|row| row as f64 * each))
 }
 
 /// A column for each frame; frames come at even times.
@@ -269,15 +319,29 @@ mod tests {
         let gripper = GripperModel::default();
         // Second row, third column of the left pad; last taxel of the right one.
         let frame = frame(0, vec![0.0; 20], &[(6, 0.25), (319, 0.1)]);
-        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force, PAD_FULL_SCALE);
-        assert_eq!((left.y.count, left.x.count, left.value(1, 2), right.value(39, 3)), (40, 4, 0.25, 0.1));
+        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force, PAD_FULL_SCALE, &(0..40));
+        assert_eq!((left.x.count, left.y.count, left.value(2, 1), right.value(3, 39)), (40, 4, 0.25, 0.1));
         assert_eq!(left.values.iter().filter(|value| **value != 0.0).count(), 1);
-        assert_eq!((left.y.text(1), left.x.text(2)), ("from palm 3.75\u{a0}mm".into(), "across 2.50\u{a0}mm".into()));
+        assert_eq!((left.x.text(1), left.y.text(2)), ("from palm 3.75\u{a0}mm".into(), "across 2.50\u{a0}mm".into()));
         // 0.25 N on 2.5 mm by 5 mm.
-        let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure, PAD_FULL_SCALE)[0];
-        assert!((pressure.value(1, 2) - 20.0).abs() < 1e-5, "{}", pressure.value(1, 2));
+        let pressure = &pads_at(&gripper, &frame, LoadUnit::Pressure, PAD_FULL_SCALE, &(0..40))[0];
+        assert!((pressure.value(2, 1) - 20.0).abs() < 1e-5, "{}", pressure.value(2, 1));
         // The colour does not depend on the unit.
         assert_eq!((left.scale, pressure.scale), (ColourScale::Load(0.5), ColourScale::Load(40.0)));
+        // Cut, each stays where it is.
+        let [left, right] = pads_at(&gripper, &frame, LoadUnit::Force, PAD_FULL_SCALE, &(30..40));
+        assert_eq!((right.x.range, right.value(3, 9)), ([75.0, 100.0], 0.1));
+        assert!(left.values.iter().all(|value| *value == 0.0) && left.values.len() == 40);
+    }
+
+    #[test]
+    fn rows_are_shown_from_the_first_that_is_touched_to_the_tip() {
+        let gripper = GripperModel::default();
+        let touching = |taxel: u16| frame(0, vec![0.0; 20], &[(taxel, 0.1)]);
+        let rows = |frames: &[&Frame]| touched_rows(&gripper, frames.iter().copied());
+        // Both tips; row 27 of the right pad, with the one before; all rows.
+        let [tip, middle, palm] = [159, 160 + 4 * 27, 0].map(touching);
+        assert_eq!([rows(&[]), rows(&[&tip]), rows(&[&tip, &middle]), rows(&[&palm])], [32..40, 32..40, 24..40, 0..40]);
     }
 
     #[test]
@@ -320,9 +384,13 @@ mod tests {
         // 0.2 rad in 10 mm.
         let curved = &joints_over_time(&gripper, &frames, BendUnit::Curvature)[0];
         assert!((curved.value(3, 2) - 20.0).abs() < 1e-5);
-        let [left, right] = pad_rows_over_time(&gripper, &frames, LoadUnit::Force);
+        let [left, right] = pad_rows_over_time(&gripper, &frames, LoadUnit::Force, &(0..40));
         assert!((left.value(1, 2) - 0.3).abs() < 1e-6 && left.value(0, 2) == 0.0);
         assert!(right.values.iter().all(|value| *value == 0.0) && right.values.len() == 120);
+        // 0.3 N on 50 mm²: 6 kPa of at most 10.
+        assert_eq!(left.scale, ColourScale::Load(0.5));
+        let cut = &pad_rows_over_time(&gripper, &frames, LoadUnit::Pressure, &(1..40))[0];
+        assert!((cut.value(0, 2) - 6.0).abs() < 1e-5 && cut.scale == ColourScale::Load(10.0));
         // Nothing yet: no column, and no panic.
         let none = joints_over_time::<Frame>(&gripper, &[], BendUnit::Angle);
         assert_eq!((none[0].x.count, none[0].values.len()), (0, 0));
@@ -339,14 +407,15 @@ mod tests {
     fn taxels_and_rows_add_up_to_the_force_on_the_finger() {
         let (trial, scene) = held("lemon");
         let (gripper, grid, frames) = (&scene.gripper, scene.gripper.taxels(), trial.frames());
-        let rows = pad_rows_over_time(gripper, frames, LoadUnit::Force);
+        let shown = touched_rows(gripper, frames);
+        let rows = pad_rows_over_time(gripper, frames, LoadUnit::Force, &shown);
         let mut largest = 0.0f64;
         for (k, frame) in frames.iter().enumerate() {
-            let pads = pads_at(gripper, frame, LoadUnit::Force, PAD_FULL_SCALE);
+            let pads = pads_at(gripper, frame, LoadUnit::Force, PAD_FULL_SCALE, &shown);
             for side in Side::BOTH {
                 let force = frame.normal_force(side, grid.count());
                 let taxels: f64 = pads[side.index()].values.iter().map(|value| f64::from(*value)).sum();
-                let in_rows: f64 = (0..grid.rows).map(|row| f64::from(rows[side.index()].value(row, k))).sum();
+                let in_rows: f64 = (0..shown.len()).map(|row| f64::from(rows[side.index()].value(row, k))).sum();
                 assert!((taxels - force).abs() < 1e-6 && (in_rows - force).abs() < 1e-6, "{side:?} at {}", frame.t);
                 largest = largest.max(force);
             }
@@ -358,7 +427,7 @@ mod tests {
     fn both_fingers_feel_a_symmetric_object_alike() {
         let (trial, scene) = held("ball");
         let frames = trial.frames();
-        let [left, right] = pad_rows_over_time(&scene.gripper, frames, LoadUnit::Pressure);
+        let [left, right] = pad_rows_over_time(&scene.gripper, frames, LoadUnit::Pressure, &(0..40));
         let peak = left.values.iter().copied().fold(0.0, f32::max);
         assert!(peak > 1.0, "{peak} kPa");
         for (a, b) in left.values.iter().zip(&right.values) {

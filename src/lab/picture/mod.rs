@@ -20,7 +20,7 @@ pub use contact_path::{ContactPath, PathColour, TouchedPlace, contact_path};
 pub use ghost::skin_mesh;
 pub use heat_maps::{
     BendUnit, LoadUnit, PAD_FULL_SCALE, SensorRows, channels_over_time, full_scale_of, joints_over_time,
-    pad_rows_over_time, pads_at, whole_pads,
+    pad_rows_over_time, pads_at, touched_rows, whole_pads,
 };
 pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
