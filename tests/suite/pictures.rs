@@ -11,9 +11,10 @@ use image::RgbaImage;
 use palpate_geometry::drawing::{Align, DrawList, Shape2, Solid, StandardView};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
-use palpate_lab::picture::{PictureView, Stage, full_scale_of};
+use palpate_lab::picture::{PictureView, Stage};
 use palpate_lab::workers::Command;
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, wanted_limits, wgpu};
+use palpate_sim::frame::Frame;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::{Scene, SupportKind};
 use palpate_store::{Store, TrialQuery};
@@ -47,16 +48,21 @@ const HELD: Shot = Shot {
     ghost: false,
 };
 
-fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaImage {
+/// The grasp of an object until a time (s): the last frame is the moment then.
+fn grasped(scene: &Scene, object: &str, until: f64) -> (Stage, Vec<Frame>) {
     let mut scene = scene.clone();
-    shot.object.clone_into(&mut scene.object.source);
+    object.clone_into(&mut scene.object.source);
     let object = scene.load_object().unwrap();
     let trial = grasp(&scene, object.as_ref(), 0);
-    let frame = trial.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
-    let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-    let until = trial.frames().iter().take_while(|frame| frame.t <= shot.at);
+    let count = trial.frames().iter().position(|frame| frame.t > until - 1e-9).unwrap() + 1;
+    (Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper), trial.frames()[..count].to_vec())
+}
+
+fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaImage {
+    let (stage, frames) = grasped(scene, shot.object, shot.at);
+    let frame = frames.last().unwrap();
     let view = PictureView {
-        full_scale: full_scale_of(&scene.gripper, until),
+        full_scale: stage.full_scale_of(&frames),
         theme: shot.theme,
         size: Vec2::new(shot.size[0] as f32, shot.size[1] as f32),
         forces: shot.forces,
@@ -67,10 +73,10 @@ fn take(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, shot: &Shot) -> RgbaI
     let camera = stage.camera(shot.view, frame, &view);
     let mut list = stage.draw(frame, &PictureView { camera, ..view });
     if shot.ghost {
+        let mut scene = scene.clone();
         scene.solver.engine = scene.solver.engine.other();
-        let other = grasp(&scene, object.as_ref(), 0);
-        let frame = other.frames().iter().find(|frame| frame.t > shot.at - 1e-9).unwrap();
-        list.ghosts = stage.ghosts(frame, shot.theme);
+        let (_, other) = grasped(&scene, shot.object, shot.at);
+        list.ghosts = stage.ghosts(other.last().unwrap(), shot.theme);
     }
     let picture = Picture::draw(gpu, renderer, &list, shot.size, 1.0).unwrap();
     RgbaImage::from_raw(picture.width, picture.height, picture.rgba).unwrap()
@@ -127,14 +133,8 @@ fn the_touch_is_seen_in_the_hold_of_each_of_the_sixteen() {
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
     let mut shares = Vec::new();
     for built_in in catalogue() {
-        let mut scene = Scene::default();
-        built_in.name.clone_into(&mut scene.object.source);
-        let object = scene.load_object().unwrap();
-        let trial = grasp(&scene, object.as_ref(), 0);
-        let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
-        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-        let until = trial.frames().iter().take_while(|frame| frame.t <= HELD.at);
-        let full_scale = full_scale_of(&scene.gripper, until);
+        let (stage, frames) = grasped(&Scene::default(), &built_in.name, HELD.at);
+        let (frame, full_scale) = (frames.last().unwrap(), stage.full_scale_of(&frames));
         let view = PictureView { size: Vec2::new(1280.0, 800.0), full_scale, ..PictureView::default() };
         let camera = stage.camera(StandardView::Home, frame, &view);
         let inset = stage.draw(frame, &PictureView { camera, ..view }).inset.expect("something is touched");
@@ -164,12 +164,8 @@ fn text_places(list: &DrawList) -> Vec<(String, Vec2, Vec2)> {
 #[test]
 fn the_numbers_of_each_hold_are_there_and_cover_nothing() {
     for (built_in, theme) in catalogue().iter().flat_map(|built_in| Theme::ALL.map(|theme| (built_in, theme))) {
-        let mut scene = Scene::default();
-        built_in.name.clone_into(&mut scene.object.source);
-        let object = scene.load_object().unwrap();
-        let trial = grasp(&scene, object.as_ref(), 0);
-        let frame = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
-        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
+        let (stage, frames) = grasped(&Scene::default(), &built_in.name, HELD.at);
+        let frame = frames.last().unwrap();
         // The 3-D view of a window of 1280 x 800, and of 960 x 600.
         for (size, curvatures) in [(Vec2::new(710.0, 376.0), 2), (Vec2::new(532.0, 260.0), 0)] {
             let view = PictureView { size, theme, ..PictureView::default() };
@@ -177,8 +173,15 @@ fn the_numbers_of_each_hold_are_there_and_cover_nothing() {
             let list = stage.draw(frame, &PictureView { camera, ..view });
             let name = format!("{}, {theme:?}, {size}", built_in.name);
             let mut places = text_places(&list);
+            // Their grounds are a little larger than the texts.
+            let fingers = hand_in_picture(&DrawList { solids: Vec::new(), ..list.clone() }, size);
+            let covers = |(_, low, high): &&(String, Vec2, Vec2)| {
+                fingers.iter().any(|at| at.cmpgt(*low).all() && at.cmplt(*high).all())
+            };
+            let covering = places.iter().find(covers).map(|(text, ..)| text);
+            assert_eq!(covering, None, "{name}: it covers a finger");
             let count = |part: &str| places.iter().filter(|(text, ..)| text.contains(part)).count();
-            assert_eq!(count("normal"), 2, "{name}");
+            assert_eq!([count("L  "), count("R  ")].map(|count| count > 0), [true; 2], "{name}");
             assert!(count("m\u{207b}\u{b9}") >= curvatures, "{name}");
             assert_eq!(count("mm"), 1, "{name}");
             places.extend(list.inset.iter().map(|own| ("inset".to_owned(), own.corner, own.corner + own.size)));
@@ -216,13 +219,9 @@ fn hand_in_picture(list: &DrawList, size: Vec2) -> Vec<Vec2> {
 fn the_home_view_shows_the_whole_hand_beside_the_inset() {
     for (k, built_in) in catalogue().iter().enumerate() {
         let mut scene = Scene::default();
-        built_in.name.clone_into(&mut scene.object.source);
         scene.gripper.mount.yaw_deg = [0.0, 35.0, -50.0, 80.0][k % 4];
-        let object = scene.load_object().unwrap();
-        let trial = grasp(&scene, object.as_ref(), 0);
-        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
-        let held = trial.frames().iter().find(|frame| frame.t > HELD.at - 1e-9).unwrap();
-        for frame in [&trial.frames()[0], held] {
+        let (stage, frames) = grasped(&scene, &built_in.name, HELD.at);
+        for frame in [&frames[0], frames.last().unwrap()] {
             for size in
                 [[640.0, 400.0], [1000.0, 420.0], [720.0, 660.0], [440.0, 260.0], [1280.0, 800.0], [360.0, 520.0]]
             {

@@ -20,6 +20,8 @@ const LEGEND_WIDTH: f32 = 132.0;
 const LEGEND_HEIGHT: f32 = 50.0;
 /// Greatest length of the scale bar, as a share of the width of the picture.
 const SCALE_BAR_SHARE: f32 = 0.16;
+/// Room of its text (points).
+const LEAST_BAR: f32 = 50.0;
 /// Height of the texts in an inset (points).
 const INSET_TEXT: f32 = 12.0;
 /// Lengths that the scale bar may stand for (mm).
@@ -57,20 +59,22 @@ pub(super) struct Annotator<'a> {
     pub(super) overlay: Overlay,
     /// What is taken already.
     plates: Vec<Plate>,
-    /// Points that stay in sight.
+    /// Points that stay in sight, and those that do where there is room.
     kept: Vec<Vec2>,
+    hand: Vec<Vec2>,
 }
 
-/// Distance of plates from the edges (points), height of the buttons above them, and of axes and scale bar below.
+/// Distance of plates from the edges (points), height of the buttons above them, and of the caption below.
 const EDGE: f32 = 10.0;
 const HEAD: f32 = 48.0;
-const FOOT: f32 = 50.0;
+const FOOT: f32 = 42.0;
 /// Distance of the places that are tried (points).
 const STEP: f32 = 9.0;
 
 impl<'a> Annotator<'a> {
-    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset.
-    pub(super) fn new(view: &'a PictureView, inset: Option<&Inset>) -> Self {
+    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset; `hand` is what plates
+    /// cover last of all.
+    pub(super) fn new(view: &'a PictureView, inset: Option<&Inset>, hand: Vec<Vec2>) -> Self {
         let mut overlay = Overlay::default();
         if view.annotations {
             add(&mut overlay, view);
@@ -78,9 +82,11 @@ impl<'a> Annotator<'a> {
         let (size, legends) = (view.size, legend_room(view));
         let axes = Plate::between(Vec2::new(0.0, size.y - AXES.y), Vec2::new(AXES.x, size.y));
         let legends = Plate::between(Vec2::new(size.x - legends.x, 0.0), Vec2::new(size.x, legends.y));
-        let scale_bar = Plate::between(size - Vec2::new(SCALE_BAR_SHARE * size.x + MARGIN, SCALE_BAR), size);
+        let bar = scale_bar(view).map_or(0.0, |(_, length)| length.max(LEAST_BAR));
+        let scale_bar = Plate::between(size - Vec2::new(bar + MARGIN, SCALE_BAR), size);
         let inset = inset.map(|inset| Plate::between(inset.corner, inset.corner + inset.size));
-        Self { view, overlay, plates: [axes, legends, scale_bar].into_iter().chain(inset).collect(), kept: Vec::new() }
+        let plates = [axes, legends, scale_bar].into_iter().chain(inset).collect();
+        Self { view, overlay, plates, kept: Vec::new(), hand }
     }
 
     /// True where a plate would cover nothing.
@@ -94,21 +100,22 @@ impl<'a> Annotator<'a> {
         self.kept.extend((0..=pieces as u32).map(|k| from.lerp(to, k as f32 / pieces)));
     }
 
-    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that. None where
-    /// all within `farthest` (points) is taken.
+    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that; beside the
+    /// hand, or over it where it must stand somewhere: `farthest` (points) is infinite. None where all within that is taken.
     pub(super) fn place(&self, wanted: &[Vec2], half: Vec2, farthest: f32) -> Option<Plate> {
         let low = half + Vec2::new(EDGE, HEAD);
         let high = (self.view.size - half - Vec2::new(EDGE, FOOT)).max(low);
-        let plate = |middle: Vec2| Plate { middle, half };
-        let mut tried = wanted.iter().map(|place| plate(place.clamp(low, high)));
-        if let Some(free) = tried.find(|plate| self.is_free(plate)) {
-            return Some(free);
-        }
         let first = wanted.first()?.clamp(low, high);
         let count = ((high - low) / STEP).floor().as_uvec2();
         let places = (0..=count.y).flat_map(|y| (0..=count.x).map(move |x| low + STEP * Vec2::new(x as f32, y as f32)));
-        let near = places.filter(|place| place.distance(first) <= farthest).map(plate).filter(|own| self.is_free(own));
-        near.min_by(|a, b| a.middle.distance(first).total_cmp(&b.middle.distance(first)))
+        let mut near: Vec<Vec2> = places.filter(|place| place.distance(first) <= farthest).collect();
+        near.sort_by(|a, b| a.distance(first).total_cmp(&b.distance(first)));
+        let places = || wanted.iter().map(|place| place.clamp(low, high)).chain(near.iter().copied());
+        let mut free = places().map(|middle| Plate { middle, half }).filter(|plate| self.is_free(plate));
+        let first_free = free.next()?;
+        let is_beside = |plate: &Plate| !self.hand.iter().any(|place| plate.covers(*place));
+        let beside = std::iter::once(first_free).chain(free).find(is_beside);
+        beside.or(Some(first_free).filter(|_| farthest.is_infinite()))
     }
 
     /// Adds the ground of a text.
@@ -192,14 +199,17 @@ fn add_ground(overlay: &mut Overlay, theme: Theme, middle: Vec2, half: Vec2) {
     overlay.shapes.push(Shape2::Rectangle { min, max, colours, opacity: 0.72 });
 }
 
-/// A bar of a round length at the distance of the target, so far from the lower right corner, and the height of its text.
-fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [f32; 2]) {
+/// Length that the scale bar stands for (mm), and its own (points).
+fn scale_bar(view: &PictureView) -> Option<(f32, f32)> {
     let points_per_mm = view.size.y / (view.camera.height_at_target() * 1e3);
     let wanted = SCALE_BAR_SHARE * view.size.x.min(900.0);
-    let Some(mm) = SCALE_STEPS.into_iter().rfind(|mm| mm * points_per_mm <= wanted) else {
-        return;
-    };
-    let length = mm * points_per_mm;
+    let mm = SCALE_STEPS.into_iter().rfind(|mm| mm * points_per_mm <= wanted)?;
+    Some((mm, mm * points_per_mm))
+}
+
+/// A bar of a round length at the distance of the target, so far from the lower right corner, and the height of its text.
+fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [f32; 2]) {
+    let Some((mm, length)) = scale_bar(view) else { return };
     let right = view.size - margin;
     let left = right - Vec2::new(length, 0.0);
     let colour = ink(view.theme);

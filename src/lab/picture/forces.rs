@@ -25,8 +25,9 @@ const FULL_SCALE: f64 = 0.5;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Least height of a picture with numbers (points).
+/// Least height of a picture with numbers, and with words beside them (points).
 const LEAST_HEIGHT: f32 = 220.0;
+const LOW: f32 = 320.0;
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
 fn friction_colour(theme: Theme) -> Rgb {
@@ -99,12 +100,26 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
             Side::Left => "L",
             Side::Right => "R",
         };
-        let line = |name: &str, force: DVec3| format!("{letter}  {name} {}", units::shown(force.length(), "N"));
-        let mut lines = vec![(line("normal", forces.normal), view.theme.colours().text)];
-        lines.extend(forces.friction.map(|force| (line("friction", force), friction_colour(view.theme))));
+        // In a low picture in one line, without words.
+        let low = view.size.y < LOW;
+        let text = |name: &str, force: DVec3| {
+            let value = units::shown(force.length(), "N");
+            match (low, name) {
+                (false, _) => format!("{letter}  {name} {value}"),
+                (true, "normal") => format!("{letter}  {value}"),
+                (true, _) => value,
+            }
+        };
+        let mut texts = vec![(text("normal", forces.normal), view.theme.colours().text)];
+        texts.extend(forces.friction.map(|force| (text("friction", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.
-        let letters = lines.iter().map(|(text, _)| text.chars().count()).max().unwrap_or_default();
-        let half = Vec2::new(0.25 * TEXT * letters as f32 + 7.0, 0.5 * LINE * lines.len() as f32 + 2.0);
+        let widths: Vec<f32> = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).collect();
+        let (width, lines) = if low {
+            (widths.iter().sum::<f32>() + GAP * (widths.len() - 1) as f32, 1)
+        } else {
+            (widths.iter().copied().fold(0.0, f32::max), texts.len())
+        };
+        let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * lines as f32 + 2.0);
         let along = (to - from).normalize_or(Vec2::Y);
         // Beyond the tip, or else on either side of the arrow.
         let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
@@ -116,10 +131,10 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         let places = [beyond, aside(-1.0), aside(1.0), aside(-1.0) + over, aside(1.0) + over];
         let Some(plate) = annotator.place(&places, half, f32::INFINITY) else { continue };
         annotator.add_plate(plate);
-        for (k, (text, ink)) in lines.into_iter().enumerate() {
-            let corner = plate.middle - half;
-            let at = Vec2::new(corner.x + 7.0, corner.y + 2.0 + LINE * (k as f32 + 0.5));
+        let mut at = plate.middle - half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
+        for ((text, ink), width) in texts.into_iter().zip(widths) {
             annotator.overlay.text(at, Align::Left, TEXT, ink, text);
+            at += if low { Vec2::new(width + GAP, 0.0) } else { Vec2::new(0.0, LINE) };
         }
     }
 }

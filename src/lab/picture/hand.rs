@@ -69,6 +69,21 @@ impl Stage {
         points
     }
 
+    /// Points of the fingers, in between their corners too, and outlines of the palm and of what they hold, in the world (m).
+    pub(super) fn held_points(&self, frame: &Frame) -> Vec<Vec3> {
+        let hand = frame.world_from_gripper(&self.world_from_gripper);
+        let corners: Vec<DVec3> = self.finger_corners(frame).collect();
+        // Each segment begins and ends with four corners.
+        let middles = corners.chunks_exact(8).flat_map(|segment| (0..4).map(|k| 0.5 * (segment[k] + segment[k + 4])));
+        let palm = self.outlines.palm.iter().map(|point| point.as_dvec3());
+        let mut points: Vec<Vec3> =
+            corners.iter().copied().chain(middles).chain(palm).map(|point| hand.point(point).as_vec3()).collect();
+        let object = frame.world_from_object.iter();
+        points
+            .extend(object.flat_map(|pose| self.outlines.object.iter().map(|at| pose.point(at.as_dvec3()).as_vec3())));
+        points
+    }
+
     /// Corners of both fingers' segments, in the gripper frame (m).
     fn finger_corners(&self, frame: &Frame) -> impl Iterator<Item = DVec3> {
         let (finger, pad) = (&self.gripper.finger, self.gripper.pad.thickness);

@@ -153,7 +153,8 @@ impl Stage {
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
         let inset = self.touch_inset(frame, view);
-        let mut annotator = Annotator::new(view, inset.as_ref());
+        let hand = self.held_points(frame).into_iter().filter_map(|point| view.camera.project(point, view.size));
+        let mut annotator = Annotator::new(view, inset.as_ref(), hand.collect());
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let layout = view.layout.as_ref().filter(|_| view.circles && view.annotations);
