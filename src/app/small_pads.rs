@@ -19,8 +19,9 @@ const TEXTS: f32 = 34.0;
 const SCALE_BAR: f32 = 46.0;
 /// A picture whose legends are lower has none (points).
 const LEGEND: f32 = 40.0;
-/// Width below which the view has no buttons in its upper left corner (points).
-const BUTTONS: f32 = 620.0;
+
+/// Width of a view from which on its buttons stand in a row in its upper left corner (points).
+pub(super) const BUTTONS: f32 = 490.0;
 
 /// Draws both pads where nothing else is; leaves them out where the view is too small.
 pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &PictureView) {

@@ -6,9 +6,10 @@ use crate::app::contact_path::{path_colour, path_mesh};
 use crate::app::export::ExportRequest;
 use crate::app::features::App;
 use crate::app::features::view::{PathLayer, ViewSource};
+use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Moment};
 use crate::app::shown_grasp::ShownGrasp;
-use crate::app::small_pads::small_pads;
+use crate::app::small_pads::{BUTTONS, small_pads};
 use crate::app::theme::{colour, veil};
 use crate::app::viewport::{Paint, PictureKey};
 use egui::{PointerButton, Pos2, Rect, Sense, Ui};
@@ -384,18 +385,17 @@ fn real_curvature(own: &View3d<'_>) -> Option<[Option<f64>; 2]> {
     (own.data.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 
-/// Width of all buttons in a row, beside the legend (points).
-const BUTTONS: f32 = 680.0;
-
 /// Standard views and switches, in the upper left corner; in a menu where there is no room.
 fn buttons(ui: &mut Ui, rect: Rect, own: &View3d<'_>, actions: &mut Actions) {
     let place = Rect::from_min_size(rect.min + egui::vec2(10.0, 10.0), egui::vec2(rect.width() - 20.0, 26.0));
     let layout = egui::Layout::left_to_right(egui::Align::Center);
     let mut bar = ui.new_child(egui::UiBuilder::new().max_rect(place).layout(layout));
     bar.spacing_mut().item_spacing.x = 4.0;
-    if place.width() < BUTTONS {
+    if rect.width() < BUTTONS {
         let menu = bar.menu_button("View", |ui| {
-            switches(ui, own, actions);
+            for Switch { name, hint, on, act, .. } in switches(own) {
+                actions.on(&ui.selectable_label(on, name).on_hover_text(hint), act);
+            }
             let large = ui.selectable_label(own.data.view.inset_large, "Large inset");
             let large = large.on_hover_text("Enlarge the picture of the touch (I)");
             actions.on(&large, |app| app.view.inset_large = !app.view.inset_large);
@@ -404,46 +404,78 @@ fn buttons(ui: &mut Ui, rect: Rect, own: &View3d<'_>, actions: &mut Actions) {
     } else {
         // Legible on whatever comes near.
         let behind = ui.painter().add(egui::Shape::Noop);
-        switches(&mut bar, own, actions);
+        for (k, Switch { icon, name, hint, on, act }) in switches(own).into_iter().enumerate() {
+            // Camera, and what is drawn.
+            if k == CAMERA {
+                bar.separator();
+            }
+            actions.on(&icons::toggle(&mut bar, icon, on, name, &hint), act);
+        }
         let ground = veil(own.data.view.theme.colours().background, 0.6);
         ui.painter().set(behind, egui::Shape::rect_filled(bar.min_rect().expand(3.0), 4.0, ground));
     }
 }
 
-fn switches(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
-    let camera = own.data.view.camera;
-    for (view, name, key) in [
-        (StandardView::Home, "Home", "double click, Shift+Z"),
-        (StandardView::Front, "Front", "Alt+1"),
-        (StandardView::Right, "Right", "Alt+3"),
-        (StandardView::Top, "Top", "Alt+7"),
-    ] {
-        if ui.small_button(name).on_hover_text(format!("{name} view ({key})")).clicked() {
-            actions.push(move |app| {
-                app.view.camera = camera.turned_to(view);
-                if view == StandardView::Home {
-                    app.frame_all();
-                }
-            });
-        }
-    }
-    let parallel = ui.selectable_label(camera.parallel, "Parallel").on_hover_text("Parallel projection (Alt+5)");
-    actions.on(&parallel, |app| app.view.camera.parallel = !app.view.camera.parallel);
-    let forces = ui.selectable_label(own.data.view.forces, "Forces").on_hover_text("Force arrows (F)");
-    actions.on(&forces, |app| app.view.forces = !app.view.forces);
-    let circles = ui
-        .selectable_label(own.data.view.circles, "Circles")
-        .on_hover_text("The circle that each flex strip reads, with its curvature (O)");
-    actions.on(&circles, |app| app.view.circles = !app.view.circles);
-    let path = ui
-        .selectable_label(own.data.view.path != PathLayer::Off, own.data.view.path.title())
-        .on_hover_text("Contact path on the object, by time or by pressure; the fingers become translucent (C)");
-    actions.on(&path, |app| app.view.path = app.view.path.next());
+/// A button of the view.
+struct Switch {
+    icon: Icon,
+    name: &'static str,
+    hint: String,
+    on: bool,
+    act: Box<dyn FnOnce(&mut App)>,
+}
+
+/// Number of switches of the camera, which come first.
+const CAMERA: usize = 5;
+
+fn switches(own: &View3d<'_>) -> Vec<Switch> {
+    let view = own.data.view;
+    let now = view.standard_view();
+    let standard = [
+        (StandardView::Home, Icon::Home, "Home", "double click, Shift+Z"),
+        (StandardView::Front, Icon::Front, "Front", "Alt+1"),
+        (StandardView::Right, Icon::Right, "Right", "Alt+3"),
+        (StandardView::Top, Icon::Top, "Top", "Alt+7"),
+    ];
+    let turn = |(standard, icon, name, key): (StandardView, Icon, &'static str, &str)| {
+        let camera = view.camera;
+        let act = Box::new(move |app: &mut App| {
+            app.view.camera = camera.turned_to(standard);
+            if standard == StandardView::Home {
+                app.frame_all();
+            }
+        });
+        Switch { icon, name, hint: format!("{name} view ({key})"), on: now == Some(standard), act }
+    };
+    let switch = |icon, name, hint: &str, on, act: fn(&mut App)| Switch {
+        icon,
+        name,
+        hint: hint.to_owned(),
+        on,
+        act: Box::new(act),
+    };
     let other = own.data.scene.solver.engine.other().name();
-    let ghost = ui
-        .selectable_label(own.data.view.ghost, "Ghost")
-        .on_hover_text(format!("Result of the other engine, {other}, translucent (G)"));
-    actions.on(&ghost, |app| app.set_ghost(!app.view.ghost));
+    let ghost = format!("Ghost: result of the other engine, {other}, translucent (G)");
+    let path = "Contact path on the object, by time or by pressure; the fingers become translucent (C)";
+    let mut all: Vec<Switch> = standard.map(turn).into();
+    all.extend([
+        switch(Icon::Parallel, "Parallel", "Parallel projection (Alt+5)", view.camera.parallel, |app| {
+            app.view.camera.parallel = !app.view.camera.parallel;
+        }),
+        switch(Icon::Force, "Forces", "Force arrows (F)", view.forces, |app| app.view.forces = !app.view.forces),
+        switch(
+            Icon::Circle,
+            "Circles",
+            "The circle that each flex strip reads, with its curvature (O)",
+            view.circles,
+            |app| app.view.circles = !app.view.circles,
+        ),
+        switch(Icon::Path, view.path.title(), path, view.path != PathLayer::Off, |app| {
+            app.view.path = app.view.path.next();
+        }),
+        switch(Icon::Ghost, "Ghost", &ghost, view.ghost, |app| app.set_ghost(!app.view.ghost)),
+    ]);
+    all
 }
 
 #[cfg(test)]
