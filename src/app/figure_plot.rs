@@ -51,7 +51,10 @@ pub(super) fn show(
 ) -> ShownPlot {
     let [x_bounds, y_bounds] = plot.bounds();
     let quiet = theme.colours().quiet_text;
-    let known = [plot.x.marks(&x_bounds), plot.y_marks(&y_bounds)];
+    let mut known = [plot.x.marks(&x_bounds), plot.y_marks(&y_bounds)];
+    let lines = if height > 2.0 * LINE * (known[1].len() + 2) as f32 { 2 } else { 1 };
+    let most = (NAMES * ui.available_width() / LETTER) as usize;
+    known[1].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, most, lines));
     let marks = |known: &[(f64, String)], bounds: &RangeInclusive<f64>| {
         let step_size = bounds.end() - bounds.start();
         let numbered = known.iter().filter(|(_, text)| !text.is_empty());
@@ -127,7 +130,9 @@ pub(super) fn show(
             let (place, anchor) = if line.horizontal {
                 (PlotPoint::new(*x_bounds.start(), at), Align2::LEFT_BOTTOM)
             } else {
-                (PlotPoint::new(at, *y_bounds.end()), Align2::LEFT_TOP)
+                // On the side with more room.
+                let beyond = at > 0.5 * (x_bounds.start() + x_bounds.end());
+                (PlotPoint::new(at, *y_bounds.end()), if beyond { Align2::RIGHT_TOP } else { Align2::LEFT_TOP })
             };
             let word = RichText::new(&line.text).small().background_color(veil(theme.colours().background, 0.8));
             plot_ui.text(Text::new("", place, word).color(colour(quiet)).anchor(anchor));
@@ -138,6 +143,32 @@ pub(super) fn show(
         cells(ui, &shown, plot, heat);
     }
     shown
+}
+
+/// Most width of the names of rows, as a share of the plot's; width of a letter and height of a line (points).
+const NAMES: f32 = 0.45;
+const LETTER: f32 = 6.6;
+const LINE: f32 = 15.0;
+
+/// A name in at most so many lines of so many letters, cut off with dots.
+fn wrapped_name(text: &str, most: usize, lines: usize) -> String {
+    let mut wrapped = vec![String::new()];
+    for word in text.split(' ') {
+        let long = wrapped
+            .last()
+            .is_some_and(|line| !line.is_empty() && line.chars().count() + 1 + word.chars().count() > most);
+        if long && wrapped.len() < lines {
+            wrapped.push(String::new());
+        }
+        if let Some(line) = wrapped.last_mut() {
+            let space = if line.is_empty() { "" } else { " " };
+            *line = format!("{line}{space}{word}");
+        }
+    }
+    for line in wrapped.iter_mut().filter(|line| line.chars().count() > most) {
+        *line = line.chars().take(most.saturating_sub(1)).chain(['…']).collect();
+    }
+    wrapped.join("\n")
 }
 
 /// Names of all series with their colours and signs.
@@ -261,4 +292,18 @@ fn add_series(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, series: &DataSer
     let radius = if series.marker == Marker::Cross { 5.5 } else { 3.5 };
     let points = Points::new(series.name.clone(), places).shape(shape).filled(filled).radius(radius).color(ink);
     plot_ui.points(points.allow_hover(false));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_are_wrapped_and_then_cut() {
+        let name = "two pads on each finger, chamber pressure";
+        assert_eq!(wrapped_name(name, 60, 1), name);
+        assert_eq!(wrapped_name(name, 24, 2), "two pads on each finger,\nchamber pressure");
+        assert_eq!(wrapped_name(name, 10, 1), "two pads …");
+        assert_eq!(wrapped_name("", 10, 2), "");
+    }
 }

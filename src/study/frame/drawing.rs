@@ -5,6 +5,7 @@ use super::report::{FigureLink, FigureMark, LinkedFigure, StudyReport, StudyTabl
 use palpate_geometry::drawing::{
     CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis, ReferenceLine,
 };
+use palpate_sim::objects::object_title;
 
 /// Heading of columns of shares in plots.
 pub(crate) const F1_PERCENT: &str = "macro F1 (%)";
@@ -287,6 +288,6 @@ fn confusion_plot(
     let mut plot = Plot::of_heat_map(heat);
     let numbered = |text: &dyn Fn(usize) -> String| (0..classes.len()).map(|k| (k as f64 + 1.0, text(k))).collect();
     plot.x.ticks = numbered(&|k| (k + 1).to_string());
-    plot.y.ticks = numbered(&|k| format!("{} {}", classes[k], k + 1));
+    plot.y.ticks = numbered(&|k| format!("{} {}", object_title(classes[k]), k + 1));
     (plot, links)
 }

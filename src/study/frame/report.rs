@@ -273,7 +273,7 @@ impl Cell {
         let number = |value: f64| match unit {
             PERCENT => format!("{:.1}", scale * value),
             POINTS => format!("{:+.1}", scale * value),
-            "" if value.fract() == 0.0 => format!("{value:.0}"),
+            "" | GRASPS if value.fract() == 0.0 => format!("{value:.0}"),
             _ => palpate_geometry::units::three_digits(value),
         };
         match self {
@@ -369,6 +369,8 @@ pub const PERCENT: &str = "%";
 
 /// Unit of differences of shares: stored from -1 to 1, shown in percentage points.
 pub const POINTS: &str = "points";
+/// Unit of columns of numbers of grasps.
+const GRASPS: &str = "grasps";
 
 impl StudyColumn {
     /// Heading with its unit.

@@ -1,7 +1,7 @@
 //! Figures of the chosen study: its plots, from which the pointer leads to rows and trials.
 
 use super::plot::plot_ui;
-use super::result_ui;
+use super::{part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::studies::Studies;
@@ -55,7 +55,8 @@ fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize
         if result.figures.len() > 1 {
             ui.separator();
             for (k, figure) in result.figures.iter().enumerate() {
-                let button = ui.selectable_label(k == number, RichText::new(&figure.name).small());
+                let button =
+                    ui.selectable_label(k == number, RichText::new(part_title(card.key, &figure.name)).small());
                 actions.on(&button.on_hover_text(&figure.figure.title), move |app| app.studies.show_figure(k));
             }
         }
@@ -90,7 +91,7 @@ fn plots_ui(ui: &mut Ui, result: &StudyResult, linked: &LinkedFigure, actions: &
     let fitting = (ui.available_width() / LEAST_WIDTH) as usize;
     let columns = most.min(plots.len()).min(fitting).max(1);
     // A single row fills the panel.
-    let room = if plots.len() <= columns { ui.available_height() - BELOW } else { 0.0 };
+    let room = (ui.available_height() - BELOW, plots.len() <= columns);
     for (row, chunk) in plots.chunks(columns).enumerate() {
         ui.columns(columns, |uis| {
             for (k, (ui, _)) in uis.iter_mut().zip(chunk).enumerate() {

@@ -58,18 +58,18 @@ fn row_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, chosen: bool, action
     let painter = ui.painter_at(inner);
     let small = FontId::proportional(11.5);
     let quiet = if chosen { colours.text } else { colours.quiet_text };
-    let paper = painter.text(inner.right_top(), Align2::RIGHT_TOP, card.paper, small.clone(), colour(quiet));
     let mut title =
         LayoutJob::simple_singleline(card.title.to_owned(), FontId::proportional(13.5), colour(colours.text));
-    title.wrap = TextWrapping::truncate_at_width(paper.left() - 6.0 - inner.left());
+    title.wrap = TextWrapping::truncate_at_width(inner.width());
     painter.galley(inner.left_top(), painter.layout_job(title), colour(colours.text));
-    painter.text(
-        inner.left_bottom(),
-        Align2::LEFT_BOTTOM,
-        &state,
-        small,
-        colour(if chosen { colours.text } else { ink }),
-    );
+    let ink = colour(if chosen { colours.text } else { ink });
+    let left = painter.text(inner.left_bottom(), Align2::LEFT_BOTTOM, &state, small.clone(), ink).right() + 8.0;
+    // The state of a study that runs may need the line.
+    let paper = painter.layout_no_wrap(card.paper.to_owned(), small, colour(quiet));
+    let corner = inner.right_bottom() - paper.size();
+    if corner.x > left {
+        painter.galley(corner, paper, colour(quiet));
+    }
     if response.on_hover_text(card.about).clicked() {
         let key = card.key;
         actions.push(|app| app.studies.choose(key));

@@ -9,9 +9,10 @@ pub(super) mod tables;
 
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
-use crate::app::widgets::{just_opened, wrapped};
+use crate::app::widgets::{capital, just_opened, wrapped};
 use egui::{RichText, Ui};
 use palpate_geometry::units::{symbol, true_minus};
+use palpate_sim::objects::object_title;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
 use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
 use palpate_tactile::trial::TrialId;
@@ -45,10 +46,23 @@ fn result_ui(
     result
 }
 
-/// Text of a cell, with a true minus before numbers.
+/// Columns with names of classes.
+const CLASSES: [&str; 3] = ["object", "true", "predicted"];
+
+/// Text of a cell, with the titles of objects and a true minus before numbers.
 fn cell_text(cell: &Cell, column: &StudyColumn) -> String {
     let text = cell.shown(&column.unit);
-    if matches!(cell, Cell::Text(_)) { text } else { true_minus(&text).replace("(-", "(−").replace(" -", " −") }
+    match cell {
+        Cell::Text(_) if CLASSES.contains(&column.name.as_str()) => object_title(&text),
+        Cell::Text(_) => text,
+        _ => true_minus(&text).replace("(-", "(−").replace(" -", " −"),
+    }
+}
+
+/// Title of a table or figure of a study: `signatures-rates` of the study `signatures` is `Rates`.
+fn part_title(study: &str, name: &str) -> String {
+    let rest = name.strip_prefix(study).map(|rest| rest.trim_start_matches('-'));
+    capital(&rest.filter(|rest| !rest.is_empty()).unwrap_or(name).replace('-', " "))
 }
 
 /// The trials behind a row; none where they are not in the store of the window.

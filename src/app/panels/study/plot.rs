@@ -4,6 +4,7 @@ use super::{about_row_ui, opening};
 use crate::app::actions::Actions;
 use crate::app::figure_plot::{self, ShownPlot};
 use crate::app::theme::{self, colour};
+use crate::app::widgets::capital;
 use egui::{Rect, RichText, Stroke, StrokeKind, Tooltip, Ui, Vec2};
 use palpate_geometry::drawing::Plot;
 use palpate_study::jobs::StudyResult;
@@ -24,19 +25,21 @@ pub(super) fn plot_ui(
     ui: &mut Ui,
     result: &StudyResult,
     (linked, number): (&LinkedFigure, usize),
-    room: f32,
+    (room, alone): (f32, bool),
     actions: &mut Actions,
 ) {
     let plot = &linked.figure.plots[number];
     if !plot.title.is_empty() {
-        ui.add(egui::Label::new(RichText::new(&plot.title).small().strong()).truncate());
+        ui.add(egui::Label::new(RichText::new(capital(&plot.title)).small().strong()).truncate());
     }
     let [least, most] = HEIGHTS;
     let rows = plot.heat.as_ref().map_or(plot.y.ticks.len(), |heat| heat.y.count);
     let height = if rows > 0 {
-        (ROW * rows as f32 + AROUND).max(least).max(room.min(1.6 * most))
+        (ROW * rows as f32 + AROUND).max(least).max(if alone { room.min(1.6 * most) } else { 0.0 })
     } else {
-        (0.7 * ui.available_width()).clamp(least, most).max(room.min(1.2 * most))
+        // Seen as a whole, with the titles of its axes.
+        let own = (0.7 * ui.available_width()).clamp(least, most).min(room.max(least));
+        own.max(if alone { room.min(1.2 * most) } else { 0.0 })
     };
     let id = format!("{} {number}", linked.name);
     // More than these would cover each other.

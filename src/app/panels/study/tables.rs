@@ -1,6 +1,6 @@
 //! Tables of the chosen study; a click on a row opens its trials.
 
-use super::{about_row_ui, cell_text, opening, result_ui};
+use super::{about_row_ui, cell_text, opening, part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
@@ -22,7 +22,8 @@ const MEASURED: usize = 300;
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
     let Some(result) = result_ui(ui, studies, "study-tables", "tables", actions) else { return };
     let tables = &result.stored.result.tables;
-    let id = egui::Id::unique(("study table", studies.chosen().card().key));
+    let key = studies.chosen().card().key;
+    let id = egui::Id::unique(("study table", key));
     let mut chosen = ui.data_mut(|data| data.get_temp::<usize>(id)).unwrap_or(0).min(tables.len().saturating_sub(1));
     let Some(first) = tables.get(chosen) else {
         ui.weak("This result has no table.");
@@ -31,7 +32,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     if tables.len() > 1 {
         ui.horizontal_wrapped(|ui| {
             for (k, table) in tables.iter().enumerate() {
-                let button = ui.selectable_label(k == chosen, RichText::new(&table.name).small());
+                let button = ui.selectable_label(k == chosen, RichText::new(part_title(key, &table.name)).small());
                 if button.on_hover_text(&table.title).clicked() {
                     chosen = k;
                     ui.data_mut(|data| data.insert_temp(id, k));
