@@ -52,6 +52,8 @@ pub(super) fn apply(ctx: &egui::Context, theme: Theme) {
         style.spacing.button_padding = egui::vec2(8.0, 4.0);
         style.spacing.interact_size.y = 24.0;
         style.spacing.slider_width = 120.0;
+        // Contents end beside the scroll bar, not below it.
+        style.spacing.scroll.floating_allocated_width = 8.0;
         style.animation_time = 0.1;
     });
     for each in Theme::ALL {

@@ -197,7 +197,9 @@ fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let font = egui::TextStyle::Body.resolve(ui.style());
     let mut line = LayoutJob::default();
     line.append(&finding.check.replace('-', " "), 0.0, TextFormat::simple(font.clone(), colour(name)));
-    line.append(&finding.seen, 10.0, TextFormat::simple(font, colour(seen)));
+    // A number and its unit stay in one line.
+    let seen_text = finding.seen.replace(" %", "\u{a0}%");
+    line.append(&seen_text, 10.0, TextFormat::simple(font, colour(seen)));
     ui.add(Label::new(line).wrap());
 }
 

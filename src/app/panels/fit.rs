@@ -139,8 +139,6 @@ fn estimates_ui(ui: &mut Ui, theme: Theme, estimates: &[Estimate]) {
         ui.horizontal(|ui| {
             ui.label(name_of(estimate));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                // Some room for the scroll bar.
-                ui.add_space(6.0);
                 ui.label(format!("{} {}", three_digits(estimate.value), units::symbol(estimate.unit)));
             });
         });

@@ -161,8 +161,7 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
         true => (class.trials.to_string(), colours.accent, colours.text),
         false => (format!("{}, needs {LEAST_TRIALS}", class.trials), colours.warning, colours.warning),
     };
-    // Room for the scroll bar.
-    let (rect, response) = ui.allocate_exact_size(vec2((ui.available_width() - 10.0).max(120.0), 18.0), Sense::hover());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width().max(120.0), 18.0), Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{}: {number}", class.name)));
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(13.0);

@@ -55,8 +55,6 @@ pub(super) fn ui(
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
-        // Numbers at the right end stay beside the scroll bar.
-        ui.set_max_width(ui.available_width() - 10.0);
         match &explained.outcome {
             Ok(why) => {
                 evidence_ui(ui, why);
@@ -168,8 +166,14 @@ impl Rows {
             let place = |k: usize| pos2(left + width * k as f32, rect.top());
             (0..why.phases.len()).map(|k| Rect::from_min_size(place(k), vec2(width - 2.0, rect.height()))).collect()
         };
-        for (span, cell) in why.phases.iter().zip(cells(head)) {
-            put_sized(ui, (span.phase.name(), HEADERS), cell, Align2::CENTER_CENTER, self.quiet);
+        for (k, (span, cell)) in why.phases.iter().zip(cells(head)).enumerate() {
+            // There is room beside the first.
+            let (cell, align) = if k == 0 {
+                (cell.with_min_x(head.left()), Align2::RIGHT_CENTER)
+            } else {
+                (cell, Align2::CENTER_CENTER)
+            };
+            put_sized(ui, (span.phase.name(), HEADERS), cell, align, self.quiet);
         }
         for (channel, evidence) in why.channels.iter().zip(&why.by_both) {
             let name = channel_words(channel);
