@@ -1,7 +1,5 @@
 //! Labelled grasps, and their splits into training and test sets.
 
-use crate::pmf::Pmf;
-use crate::recogniser::Properties;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -106,17 +104,6 @@ impl Labels {
             both.classes.push(Class { name: class.name.clone(), size, shape });
         }
         both
-    }
-
-    /// Size and shape by the probabilities of the classes that have both: sums over classes of each. Together with the class,
-    /// they are one belief.
-    pub fn properties_of(&self, pmf: &Pmf) -> Properties {
-        let sums = |names: &[String], of: fn(&Class) -> Option<usize>| {
-            let own =
-                |k: usize| self.classes.iter().zip(pmf.probabilities()).filter(move |(class, _)| of(class) == Some(k));
-            Pmf::from_weights((0..names.len()).map(|k| own(k).map(|(_, p)| p).sum()))
-        };
-        Properties { size: sums(&self.sizes, |class| class.size), shape: sums(&self.shapes, |class| class.shape) }
     }
 
     /// True if at least one class has a size and one a shape, as stage one requires.
@@ -425,20 +412,6 @@ mod tests {
     fn hashes_are_those_of_its_authors() {
         assert_eq!(fnv_1a([]), 0xcbf2_9ce4_8422_2325);
         assert_eq!(fnv_1a("foobar".bytes()), 0x8594_4171_f739_67e8);
-    }
-
-    #[test]
-    fn size_and_shape_are_sums_over_the_classes_that_have_them() {
-        let class = |size, shape| Class { name: String::new(), size, shape };
-        let names = |all: [&str; 2]| all.map(str::to_owned).to_vec();
-        let labels = Labels {
-            classes: vec![class(Some(0), Some(1)), class(Some(1), Some(1)), class(Some(1), Some(0)), class(None, None)],
-            sizes: names(["small", "large"]),
-            shapes: names(["round", "flat"]),
-        };
-        let Properties { size, shape } = labels.properties_of(&Pmf::from_weights([0.1, 0.2, 0.5, 0.2]));
-        let close = |pmf: &Pmf, own: [f64; 2]| pmf.probabilities().iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12);
-        assert!(close(&size, [0.125, 0.875]) && close(&shape, [0.625, 0.375]), "{size:?} {shape:?}");
     }
 
     #[test]

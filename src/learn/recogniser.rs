@@ -2,17 +2,29 @@
 
 use crate::arrays::Arrays;
 use crate::belief::Rejection;
-use crate::data::{Dataset, Sequence};
+use crate::data::{Class, Dataset, Labels, Sequence};
 use crate::fitting::{Fitting, LearnError};
 use crate::pmf::Pmf;
 
-/// Result of stage one: probabilities of size and shape (paper, section III).
+/// Probabilities of size and shape, as stage one gives them (paper, section III), or as they follow from the classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Properties {
     /// PMF over [`crate::Labels::sizes`].
     pub size: Pmf,
     /// PMF over [`crate::Labels::shapes`].
     pub shape: Pmf,
+}
+
+impl Properties {
+    /// Sums of the probabilities of the classes that have a size, and a shape. Together with the class, they are one belief.
+    pub fn of_classes(labels: &Labels, pmf: &Pmf) -> Self {
+        let sums = |names: &[String], of: fn(&Class) -> Option<usize>| {
+            let classes = || labels.classes.iter().zip(pmf.probabilities());
+            let share = |k: usize| classes().filter(|(class, _)| of(class) == Some(k)).map(|(_, p)| p).sum();
+            Pmf::from_weights((0..names.len()).map(share))
+        };
+        Self { size: sums(&labels.sizes, |class| class.size), shape: sums(&labels.shapes, |class| class.shape) }
+    }
 }
 
 /// Result of recognising one grasp.
@@ -76,4 +88,23 @@ pub trait LiveRecogniser: Send {
 
     /// Ends the grasp; returns the verdict on all samples, `None` without samples.
     fn finish(&mut self) -> Option<Verdict>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn size_and_shape_are_sums_over_the_classes_that_have_them() {
+        let class = |size, shape| Class { name: String::new(), size, shape };
+        let names = |all: [&str; 2]| all.map(str::to_owned).to_vec();
+        let labels = Labels {
+            classes: vec![class(Some(0), Some(1)), class(Some(1), Some(1)), class(Some(1), Some(0)), class(None, None)],
+            sizes: names(["small", "large"]),
+            shapes: names(["round", "flat"]),
+        };
+        let Properties { size, shape } = Properties::of_classes(&labels, &Pmf::from_weights([0.1, 0.2, 0.5, 0.2]));
+        let close = |pmf: &Pmf, own: [f64; 2]| pmf.probabilities().iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(close(&size, [0.125, 0.875]) && close(&shape, [0.625, 0.375]), "{size:?} {shape:?}");
+    }
 }

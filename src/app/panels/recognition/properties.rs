@@ -4,7 +4,7 @@ use super::words::{newest, whole_percent};
 use super::{Part, eased, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use palpate_learn::{Class, Labels, Pmf};
+use palpate_learn::{Class, Labels, Pmf, Properties};
 
 /// Height of the line that shows the probability of an answer (points).
 const UNDERLINE: f32 = 4.0;
@@ -23,7 +23,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     // An empty hand has neither, and nothing is known of other objects.
     let has_any = |class: &Class| class.size.is_some() || class.shape.is_some();
     let known = newest(part.view).filter(|pmf| has_any(&labels.classes[pmf.top().0]));
-    let properties = known.map(|pmf| labels.properties_of(pmf));
+    let properties = known.map(|pmf| Properties::of_classes(labels, pmf));
     if !labels.sizes.is_empty() {
         property_ui(ui, part, "size", &labels.sizes, properties.as_ref().map(|own| &own.size));
     }
