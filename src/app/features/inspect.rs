@@ -314,6 +314,7 @@ impl App {
         }
         inspect.wanted = Some(id);
         inspect.ask(id, Keep::Scenery);
+        self.library.follow(id);
     }
 
     /// Closes the trial; the live gripper is shown again.

@@ -132,6 +132,11 @@ impl LibraryFeature {
         self.worker.send(LibraryCommand::Draw(ids));
     }
 
+    /// Keeps up with the row of the open trial.
+    pub(super) fn follow(&self, id: TrialId) {
+        self.worker.send(LibraryCommand::Follow(id));
+    }
+
     /// Changes the selected trials.
     pub fn edit(&self, edit: TrialEdit) {
         if !self.selection.selected.is_empty() {

@@ -90,7 +90,7 @@ pub const ALL: [PanelKind; 35] = [
     panel("fit", "Fit", |ui, app, actions| fit::ui(ui, &app.tools, &app.simulation.scene, actions)),
     panel("pads", "Pads", |ui, app, actions| pads::ui(ui, &app.shown(), actions)),
     panel("signature", "Signature", |ui, app, actions| signature::ui(ui, &app.shown(), actions)),
-    panel("trial", "This trial", |ui, app, actions| trial::ui(ui, &app.shown(), actions)),
+    panel("trial", "This trial", |ui, app, actions| trial::ui(ui, &app.shown(), app.library.view.as_deref(), actions)),
     panel("compared", "Compared", |ui, app, actions| compared::ui(ui, &app.shown(), actions)),
     panel("sensors", "Sensors", |ui, app, actions| {
         sensors::ui(ui, &app.view, &app.simulation.scene, &app.tools.data, actions);

@@ -1,16 +1,19 @@
-//! Facts of the stored trial that is open: object, source, quality, phases with their times, and the scene.
+//! Facts of the stored trial that is open: object, labels, source, quality, phases with their times, and the scene.
 
 use crate::app::actions::Actions;
 use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
-use crate::app::widgets::{capital, wrapped};
+use crate::app::widgets::{capital, chip, wrapped};
 use egui::{Grid, RichText, ScrollArea, Ui};
+use palpate_geometry::palette::Rgb;
+use palpate_geometry::units::SPACE;
 use palpate_lab::inspection::OpenTrial;
+use palpate_lab::workers::LibraryView;
 use palpate_sim::frame::TrustLevel;
 use palpate_tactile::trial::TrialSource;
 
-pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, library: Option<&LibraryView>, actions: &mut Actions) {
     let Some(inspected) = data.inspected else {
         ui.weak("No trial is open. Choose one in the library, or press Enter on it.");
         return;
@@ -19,7 +22,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let colours = data.view.theme.colours();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.heading(&trial.title);
-        ui.weak(format!("Trial {}, {}, {}", trial.id, trial.source_title(), date(&trial.created)));
+        labels_ui(ui, trial, library, colours.accent);
         for remark in trial.remarks.iter().chain(&trial.header.warnings) {
             wrapped(ui, RichText::new(remark).color(colour(colours.warning)));
         }
@@ -45,8 +48,8 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                     let from_s = span.from_s;
                     actions.push(move |app| app.seek(Seek::To(from_s)));
                 }
-                ui.monospace(format!("{:.2} s", span.from_s));
-                ui.weak(format!("for {:.2} s", span.to_s - span.from_s));
+                ui.monospace(format!("{:.2}{SPACE}s", span.from_s));
+                ui.weak(format!("for {:.2}{SPACE}s", span.to_s - span.from_s));
                 ui.end_row();
             }
         });
@@ -62,10 +65,26 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     });
 }
 
+/// Number and source, and what the library says: local time, tags and note.
+fn labels_ui(ui: &mut Ui, trial: &OpenTrial, library: Option<&LibraryView>, ink: Rgb) {
+    ui.weak(format!("Trial {}, {}", trial.id, trial.source_title()));
+    let followed = library.and_then(|view| Some((view, view.followed.as_ref().filter(|own| own.row.id == trial.id)?)));
+    let Some((view, row)) = followed.map(|(view, own)| (view, &own.row)) else { return };
+    let utc: String = trial.created.chars().take(16).collect();
+    ui.weak(capital(&view.date(&row.local))).on_hover_text(format!("{} UTC", utc.replace('T', " ")));
+    if !row.tags.is_empty() {
+        ui.horizontal_wrapped(|ui| row.tags.iter().for_each(|tag| _ = chip(ui, tag, ink)));
+    }
+    if !row.note.is_empty() {
+        wrapped(ui, RichText::new(&row.note));
+    }
+}
+
 fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
     let header = &trial.header;
     let mut facts = vec![
-        ("samples", format!("{}, {:.2} s", trial.t_s.len(), trial.span_s()[1] - trial.span_s()[0])),
+        ("samples", trial.t_s.len().to_string()),
+        ("length", format!("{:.2}{SPACE}s", trial.span_s()[1] - trial.span_s()[0])),
         ("channels", trial.columns.len().to_string()),
         ("made by", format!("Palpate {}", header.version)),
     ];
@@ -73,7 +92,7 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
         facts.push(("seed", header.seed.to_string()));
         facts.push(("engine", header.scene.solver.engine.name().to_owned()));
         facts.push(("accuracy", header.scene.solver.accuracy.to_string()));
-        facts.push(("peak pressure", format!("{:.2} bar", header.scene.programme.peak_bar)));
+        facts.push(("peak pressure", format!("{:.2}{SPACE}bar", header.scene.programme.peak_bar)));
     }
     if let Some(own) = &trial.simulated {
         let on: Vec<&str> = own.plan.effects.iter().filter(|effect| effect.on).map(|e| e.name.as_str()).collect();
@@ -89,10 +108,4 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
             ui.end_row();
         }
     });
-}
-
-/// `2026-11-22 16:05` of a time in the store's format.
-fn date(created: &str) -> String {
-    let shown: String = created.chars().take(16).collect();
-    format!("{} UTC", shown.replace('T', " "))
 }

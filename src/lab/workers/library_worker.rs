@@ -24,6 +24,8 @@ pub enum LibraryCommand {
     Draw(Vec<TrialId>),
     /// Change trials; one undo takes it back.
     Edit(Vec<TrialId>, TrialEdit),
+    /// Show this trial too, whether it matches or not.
+    Follow(TrialId),
 }
 
 /// Trials that were found, for display.
@@ -33,6 +35,8 @@ pub struct LibraryView {
     pub query: TrialQuery,
     /// Trials in the order of the query.
     pub found: Arc<[Arc<LibraryTrial>]>,
+    /// The trial that is followed, once it has been read.
+    pub followed: Option<Arc<LibraryTrial>>,
     /// Counts of the whole library.
     pub counts: Arc<LibraryCounts>,
     /// The whole store has been read.
@@ -41,6 +45,20 @@ pub struct LibraryView {
     pub days: [String; 2],
     /// Sparklines made so far, of trials in sight.
     pub sparklines: Arc<BTreeMap<TrialId, Sparkline>>,
+}
+
+impl LibraryView {
+    /// A local time of the store, short: `today 14:03`, `yesterday 09:12`, `2026-11-19 17:30`.
+    pub fn date(&self, local: &str) -> String {
+        let (day, time) = local.split_once('T').unwrap_or((local, ""));
+        let [today, yesterday] = &self.days;
+        let day = match day {
+            day if day == today => "today",
+            day if day == yesterday => "yesterday",
+            day => day,
+        };
+        format!("{day} {time}")
+    }
 }
 
 /// Trials read at a time while the store is opened: a few milliseconds each time.
@@ -85,6 +103,7 @@ struct LibraryService {
     /// As [`Store::data_version`] counts.
     version: i64,
     view: LibraryView,
+    followed: Option<TrialId>,
     /// Trials in sight without a sparkline, the last to be made first.
     undrawn: Vec<TrialId>,
     /// Trials that were still being recorded when their sparkline was made.
@@ -107,6 +126,11 @@ impl LibraryService {
         match command {
             Some(LibraryCommand::Find(query)) => {
                 self.view.query = query;
+                self.read(store)?;
+                self.find(store)?;
+            }
+            Some(LibraryCommand::Follow(id)) => {
+                self.followed = Some(id);
                 self.read(store)?;
                 self.find(store)?;
             }
@@ -155,6 +179,7 @@ impl LibraryService {
     fn find(&mut self, store: &Store) -> Result<(), StoreError> {
         self.view.days = [store.local_day(0)?, store.local_day(1)?];
         self.view.found = self.library.find(store, &self.view.query)?.into();
+        self.view.followed = self.followed.and_then(|id| self.library.trial(id)).cloned();
         self.view.complete = self.library.is_complete();
         Ok(())
     }
@@ -188,6 +213,13 @@ mod tests {
     use palpate_store::{BoardChunk, BoardInfo, Shown};
     use palpate_tactile::board::Reading;
     use palpate_tactile::trial::TrialHeader;
+
+    #[test]
+    fn dates_of_these_days_are_words() {
+        let view = LibraryView { days: ["2026-11-22", "2026-11-21"].map(str::to_owned), ..LibraryView::default() };
+        let shown = ["2026-11-22T14:03", "2026-11-21T09:12", "2025-11-22T23:59"].map(|local| view.date(local));
+        assert_eq!(shown, ["today 14:03", "yesterday 09:12", "2025-11-22 23:59"]);
+    }
 
     fn record(store: &mut Store, object: &str) -> TrialId {
         let id = store.begin_board(&TrialHeader::new(object, Scene::default()), &BoardInfo::default()).expect("begins");
@@ -239,6 +271,11 @@ mod tests {
         let search = |text: &str| LibraryCommand::Find(TrialQuery { search: text.to_owned(), ..TrialQuery::default() });
         library.send(search("lemon"));
         shown(&library, &woken, |view| ids(view) == [lemon]);
+        library.send(LibraryCommand::Follow(mug));
+        let followed = |view: &LibraryView| view.followed.as_ref().map(|trial| trial.row.note.clone());
+        shown(&library, &woken, |view| ids(view) == [lemon] && followed(view).is_some());
+        theirs.labels().edit(&[mug], &TrialEdit::Note("chipped".to_owned())).expect("notes");
+        shown(&library, &woken, |view| followed(view).as_deref() == Some("chipped"));
         // Another program records and discards: nobody asks.
         let third = record(&mut theirs, "lemon");
         shown(&library, &woken, |view| ids(view) == [third, lemon]);

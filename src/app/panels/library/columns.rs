@@ -74,7 +74,7 @@ pub(super) fn cell(view: &LibraryView, trial: &LibraryTrial, column: TrialColumn
     match column {
         TrialColumn::Id => row.id.to_string(),
         TrialColumn::Object => format!("{}{}", trial.title, if row.unsure { "?" } else { "" }),
-        TrialColumn::Date => date(&row.local, &view.days),
+        TrialColumn::Date => view.date(&row.local),
         TrialColumn::Source if row.place == TrialPlace::DemoLog => row.place.title().to_owned(),
         TrialColumn::Source => source(row.source).to_owned(),
         TrialColumn::Preset => row.preset.unwrap_or_default().to_owned(),
@@ -103,18 +103,6 @@ fn quality(trial: &LibraryTrial) -> String {
     }
 }
 
-/// A local time, short: `today 14:03`, `yesterday 09:12`, `2026-11-19 17:30`.
-fn date(local: &str, [today, yesterday]: &[String; 2]) -> String {
-    let (day, time) = local.split_once('T').unwrap_or((local, ""));
-    if day == today {
-        format!("today {time}")
-    } else if day == yesterday {
-        format!("yesterday {time}")
-    } else {
-        format!("{day} {time}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,12 +118,5 @@ mod tests {
             assert_eq!(has(TrialColumn::Sensors), room > 850.0, "{room}");
         }
         assert_eq!(fitting(884.0).len(), COLUMNS.len());
-    }
-
-    #[test]
-    fn dates_of_these_days_are_words() {
-        let days = ["2026-11-22", "2026-11-21"].map(str::to_owned);
-        let shown = ["2026-11-22T14:03", "2026-11-21T09:12", "2025-11-22T23:59"].map(|local| date(local, &days));
-        assert_eq!(shown, ["today 14:03", "yesterday 09:12", "2025-11-22 23:59"]);
     }
 }
