@@ -167,7 +167,7 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
             scene = Scene::from_file(Path::new(object))?;
         } else {
             refuse_unknown_word(object);
-            scene.object.source = anchored(object);
+            (scene.object.source, scene.object.name) = (anchored(object), None);
         }
         // Errors in the file belong to the terminal, before a window opens.
         setup::load_object(&scene)?;

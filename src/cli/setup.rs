@@ -139,7 +139,7 @@ impl SceneArguments {
             None => Scene::default(),
         };
         if let Some(object) = object {
-            scene.object.source = anchored(object);
+            (scene.object.source, scene.object.name) = (anchored(object), None);
         }
         if let Some(accuracy) = self.accuracy {
             scene.solver.accuracy = accuracy;

@@ -222,7 +222,7 @@ fn unsuitable_data_are_refused_with_a_reason() {
         assert!(refused(&data.part(&[])).is_some(), "{}", method.key);
         // Two trials of different objects suffice for dtw-knn only.
         let two = refused(&data.part(&[0, 1]));
-        assert!(two.is_some_and(|text| text.contains("only 1 grasps")) || method.key == "dtw-knn", "{}", method.key);
+        assert!(two.is_some_and(|text| text.contains("only 1 of the")) || method.key == "dtw-knn", "{}", method.key);
         let stopped = AtomicBool::new(true);
         let fitting = Fitting { stop: &stopped, ..quick(1) };
         if method.recipe.is_some() {

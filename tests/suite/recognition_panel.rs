@@ -4,7 +4,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::golden::compare;
 use egui::accesskit::Role;
-use egui::{Key, Rect};
+use egui::{Key, Modifiers, Rect};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, PanelKind};
@@ -266,6 +266,24 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.until(|s| s.truth() == "carton");
     bench.harness.run_steps(5);
     assert!(bench.harness.query_by_label_contains("Learning carton").is_none());
+
+    // Another name is its class, its truth and its name in scene files, also when it is opened again.
+    bench.harness.get_by_label("Rename").click();
+    bench.harness.run_steps(3);
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    bench.harness.run_steps(2);
+    bench.harness.get_by_label("Name of the object").type_text("crate");
+    bench.harness.run_steps(2);
+    bench.harness.get_by_label("Save").click();
+    bench.until_told("Learned \"crate\".");
+    let named = bench.until(|s| s.truth() == "crate");
+    assert!(named.scene.to_toml().contains("name = \"crate\""), "{}", named.scene.to_toml());
+    let saved = bench.workbench().view().simulation_model.clone().unwrap();
+    assert_eq!(palpate_learn::Model::load(&saved).unwrap().card.taught, ["crate"]);
+    bench.tell(|app| app.open("lemon"));
+    bench.until(|s| s.truth() == "lemon");
+    bench.tell(|app| app.open(&file.to_string_lossy()));
+    bench.until(|s| s.truth() == "crate");
 }
 
 #[test]

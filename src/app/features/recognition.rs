@@ -7,6 +7,7 @@ use palpate_lab::grasping::{LESSON_GRASPS, RecognisedGrasp};
 use palpate_lab::workers::{Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Model, Models, Shipped};
 use palpate_sim::objects::object_title;
+use palpate_store::labels::class_name;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -153,15 +154,37 @@ impl App {
         self.notices.info(format!("Forgot \"{title}\"."));
     }
 
+    /// Gives the object of the last lesson another name, under which it is learned anew.
+    pub(in crate::app) fn rename_learned(&mut self, name: &str) {
+        let Some(Learned { title, source, before: (model, _), .. }) = &self.recognition.learned else { return };
+        let (title, source) = (title.clone(), source.clone());
+        let name = match class_name(name) {
+            Ok(name) if name == title => return,
+            Ok(name) if model.card.labels.class(&name).is_none() => name,
+            Ok(name) => return self.notices.failed("name", format!("The model knows another \"{name}\".")),
+            Err(cause) => return self.notices.failed("name", cause.to_string()),
+        };
+        self.notices.done("name");
+        self.forget_learned();
+        let mut scene = match &self.simulation.scene {
+            scene if scene.object.source == source => scene.clone(),
+            _ => self.simulation.scene_with(&source),
+        };
+        scene.object.name = Some(name);
+        self.set_scene(scene);
+        self.recognition.taught = None;
+    }
+
     /// Says no more about the last lesson.
     pub(in crate::app) fn dismiss_learned(&mut self) {
         self.recognition.learned = None;
     }
 
-    /// Names of the classes that the model in use was taught.
-    pub(in crate::app) fn learned_names(&self) -> &[String] {
-        let fixed = self.snapshot().is_some_and(|snapshot| snapshot.scene.holds_object());
-        self.recognition.models.of(Shipped::simulated(fixed)).map_or(&[], |model| &model.card.taught)
+    /// Class as which the model in use has learned the object in this file.
+    pub(in crate::app) fn learned_as(&self, source: &str) -> Option<&str> {
+        let fixed = self.simulation.scene.holds_object();
+        let model = self.recognition.models.of(Shipped::simulated(fixed))?;
+        model.card.taught_from.iter().find(|(_, (_, from))| from == source).map(|(class, _)| class.as_str())
     }
 
     /// Cancels the lesson.
@@ -207,6 +230,10 @@ impl App {
         let Some(model) = model.filter(|model| model.learns_new_objects()) else { return };
         let Some(card) = &snapshot.object else { return };
         let source = &snapshot.scene.object.source;
+        // A name that was just given is on its way.
+        if *source == simulation.scene.object.source && snapshot.scene.object.name != simulation.scene.object.name {
+            return;
+        }
         // A lesson with another object of a class that was taught says why it cannot be.
         let is_other = model.card.taught_from.get(&card.name).is_some_and(|(content, _)| *content != card.content);
         let is_known = model.card.labels.class(&card.name).is_some() && !is_other;

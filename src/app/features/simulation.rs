@@ -91,8 +91,9 @@ impl SimulationFeature {
     pub(in crate::app) fn scene_with(&self, source: &str) -> Scene {
         let mut scene = self.scene.clone();
         scene.object.source = anchored(source);
-        // Mass and size belong to the object before.
+        // Name, mass and size belong to the object before.
         let fresh = Scene::default().object;
+        scene.object.name = fresh.name;
         scene.object.mass = fresh.mass;
         scene.object.friction = fresh.friction;
         scene.object.scale = fresh.scale;
@@ -210,7 +211,10 @@ impl App {
                 Err(error) => self.notices.failed("scene", error.to_string()),
             };
         }
-        self.set_scene(self.simulation.scene_with(source));
+        let mut scene = self.simulation.scene_with(source);
+        // A file that the model has learned keeps the name that it had then.
+        scene.object.name = self.learned_as(&scene.object.source).map(str::to_owned);
+        self.set_scene(scene);
     }
 
     /// Grasps another built-in object, drawn at random.
@@ -275,7 +279,8 @@ fn changes(from: &Scene, to: &Scene) -> String {
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let value = |of: &BTreeMap<String, String>, key: &str| of.get(key).cloned().unwrap_or_else(|| "default".to_owned());
     let named = |key: &str| key.rsplit('.').next().unwrap_or(key).replace('_', " ");
-    let titles = [from, to].map(|scene| object_title(&scene.object.source));
+    let title = |scene: &Scene| scene.object.name.clone().unwrap_or_else(|| object_title(&scene.object.source));
+    let titles = [from, to].map(title);
     let mut texts: Vec<String> = Vec::new();
     if titles[0] != titles[1] {
         texts.push(format!("object {} \u{2192} {}", titles[0], titles[1]));

@@ -11,10 +11,10 @@ use palpate_sim::objects::{EMPTY, catalogue};
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
-pub(super) fn ui(
+pub(super) fn ui<'a>(
     ui: &mut Ui,
     (chosen, recent): (&str, &[String]),
-    taught: &[String],
+    learned_as: impl Fn(&str) -> Option<&'a str>,
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -32,9 +32,11 @@ pub(super) fn ui(
     ui.add_space(2.0);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for path in recent {
-            let name = std::path::Path::new(path).file_stem().map_or(path.as_str(), |n| n.to_str().unwrap_or(path));
+            let class = learned_as(path);
+            let stem = || std::path::Path::new(path).file_stem()?.to_str();
+            let name = class.or_else(stem).unwrap_or(path);
             let texture = pictures.get(path);
-            let learned = if taught.iter().any(|taught| taught == name) { "learned, " } else { "" };
+            let learned = if class.is_some() { "learned, " } else { "" };
             let clicked = row(ui, chosen == path, texture, &capital(name), &format!("{learned}{path}"));
             follow(chosen == path, &clicked);
             let source = path.clone();

@@ -127,7 +127,7 @@ impl Hand {
             return Ok(known);
         }
         let mut scene = self.plan.scene.clone();
-        name.clone_into(&mut scene.object.source);
+        (scene.object.source, scene.object.name) = (name.to_owned(), None);
         let model = scene.load_object()?;
         let poses = PoseSampler::new(&scene, model.as_ref());
         self.things.push(Graspable { name: name.to_owned(), model, poses });

@@ -383,7 +383,9 @@ impl<'a> ReadyCollection<'a> {
 
     fn load(&self, object: usize) -> Result<OnBench, ObjectError> {
         let mut scene = self.plan.scene.clone();
-        scene.object.source = palpate_sim::objects::anchored(&self.plan.objects[object]);
+        let source = palpate_sim::objects::anchored(&self.plan.objects[object]);
+        scene.object.name.take_if(|_| scene.object.source != source);
+        scene.object.source = source;
         let mut model = scene.load_object()?;
         if let (Some(model), Some(class)) = (&mut model, self.plan.classes.get(object)) {
             model.name.clone_from(class);

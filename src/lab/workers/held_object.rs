@@ -9,6 +9,7 @@ use std::time::SystemTime;
 /// Identity and source of the loaded object: loading again is skipped when nothing about it changed.
 pub(super) struct LoadedObject {
     pub(super) source: String,
+    pub(super) name: Option<String>,
     pub(super) options: LoadOptions,
     /// Time and length of its file: a file that was exported again is loaded again.
     pub(super) stamp: Option<(SystemTime, u64)>,

@@ -36,6 +36,11 @@ pub fn titled(name: &str) -> String {
     if title.to_lowercase() == name.to_lowercase() { title } else { format!("{title} ({name})") }
 }
 
+/// True for the path of a file, false for the name of a built-in object, of a random shape or of the empty hand.
+pub fn is_file(source: &str) -> bool {
+    source != EMPTY && RandomShape::seed_of(source).is_none() && !catalogue().iter().any(|b| b.name == source)
+}
+
 /// A source that names the same object from any folder: files that exist get their whole path, names stay names.
 pub fn anchored(source: &str) -> String {
     let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);

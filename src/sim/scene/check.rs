@@ -4,6 +4,9 @@ use super::timing::{FASTEST_COMMON_HZ, MOST_TICKS};
 use super::{Accuracy, Auto, Scene, SceneError};
 use std::ops::RangeInclusive;
 
+/// Most characters of the name of an object.
+const LONGEST_NAME: usize = 80;
+
 /// Collects the first value out of range.
 struct Ranges {
     fault: Option<SceneError>,
@@ -86,6 +89,10 @@ impl Scene {
         let object = &self.object;
         if object.source.trim().is_empty() {
             ranges.refuse("object.source", &"\"\"", "a name or a path");
+        }
+        let is_name = |name: &&String| name.chars().count() <= LONGEST_NAME && !name.contains(char::is_control);
+        if let Some(name) = object.name.as_ref().filter(|name| !is_name(name)) {
+            ranges.refuse("object.name", &format!("{name:?}"), "at most 80 characters on one line");
         }
         ranges.numbers("object.rotation_deg", &object.rotation_deg, &(-360.0..=360.0));
         ranges.numbers("object.shift", &object.shift, &(-0.5..=0.5));

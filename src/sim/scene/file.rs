@@ -48,6 +48,9 @@ impl SceneKey {
     }
 }
 
+/// Keys that say which object it is.
+const OF_OBJECT: [&str; 2] = ["object.source", "object.name"];
+
 /// Scene files larger than this are refused before parsing (bytes).
 const LARGEST_FILE: u64 = 1 << 20;
 
@@ -113,7 +116,8 @@ impl Scene {
         };
         let usual = values(&known_keys());
         let own = toml::Table::try_from(self).expect("a scene is a table");
-        let own = values(&own).into_iter().filter(|key| key.name != "object.source" && !usual.contains(key));
+        let own =
+            values(&own).into_iter().filter(|key| !OF_OBJECT.contains(&key.name.as_str()) && !usual.contains(key));
         own.map(|SceneKey { name, default: value }| format!("{name}={value}\n")).collect()
     }
 
@@ -152,6 +156,9 @@ fn set_key(document: &mut toml::Table, key: &str, value: toml::Value) -> Result<
         prefix.push_str(name);
         prefix.push('.');
     }
+    if let Some(optional) = beside(&prefix).and_then(|own| own.get(last)).filter(|_| !table.contains_key(last)) {
+        table.insert(last.to_owned(), optional.clone());
+    }
     match table.get_mut(last) {
         // A whole number where a fraction is expected is what people write.
         Some(slot @ toml::Value::Float(_)) => {
@@ -177,6 +184,7 @@ fn syntax(error: &toml::de::Error) -> SceneError {
 fn known_keys() -> toml::Table {
     let mut scene = Scene::default();
     scene.gripper.fitted = Some(FittedRanges::default());
+    scene.object.name = Some(String::new());
     toml::Table::try_from(scene).expect("a scene is a table")
 }
 
@@ -292,6 +300,7 @@ mod tests {
             let setting = format!("{}={}", key.name, key.default);
             let mut same = Scene::default();
             same.gripper.fitted = key.name.starts_with("gripper.fitted.").then(FittedRanges::default);
+            same.object.name = (key.name == "object.name").then(String::new);
             assert_eq!(Scene::default().with_settings(&[setting]), Ok(same), "{}", key.name);
         }
         let key = |name: &str| keys.iter().find(|key| key.name == name).expect("there");

@@ -24,7 +24,7 @@ pub use shaking::{HandMotion, HandPlace, Shaking};
 pub use timing::{Clock, Timing};
 
 use crate::gripper::{GripperModel, Programme};
-use crate::objects::{CollisionShape, LoadOptions, ObjectError, ObjectModel, load};
+use crate::objects::{CollisionShape, LoadOptions, ObjectError, ObjectModel, is_file, load};
 use palpate_geometry::units::STANDARD_GRAVITY;
 use serde::{Deserialize, Serialize};
 
@@ -101,7 +101,9 @@ impl Scene {
 
     /// Loads what the scene grasps; `None` for an empty hand.
     pub fn load_object(&self) -> Result<Option<ObjectModel>, ObjectError> {
-        load(&self.object.source, &self.load_options())
+        let object = load(&self.object.source, &self.load_options())?;
+        let name = self.object.name.as_ref().filter(|name| !name.is_empty() && is_file(&self.object.source));
+        Ok(object.map(|object| ObjectModel { name: name.cloned().unwrap_or(object.name.clone()), ..object }))
     }
 }
 
@@ -111,6 +113,9 @@ impl Scene {
 pub struct ObjectSetup {
     /// The name of a built-in object, the path of a URDF, OBJ or STL file, or `empty` for an empty hand.
     pub source: String,
+    /// Name of an object from a file, which is its class; without one or an empty one, the file says it. Built-in objects keep theirs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Held in place instead of resting freely until the fingers move it; see [`Scene::holds_object`].
     pub fixed: bool,
     /// Fixed-axis roll, pitch, yaw of the object as it is put down (degrees).
@@ -205,6 +210,7 @@ impl Default for ObjectSetup {
     fn default() -> Self {
         Self {
             source: "lemon".to_owned(),
+            name: None,
             fixed: false,
             rotation_deg: [0.0; 3],
             shift: [0.0; 2],

@@ -16,7 +16,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, failed_sensors_ui, number_field};
+use crate::app::widgets::{capital, failed_sensors_ui, number_field, text_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
@@ -178,12 +178,36 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
                         .color(colour(good)),
                 );
                 ui.label(format!("from {} simulated grasps in {:.0}\u{a0}s", learned.grasps, learned.seconds));
+                let id = egui::Id::unique("name of what was learned");
+                if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {
+                    return rename_ui(ui, id, name, actions);
+                }
                 let hint = "Use the model without this object again";
                 actions.on(&ui.small_button("Forget").on_hover_text(hint), App::forget_learned);
+                if ui.small_button("Rename").on_hover_text("Learn it under another name").clicked() {
+                    ui.data_mut(|data| data.insert_temp(id, learned.title.clone()));
+                    ui.memory_mut(|memory| memory.request_focus(id.with("field")));
+                }
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
         }
     });
+}
+
+/// Field for another name; its text is kept under `id` while it is open.
+fn rename_ui(ui: &mut Ui, id: egui::Id, mut name: String, actions: &mut Actions) {
+    let field = ui.add(text_field(&mut name, id.with("field")).desired_width(120.0));
+    field.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Name of the object"));
+    let enter = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+    let [save, cancel] = ["Save", "Cancel"].map(|text| ui.small_button(text).clicked());
+    if save || enter || cancel {
+        ui.data_mut(|data| data.remove::<String>(id));
+    } else {
+        ui.data_mut(|data| data.insert_temp(id, name.clone()));
+    }
+    if save || enter {
+        actions.push(move |app| app.rename_learned(&name));
+    }
 }
 
 /// Button for one more grasp, where a raised threshold asks for it.

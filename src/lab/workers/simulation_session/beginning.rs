@@ -157,9 +157,10 @@ impl Session {
 
     /// Loads a scene's object, unless it is the present one, which stays on failure.
     pub(super) fn load_object(&mut self, scene: &Scene) -> Result<(), ObjectError> {
-        let (source, options) = (scene.object.source.clone(), scene.load_options());
+        let (source, name, options) = (scene.object.source.clone(), scene.object.name.clone(), scene.load_options());
         let stamp = stamp_of(&source);
-        let is_known = |o: &LoadedObject| o.source == source && o.options == options && o.stamp == stamp;
+        let is_known =
+            |o: &LoadedObject| o.source == source && o.name == name && o.options == options && o.stamp == stamp;
         if self.object.as_ref().is_some_and(is_known) {
             return Ok(());
         }
@@ -172,7 +173,7 @@ impl Session {
         self.status.loading = None;
         self.publish();
         let model = loaded?.map(Arc::new);
-        self.object = Some(LoadedObject { source, options, stamp, model });
+        self.object = Some(LoadedObject { source, name, options, stamp, model });
         self.sampler = None;
         Ok(())
     }
