@@ -9,6 +9,7 @@ use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::{TrialRequest, record};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
+use palpate_store::labels::TrialEdit;
 use palpate_tactile::board::SensorKind;
 use palpate_tactile::calibration::{Curve, KnownWeight};
 use palpate_tactile::trial::Control;
@@ -122,7 +123,11 @@ fn close_empty(arguments: &AdaptArguments, scene: &Scene, store: &Store) -> Resu
     let request = TrialRequest { object: Some(EMPTY.to_owned()), control, length_s: None, adds: false };
     let mut gripper = SerialGripper::new(Box::new(link));
     let recording = record(&mut gripper, scene, request, store.path().to_owned(), &stop, &mut |_progress| ())?;
-    if stop.load(Ordering::Relaxed) {
+    let stopped = stop.load(Ordering::Relaxed);
+    if stopped || recording.aborted.is_some() {
+        store.labels().edit(&[recording.trial.id], &TrialEdit::Discard)?;
+    }
+    if stopped {
         return Err("stopped; no calibration was stored".into());
     }
     match recording.aborted {

@@ -102,7 +102,7 @@ pub(crate) fn check_enough(data: &Dataset, needed: usize) -> Result<(), LearnErr
         ))),
         _ => match counts.iter().find(|(_, found)| *found < needed) {
             Some(&(class, found)) => Err(LearnError::Refused(format!(
-                "class \"{}\" has only {found} grasps, {needed} are needed; record more or leave the class out",
+                "class \"{}\" has only {found} of the {needed} grasps that are needed; record more or leave the class out",
                 name(class)
             ))),
             None => Ok(()),

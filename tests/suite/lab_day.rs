@@ -70,7 +70,7 @@ fn from_an_unknown_board_to_taxels_for_another_program() {
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
     store.calibrations().set_sensors(sensors).unwrap();
     let empty = recorded(&mut store, &parts, EMPTY, 1, Vec::new());
-    Adaptation::from_trial(&store, empty, &Scene::default(), &[], false).unwrap().keep(&store).unwrap();
+    Adaptation::from_close(&mut store, empty, &Scene::default(), &[], false).unwrap().keep(&store).unwrap();
     for seed in 0..EACH * OBJECTS.len() as u64 {
         recorded(&mut store, &parts, OBJECTS[seed as usize % OBJECTS.len()], 100 + seed, Vec::new());
     }
@@ -86,8 +86,8 @@ fn from_an_unknown_board_to_taxels_for_another_program() {
     assert!(f1 > 0.8, "F1 {f1}");
 
     // A model of all sixty, with a promise.
-    let objects = OBJECTS.join(",");
-    said(at, &["train", "extra-trees", "--source", "serial", "--objects", &objects, "--out", "day.safetensors"]);
+    let trained = said(at, &["train", "extra-trees", "--source", "serial", "--out", "day.safetensors"]);
+    assert!(trained.contains("1 recorded to adapt"), "{trained}");
     let promise = said(at, &["promise", "day.safetensors", "--rounds", "100", "--grasps", "2"]);
     assert!(promise.contains("the true class is left in 90 % of rounds"), "{promise}");
     let model = Arc::new(Model::load(&at.join("day.safetensors")).unwrap());

@@ -91,7 +91,7 @@ fn from_nothing_to_a_table_and_a_model() {
     refused(at, &["train", "ds-lstm", "--layout", "C9"], &["C9"]);
     refused(at, &["train", "ds-lstm", "--collection", "nope"], &["collection nope", "palpate collect"]);
     refused(at, &["train", "svm", "--objects", "ball"], &["only one class, \"ball\""]);
-    refused(at, &["train", "ds-lstm", "--trials", "1"], &["only 1 grasps"]);
+    refused(at, &["train", "ds-lstm", "--trials", "1"], &["only 1 of the 4 grasps"]);
     // A models folder that cannot be made ends it before the training.
     std::fs::remove_dir_all(at.join("data")).unwrap();
     std::fs::write(at.join("data"), "").unwrap();

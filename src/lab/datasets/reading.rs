@@ -14,12 +14,16 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+/// Tag of the trial of the empty hand that a gripper was adapted by. Its sensors were calibrated to read it as the model does, so
+/// that it is no example to learn from; without the tag it is.
+pub const ADAPTING: &str = "adapting";
+
 /// Numbers of trials left out, by reason.
 type LeftOut = BTreeMap<String, usize>;
 
 impl DatasetQuery {
     /// Reads the data set of all labelled trials that match. Trials of the demo log, trials that diverged, did not converge or
-    /// did not come to rest, whose object was pulled, that are flagged, or that hold the grasp of an earlier trial among them are left
+    /// did not come to rest, whose object was pulled, that a gripper was adapted by, that are flagged, or that hold the grasp of an earlier trial among them are left
     /// out and counted, but not those after the last one that `most_of_each` allows. `progress` gets the number of trials
     /// read and their total.
     pub fn read(
@@ -104,6 +108,8 @@ impl DatasetQuery {
             Some(NOT_SOUND)
         } else if row.pulled {
             Some("pulled by hand")
+        } else if row.tags.iter().any(|tag| tag == ADAPTING) && self.tag.is_none() {
+            Some("recorded to adapt")
         } else if row.flags.iter().any(|found| found.flag != Flag::Duplicate) && !self.include_flagged {
             Some("flagged")
         } else {

@@ -2,6 +2,7 @@
 //! for any gripper were trained on readings that are calibrated in this way.
 
 use super::run::grasp;
+use crate::datasets::ADAPTING;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
@@ -133,7 +134,8 @@ impl Adaptation {
         Self::new(log, scene, &[], &[], &[])
     }
 
-    /// Adapts by a trial that was recorded for this purpose. Deletes the trial if something was in the hand.
+    /// Adapts by a trial that was recorded for this purpose, and tags it so. Deletes the trial if something was in the hand, or if
+    /// it leaves a sensor without calibration, as where the fingers did not close.
     pub fn from_close(
         store: &mut Store,
         id: TrialId,
@@ -141,13 +143,23 @@ impl Adaptation {
         weights: &[(Sensor, KnownWeight)],
         replace: bool,
     ) -> Result<Self, AdaptError> {
-        match Self::from_trial(store, id, scene, weights, replace) {
-            Err(AdaptError::Held { id, finger, how, .. }) => {
-                store.labels().edit(&[id], &TrialEdit::Discard)?;
-                Err(AdaptError::Held { id, finger, how, deleted: true })
+        let mut adapted = Self::from_trial(store, id, scene, weights, replace);
+        let edit = match &mut adapted {
+            Ok(adaptation) if adaptation.is_complete() => TrialEdit::Tag(vec![ADAPTING.to_owned()]),
+            Ok(adaptation) => {
+                adaptation
+                    .warnings
+                    .push(format!("Trial {id} was discarded; `palpate trials restore {id}` brings it back"));
+                TrialEdit::Discard
             }
-            adapted => adapted,
-        }
+            Err(AdaptError::Held { deleted, .. }) => {
+                *deleted = true;
+                TrialEdit::Discard
+            }
+            Err(AdaptError::Store(_) | AdaptError::Refused(_)) => return adapted,
+        };
+        store.labels().edit(&[id], &edit)?;
+        adapted
     }
 
     fn new(

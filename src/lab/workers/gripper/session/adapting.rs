@@ -17,10 +17,11 @@ impl GripperSession {
         self.adapting = self.begun > begun;
     }
 
-    /// Calibrates the sensors by the recorded close, if it was recorded for this purpose.
-    pub(super) fn adapt_to(&mut self, id: TrialId, discarded: bool) {
+    /// Calibrates the sensors by the recorded close, if it was recorded for this purpose. True where the trial is discarded, also
+    /// because it was of no use.
+    pub(super) fn adapt_to(&mut self, id: TrialId, discarded: bool) -> bool {
         if !std::mem::take(&mut self.adapting) || discarded {
-            return;
+            return discarded;
         }
         let scene = self.scene.clone();
         let adapted = self.store.open().map_err(AdaptError::from).and_then(|store: &mut Store| {
@@ -33,8 +34,12 @@ impl GripperSession {
                 self.read_calibrations();
                 adaptation.warnings.iter().for_each(|text| self.publisher.notify(Notice::Warning(text.clone())));
                 self.publisher.notify(notice_of(&adaptation));
+                !adaptation.is_complete()
             }
-            Err(cause) => self.publisher.notify(Notice::Failed(format!("not adapted: {cause}"))),
+            Err(cause) => {
+                self.publisher.notify(Notice::Failed(format!("not adapted: {cause}")));
+                matches!(cause, AdaptError::Held { deleted: true, .. })
+            }
         }
     }
 }

@@ -161,10 +161,10 @@ impl GripperSession {
                 RecorderNotice::Begun(id) => self.recording_id = Some(id),
                 RecorderNotice::Recorded(trial) => {
                     let Some((request, discarded, complete)) = self.ending.pop_front() else { continue };
+                    let discarded = self.adapt_to(trial.id, discarded);
                     if !discarded {
                         self.publisher.notify(Notice::Stored(Stored::New(trial.id)));
                     }
-                    self.adapt_to(trial.id, discarded);
                     let cadence = cadence_line(&trial.about.course.cadence);
                     let warnings = trial.warnings;
                     let ended = EndedTrial { id: trial.id, request, discarded, complete, warnings, cadence };
