@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::panels::{self, PanelKind};
 use crate::app::theme::colour;
-use egui::{Frame, Margin, Ui};
+use egui::{Frame, Id, Margin, Ui};
 use egui_tiles::{
     Behavior, Container, Linear, LinearDir, ResizeState, SimplificationOptions, TabState, Tile, TileId, Tiles, Tree,
     UiResponse,
@@ -19,8 +19,11 @@ pub(super) fn panel_frame(panel: &PanelKind) -> Frame {
 
 /// Greatest width of the panels at either side (points): beyond, the room is for what stands between them.
 const WIDEST_SIDE: f32 = 430.0;
+/// Least width of these panels (points), where that is at most the share of the window: a name and a number beside it.
+const LEAST_SIDE: f32 = 210.0;
+const LEAST_SHARE: f32 = 0.22;
 
-/// Shares of the columns of a layout: as they were, and as they are drawn in a wide window.
+/// Shares of the columns of a layout: as they were, and as they are drawn in a wide or narrow window.
 pub(super) struct Shares {
     root: TileId,
     before: Vec<(TileId, f32)>,
@@ -36,14 +39,15 @@ fn columns(layout: &mut Tree<String>) -> Option<(TileId, &mut Linear)> {
     }
 }
 
-/// Narrows the panels at both sides of a window of that width.
-pub(super) fn narrow_sides(layout: &mut Tree<String>, width: f32) -> Option<Shares> {
+/// Narrows the panels at both sides of a wide window, and widens them in a narrow one.
+pub(super) fn fit_sides(layout: &mut Tree<String>, width: f32) -> Option<Shares> {
     let (root, linear) = columns(layout)?;
     let [left, middle, right] = <[TileId; 3]>::try_from(linear.children.clone()).ok()?;
     let before: Vec<(TileId, f32)> = [left, middle, right].map(|id| (id, linear.shares[id])).to_vec();
     let total: f32 = before.iter().map(|(_, share)| share).sum();
     let most = total * WIDEST_SIDE / width.max(1.0);
-    let sides = [before[0].1.min(most), before[2].1.min(most)];
+    let least = total * LEAST_SHARE.min(LEAST_SIDE / width.max(1.0));
+    let sides = [before[0].1, before[2].1].map(|share| share.max(least).min(most));
     let drawn = vec![(left, sides[0]), (middle, total - sides[0] - sides[1]), (right, sides[1])];
     for (id, share) in &drawn {
         linear.shares.set_share(*id, *share);
@@ -77,6 +81,23 @@ impl Tiling<'_> {
     }
 }
 
+/// Frames in which a bar of tabs is scrolled to its active tab, once that or its room has changed: it first learns how wide its
+/// tabs are.
+const SETTLES: u32 = 3;
+
+/// Scrolls a bar of tabs to the active one, `[left, right]` of all tabs. The key is the bar, the active tab, and the room for tabs.
+fn scroll_to_active(ui: &Ui, key: (TileId, TileId, f32), [left, right]: [f32; 2], scroll: &mut f32) {
+    let id = Id::unique(("active tab", key.0));
+    let last = ui.data(|data| data.get_temp::<((TileId, TileId, f32), u32)>(id));
+    let left_frames = last.filter(|(before, _)| *before == key).map_or(SETTLES, |(_, frames)| frames);
+    if left_frames == 0 {
+        return;
+    }
+    *scroll = scroll.max(right - key.2).min(left);
+    ui.data_mut(|data| data.insert_temp(id, (key, left_frames - 1)));
+    ui.request_repaint();
+}
+
 impl Behavior<String> for Tiling<'_> {
     fn tab_title_for_pane(&mut self, pane: &String) -> egui::WidgetText {
         panels::named(pane).map_or(pane.as_str(), |panel| panel.title).into()
@@ -96,9 +117,9 @@ impl Behavior<String> for Tiling<'_> {
         &mut self,
         tiles: &Tiles<String>,
         ui: &mut Ui,
-        _tile: TileId,
+        tile: TileId,
         tabs: &egui_tiles::Tabs,
-        _scroll: &mut f32,
+        scroll: &mut f32,
     ) {
         let font = egui::TextStyle::Button.resolve(ui.style());
         let titles: Vec<(TileId, String)> =
@@ -108,8 +129,15 @@ impl Behavior<String> for Tiling<'_> {
             ui.painter().layout_no_wrap(title.to_owned(), font.clone(), ink).size().x
         };
         let spacing = 2.0 * self.tab_title_spacing(ui.visuals());
-        let needed: f32 = titles.iter().map(|(_, title)| width(title) + spacing).sum();
-        if needed <= ui.available_width() {
+        // Right end of each tab.
+        let ends: Vec<f32> = titles
+            .iter()
+            .scan(0.0, |end, (_, title)| {
+                *end += width(title) + spacing;
+                Some(*end)
+            })
+            .collect();
+        if ends.last().is_none_or(|needed| *needed <= ui.available_width()) {
             return;
         }
         let response = ui.menu_button("⏷", |ui| {
@@ -122,6 +150,11 @@ impl Behavior<String> for Tiling<'_> {
         });
         response.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "All tabs"));
         response.response.on_hover_text("All tabs");
+        let Some(place) = titles.iter().position(|(id, _)| tabs.is_active(*id)) else { return };
+        let start = if place > 0 { ends[place - 1] } else { 0.0 };
+        let arrows = 2.0 * (self.tab_bar_height(ui.style()) + ui.spacing().item_spacing.x);
+        let room = (ui.available_width() - arrows).max(0.0);
+        scroll_to_active(ui, (tile, titles[place].0, room), [start, ends[place]], scroll);
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

@@ -272,7 +272,7 @@ impl Workbench {
         }
         CentralPanel::default().frame(Frame::NONE).show(ui, |ui| {
             let mut tiling = Tiling { app, actions: &mut actions, chosen: None };
-            let wide = tiling::narrow_sides(&mut layout, ui.available_width());
+            let wide = tiling::fit_sides(&mut layout, ui.available_width());
             layout.ui(&mut tiling, ui);
             wide.into_iter().for_each(|shares| shares.restore(&mut layout));
             if let Some(chosen) = tiling.chosen {

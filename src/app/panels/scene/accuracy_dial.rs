@@ -5,7 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::theme::{self, colour};
 use crate::app::widgets::number_field;
-use egui::{RichText, Slider, Ui};
+use egui::{Label, Slider, Ui};
 use palpate_geometry::units::{SPACE, symbol, three_digits, two_digits};
 use palpate_lab::workers::Command;
 use palpate_sim::scene::{Accuracy, EngineKind, IntegrationMethod, Integrator, Scene};
@@ -83,7 +83,7 @@ fn measured_rows(ui: &mut Ui, simulation: &SimulationFeature) {
     let mut row = |name: &str, value: Option<String>, hover: &str| {
         ui.label(name).on_hover_text(hover);
         match value {
-            Some(text) => ui.label(RichText::new(text).monospace()),
+            Some(text) => ui.add(Label::new(text).wrap()),
             None => ui.weak("measuring .."),
         };
         ui.end_row();

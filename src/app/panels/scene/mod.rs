@@ -9,7 +9,7 @@ use crate::app::widgets::number_field;
 use egui::{CollapsingHeader, DragValue, Grid, ScrollArea, Ui};
 use palpate_geometry::units::SPACE;
 use palpate_sim::gripper::{Finger, PadLaw, Sideways};
-use palpate_sim::scene::{Auto, EngineKind, SCENES, Scene, SupportKind};
+use palpate_sim::scene::{Auto, EngineKind, Faces, PRESETS, PoseSpread, SCENES, Scene, SupportKind};
 
 pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Actions) {
     let mut scene = simulation.scene.clone();
@@ -25,10 +25,10 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
         named_scenes_ui(ui, &mut scene);
         ui.horizontal_wrapped(|ui| {
             actions.on(&ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)"), App::save_scene);
-            if ui.button("Defaults").on_hover_text("Restore all settings, keep the object").clicked() {
-                let source = std::mem::take(&mut scene.object.source);
+            if ui.button("Reset all").on_hover_text("All settings as at first; the object stays").clicked() {
+                let (source, name) = (std::mem::take(&mut scene.object.source), scene.object.name.take());
                 scene = Scene::default();
-                scene.object.source = source;
+                (scene.object.source, scene.object.name) = (source, name);
             }
         });
     });
@@ -40,7 +40,7 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
 /// Scenes with a name; each keeps the object, its poses and the solver.
 fn named_scenes_ui(ui: &mut Ui, scene: &mut Scene) {
     ui.horizontal_wrapped(|ui| {
-        ui.label("Scene");
+        ui.label("Settings of");
         for named in SCENES {
             let applied = named.applied_to(scene);
             let chosen = applied == *scene;
@@ -52,10 +52,17 @@ fn named_scenes_ui(ui: &mut Ui, scene: &mut Scene) {
 }
 
 fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(title).default_open(open).show(ui, |ui| {
-        Grid::new(title).num_columns(2).spacing([10.0, 5.0]).show(ui, contents);
+    // Without indentation and with one width of names, all sections have the same columns.
+    CollapsingHeader::new(title).default_open(open).show_unindented(ui, |ui| {
+        ui.spacing_mut().interact_size.x = NUMBER;
+        Grid::new(title).num_columns(2).min_col_width(NAME).spacing([6.0, 5.0]).show(ui, contents);
     });
 }
+
+/// Width of the column of names, and of numbers and choices at most (points).
+const NAME: f32 = 84.0;
+const NUMBER: f32 = 88.0;
+const CHOICE: f32 = 140.0;
 
 /// Number in another unit than the scene's. The range limits what the user enters; a value outside of it is shown and
 /// kept.
@@ -90,10 +97,8 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
     let label = ui.label(number.name);
     ui.horizontal(|ui| {
         let mut own = value.value().is_some();
-        let tick = ui.add(egui::Checkbox::without_text(&mut own)).labelled_by(label.id);
-        if tick.on_hover_text("Override the object's own value").changed() {
-            *value = if own { Auto::Value(known) } else { Auto::Auto };
-        }
+        // With its tick as wide as other numbers.
+        ui.spacing_mut().interact_size.x = NUMBER - ui.spacing().icon_width - ui.spacing().item_spacing.x;
         let mut shown = value.value().unwrap_or(known) * number.factor;
         let drag = DragValue::new(&mut shown)
             .range(number.range[0]..=number.range[1])
@@ -104,6 +109,10 @@ fn automatic(ui: &mut Ui, number: &Number<'_>, value: &mut Auto, known: f64) {
         let enabled = |ui: &mut Ui| ui.add_enabled(own, drag);
         if number_field(ui, number.name, enabled).labelled_by(label.id).changed() {
             *value = Auto::Value(shown / number.factor);
+        }
+        let tick = ui.add(egui::Checkbox::without_text(&mut own)).labelled_by(label.id);
+        if tick.on_hover_text("Override the object's own value").changed() {
+            *value = if own { Auto::Value(known) } else { Auto::Auto };
         }
     });
     ui.end_row();
@@ -125,6 +134,29 @@ fn object_ui(ui: &mut Ui, scene: &mut Scene, simulation: &SimulationFeature) {
         Number { name, unit: "°", factor: 1.0, range: [-180.0, 180.0], speed: 0.5 }
             .ui(ui, &mut object.rotation_deg[axis]);
     }
+    let faces = match scene.pose.faces {
+        Faces::Nominal => return,
+        Faces::Natural => "resting faces",
+        Faces::Any => "any face",
+    };
+    ui.label("+ random");
+    ui.label(faces).on_hover_text("Each grasp turns the object at random, on top of this base pose");
+    ui.end_row();
+}
+
+/// Random poses by their preset.
+fn random_ui(ui: &mut Ui, scene: &mut Scene) {
+    let between = scene.pose.between;
+    let poses = PRESETS.map(|preset| PoseSpread { between, ..preset.poses() });
+    let before = poses.iter().position(|poses| *poses == scene.pose);
+    let names = PRESETS.map(|preset| format!("preset {}", preset.name));
+    let presets = names.iter().enumerate().map(|(place, name)| (Some(place), name.as_str()));
+    let own = before.is_none().then_some((None, "its own"));
+    let mut now = before;
+    choice(ui, "+ random", &mut now, &presets.chain(own).collect::<Vec<_>>());
+    if let Some(poses) = now.filter(|_| now != before).and_then(|place| poses.into_iter().nth(place)) {
+        scene.pose = poses;
+    }
 }
 
 fn pose_ui(ui: &mut Ui, scene: &mut Scene) {
@@ -136,6 +168,7 @@ fn pose_ui(ui: &mut Ui, scene: &mut Scene) {
     Number { name: "grasp depth", unit: "mm", factor: 1e3, range: [20.0, 150.0], speed: 0.2 }
         .ui(ui, &mut mount.grasp_depth);
     Number { name: "opening", unit: "mm", factor: 1e3, range: [10.0, 200.0], speed: 0.2 }.ui(ui, &mut mount.opening);
+    random_ui(ui, scene);
 }
 
 fn programme_ui(ui: &mut Ui, scene: &mut Scene) {
@@ -221,11 +254,14 @@ fn support_ui(ui: &mut Ui, scene: &mut Scene) {
 /// Choice by name, as a row of a grid.
 fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
     let label = ui.label(name);
+    let width = ui.available_width().min(CHOICE);
     // Explanations after a comma are shown in the list only.
     let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
     let shown = text.split(", ").next().unwrap_or(text);
     egui::ComboBox::from_id_salt(name)
         .selected_text(shown)
+        .width(width)
+        .truncate()
         .show_ui(ui, |ui| {
             for (each, text) in all {
                 ui.selectable_value(value, *each, *text);
