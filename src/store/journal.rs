@@ -433,6 +433,8 @@ pub(super) fn change(
     Ok(changed)
 }
 
+const UNREVIEWED: &str = "UPDATE trials SET reviewed = 0 WHERE id = ?1";
+
 fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusqlite::Result<usize> {
     let set = |column: &str, from: &dyn rusqlite::ToSql, to: &dyn rusqlite::ToSql| {
         // What a person has worked on leaves the demo log, where it would be lost.
@@ -443,7 +445,12 @@ fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusq
     match change {
         Change::Label { from, to } => {
             let stored = |label: &Option<String>| label.clone().unwrap_or_default();
-            set("object", &stored(from), &stored(to))
+            let changed = set("object", &stored(from), &stored(to))?;
+            // Nobody has reviewed this label, also where it comes back by undo.
+            if changed == 1 {
+                transaction.execute(UNREVIEWED, [trial])?;
+            }
+            Ok(changed)
         }
         Change::Note { from, to } => set("note", from, to),
         Change::Tags { from, to } => set("tags", &json(from), &json(to)),
@@ -476,7 +483,7 @@ fn apply(transaction: &Transaction<'_>, trial: TrialId, change: &Change) -> rusq
                        ON CONFLICT (trial) DO UPDATE SET model = excluded.model, pmf = excluded.pmf";
             let changed = transaction.execute(sql, params![trial, guess.model, json(&guess.pmf)])?;
             // A new prediction has not been reviewed.
-            transaction.execute("UPDATE trials SET reviewed = 0 WHERE id = ?1", [trial])?;
+            transaction.execute(UNREVIEWED, [trial])?;
             Ok(changed)
         }
         // The plan belongs to no trial.

@@ -75,6 +75,20 @@ fn something_new_leaves_nothing_to_be_done_again() -> Outcome {
 }
 
 #[test]
+fn a_label_that_comes_back_is_to_be_reviewed_again() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let store = store_with(&folder.path().join("trials.sqlite"), &["lemon"])?;
+    store.labels().set_guess(1, "m", &[("lemon".to_owned(), 0.25), ("ball".to_owned(), 0.75)])?;
+    store.labels().set_label(1, "cube")?;
+    store.labels().mark_reviewed(1)?;
+    assert!(store.labels().trials()?[0].reviewed);
+    store.journal().undo()?.ok_or("the label")?;
+    let row = &store.labels().trials()?[0];
+    assert_eq!((row.object.as_deref(), row.reviewed), (Some("lemon"), false));
+    Ok(())
+}
+
+#[test]
 fn the_journal_is_only_added_to() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = store_with(&folder.path().join("trials.sqlite"), &[""])?;

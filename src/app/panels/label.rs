@@ -150,10 +150,9 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
         }
         Some(guess) => {
             let (class, p) = (object_title(&guess.class), 100.0 * guess.p);
-            (
-                format!("trial {}: {title}. The model predicts {class} ({p:.0} %): please review", trial.id),
-                colours.warning,
-            )
+            let (state, ink) =
+                if trial.reviewed { ("reviewed", colours.quiet_text) } else { ("please review", colours.warning) };
+            (format!("trial {}: {title}. The model predicts {class} ({p:.0} %): {state}", trial.id), ink)
         }
         None => (format!("trial {}: {title}", trial.id), colours.quiet_text),
     };
