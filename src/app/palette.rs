@@ -16,7 +16,7 @@ use palpate_sim::objects::{EMPTY, catalogue};
 
 /// Entry of the palette.
 struct Entry {
-    group: &'static str,
+    group: String,
     title: String,
     /// Its key, where it has one.
     key: String,
@@ -128,11 +128,12 @@ fn entries(app: &App) -> Vec<Entry> {
     for (group, acts) in keys::groups(mode).into_iter().chain(commands) {
         for act in named(acts) {
             let key = act.key_text(&app.ctx);
+            let group = group.to_owned();
             all.push(Entry { group, title: capital(act.does), key, run: Box::new(|app| act.run(app)) });
         }
     }
     let mut add = |group: &'static str, title: String, run: Run| {
-        all.push(Entry { group, title, key: String::new(), run });
+        all.push(Entry { group: group.to_owned(), title, key: String::new(), run });
     };
     for speed in SPEEDS {
         let run = move |app: &mut App| app.simulation.send(Command::SetSpeed(speed));
@@ -159,8 +160,8 @@ fn entries(app: &App) -> Vec<Entry> {
     for kind in modes::ALL.iter().filter(|kind| kind.mode != mode) {
         for act in named(kind.keys.iter().collect()) {
             let key = format!("{} {}", kind.open.key_text(&app.ctx), act.key_text(&app.ctx));
-            let title = format!("{} (opens {} mode)", capital(act.does), kind.title);
-            all.push(Entry { group: kind.title, title, key, run: Box::new(|app| app.set_mode(kind.mode)) });
+            let (group, title) = (format!("opens {}", kind.title), capital(act.does));
+            all.push(Entry { group, title, key, run: Box::new(|app| app.set_mode(kind.mode)) });
         }
     }
     all
@@ -180,7 +181,8 @@ fn found(entries: Vec<Entry>, text: &str) -> Vec<Entry> {
     scored.into_iter().map(|(_, entry)| entry).collect()
 }
 
-/// How well a text fits a title; `None` where a letter is missing. Beginnings of words and runs of letters count more.
+/// How well a text fits a title; `None` where a letter is missing. After the first, each letter follows the one before or begins
+/// a word. Beginnings of words and runs of letters count more.
 fn score(title: &str, text: &str) -> Option<i32> {
     let title: Vec<char> = title.to_lowercase().chars().collect();
     let wanted: Vec<char> = text.to_lowercase().chars().filter(|letter| !letter.is_whitespace()).collect();
@@ -191,7 +193,11 @@ fn score(title: &str, text: &str) -> Option<i32> {
         let mut next = vec![None; title.len() + 1];
         for (at, _) in title.iter().enumerate().filter(|(_, own)| *own == letter) {
             let run = if k > 0 { best[at].map(|score| score + 6) } else { None };
-            let before = if k == 0 { Some(0) } else { best[..at].iter().copied().flatten().max() };
+            let before = match k {
+                0 => Some(0),
+                _ if starts(at) => best[..at].iter().copied().flatten().max(),
+                _ => None,
+            };
             let gain = 1 + if starts(at) { 5 } else { 0 };
             next[at + 1] = run.max(before).map(|score| score + gain);
         }
@@ -209,6 +215,7 @@ mod tests {
     fn letters_in_their_order_are_found_and_words_count_more() {
         assert_eq!(score("Tennis ball", "xyz"), None);
         assert_eq!(score("Tennis ball", "llab"), None);
+        assert_eq!(score("Discard what is not seen", "dscd"), None, "letters within words, apart");
         assert!(score("Tennis ball", "tb") > score("Tabletop cube", "tb"));
         assert!(score("Save the scene", "save") > score("Show a very early one", "save"));
         assert!(score("Lemon", "LEM") > score("Larger element", "lem"));

@@ -29,10 +29,9 @@ use std::process::{Child, Command, Stdio};
   palpate movie --demo 60 --size 1280x800 --fps 10 --out demo/
 
 A folder gets a PNG file per picture, for any other encoder. An .mp4 is written by ffmpeg, where that is installed.
-A .glb is an animated 3-D model (glTF 2.0) for viewers, Blender and slides: hand, object and skinned fingers, with the
-pressure as colours of their corners. It is seen from anywhere, in the light of its viewer: --view, --size, --theme,
---no-forces and --bare do not apply. Fingers of the real gripper are drawn as arcs of the curvature that their strips
-read.")]
+A .glb is an animated 3-D model (glTF 2.0) for viewers, Blender and slides: hand, object and skinned fingers, with the \
+pressure as colours of their corners. It is seen from anywhere, in the light of its viewer: --view, --size, --theme, \
+--no-forces and --bare do not apply. Fingers of the real gripper are drawn as arcs of the curvature that their strips read.")]
 pub(super) struct MovieArguments {
     /// Trial number.
     #[arg(required_unless_present = "demo", conflicts_with = "demo")]

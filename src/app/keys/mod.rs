@@ -182,7 +182,8 @@ fn group_ui(ui: &mut Ui, title: &str, lines: &[(String, &str)]) {
     ui.add_space(4.0);
     ui.label(RichText::new(title).strong());
     ui.spacing_mut().interact_size.y = 18.0;
-    egui::Grid::new(("keys", title)).num_columns(2).spacing([14.0, 3.0]).show(ui, |ui| {
+    // Long enough for most keys, so that what they do is one column in all groups.
+    egui::Grid::new(("keys", title)).num_columns(2).min_col_width(96.0).spacing([14.0, 3.0]).show(ui, |ui| {
         for (how, does) in lines {
             ui.monospace(how);
             ui.add(egui::Label::new(*does).wrap());

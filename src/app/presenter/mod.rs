@@ -29,7 +29,7 @@ const STORY: f32 = 3.5;
 const GUESS: f32 = 4.6;
 const BELIEFS: f32 = 10.4;
 const REASON: f32 = 5.6;
-const SCORE: f32 = 1.9;
+const SCORE: f32 = 2.2;
 const VERDICT: f32 = 5.2;
 const GAP: f32 = 0.6;
 
@@ -190,7 +190,12 @@ impl Page<'_> {
             words = head.with_min_x(head.left() + 3.4 * unit);
         }
         put(ui, self.line(ui, word, 2.2 * unit, words.width(), colour(ink)), words, Align2::LEFT_CENTER);
-        let name = if finished { format!("It is: {title}") } else { "Shown once it decides.".to_owned() };
+        let decided = self.answer().is_some_and(|view| view.decision.is_some());
+        let name = match (finished, decided) {
+            (true, _) => format!("It is: {title}"),
+            (false, true) => "Shown once it lets go.".to_owned(),
+            (false, false) => "Shown once it decides.".to_owned(),
+        };
         let quiet = colour(if finished { colours.text } else { colours.quiet_text });
         put(ui, self.line(ui, &name, 1.4 * unit, below.width(), quiet), below, Align2::LEFT_CENTER);
         let spoken = if finished { format!("{word}: it is {title}") } else { word.to_owned() };

@@ -11,10 +11,10 @@ pub(super) const EXAMPLES: &str = "Examples:
   palpate trials import grasps.csv bag.mcap
   palpate trials import log.csv --profile plotjuggler --label mug
   palpate trials import log.csv --time 'timestamp [ms]' --label object --split-by gap
-  palpate trials import glove.csv --time 1[s] --label mug --channel 'force_left=2 [kgf]' --channel tip=3
+  palpate trials import glove.csv --time 1[s] --label mug --channel 'force_left=2 [kgf]'
   palpate trials import run.csv --time t --trial episode --save-profile lab.toml
 
-A column is named as in the header, with or without a unit in brackets, which counts instead of the header's; in a table
+A column is named as in the header, with or without a unit in brackets, which counts instead of the header's; in a table \
 without a header by its number. See also: palpate help formats";
 
 /// Arguments of `palpate trials import`.
