@@ -2,7 +2,7 @@
 
 use crate::app::plots::static_plot;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{failure_ui, remark_ui, text_field, warning_ui, wrapped};
+use crate::app::widgets::{capital, failure_ui, remark_ui, text_field, warning_ui, wrapped};
 use egui::{Button, ComboBox, Grid, Id, Modal, RichText, ScrollArea, Ui};
 use egui_plot::{AxisHints, Legend, Line};
 use palpate_exchange::{Import, Mapping, PROFILES, SPLIT_GAP_S, columns_of, plain_name, read_trials};
@@ -102,7 +102,7 @@ fn read(request: &Request) -> Result<Outcome, JobError> {
         let added = Store::open(store)?.insert_imported(&collection, &import.trials)?;
         let known = import.trials.len() - added as usize;
         let known = if known > 0 { format!("; {known} were there already") } else { String::new() };
-        stored = Some(format!("{added} trial(s) imported as collection {collection}{known}."));
+        stored = Some(format!("{} imported as collection {collection}{known}.", trials_text(added as usize)));
     }
     Ok(Outcome { columns, import, stored })
 }
@@ -272,7 +272,7 @@ impl ImportDialog {
                     _ => 0,
                 };
                 let is_ready = trials > 0 && running.is_none();
-                if ui.add_enabled(is_ready, Button::new(format!("Import {trials} trial(s)"))).clicked() {
+                if ui.add_enabled(is_ready, Button::new(format!("Import {}", trials_text(trials)))).clicked() {
                     self.start(Some(self.store.clone()));
                 }
                 if ui.button("Cancel").clicked() {
@@ -357,14 +357,18 @@ impl ImportDialog {
     }
 }
 
+fn trials_text(trials: usize) -> String {
+    if trials == 1 { "1 trial".to_owned() } else { format!("{trials} trials") }
+}
+
 /// What is going to be imported: counts, curves of the first trial, warnings.
 fn import_ui(ui: &mut Ui, import: &Import) {
     let mut labels: BTreeMap<&str, usize> = BTreeMap::new();
     import.trials.iter().for_each(|trial| *labels.entry(&trial.label).or_default() += 1);
     let labels: Vec<String> = labels.iter().take(12).map(|(label, count)| format!("{label} {count}")).collect();
     ui.add_space(6.0);
-    wrapped(ui, RichText::new(format!("{} trial(s): {}", import.trials.len(), labels.join(", "))).strong());
-    import.warnings.iter().take(MOST_WARNINGS).for_each(|warning| warning_ui(ui, warning));
+    wrapped(ui, RichText::new(format!("{}: {}", trials_text(import.trials.len()), labels.join(", "))).strong());
+    import.warnings.iter().take(MOST_WARNINGS).for_each(|warning| warning_ui(ui, capital(warning)));
     if import.warnings.len() > MOST_WARNINGS {
         remark_ui(ui, format!("and {} more", import.warnings.len() - MOST_WARNINGS));
     }

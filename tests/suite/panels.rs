@@ -235,7 +235,7 @@ fn scene_settings_reach_the_simulation() {
     bench.harness.run_steps(3);
     bench.harness.get_by_label("draft, 1e-3").click();
     bench.until(|s| s.scene.solver.accuracy == Accuracy::Draft);
-    bench.harness.get_by_label("Defaults").click();
+    bench.harness.get_by_label("Reset all").click();
     let back = bench.until(|s| !s.scene.object.fixed);
     assert_eq!((back.scene.solver.accuracy, back.scene.object.source.as_str()), (Accuracy::Standard, "lemon"));
 }

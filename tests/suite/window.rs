@@ -194,9 +194,9 @@ fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
         bench.harness.get_by_label("Unit of timestamp").focus();
         bench.harness.run_steps(2);
         type_text(&mut bench, "ms");
-        bench.until_shown(true, "1 trial(s): mug 1");
+        bench.until_shown(true, "1 trial: mug 1");
         bench.harness.get_by_label("New trial after a pause of 1 s").click();
-        bench.until_shown(true, "2 trial(s): mug 2");
+        bench.until_shown(true, "2 trials: mug 2");
         let picture = bench.picture();
         // The roles are kept for other files, and read from their profile.
         let profile = folder.path().join(format!("{theme:?}.toml"));
@@ -219,10 +219,10 @@ fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
         press(&mut bench, Modifiers::COMMAND, Key::A);
         type_text(&mut bench, profile.to_str().unwrap());
         press(&mut bench, Modifiers::NONE, Key::Enter);
-        bench.until_shown(true, "2 trial(s): mug 2");
-        bench.harness.get_by_label("Import 2 trial(s)").click();
+        bench.until_shown(true, "2 trials: mug 2");
+        bench.harness.get_by_label("Import 2 trials").click();
         bench.harness.run_steps(2);
-        bench.until_told("2 trial(s) imported as collection mug");
+        bench.until_told("2 trials imported as collection mug");
         let rows = bench.store().list(false).unwrap();
         let imported: Vec<&str> =
             rows.iter().filter(|row| row.source == TrialSource::Imported).map(|row| row.object.as_str()).collect();

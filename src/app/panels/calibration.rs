@@ -43,7 +43,7 @@ fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         Some(Err(cause)) => failure_ui(ui, cause),
         None => {}
     }
-    remark_ui(ui, "Calibrate each sensor at known angles or forces, to turn its counts into angles and forces.");
+    remark_ui(ui, "Turns the counts of a sensor into angles or forces, by known ones.");
     ui.add_space(4.0);
     Grid::new("calibration form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         ui.label("Sensor");

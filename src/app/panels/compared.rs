@@ -15,9 +15,7 @@ use palpate_lab::inspection::Alignment;
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let comparison = data.comparison;
     if comparison.pinned.is_empty() {
-        let text = "No trial is compared. Select trials in the library and press P, or choose Compare: each is drawn over \
-                    the one shown, in a colour of its own.";
-        remark_ui(ui, text);
+        remark_ui(ui, "No trial is compared. Select trials in the library and press P.");
         return;
     }
     ui.horizontal_wrapped(|ui| {

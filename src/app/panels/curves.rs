@@ -38,10 +38,7 @@ pub(super) fn other_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Acti
         }
     }
     if plots.is_empty() {
-        ui.weak(
-            "Channels that are neither curvature nor pressure nor force, such as a motor's current: sensors of kind raw in a \
-             gripper file, or columns of an imported table.",
-        );
+        ui.weak("No other channels. Sensors of kind raw and other columns of imported tables appear here.");
     }
     let height = (ui.available_height() - ui.spacing().item_spacing.y * plots.len() as f32) / plots.len().max(1) as f32;
     for (unit, curves) in plots {

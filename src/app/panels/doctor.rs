@@ -42,8 +42,9 @@ pub(super) fn ui(
             Some(Err(cause)) => failure_ui(ui, cause),
             None => {
                 ui.add_space(6.0);
-                let about: Vec<&str> = CHECKS.iter().map(|check| check.about).collect();
-                remark_ui(ui, format!("Checks that {}.", about.join(", ")));
+                CollapsingHeader::new("What is checked").show(ui, |ui| {
+                    CHECKS.iter().for_each(|check| remark_ui(ui, capital(check.about)));
+                });
             }
         }
         ui.add_space(6.0);

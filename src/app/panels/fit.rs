@@ -24,8 +24,7 @@ pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, scene: &Scene, actions: &mut
         actions.push(|app| _ = app.tools.trials.start(()));
     }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let hint =
-            "Fits the simulated finger to trials of the real one: a few empty closes, and grasps of a fixed object.";
+        let hint = "Fits the simulated finger to empty closes and grasps of a fixed object.";
         remark_ui(ui, hint);
         let controls = |ui: &mut Ui, actions: &mut Actions| match tools.trials.last().map(|ended| ended.outcome) {
             None => remark_ui(ui, "loading trials .."),

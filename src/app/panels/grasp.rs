@@ -62,8 +62,9 @@ fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
     ui.spacing_mut().interact_size.y = 18.0;
     Grid::new("readings").num_columns(3).spacing([14.0, 3.0]).show(ui, |ui| {
         ui.weak("now");
-        ui.weak("left");
-        ui.weak("right");
+        for side in ["left", "right"] {
+            ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(side).weak()));
+        }
         ui.end_row();
         for (name, unit, quantity, factor) in [
             ("curvature", "1/m", Quantity::Curvature, 1.0),

@@ -4,7 +4,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::view::ViewState;
 
-use crate::app::widgets::{choice_ui, just_opened, remark_ui, wrapped};
+use crate::app::widgets::{choice_ui, just_opened, remark_ui};
 use egui::{Checkbox, ComboBox, RichText, ScrollArea, Ui};
 use palpate_lab::workers::{Job, TrainingData};
 use palpate_sim::scene::{Between, PRESETS, PoseSpread, Scene};
@@ -128,15 +128,10 @@ fn model_ui(ui: &mut Ui, chosen: Option<&PathBuf>, data: &Job<(), TrainingData>,
     {
         actions.push(|app| app.use_simulation_model(None));
     }
-    wrapped(
-        ui,
-        RichText::new(
-            "For the simulation and its trials: a model answers for fixed or free objects, whichever it learned; the shipped \
-             ones answer for the others. The model of the real gripper is chosen in the panel Training.",
-        )
-        .weak()
-        .small(),
-    );
+    let hint =
+        "A model answers for fixed or free objects, whichever it learned; the shipped ones answer for the others";
+    let text = RichText::new("For simulated trials. That of the real gripper: panel Training.").weak().small();
+    ui.add(egui::Label::new(text).wrap()).on_hover_text(hint);
 }
 
 /// Quantities and stretches of a layout, in words.

@@ -8,11 +8,12 @@ use crate::app::theme::{self, colour};
 use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_geometry::units::SPACE;
 use palpate_lab::datasets::{HELD_BACK, LEAST_TRIALS, LabelledClass};
 use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::comparison::in_table_order;
 use palpate_learn::metrics::Confusion;
-use palpate_learn::{Labels, METHODS, Model, counted, method};
+use palpate_learn::{Labels, Model, counted, method};
 use std::path::Path;
 
 pub(super) fn ui(
@@ -58,7 +59,8 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
                 ui.selectable_value(&mut chosen, method.key.to_owned(), method.title).on_hover_text(method.about);
             }
         });
-        shown.response.labelled_by(label.id);
+        let about = method(&chosen).map_or("", |method| method.about);
+        shown.response.labelled_by(label.id).on_hover_text(about);
         let ready = data.is_some_and(|data| data.classes.is_ok()) && too_little.is_none();
         let train = ui
             .add_enabled(ready, Button::new("Train"))
@@ -68,11 +70,8 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
             actions.push(|app| _ = app.tools.training.start(request));
         }
     });
-    if let Some(about) = METHODS.iter().find(|method| method.key == chosen).map(|method| method.about) {
-        let share = 100.0 * HELD_BACK;
-        let text = format!("{about}. {share:.0} % of each object's trials are held back for evaluation.");
-        remark_ui(ui, text);
-    }
+    let share = 100.0 * HELD_BACK;
+    remark_ui(ui, format!("{share:.0}{SPACE}% of each object's trials are held back for evaluation."));
     if let Some(why) = too_little {
         warning_ui(ui, why);
     }

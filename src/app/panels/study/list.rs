@@ -120,7 +120,7 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     } else {
         "Its grasps are not kept."
     };
-    let cost = format!("In full: {}. Quick: less than a minute, not to be quoted. {kept}", card.budget);
+    let cost = format!("In full: {}. Quick: less than a minute, not to be quoted.", card.budget);
     wrapped(ui, RichText::new(cost).small().weak());
     let running = progress(studies, key);
     if let Some(JobProgress { share, words }) = &running {
@@ -143,7 +143,7 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
             if size == StudySize::Quick {
                 button = button.fill(accented(theme::of(ui)));
             }
-            if ui.add(button).on_hover_text(shortcut).clicked() {
+            if ui.add(button).on_hover_text(format!("{kept} ({shortcut})")).clicked() {
                 run(key, size, false, actions);
             }
         }
