@@ -281,6 +281,11 @@ fn every_tab_is_reachable_in_a_small_window() {
     both.iter().max_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).unwrap().click();
     bench.harness.run_steps(3);
     assert!(bench.harness.query_all_by_label_contains("Connect").next().is_some());
+    // Its tab has come into sight, left of the menu.
+    bench.harness.run_steps(4);
+    let menu = bench.harness.query_all_by_label("All tabs").last().unwrap().rect();
+    let tab = bench.harness.query_all_by_label("Gripper").next().unwrap().rect();
+    assert!(tab.right() <= menu.left() && tab.width() > 40.0, "{tab:?} {menu:?}");
     // Also with large letters.
     bench.tell(|app| app.set_scale(1.5));
     bench.harness.run_steps(4);
