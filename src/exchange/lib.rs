@@ -16,13 +16,13 @@
 //! | 0 | `taxels` | force on every taxel of both pads, and its place |
 //! | 1 | `format` | the trait [`TrialFormat`], what is written and read, errors |
 //! | 2 | `content` | a stored trial as other programs see it |
-//! | 2 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
 //! | 3 | `card` | cards of data sets, for hubs |
 //! | 3 | `urdf` | the gripper for viewers of ROS |
-//! | 3 | `npz_import` | arrays of numpy as trials |
-//! | 4 | `npz`, `parquet` | arrays and tables |
-//! | 4 | `mcap` | messages of ROS 2 |
-//! | 5 | `lerobot` | data sets of LeRobot |
+//! | 4 | `csv_files` | CSV of trials, of labelled trials and of calibration points |
+//! | 5 | `npz_import` | arrays of numpy as trials |
+//! | 6 | `npz`, `parquet` | arrays and tables |
+//! | 6 | `mcap` | messages of ROS 2 |
+//! | 7 | `lerobot` | data sets of LeRobot |
 //!
 //! # Example
 //!

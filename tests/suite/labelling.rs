@@ -174,7 +174,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
         names.sort();
         names
     };
-    assert_eq!(names("out"), ["raw", "signals.csv", "trials.csv"]);
+    assert_eq!(names("out"), ["README.md", "raw", "signals.csv", "trials.csv"]);
     assert_eq!(
         names("out/raw"),
         ["trial_1_lemon.bytes", "trial_1_lemon.csv", "trial_2_ball.bytes", "trial_2_ball.csv"]
