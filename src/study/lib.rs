@@ -23,9 +23,9 @@
 //! | 3 | `added_sensors` | what sensors beyond the paper's four are worth |
 //! | 3 | `answers` | whether answers keep their promise |
 //! | 4 | `promises` | the numbers behind the program's promises, beside those of the version before |
-//! | 4 | `generated` | sections of manual and README, written from stored results |
-//! | 4 | `all` | the list of all studies |
-//! | 5 | [`jobs`] | background tasks of the window |
+//! | 5 | `generated` | sections of manual and README, written from stored results |
+//! | 5 | `all` | the list of all studies |
+//! | 6 | [`jobs`] | background tasks of the window |
 
 pub mod accuracy;
 mod added_sensors;

@@ -8,7 +8,7 @@ use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::capital;
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{symbol, three_digits};
 use palpate_sim::frame::PlannedEffect;
 use palpate_sim::scene::{Effect, Setting};
 use palpate_study::{ExplainedEffect, Explanation};
@@ -146,7 +146,7 @@ impl Row<'_> {
             let size = explained.change.norms;
             let largest = size.curvature_share.max(size.pressure_share).max(size.force_share);
             let share = (1.0 - (largest.max(LEAST_CHANGE)).log10() / LEAST_CHANGE.log10()) as f32;
-            let words = explained.change_in_words(explanation.contact_onset_s);
+            let words = symbol(&explained.change_in_words(explanation.contact_onset_s));
             self.bar_ui(ui, change, (share, colour(colours.warning)), &words);
         }
         clicked
@@ -198,7 +198,7 @@ impl Row<'_> {
                 lines.push(format!("The numbers below are {BEFORE}."));
             }
             lines.push(format!("It {}.", explained.cost_in_words()));
-            lines.push(format!("{}.", capital(&explained.change_in_words(explanation.contact_onset_s))));
+            lines.push(format!("{}.", capital(&symbol(&explained.change_in_words(explanation.contact_onset_s)))));
         }
         let indented = egui::Margin { left: (LAMP + GAP) as i8, bottom: 6, ..egui::Margin::ZERO };
         egui::Frame::new().inner_margin(indented).show(ui, |ui| {

@@ -111,7 +111,9 @@ impl SpringAtRest {
             let squared = slope.length_squared();
             let curvature = match before {
                 Some((z_before, slope_before, _)) => {
-                    ((half_slope - slope_before) / (z - z_before)).clamp(1.0 / stem, 1.0 / stem + 4.0 * squared / end)
+                    // Not `clamp`, which panics where a surface has no slope.
+                    let curvature = (half_slope - slope_before) / (z - z_before);
+                    curvature.max(1.0 / stem).min(1.0 / stem + 4.0 * squared / end)
                 }
                 None => {
                     if self.is_beyond(margin, distance, (z, gap)) {

@@ -2,10 +2,14 @@
 
 use super::timing::{FASTEST_COMMON_HZ, MOST_TICKS};
 use super::{Accuracy, Auto, Scene, SceneError};
+use palpate_geometry::units::two_digits;
 use std::ops::RangeInclusive;
 
 /// Most characters of the name of an object.
 const LONGEST_NAME: usize = 80;
+
+/// Least thickness of a pad at its edges, as a share of that in the middle.
+const LEAST_EDGE: f64 = 0.1;
 
 /// Collects the first value out of range.
 struct Ranges {
@@ -170,6 +174,15 @@ impl Scene {
         ranges.number("gripper.pad.modulus", pad.modulus, 1.0..=1e12);
         let least_crown = 0.51 * finger.width; // a crown rounder than the pad is wide would leave its edges behind
         ranges.number("gripper.pad.crown_radius", pad.crown_radius, least_crown..=1e6);
+        let least = (0.5 * finger.width).powi(2) / (2.0 * pad.crown_radius * (1.0 - LEAST_EDGE));
+        if pad.thickness < least {
+            let wanted = format!(
+                "at least {}: with its crown_radius of {} a thinner pad has no edges left, a larger one makes it flatter",
+                two_digits(least),
+                pad.crown_radius
+            );
+            ranges.refuse("gripper.pad.thickness", &pad.thickness, &wanted);
+        }
         ranges.number("gripper.pad.dissipation", pad.dissipation, 0.0..=1e4);
         ranges.number("gripper.pad.shear_damping_time", pad.shear_damping_time, 0.0..=1.0);
         ranges.number("gripper.pad.friction", pad.friction, 0.0..=100.0);
@@ -260,6 +273,10 @@ mod tests {
     #[test]
     fn refusals_name_the_key() {
         assert!(refused(|s| s.gripper.pad.modulus = f64::NAN).contains("gripper.pad.modulus"));
+        // The edges lie 2.5 mm below the middle.
+        assert!(
+            refused(|s| s.gripper.pad.thickness = 0.0027).contains("at least 0.0028: with its crown_radius of 0.02")
+        );
         assert!(refused(|s| s.gripper.finger.joints = 81).contains("between 2 and 80"));
         let half = |s: &mut Scene| s.gripper.finger.sideways.torsional_stiffness = Auto::Value(1e-3);
         assert!(refused(half).contains("gripper.finger.sideways.bending_stiffness"));
