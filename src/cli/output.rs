@@ -85,8 +85,10 @@ pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
         Some(folder) => {
             let (path, folder) = (path.display(), folder.display());
-            Err(format!("cannot write \"{path}\": there is no folder \"{folder}\". Create it, or choose another --out")
-                .into())
+            Err(format!(
+                "cannot write \"{path}\": there is no folder \"{folder}\". Create it, or choose another folder"
+            )
+            .into())
         }
         None => Ok(()),
     }

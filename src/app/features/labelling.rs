@@ -78,6 +78,7 @@ impl App {
         if matches!(action, LabellingAction::FocusSearch(_)) {
             self.show_panel("label");
         }
+        self.notices.changed();
         let effects = self.in_session(|session, now| session.apply(action, now));
         self.carry_out(effects);
     }

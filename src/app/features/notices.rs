@@ -21,8 +21,11 @@ const REMEDIES: [Remedy; 8] = [
     Remedy("cannot read the mesh", "Choose a file ..", App::ask_for_object),
     Remedy("not calibrated", "Calibrate ..", |app| app.show_panel("calibration")),
     Remedy("no calibration", "Calibrate ..", |app| app.show_panel("calibration")),
-    Remedy("Ctrl+Z brings it back", "Undo", |app| app.edit_labels(LabelCommand::Undo)),
+    Remedy(UNDONE_BY_KEY, "Undo", |app| app.edit_labels(LabelCommand::Undo)),
 ];
+
+/// In messages of what Ctrl+Z takes back, until something else is changed.
+const UNDONE_BY_KEY: &str = "Ctrl+Z brings it back";
 
 /// Messages that are kept.
 const MOST_MESSAGES: usize = 50;
@@ -124,6 +127,11 @@ impl Notices {
             let gone: Vec<String> = gone.collect();
             self.messages.retain(|text| !gone.contains(text));
         }
+    }
+
+    /// Takes away what Ctrl+Z no longer does: something else is changed now.
+    pub(in crate::app) fn changed(&mut self) {
+        self.shown.retain(|shown| !shown.text.contains(UNDONE_BY_KEY));
     }
 
     /// Last messages, oldest first.

@@ -64,6 +64,8 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
         let source = std::mem::take(&mut path);
+        // Where the file cannot be opened, the next letters are another path, not keys.
+        response.request_focus();
         actions.push(move |app| app.open(source.trim().trim_matches(['"', '\''])));
     }
     ui.data_mut(|data| data.insert_temp(id, path));

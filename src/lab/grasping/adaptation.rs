@@ -126,7 +126,13 @@ impl Adaptation {
         }
         let serving = store.calibrations().serving(None, &[])?;
         let measured = serving.calibrations.into_iter().filter(|(_, own)| !own.record.assumed && !replace);
-        Ok(Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights))
+        let mut adapted = Self::new(&log, scene, &parts, &measured.collect::<Vec<_>>(), weights);
+        if !is_driven(&log) {
+            adapted.warnings.push(format!(
+                "Whether the hand was empty in trial {id} was not checked: only a close that the board drives is"
+            ));
+        }
+        Ok(adapted)
     }
 
     /// Adapts by readings that are not stored, of parts without names.
@@ -262,7 +268,9 @@ fn most(course: &[(f64, f64)]) -> f64 {
 /// Only the strips are used: pads also respond when fingers only bend or press on each other. A close by hand follows
 /// no programme and is not checked.
 fn held(log: &BoardLog, scene: &Scene) -> Option<(&'static str, &'static str)> {
-    log.course.phases.first()?.line_bar?;
+    if !is_driven(log) {
+        return None;
+    }
     let scene = as_driven(log, scene);
     let model = modelled_close(&scene);
     let most = most(&model);
@@ -282,6 +290,11 @@ fn held(log: &BoardLog, scene: &Scene) -> Option<(&'static str, &'static str)> {
         }
     };
     log.course.board.sensors.of_kind(SensorKind::Flex).find_map(judged)
+}
+
+/// True for a close by the programme, whose pressure the board sets.
+fn is_driven(log: &BoardLog) -> bool {
+    log.course.phases.first().is_some_and(|phase| phase.line_bar.is_some())
 }
 
 /// Value of a curve over time at a time (s).

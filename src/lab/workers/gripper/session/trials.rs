@@ -7,6 +7,7 @@ use crate::recording::{BoardTrialRecording, RecorderNotice, TrialRequest};
 use crate::workers::Notice;
 use crate::workers::gripper::messages::{EndedTrial, TrialView};
 use crate::workers::live_recognition::LiveRecognition;
+use palpate_device::serial::LinkState;
 use palpate_sim::gripper::Phase;
 use palpate_store::Stored;
 use palpate_store::labels::cadence_line;
@@ -126,8 +127,9 @@ impl GripperSession {
             let text = "no board is connected: connect the gripper first";
             return self.publisher.notify(Notice::Warning(text.to_owned()));
         };
-        if connection.latest.is_none() {
-            let text = format!("nothing is recorded yet: {}", connection.gripper.stream().status().state.sentence());
+        let state = connection.gripper.stream().status().state;
+        if connection.latest.is_none() || matches!(state, LinkState::Lost { .. } | LinkState::Silent { .. }) {
+            let text = format!("nothing is recorded: {}", state.sentence());
             return self.publisher.notify(Notice::Warning(text));
         }
         let Some(recorder) = &self.recorder else {
