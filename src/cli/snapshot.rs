@@ -268,13 +268,14 @@ fn draw(arguments: &SnapshotArguments, store: Option<&Path>, drawers: &mut Drawe
     if let Some(out) = arguments.out.as_ref().or(blessed) {
         check_new(out, FileKind::Png)?;
     }
-    // Read first: a missing file is known before anything is drawn.
-    let golden = arguments.compare.as_ref().filter(|_| !arguments.bless).map(|path| golden(path)).transpose()?;
+    // Read first: without another picture to write, a missing file is known before anything is drawn.
+    let golden = arguments.compare.as_ref().filter(|_| !arguments.bless).map(|path| golden(path)).transpose();
+    let golden = if arguments.out.is_some() { golden } else { Ok(golden?) };
     let drawn = if arguments.panels { window(arguments, store)? } else { scene_picture(arguments, store, drawers)? };
     if let Some(out) = arguments.out.as_ref().or(blessed) {
         write_new(out, FileKind::Png, &drawn.to_png()?)?;
     }
-    let is_same = golden.map_or(Ok(true), |golden| compare(arguments, &drawn, &golden))?;
+    let is_same = golden?.map_or(Ok(true), |golden| compare(arguments, &drawn, &golden))?;
     if let Some(out) = arguments.out.as_ref().or(blessed).filter(|_| is_same) {
         say(out.display())?;
     }

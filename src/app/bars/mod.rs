@@ -103,7 +103,8 @@ fn drawn_by(app: &App, driver: &str) -> String {
     let resolution = app.resolution();
     let coarse =
         if resolution < 1.0 { format!(", 3-D view at {:.0}{SPACE}%", 100.0 * resolution) } else { String::new() };
-    format!("{rate:.0}{SPACE}frames/s{coarse} \u{b7} {driver}")
+    let frames = if rate.round() == 1.0 { "frame" } else { "frames" };
+    format!("{rate:.0}{SPACE}{frames}/s{coarse} \u{b7} {driver}")
 }
 
 /// Settings of the window.
@@ -407,7 +408,8 @@ fn recording(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
     }
     keep_ui(ui, app, actions);
     let mut grasps = status.grasps.max(1);
-    let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(" grasps");
+    let unit = if grasps == 1 { " grasp" } else { " grasps" };
+    let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(unit);
     if number_field(ui, "grasps", drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
         actions.push(move |app| app.simulation.send(Command::SetGrasps(grasps)));
     }

@@ -279,12 +279,14 @@ impl Hand {
     fn next_object(&mut self) -> String {
         let turn = self.turn;
         self.turn += 1;
-        let objects = match self.plan.objects.as_slice() {
-            [] if !self.driven => built_in(),
-            [empty, others @ ..] if self.driven && turn > 0 && empty == EMPTY && !others.is_empty() => others.to_vec(),
-            objects => objects.to_vec(),
+        let (place, objects) = match self.plan.objects.as_slice() {
+            [] if !self.driven => (turn, built_in()),
+            [empty, others @ ..] if self.driven && turn > 0 && empty == EMPTY && !others.is_empty() => {
+                (turn - 1, others.to_vec())
+            }
+            objects => (turn, objects.to_vec()),
         };
-        objects.get(turn % objects.len().max(1)).map_or(EMPTY, String::as_str).to_owned()
+        objects.get(place % objects.len().max(1)).map_or(EMPTY, String::as_str).to_owned()
     }
 
     fn grasp(&mut self, thing: usize, t: f64, programme: Option<Programme>) {

@@ -126,6 +126,26 @@ fn a_host_drives_it_and_the_watchdog_lets_go() {
 }
 
 #[test]
+fn an_empty_hand_first_shifts_no_object_out_of_its_turn() {
+    let mut setup = setup("", "");
+    setup.hand.objects = [EMPTY, "ball", "cube", "cylinder"].map(str::to_owned).to_vec();
+    let mut gripper = EmulatedGripper::new(setup).expect("loads");
+    let mut grasped = Vec::new();
+    for k in 0..5 {
+        let from_s = 2.0 * f64::from(k);
+        gripper.hear(b"P 0.50\n");
+        sent(&mut gripper, from_s, from_s + 0.2);
+        gripper.hear(b"P 0.00\n");
+        sent(&mut gripper, from_s + 0.2, from_s + 2.0);
+        grasped.extend(gripper.take_happened().into_iter().filter_map(|happened| match happened.what {
+            EmulatorEventKind::Grasp { object, .. } => Some(object),
+            _ => None,
+        }));
+    }
+    assert_eq!(grasped, [EMPTY, "ball", "cube", "cylinder", "ball"]);
+}
+
+#[test]
 fn every_fault_does_what_it_says() {
     let clean = text(setup("", ""), 3.0);
     let lines = |faults: &str| {

@@ -22,7 +22,11 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     }
     // An empty hand has neither, and nothing is known of other objects.
     let has_any = |class: &Class| class.size.is_some() || class.shape.is_some();
-    let known = newest(part.view).filter(|pmf| has_any(&labels.classes[pmf.top().0]));
+    let share_of_known = |pmf: &Pmf| -> f64 {
+        let classes = labels.classes.iter().zip(pmf.probabilities());
+        classes.filter(|(class, _)| has_any(class)).map(|(_, p)| p).sum()
+    };
+    let known = newest(part.view).filter(|pmf| share_of_known(pmf) > 0.5);
     let properties = known.map(|pmf| Properties::of_classes(labels, pmf));
     if !labels.sizes.is_empty() {
         property_ui(ui, part, "size", &labels.sizes, properties.as_ref().map(|own| &own.size));
