@@ -10,14 +10,10 @@ use std::fmt::Write as _;
 /// Card of a LeRobot data set that `info.json` describes.
 pub(crate) fn data_set_card(trials: &[TrialContent], info: &Value) -> String {
     let frames = info["total_frames"].as_u64().unwrap_or(0);
-    let size = size_category(frames);
-    let (episodes, fps, version) = (trials.len(), &info["fps"], env!("CARGO_PKG_VERSION"));
-    let mut text = format!(
-        "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:\n- LeRobot\n- tactile\n- soft-gripper\nsize_categories:\n- \
-         {size}\nconfigs:\n- config_name: default\n  data_files: data/*/*.parquet\n---\n\n# Grasps of a two-finger soft gripper\n\n\
-         {episodes} grasps, {frames} frames at {fps} Hz, written by Palpate {version}. The licence is unknown: name one before \
-         you publish them.\n\n## Objects\n\n| task | episodes |\n|---|---|\n"
-    );
+    let configs = "- config_name: default\n  data_files: data/*/*.parquet";
+    let content = format!("{} grasps, {frames} frames at {} Hz", trials.len(), info["fps"]);
+    let mut text = opening("\n- LeRobot", (configs, frames), "Grasps of a two-finger soft gripper", &content);
+    text += "| task | episodes |\n|---|---|\n";
     let mut line = |line: &str| {
         // Writing to a text cannot fail.
         let _written = writeln!(text, "{line}");
@@ -62,13 +58,11 @@ pub(crate) fn data_set_card(trials: &[TrialContent], info: &Value) -> String {
 /// could not be derived.
 pub(crate) fn labelled_card(rows: &[&LabelledTrial], channels: &[String], left_out: usize) -> String {
     let samples = rows.iter().map(|row| row.samples).sum();
-    let (trials, size, version) = (rows.len(), size_category(samples), env!("CARGO_PKG_VERSION"));
-    let mut text = format!(
-        "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:\n- tactile\n- soft-gripper\nsize_categories:\n- {size}\nconfigs:\n- \
-         config_name: signals\n  data_files: signals.csv\n- config_name: trials\n  data_files: trials.csv\n---\n\n# Labelled grasps \
-         of a soft gripper\n\n{trials} grasps, {samples} readings, written by Palpate {version}. The licence is unknown: name one \
-         before you publish them.\n\n## Objects\n\n| label | grasps |\n|---|---|\n"
-    );
+    let trials = rows.len();
+    let configs = "- config_name: signals\n  data_files: signals.csv\n- config_name: trials\n  data_files: trials.csv";
+    let content = format!("{trials} grasps, {samples} readings");
+    let mut text = opening("", (configs, samples), "Labelled grasps of a soft gripper", &content);
+    text += "| label | grasps |\n|---|---|\n";
     let mut line = |line: &str| {
         // Writing to a text cannot fail.
         let _written = writeln!(text, "{line}");
@@ -95,15 +89,22 @@ pub(crate) fn labelled_card(rows: &[&LabelledTrial], channels: &[String], left_o
     text
 }
 
-/// Number of rows, as hubs sort them.
-fn size_category(rows: u64) -> &'static str {
-    match rows {
+/// YAML with further tags, the files of each configuration and the number of rows; then title and content, up to the table of
+/// objects.
+fn opening(tags: &str, (configs, rows): (&str, u64), title: &str, content: &str) -> String {
+    let size = match rows {
         0..1_000 => "n<1K",
         1_000..10_000 => "1K<n<10K",
         10_000..100_000 => "10K<n<100K",
         100_000..1_000_000 => "100K<n<1M",
         _ => "n>1M",
-    }
+    };
+    format!(
+        "---\nlicense: unknown\ntask_categories:\n- robotics\ntags:{tags}\n- tactile\n- soft-gripper\nsize_categories:\n- {size}\n\
+         configs:\n{configs}\n---\n\n# {title}\n\n{content}, written by Palpate {}. The licence is unknown: name one before you \
+         publish them.\n\n## Objects\n\n",
+        env!("CARGO_PKG_VERSION")
+    )
 }
 
 /// How often each text occurs.

@@ -2,7 +2,7 @@
 //! stable, and effects that a scene needs. They come from the results of three studies, `accuracy`, `stability` and
 //! `effects`, so that nothing is measured here.
 
-use crate::accuracy::{AccuracyStudy, GroupCost, SceneGroup, SettingFamily, Spread};
+use crate::accuracy::{AccuracyStudy, SceneGroup, SettingFamily, Spread};
 use crate::effects::AuditReport;
 use crate::frame::{
     Cell, Column, GeneratedSection, PERCENT, StoredStudy, StudyError, StudyFolder, StudyTable, TableRows, unique,
@@ -179,10 +179,12 @@ fn costs(study: &AccuracyStudy) -> Vec<PromiseNumber> {
     let mut numbers = Vec::new();
     for group in [SceneGroup::Free, SceneGroup::Fixed] {
         for accuracy in ACCURACIES.map(|own| own.to_string()) {
-            let is_own = |own: &&GroupCost| own.group == group;
-            let rows = study.rows.iter().filter(|row| row.setting.family == SettingFamily::Tolerance);
-            let row = { rows }.find(|row| row.setting.name == accuracy);
-            let Some(cost) = row.and_then(|row| row.groups.iter().find(is_own)) else { continue };
+            let row = study
+                .rows
+                .iter()
+                .find(|row| row.setting.family == SettingFamily::Tolerance && row.setting.name == accuracy);
+            let cost = row.and_then(|row| row.groups.iter().find(|own| own.group == group));
+            let Some(cost) = cost else { continue };
             let mut add = |what: &str, unit: &str, spread: Spread| {
                 let what = format!("{what} at `{accuracy}`, {} object", group.title());
                 numbers.push(PromiseNumber::new(Promise::Cost, what, unit, Some(spread.median)));

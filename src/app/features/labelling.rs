@@ -77,8 +77,9 @@ impl App {
     pub fn label(&mut self, action: LabellingAction) {
         if matches!(action, LabellingAction::FocusSearch(_)) {
             self.show_panel("label");
+        } else {
+            self.notices.changed();
         }
-        self.notices.changed();
         let effects = self.in_session(|session, now| session.apply(action, now));
         self.carry_out(effects);
     }
