@@ -46,12 +46,8 @@ pub(super) struct DemoArguments {
     /// Recognition model (default: the shipped one for free or fixed objects; with --port, the one for any gripper).
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Leave the object as released between grasps instead of placing it anew.
-    #[arg(long)]
-    as_released: bool,
-    /// The same, and choose each next grasp by what is expected to be learned from it instead of at random.
-    #[arg(long, conflicts_with = "as_released")]
-    guided: bool,
+    #[command(flatten)]
+    between: BetweenArguments,
     /// Folder for the pictures.
     #[arg(long, value_name = "FOLDER", default_value = "palpate-demo", value_parser = file_or_folder(&[]))]
     out: PathBuf,
@@ -138,7 +134,7 @@ fn grasp_until_recognised(
     model: &Arc<Model>,
     arguments: &DemoArguments,
     truth: Option<String>,
-    seed: Option<u64>,
+    (seed, between): (Option<u64>, Between),
 ) -> Result<(), Failure> {
     let threshold = arguments.threshold.unwrap_or(model.card.stop.threshold);
     let rule = StopRule { threshold, most_grasps: arguments.grasps as usize };
@@ -152,9 +148,7 @@ fn grasp_until_recognised(
         (grasp.number, grasp.stage_one) = (grasps.len() + 1, stage_one(&identification));
         grasp.touch = Touched::of(&identification);
         grasp.pmf = identification.belief().now().map(|pmf| named(model, pmf)).unwrap_or_default();
-        // The promise is for an object that is put down anew.
-        let is_anew = !arguments.guided && !arguments.as_released;
-        grasp.left = model.card.left(identification.belief()).filter(|_| is_anew);
+        grasp.left = model.card.left(identification.belief(), between.name());
         let decision = identification.decision();
         if !arguments.json {
             let mut page = Page::default();

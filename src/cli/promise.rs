@@ -5,6 +5,7 @@ use palpate_lab::datasets::{check_model_path, save_model};
 use palpate_lab::grasping::GraspRounds;
 use palpate_learn::{AnswerSets, CalibratedBy, Model};
 use palpate_store::labels::shown_title;
+use std::sync::Arc;
 
 /// Arguments of `palpate promise`.
 #[derive(Debug, clap::Args)]
@@ -14,8 +15,8 @@ use palpate_store::labels::shown_title;
   palpate promise mine.safetensors --rounds 100 --out promised.safetensors --json
 
 The model then names the classes that are left after each grasp. The true one is among them in as many rounds of grasps as \
-promised, whenever grasping stops. Each grasp of a round finds the object put down anew, in simulation, by the gripper that the \
-model learned from. A grasp ends a round by itself only at a confidence at which the decisions are wrong no more often; where \
+promised, whenever grasping stops. Each grasp of a round finds the object put down anew (or as --as-released or --guided say), in \
+simulation, by the gripper that the model learned from; sets are shown in rounds of the same kind. A grasp ends a round by itself only at a confidence at which the decisions are wrong no more often; where \
 there is none, it never does.
 
 See also: palpate help recognition")]
@@ -31,6 +32,8 @@ pub(super) struct PromiseArguments {
     /// Grasps of a round.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = within(1..=20_usize))]
     grasps: usize,
+    #[command(flatten)]
+    between: BetweenArguments,
     /// Random seed of the poses.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -52,15 +55,16 @@ struct PromiseReport<'a> {
 }
 
 pub(super) fn run(arguments: &PromiseArguments) -> Result<(), Failure> {
-    let model = Model::load(&arguments.model)?;
+    let model = Arc::new(Model::load(&arguments.model)?);
     // Before the work, which takes minutes.
     let out = arguments.out.as_ref().unwrap_or(&arguments.model);
     check_model_path(out)?;
     let (stop, bar) = (stop_flag()?, Progress::of("grasping"));
     let progress = |done: usize, of: usize| bar.show(done, of);
     let PromiseArguments { rounds, grasps, seed, wrong, .. } = *arguments;
+    let between = arguments.between.chosen().unwrap_or_default();
     let promised =
-        GraspRounds { rounds, grasps, seed, progress: &progress, stop: &stop }.promised(&model, 0.01 * wrong);
+        GraspRounds { rounds, grasps, seed, progress: &progress, stop: &stop }.promised(&model, 0.01 * wrong, between);
     drop(bar);
     let promised = promised?;
     save_model(&promised, out)?;

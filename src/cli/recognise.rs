@@ -189,7 +189,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             probability,
             stage_one,
             pmf: named(&model, &alone.pmf),
-            left: model.card.left(&single),
+            left: model.card.left(&single, Between::default().name()),
             why,
         });
     }
@@ -197,7 +197,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         decided: labels.classes[pmf.top().0].name.clone(),
         probability: pmf.top().1,
         pmf: named(&model, pmf),
-        left: model.card.left(&belief),
+        left: model.card.left(&belief, Between::default().name()),
     });
     if is_real {
         warn_of_perfect_sensors(&model);

@@ -5,7 +5,7 @@ use super::terminal::{Progress, warn};
 use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::Recompute;
 use palpate_sim::objects::{ObjectModel, anchored};
-use palpate_sim::scene::{Accuracy, EngineKind, PRESETS, PosePreset, Scene};
+use palpate_sim::scene::{Accuracy, Between, EngineKind, PRESETS, PosePreset, Scene};
 use palpate_store::labels::class_name;
 use palpate_store::{Store, StoreError};
 use palpate_tactile::board::{Sensor, SensorKind, SensorList};
@@ -15,6 +15,28 @@ use std::io::ErrorKind;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+
+/// The object between two grasps.
+#[derive(Debug, clap::Args)]
+pub(super) struct BetweenArguments {
+    /// Leave the object as released between grasps instead of placing it anew.
+    #[arg(long)]
+    as_released: bool,
+    /// The same, and choose each next grasp by what is expected to be learned from it instead of at random.
+    #[arg(long, conflicts_with = "as_released")]
+    guided: bool,
+}
+
+impl BetweenArguments {
+    /// None where nothing is asked for.
+    pub(super) fn chosen(&self) -> Option<Between> {
+        match (self.as_released, self.guided) {
+            (_, true) => Some(Between::Guided),
+            (true, _) => Some(Between::AsReleased),
+            _ => None,
+        }
+    }
+}
 
 /// Scene and changes to it.
 #[derive(Debug, clap::Args)]

@@ -45,10 +45,18 @@ pub struct AnswerSets {
     pub by: Vec<CalibratedBy>,
     /// Number of rounds.
     pub rounds: usize,
+    /// How the object lay between the grasps of a round, as in scene files.
+    #[serde(default = "reposed")]
+    pub between: String,
     /// Least probability with which each class stays after one grasp, two, and so on.
     least: Vec<Vec<f64>>,
     /// Automatic stops.
     pub stop: StopLevel,
+}
+
+/// Of models from before this was a choice.
+fn reposed() -> String {
+    "reposed".to_owned()
 }
 
 /// Confidence at which grasping stops by itself.
@@ -95,7 +103,7 @@ impl AnswerSets {
             }
         }
         let stop = StopLevel::chosen(&further, grasps, rejection, risk);
-        Some(Self { risk, by, rounds: rounds.len(), least, stop })
+        Some(Self { risk, by, rounds: rounds.len(), between: reposed(), least, stop })
     }
 
     /// Refuses sets from a file that do not fit a number of classes, or hold numbers that are no probabilities.

@@ -155,9 +155,14 @@ impl ModelCard {
         Some(Pmf::from_weights((0..classes).map(share)))
     }
 
-    /// Names of the classes that are left after grasps, where the sets are calibrated.
-    pub fn left(&self, belief: &Belief) -> Option<Vec<String>> {
-        let left = self.answer_sets.as_ref()?.left(belief);
+    /// Sets that are calibrated by rounds whose object lay like this between two grasps, as in scene files.
+    pub fn sets_of(&self, between: &str) -> Option<&AnswerSets> {
+        self.answer_sets.as_ref().filter(|sets| sets.between == between)
+    }
+
+    /// Names of the classes that are left after grasps, where sets are calibrated for such rounds.
+    pub fn left(&self, belief: &Belief, between: &str) -> Option<Vec<String>> {
+        let left = self.sets_of(between)?.left(belief);
         let classes = self.labels.classes.iter().zip(left);
         Some(classes.filter(|(_, left)| *left).map(|(class, _)| class.name.clone()).collect())
     }

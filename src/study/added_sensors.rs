@@ -109,7 +109,7 @@ impl AddedSensorStudy {
             labels.classes.iter().enumerate().map(|(k, class)| (k, class.name.clone())).collect();
         let simulated = |rounds: usize, seed: u64| {
             let rounds = GraspRounds { rounds, grasps: 1, seed, progress: &|_, _| (), stop };
-            rounds.simulated(&scene, &views, &sources)
+            rounds.simulated(&scene, &views, &sources, None)
         };
         let [train, test] = [simulated(self.train, SEEDS[0])?, simulated(self.test, SEEDS[1])?];
         let sets = views.iter().enumerate().map(|(number, view)| {

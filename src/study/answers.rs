@@ -1,5 +1,6 @@
 //! Whether answers keep their promise: sets of classes and automatic stops, calibrated on some rounds of grasps and tested on
-//! others, for perfect sensors, real ones, and grippers that no model has met.
+//! others, for perfect sensors, real ones, and grippers that no model has met, and where a guide chooses the grasps; and how often
+//! nothing is left of an object of no class.
 
 use crate::frame::{
     Column, Experiment, Facets, LinkedFigure, OWN_METHODS, PERCENT, PlainStudy, StudyCard, StudyCell, StudyCommand,
@@ -7,7 +8,7 @@ use crate::frame::{
 };
 use palpate_geometry::drawing::ReferenceLine;
 use palpate_lab::datasets::{Cut, SensorView, labels_of_catalogue};
-use palpate_lab::grasping::{GraspRounds, GraspedRound, PromiseError};
+use palpate_lab::grasping::{GraspRounds, GraspedRound, PromiseError, random_shapes};
 use palpate_learn::evaluation::{Stop, stops};
 use palpate_learn::metrics::{Interval, largest_share};
 use palpate_learn::{
@@ -15,7 +16,7 @@ use palpate_learn::{
     method,
 };
 use palpate_sim::objects::EMPTY;
-use palpate_sim::scene::{PosePreset, Scene};
+use palpate_sim::scene::{Between, PosePreset, Scene};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::{Channel, SignalDefinition, whole_fingers};
 use serde::{Deserialize, Serialize};
@@ -29,7 +30,7 @@ pub(crate) const LISTED: PlainStudy<AnswerStudy> = PlainStudy {
         title: "Answers that keep their promise",
         about: "sets of classes and automatic stops calibrated for nine of ten rounds, tested on 1500 others: how often the true class is lost, how large sets are, how many stops are wrong",
         paper: OWN_METHODS,
-        budget: "about 90 CPU minutes",
+        budget: "about an hour of CPU time",
     },
     of_size: |size| Ok(AnswerStudy::of_size(size)),
 };
@@ -42,8 +43,10 @@ const GRASPS: usize = 4;
 const METHODS: [&str; 4] = ["ids-lstm", "paper-ids-lstm", "random-forest", "extra-trees"];
 /// Name of the shipped model in tables.
 const SHIPPED: &str = "shipped";
-/// Seeds of the rounds to learn from, to calibrate on and to test with.
-const SEEDS: [u64; 3] = [21, 22, 23];
+/// Seeds of the rounds to learn from, to calibrate on, to test with, and of objects of no class.
+const SEEDS: [u64; 4] = [21, 22, 23, 24];
+/// First of the random shapes that are no class; no model has learned them.
+const STRANGERS: u64 = 50_000;
 
 /// The study: rounds of each object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -55,6 +58,8 @@ pub struct AnswerStudy {
     test: usize,
     /// Number of objects.
     objects: usize,
+    /// Objects of no class, each in one round.
+    strangers: usize,
     /// Small networks, whose results are not to be quoted.
     quick: bool,
 }
@@ -72,9 +77,9 @@ impl AnswerStudy {
     /// The study in a size.
     pub fn of_size(size: StudySize) -> Self {
         match size {
-            StudySize::Full => Self { train: 50, calibrate: 300, test: 94, objects: 16, quick: false },
+            StudySize::Full => Self { train: 50, calibrate: 300, test: 94, objects: 16, strangers: 300, quick: false },
             StudySize::Quick | StudySize::Sample { .. } => {
-                Self { train: 8, calibrate: 80, test: 8, objects: 4, quick: true }
+                Self { train: 8, calibrate: 80, test: 8, objects: 4, strangers: 8, quick: true }
             }
         }
     }
@@ -87,14 +92,16 @@ pub enum AnswerCase {
     PhysicalLike,
     /// Another gripper in each round.
     Unknown,
+    /// Perfect sensors, and an object that stays and is grasped where a guide expects to learn most.
+    Guided,
 }
 
 impl AnswerCase {
-    const ALL: [Self; 3] = [Self::Perfect, Self::PhysicalLike, Self::Unknown];
+    const ALL: [Self; 4] = [Self::Perfect, Self::PhysicalLike, Self::Unknown, Self::Guided];
 
     fn sensors(self) -> SensorModel {
         match self {
-            Self::Perfect => SensorModel::Virtual,
+            Self::Perfect | Self::Guided => SensorModel::Virtual,
             Self::PhysicalLike => SensorModel::PhysicalLike,
             Self::Unknown => SensorModel::Drawn,
         }
@@ -105,9 +112,14 @@ impl AnswerCase {
         if self == Self::PhysicalLike { SensorModel::Adapted } else { self.sensors() }
     }
 
+    /// Methods that are judged beside the shipped model: none where grasps are guided, since each would be by its own answers.
+    fn methods(self) -> &'static [&'static str] {
+        if self == Self::Guided { &[] } else { &METHODS }
+    }
+
     /// The model that comes for such grasps.
     fn shipped(self) -> Shipped {
-        if self == Self::Perfect { Shipped::PerfectSensors } else { Shipped::AnyGripper }
+        if matches!(self, Self::Perfect | Self::Guided) { Shipped::PerfectSensors } else { Shipped::AnyGripper }
     }
 }
 
@@ -117,13 +129,14 @@ impl StudyCell for AnswerCase {
             Self::Perfect => "perfect sensors",
             Self::PhysicalLike => "physical-like sensors",
             Self::Unknown => "another gripper in each round",
+            Self::Guided => "perfect sensors, guided",
         }
         .to_owned()
     }
 
     /// With the versions of all methods, and the contents of the shipped model.
     fn stored_name(&self) -> String {
-        let versions: Vec<String> = METHODS.iter().filter_map(|key| Some(method(key)?.fingerprint())).collect();
+        let versions: Vec<String> = self.methods().iter().filter_map(|key| Some(method(key)?.fingerprint())).collect();
         format!("{} ({}, {:08x})", self.name(), versions.join(", "), self.shipped().model_content())
     }
 }
@@ -134,6 +147,8 @@ pub struct KeptPromise {
     model: String,
     /// Number of test rounds.
     rounds: usize,
+    /// Rounds of objects of no class after which no known class is left, and all of them.
+    strangers: [usize; 2],
     /// Rounds whose set lost the true class.
     lost: usize,
     /// The same of the class with the largest share: its rounds.
@@ -160,6 +175,9 @@ impl AnswerStudy {
             scene.pose = preset.poses();
         }
         scene.pose.build = if case == AnswerCase::Unknown { 1.0 } else { 0.0 };
+        if case == AnswerCase::Guided {
+            scene.pose.between = Between::Guided;
+        }
         scene
     }
 
@@ -223,24 +241,29 @@ impl Experiment for AnswerStudy {
 
     fn measure(&self, case: &AnswerCase, stop: &AtomicBool) -> Result<Vec<KeptPromise>, StudyError> {
         let labels = self.labels();
-        let sources: Vec<(usize, String)> =
-            labels.classes.iter().enumerate().map(|(k, class)| (k, class.name.clone())).collect();
+        let named = labels.classes.iter().map(|class| class.name.clone());
+        let known: Vec<(usize, String)> = named.enumerate().collect();
+        let strangers = random_shapes(STRANGERS..STRANGERS + self.strangers as u64);
+        let strangers: Vec<(usize, String)> = strangers.into_iter().enumerate().collect();
+        let shipped = Arc::new(case.shipped().model().map_err(StudyError::missing)?);
+        let guide = (*case == AnswerCase::Guided).then_some(&shipped);
         let view = |sensors: SensorModel| SensorView { sensors, ..SensorView::default() };
         let own = view(case.sensors());
         let views = [own.clone(), SensorView { cut: Cut::Whole, ..own }, view(case.shipped_sensors())];
-        let simulated = |rounds: usize, grasps: usize, seed: u64| {
+        let simulated = |objects: &[(usize, String)], rounds: usize, grasps: usize, seed: u64| {
             let rounds = GraspRounds { rounds, grasps, seed, progress: &|_, _| (), stop };
-            rounds.simulated(&Self::scene(*case), &views, &sources).map_err(StudyError::from)
+            rounds.simulated(&Self::scene(*case), &views, objects, guide).map_err(StudyError::from)
         };
-        let train = simulated(self.train, 1, SEEDS[0])?;
-        let [calibrate, test] =
-            [(self.calibrate, SEEDS[1]), (self.test, SEEDS[2])].map(|(rounds, seed)| simulated(rounds, GRASPS, seed));
-        let (calibrate, test) = (calibrate?, test?);
+        let learned = if case.methods().is_empty() { 0 } else { self.train };
+        let train = simulated(&known, learned, 1, SEEDS[0])?;
+        let calibrate = simulated(&known, self.calibrate, GRASPS, SEEDS[1])?;
+        let test = simulated(&known, self.test, GRASPS, SEEDS[2])?;
+        let strange = simulated(&strangers, 1, GRASPS, SEEDS[3])?;
         let mut kept = Vec::new();
-        for key in [&[SHIPPED][..], &METHODS].concat() {
+        for key in [&[SHIPPED][..], case.methods()].concat() {
             let model = match key {
-                SHIPPED => case.shipped().model().map_err(StudyError::missing)?,
-                key => self.trained(key, &train, *case, stop)?,
+                SHIPPED => Arc::clone(&shipped),
+                key => Arc::new(self.trained(key, &train, *case, stop)?),
             };
             let view = match key {
                 SHIPPED => 2,
@@ -254,7 +277,8 @@ impl Experiment for AnswerStudy {
             let rejection = model.card.rejection.as_ref();
             let sets = AnswerSets::calibrate(&model.card.labels, &judged(&calibrate), rejection, RISK, 1);
             let sets = sets.ok_or_else(|| StudyError::missing("rounds to calibrate on"))?;
-            kept.push(KeptPromise::of(key, &model, &sets, &judged(&test)));
+            let strangers: Vec<Round> = strange.iter().map(|round| round.judged(&model, view)).collect();
+            kept.push(KeptPromise::of(key, &model, &sets, &judged(&test), &strangers));
         }
         Ok(kept)
     }
@@ -287,12 +311,16 @@ impl Experiment for AnswerStudy {
             Column("wrong of all", PERCENT, &|(_, own)| share(own.wrong, own.rounds).into()),
             Column("grasps", "", &|(_, own)| Some(own.grasps).into()),
             Column("wrong of stops at 90 %", PERCENT, &|(_, own)| share(own.at_90[1], own.at_90[0]).into()),
+            Column("none left of unknown objects", PERCENT, &|(_, own)| {
+                share(own.strangers[0], own.strangers[1]).into()
+            }),
             Column("tested", "rounds", &|(_, own)| own.rounds.into()),
         ]);
         let data = format!(
-            "preset B, object free and put down anew for each of {GRASPS} grasps; {} objects; {} rounds of each to calibrate on, {} to \
-             test with; trained models learned {} grasps of each, shipped ones read physical-like sensors after `palpate adapt`",
-            self.objects, self.calibrate, self.test, self.train
+            "preset B, object free and put down anew for each of {GRASPS} grasps (guided: left as released); {} objects; {} rounds of \
+             each to calibrate on, {} to test with, and a round of each of {} random shapes that are no class; trained models learned \
+             {} grasps of each, shipped ones read physical-like sensors after `palpate adapt`",
+            self.objects, self.calibrate, self.test, self.strangers, self.train
         );
         StudyReport::new(vec![data], vec![table], Vec::new())
     }
@@ -319,7 +347,7 @@ impl Experiment for AnswerStudy {
 }
 
 impl KeptPromise {
-    fn of(key: &str, model: &Model, sets: &AnswerSets, test: &[Round]) -> Self {
+    fn of(key: &str, model: &Model, sets: &AnswerSets, test: &[Round], strangers: &[Round]) -> Self {
         let recogniser = model.recogniser.as_ref();
         let ends = |threshold: f64| stops(recogniser, test, StopRule { threshold, most_grasps: GRASPS });
         let sure = |ends: &[Stop]| {
@@ -332,6 +360,11 @@ impl KeptPromise {
             let own = test.iter().zip(&is_lost).filter(move |(round, _)| round.truth == class);
             [own.clone().filter(|(_, lost)| **lost).count(), own.count()]
         };
+        let other = model.card.labels.other();
+        let is_noticed = |round: &&Round| {
+            let left = sets.left(&round.belief);
+            (0..left.len()).all(|class| !left[class] || Some(class) == other)
+        };
         let share = |[lost, rounds]: &[usize; 2]| *lost as f64 / *rounds as f64;
         let classes = (0..model.card.labels.classes.len()).map(of_class).filter(|[_, rounds]| *rounds > 0);
         let size = |grasps: usize| {
@@ -341,6 +374,7 @@ impl KeptPromise {
         Self {
             model: key.to_owned(),
             rounds: test.len(),
+            strangers: [strangers.iter().filter(is_noticed).count(), strangers.len()],
             lost: is_lost.iter().filter(|lost| **lost).count(),
             worst: classes.max_by(|a, b| share(a).total_cmp(&share(b))).unwrap_or_default(),
             sizes: (1..=GRASPS).map(size).collect(),
@@ -368,6 +402,7 @@ mod tests {
         let kept = |lost: usize| KeptPromise {
             model: String::new(),
             rounds: 1504,
+            strangers: [0; 2],
             lost,
             worst: [0; 2],
             sizes: Vec::new(),

@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &DemoArguments, port: &Path, store: Option<&Path>) 
     let keys = std::io::stdin().is_terminal().then(typed_lines).transpose()?;
     let gripper = SerialGripper::new(Box::new(link));
     let mut hand = RealHand { gripper, scene, truth: truth.clone(), store, stop, keys, advisor: Advisor::default() };
-    grasp_until_recognised(&mut hand, &model, arguments, truth, None)
+    grasp_until_recognised(&mut hand, &model, arguments, truth, (None, Between::Reposed))
 }
 
 impl Hand for RealHand {

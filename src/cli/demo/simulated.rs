@@ -18,7 +18,7 @@ use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::{EMPTY, ObjectModel, catalogue, titled};
 use palpate_sim::poses::PoseSampler;
-use palpate_sim::scene::{Between, Scene};
+use palpate_sim::scene::Scene;
 use palpate_store::Stored;
 use palpate_tactile::trial::SimulatedTrial;
 use palpate_tactile::{Channel, Sensors};
@@ -50,12 +50,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let seed = arguments.seed.unwrap_or_else(|| RandomState::new().hash_one(0) % 1_000_000);
     let random = (arguments.object.is_none() && arguments.scene.scene.is_none()).then(|| random_object(seed));
     let mut nominal = arguments.scene.scene(arguments.object.as_deref().or(random.as_deref()))?;
-    if arguments.as_released {
-        nominal.pose.between = Between::AsReleased;
-    }
-    if arguments.guided {
-        nominal.pose.between = Between::Guided;
-    }
+    nominal.pose.between = arguments.between.chosen().unwrap_or(nominal.pose.between);
     let object = load_object(&nominal)?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
     warn_unless_learned(&model, nominal.holds_object());
@@ -81,7 +76,7 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
         pictures: 0,
         store,
     };
-    grasp_until_recognised(&mut hand, &model, arguments, Some(truth), Some(seed))
+    grasp_until_recognised(&mut hand, &model, arguments, Some(truth), (Some(seed), nominal.pose.between))
 }
 
 impl Hand for SimulatedHand<'_> {

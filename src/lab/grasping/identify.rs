@@ -9,6 +9,7 @@ use palpate_learn::{
     Signatures, StopReason, StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
+use palpate_sim::scene::Between;
 use palpate_tactile::trial::EarlierGrasps;
 use palpate_tactile::{Channel, LayoutError};
 use std::collections::BTreeMap;
@@ -96,8 +97,8 @@ pub struct Identification {
     decision: Option<StopReason>,
     /// Threshold at the decision.
     decided_at: f64,
-    /// The object is put down anew for each grasp, as in the rounds that calibrated the model's sets.
-    is_anew: bool,
+    /// The object between two grasps. The model's sets hold for rounds like those that calibrated them.
+    between: Between,
 }
 
 impl std::fmt::Debug for Identification {
@@ -180,7 +181,7 @@ impl Identification {
             closed: true,
             decision: None,
             decided_at: 0.0,
-            is_anew: true,
+            between: Between::default(),
         }
     }
 
@@ -214,9 +215,9 @@ impl Identification {
         (!judged.is_empty()).then(|| EarlierGrasps { model: self.model.card.described(), judged })
     }
 
-    /// Sets whether the object is put down anew for each grasp.
-    pub fn set_anew(&mut self, is_anew: bool) {
-        self.is_anew = is_anew;
+    /// Sets how the object lies between two grasps.
+    pub fn set_between(&mut self, between: Between) {
+        self.between = between;
     }
 
     /// Sets the stop rule. A decision is kept; between two grasps the new rule may end the round.
@@ -374,7 +375,7 @@ impl Identification {
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,
-            left: self.model.card.answer_sets.as_ref().filter(|_| self.is_anew).map(|sets| sets.left(&self.belief)),
+            left: self.model.card.sets_of(self.between.name()).map(|sets| sets.left(&self.belief)),
             asks_for_more: self.asks_for_more(),
             from_perfect_sensors: self.model.card.learned_from_perfect_sensors(),
             signatures: self.model.signatures.clone(),

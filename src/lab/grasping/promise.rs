@@ -1,18 +1,21 @@
 //! Whole rounds of simulated grasps, by which a model's sets of classes and its automatic stops are calibrated and tested.
 //!
-//! In each round the object is put down anew for every grasp, on one gripper: where the gripper varies, it varies from round to
-//! round.
+//! In each round one gripper grasps one object, which is put down anew for every grasp, stays as the fingers leave it, or is
+//! grasped where a guide expects to learn most; where the gripper varies, it varies from round to round.
 
 use super::agreement::{Recompute, grasp_soundly};
+use super::guidance::Advisor;
+use super::identify::RecognisedGrasp;
 use super::lessons::{scene_of, view_of};
 use crate::datasets::{SensorView, sequence_of};
 use palpate_learn::{AnswerSets, Belief, Class, Model, OTHER, ROUNDS_OF_A_CLASS, Round, Sequence, StopRule};
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::objects::{EMPTY, ObjectError, ObjectModel, catalogue};
 use palpate_sim::poses::PoseSampler;
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{Between, Scene};
 use palpate_tactile::LayoutError;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Rounds to simulate.
@@ -47,6 +50,10 @@ pub enum PromiseError {
     Object(#[from] ObjectError),
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    #[error(
+        "no guide for this model: it reads channels of which no grasps in known poses are at hand. Leave --between out"
+    )]
+    NoGuide,
     #[error("{0} rounds are too few: take at least {least} in all, and {least} of each class for a promise of its own", least = 3 * ROUNDS_OF_A_CLASS)]
     TooFew(usize),
 }
@@ -60,30 +67,36 @@ const NEXT_GRASP: u64 = 0xd1b5_4a32_d192_ed03;
 impl GraspRounds<'_> {
     /// The model with sets of classes that lose the true one in at most a share of rounds, and with a stop rule whose automatic
     /// stops are wrong in at most as many; it never stops by itself where no confidence keeps that.
-    pub fn promised(&self, model: &Model, risk: f64) -> Result<Model, PromiseError> {
-        let (scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
+    pub fn promised(&self, model: &Arc<Model>, risk: f64, between: Between) -> Result<Model, PromiseError> {
+        let (mut scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
+        scene.pose.between = between;
         let classes = model.card.labels.classes.iter().enumerate();
         let known: Vec<(usize, String)> =
             classes.filter_map(|(number, class)| Some((number, source_of(class, model)?))).collect();
-        let rounds: Vec<Round> =
-            self.simulated(&scene, &[view], &known)?.iter().map(|round| round.judged(model, 0)).collect();
+        let grasped = self.simulated(&scene, &[view], &known, (between == Between::Guided).then_some(model))?;
+        let rounds: Vec<Round> = grasped.iter().map(|round| round.judged(model, 0)).collect();
         let card = &model.card;
         let sets = AnswerSets::calibrate(&card.labels, &rounds, card.rejection.as_ref(), risk, self.seed);
-        let sets = sets.ok_or(PromiseError::TooFew(rounds.len()))?;
-        let mut promised = model.clone();
+        let mut sets = sets.ok_or(PromiseError::TooFew(rounds.len()))?;
+        between.name().clone_into(&mut sets.between);
+        let mut promised = Model::clone(model);
         promised.card.stop = StopRule { threshold: sets.stop.level.unwrap_or(1.0), most_grasps: sets.most_grasps() };
         promised.card.answer_sets = Some(sets);
         Ok(promised)
     }
 
     /// Rounds of objects, each with the number of its class and its source, in poses of a scene, each grasp read through all
-    /// views. Those of a class follow each other.
+    /// views. Those of a class follow each other. Where the scene is guided, it is by the answers of a model through the first
+    /// view.
     pub fn simulated(
         &self,
         scene: &Scene,
         views: &[SensorView],
         objects: &[(usize, String)],
+        guided_by: Option<&Arc<Model>>,
     ) -> Result<Vec<GraspedRound>, PromiseError> {
+        let advisor = guided_by.map(|model| Advisor::of(model).ok_or(PromiseError::NoGuide)).transpose()?;
+        let guide = guided_by.zip(advisor.as_ref());
         let (done, of) = (AtomicUsize::new(0), objects.len() * self.rounds);
         let mut all = Vec::new();
         for (class, source) in objects {
@@ -91,7 +104,7 @@ impl GraspRounds<'_> {
             scene.object.source.clone_from(source);
             let object = scene.load_object()?;
             let sampler = PoseSampler::new(&scene, object.as_ref());
-            let own = ObjectRounds { views, sampler, object: object.as_ref() };
+            let own = ObjectRounds { views, sampler, object: object.as_ref(), guide };
             let first = self.seed.wrapping_mul(NEXT_SEED).wrapping_add((*class as u64 + 1).wrapping_mul(NEXT_CLASS));
             let round = |number: usize| {
                 let grasps = own.grasps(first.wrapping_add(number as u64), self.grasps, self.stop)?;
@@ -114,16 +127,19 @@ fn source_of(class: &Class, model: &Model) -> Option<String> {
 impl GraspedRound {
     /// Answers of a model to its grasps through one of the views, each fed with the belief before.
     pub fn judged(&self, model: &Model, view: usize) -> Round {
-        let (recogniser, prior) = (&model.recogniser, model.card.prior());
         let mut belief = Belief::default();
-        for grasp in &self.grasps {
-            let (grasp, before) = (&grasp[view], belief.now().or(prior.as_ref()));
-            let with = recogniser.recognise(grasp, before).pmf;
-            let alone = if before.is_some() { recogniser.recognise(grasp, None).pmf } else { with.clone() };
-            belief.add(with, alone);
-        }
+        self.grasps.iter().for_each(|grasp| feel(model, &mut belief, &grasp[view]));
         Round { truth: self.class, belief }
     }
+}
+
+/// Adds the answer of a model to one more grasp, fed with the belief before.
+fn feel(model: &Model, belief: &mut Belief, grasp: &Sequence) {
+    let (recogniser, prior) = (&model.recogniser, model.card.prior());
+    let before = belief.now().or(prior.as_ref());
+    let with = recogniser.recognise(grasp, before).pmf;
+    let alone = if before.is_some() { recogniser.recognise(grasp, None).pmf } else { with.clone() };
+    belief.add(with, alone);
 }
 
 /// Rounds of one object.
@@ -131,6 +147,8 @@ struct ObjectRounds<'a> {
     views: &'a [SensorView],
     sampler: PoseSampler,
     object: Option<&'a ObjectModel>,
+    /// The model by whose answers grasps are guided, and who guides.
+    guide: Option<(&'a Arc<Model>, &'a Advisor)>,
 }
 
 impl ObjectRounds<'_> {
@@ -145,16 +163,26 @@ impl ObjectRounds<'_> {
             PoseSampler::new(&nominal, self.object)
         });
         let sampler = same_gripper.as_ref().unwrap_or(&self.sampler);
-        let mut grasps = Vec::new();
+        let mut guide = self.guide.map(|(model, advisor)| (model, advisor.clone(), Belief::default()));
+        let mut grasps: Vec<Vec<Sequence>> = Vec::new();
+        let mut scene = first;
         for number in 0..count as u64 {
             if stop.load(Ordering::Relaxed) {
                 return Err(PromiseError::Stopped);
             }
-            let own = seed.wrapping_add(number.wrapping_mul(NEXT_GRASP));
-            let scene = if number == 0 { first.clone() } else { sampler.draw(self.object, own).0 };
-            let trial = grasp_soundly(&scene, self.object, own, Recompute::Unsettled);
+            let seed_of = |number: u64| seed.wrapping_add(number.wrapping_mul(NEXT_GRASP));
+            let trial = grasp_soundly(&scene, self.object, seed_of(number), Recompute::Unsettled);
             let read = |view: &SensorView| view.signals_on(&trial, seed).map(|signals| sequence_of(&signals));
-            grasps.push(self.views.iter().map(read).collect::<Result<_, LayoutError>>()?);
+            let read: Vec<Sequence> = self.views.iter().map(read).collect::<Result<_, LayoutError>>()?;
+            let drawn = sampler.draw_after(self.object, seed_of(number + 1), trial.frames().last()).0;
+            let guided = guide.as_mut().zip(read.first()).and_then(|((model, advisor, belief), grasp)| {
+                feel(model, belief, grasp);
+                let (model, belief) = (Arc::clone(model), belief.clone());
+                let last = RecognisedGrasp { model, grasp: grasp.clone(), hold_s: None, belief };
+                advisor.next(&last, [&scene, &drawn], sampler, self.object)
+            });
+            scene = guided.map_or(drawn, |(_, scene)| scene);
+            grasps.push(read);
         }
         Ok(grasps)
     }
@@ -172,7 +200,8 @@ mod tests {
             let mut scene = Scene::default();
             scene.solver.accuracy = palpate_sim::scene::Accuracy::Draft;
             scene.pose.shift = [0.008; 3];
-            let all = rounds.simulated(&scene, &[SensorView::default()], &[(0, "box".to_owned())]).expect("grasped");
+            let all =
+                rounds.simulated(&scene, &[SensorView::default()], &[(0, "box".to_owned())], None).expect("grasped");
             all.into_iter().flat_map(|round| round.grasps).map(|grasp| grasp[0].clone()).collect::<Vec<_>>()
         };
         let (mut all, other) = (grasps(1), grasps(2));
@@ -180,5 +209,27 @@ mod tests {
         for (k, own) in all.iter().enumerate() {
             assert!(all[..k].iter().all(|before| before != own), "grasp {k} comes twice");
         }
+    }
+
+    #[test]
+    fn a_guide_chooses_the_later_grasps_of_a_round_by_the_answers_of_a_model() {
+        let stop = AtomicBool::new(false);
+        let model = Arc::new(palpate_learn::Shipped::PerfectSensors.model().expect("shipped"));
+        let (mut scene, view) = (scene_of(&model.card), SensorView { draws: 1, ..view_of(&model.card) });
+        scene.solver.accuracy = palpate_sim::scene::Accuracy::Draft;
+        let mut grasps = |between: Between, guide: Option<&Arc<Model>>| {
+            scene.pose.between = between;
+            let rounds = GraspRounds { rounds: 1, grasps: 2, seed: 3, progress: &|_, _| (), stop: &stop };
+            let mut all = rounds.simulated(&scene, &[view.clone()], &[(0, "box".to_owned())], guide).expect("grasped");
+            all.remove(0).grasps
+        };
+        let (left, guided) = (grasps(Between::AsReleased, None), grasps(Between::Guided, Some(&model)));
+        assert_eq!(left[0], guided[0]);
+        assert!(left[1] != guided[1] && guided[0] != guided[1]);
+        assert_eq!(guided, grasps(Between::Guided, Some(&model)));
+
+        let mut other = Model::clone(&model);
+        other.card.channels = vec!["palm".to_owned()];
+        assert!(Advisor::of(&Arc::new(other)).is_none());
     }
 }

@@ -3,6 +3,7 @@
 use crate::grasping::{Identification, IdentificationView, RecognisedGrasp, Row};
 use palpate_learn::{Model, StopReason, StopRule};
 use palpate_sim::gripper::GripperModel;
+use palpate_sim::scene::Between;
 use palpate_tactile::Channel;
 use palpate_tactile::trial::EarlierGrasps;
 use std::ops::RangeInclusive;
@@ -72,9 +73,9 @@ impl LiveRecognition {
         self.identification.channels_on(gripper).unwrap_or_default()
     }
 
-    /// Sets whether the object is put down anew for each grasp.
-    pub(super) fn set_anew(&mut self, is_anew: bool) {
-        self.identification.set_anew(is_anew);
+    /// Sets how the object lies between two grasps.
+    pub(super) fn set_between(&mut self, between: Between) {
+        self.identification.set_between(between);
     }
 
     /// Begins a grasp whose rows have these channels in these columns. Returns once per scene the

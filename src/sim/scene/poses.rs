@@ -42,6 +42,15 @@ pub enum Between {
 }
 
 impl Between {
+    /// Name in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reposed => "reposed",
+            Self::AsReleased => "as-released",
+            Self::Guided => "guided",
+        }
+    }
+
     /// True where the object stays as the fingers have left it.
     pub fn leaves_object(self) -> bool {
         match self {

@@ -21,7 +21,7 @@ const WORTH: f64 = 0.02;
 
 /// Advice on the next grasp of an object. Answers of a model to the grasps in known poses are computed when it is first asked
 /// for, in one or two seconds.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Advisor {
     /// The model in use; none within where the known grasps lack its channels.
     library: Option<(Arc<Model>, Option<Arc<TouchLibrary>>)>,
@@ -31,6 +31,13 @@ pub struct Advisor {
 }
 
 impl Advisor {
+    /// One that knows the answers of a model ahead; none where the model's channels are unknown here.
+    pub fn of(model: &Arc<Model>) -> Option<Self> {
+        let mut advisor = Self::default();
+        advisor.library(model)?;
+        Some(advisor)
+    }
+
     fn library(&mut self, model: &Arc<Model>) -> Option<Arc<TouchLibrary>> {
         if !self.library.as_ref().is_some_and(|(own, _)| Arc::ptr_eq(own, model)) {
             self.guide = None;

@@ -12,7 +12,7 @@ use crate::picture::Stage;
 use palpate_learn::{Model, Shipped};
 use palpate_sim::objects::{EMPTY, ObjectError};
 use palpate_sim::poses::PoseSampler;
-use palpate_sim::scene::{Between, Scene};
+use palpate_sim::scene::Scene;
 use palpate_tactile::{Channel, Sensors};
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ impl Session {
         self.choose_model();
         if let Some(recognition) = &mut self.recognition {
             recognition.start_over();
-            recognition.set_anew(self.nominal.pose.between == Between::Reposed);
+            recognition.set_between(self.nominal.pose.between);
         }
         self.begin_grasp();
     }
