@@ -50,6 +50,11 @@ impl CalibrationRepository<'_> {
         Ok(self.tare()?.unwrap_or_default())
     }
 
+    /// When each tare was taken, in the format of [`TrialRow::created`](crate::TrialRow::created), rising.
+    pub fn tare_times(&self) -> Result<Vec<String>, StoreError> {
+        self.store.all("SELECT DISTINCT taken FROM tares ORDER BY taken", [], |row| row.get(0))
+    }
+
     /// The newest tares of the mounted parts with their present calibrations, if any.
     pub fn tare(&self) -> Result<Option<StoredTare>, StoreError> {
         let serving = self.serving(None, &[])?;
@@ -87,6 +92,8 @@ mod tests {
         store.calibrations().add_tare(&zero(0.01))?;
         let tare = store.calibrations().add_tare(&zero(0.02))?;
         assert_eq!(tare.zero.offsets, [Some(0.02)]);
+        let times = store.calibrations().tare_times()?;
+        assert!(times.is_sorted() && times.contains(&tare.parts[0].taken), "{times:?}");
         assert_eq!((tare.parts.len(), tare.parts[0].version, tare.parts[0].part.as_str()), (1, 2, "A"));
         assert_eq!(store.calibrations().tare()?.as_ref(), Some(&tare));
         // The part moves to the other finger, and its zero with it.

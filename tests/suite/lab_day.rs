@@ -1,4 +1,4 @@
-//! A day in a lab with a gripper that only its file describes: doctor, adapting, sixty labelled grasps, leak check,
+//! A day in a lab with a gripper that only its file describes: doctor, adapting, sixty labelled grasps in two sessions, leak check,
 //! training, a promise, live recognition, a pad that dies, and taxels for another program. The board's clock runs as fast as it
 //! is asked.
 
@@ -13,6 +13,7 @@ use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;
 use palpate_tactile::board::SensorList;
+use palpate_tactile::calibration::Zero;
 use palpate_tactile::trial::TrialData;
 use std::path::Path;
 use std::sync::Arc;
@@ -71,7 +72,13 @@ fn from_an_unknown_board_to_taxels_for_another_program() {
     store.calibrations().set_sensors(sensors).unwrap();
     let empty = recorded(&mut store, &parts, EMPTY, 1, Vec::new());
     Adaptation::from_close(&mut store, empty, &Scene::default(), &[], false).unwrap().keep(&store).unwrap();
-    for seed in 0..EACH * OBJECTS.len() as u64 {
+    let sixty = EACH * OBJECTS.len() as u64;
+    for seed in 0..sixty {
+        if 2 * seed == sixty {
+            // After the break the fingers are tared, which begins another session.
+            let zero = Zero { offsets: vec![Some(0.0); sensors.len()] };
+            assert!(!store.calibrations().add_tare(&zero).unwrap().parts.is_empty());
+        }
         recorded(&mut store, &parts, OBJECTS[seed as usize % OBJECTS.len()], 100 + seed, Vec::new());
     }
 
@@ -84,6 +91,10 @@ fn from_an_unknown_board_to_taxels_for_another_program() {
     );
     let f1 = json(at, &[&split[..], &["--json"]].concat())[0]["f1_macro"].as_f64().unwrap_or_default();
     assert!(f1 > 0.8, "F1 {f1}");
+
+    // Each session is tested by a model of the other one.
+    let sessions = said(at, &[&split[..5], &["--split", "leave-a-session-out"]].concat());
+    assert!(sessions.contains("one session left out at a time, 2 fits"), "{sessions}");
 
     // A model of all sixty, with a promise.
     let trained = said(at, &["train", "extra-trees", "--source", "serial", "--out", "day.safetensors"]);

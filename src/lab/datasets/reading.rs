@@ -210,7 +210,7 @@ impl DatasetQuery {
         let poses: Vec<u32> = origins.iter().map(|origin| origin.pose).collect();
         type Readings = (Sequence, Vec<Arc<Sequence>>, Option<Arc<Sequence>>);
         type Read<'r> = (&'r TrialRow, Readings, Option<TrialId>);
-        let mut sessions = Sessions::default();
+        let mut sessions = Sessions { tares: store.calibrations().tare_times()?, ..Sessions::default() };
         let mut example = |((row, (grasp, further, rest), after), pose): (Read<'_>, u32)| {
             let content = content_of(row, &grasp);
             Some(Example {
@@ -244,11 +244,14 @@ const COPIES: &str = "copies of other trials";
 const PAUSE_S: f64 = 600.0;
 
 /// Numbers of the sessions of trials that were not simulated, in the order in which they were made: another day, ten minutes
-/// without a trial, another imported file.
+/// without a trial, a tare, another imported file.
 #[derive(Default)]
 struct Sessions {
+    /// Times of all tares, as those of trials.
+    tares: Vec<String>,
     newest: u32,
-    last: Option<(Option<String>, String, f64)>,
+    /// File, time of day (s) and time of the last trial.
+    last: Option<(Option<String>, f64, String)>,
 }
 
 impl Sessions {
@@ -261,11 +264,13 @@ impl Sessions {
         let time_s: f64 = parts.map(|(part, unit)| unit * part.parse::<f64>().unwrap_or(0.0)).sum();
         // Imported trials are all made at once.
         let file = row.collection.clone().filter(|_| row.source == TrialSource::Imported);
-        let goes_on = self.last.as_ref().is_some_and(|(own, on, at_s)| {
-            *own == file && (file.is_some() || (on == day && (time_s - at_s).abs() < PAUSE_S))
+        let goes_on = self.last.as_ref().is_some_and(|(own, at_s, at)| {
+            let is_tared = || self.tares.iter().any(|tare| at < tare && *tare <= row.created);
+            let at_once = at.starts_with(day) && (time_s - at_s).abs() < PAUSE_S && !is_tared();
+            *own == file && (file.is_some() || at_once)
         });
         self.newest += u32::from(!goes_on);
-        self.last = Some((file, day.to_owned(), time_s));
+        self.last = Some((file, time_s, row.created.clone()));
         self.newest
     }
 }
