@@ -34,11 +34,11 @@ fn desk_at(listen: Listen) -> Bench {
 }
 
 impl Bench {
-    fn press(&mut self, key: Key) {
+    pub(crate) fn press(&mut self, key: Key) {
         self.press_with(Modifiers::NONE, key);
     }
 
-    fn press_with(&mut self, modifiers: Modifiers, key: Key) {
+    pub(crate) fn press_with(&mut self, modifiers: Modifiers, key: Key) {
         self.harness.key_press_modifiers(modifiers, key);
         // Once for the key, once for what it has changed.
         self.harness.step();
@@ -51,7 +51,7 @@ impl Bench {
         self.harness.step();
     }
 
-    fn record(&mut self) {
+    pub(crate) fn record(&mut self) {
         self.press(Key::R);
         self.until_shown(true, "Time in the trial");
         self.until_shown(false, "Time in the trial");

@@ -115,10 +115,12 @@ impl Drift {
 
     /// Shift with its unit: `+1.3°`, `0.2 N`.
     pub fn with_unit(&self) -> String {
+        // No minus before zero.
+        let rounded = |value: f64, steps: f64| (value * steps).round() / steps + 0.0;
         match self.sensor.kind() {
-            SensorKind::Flex => format!("{:+.1}°", self.moved.to_degrees()),
-            SensorKind::Pad => format!("{:.2} N", self.moved),
-            SensorKind::Raw => format!("{:+.3}", self.moved),
+            SensorKind::Flex => format!("{:+.1}°", rounded(self.moved.to_degrees(), 10.0)),
+            SensorKind::Pad => format!("{:.2} N", rounded(self.moved, 100.0)),
+            SensorKind::Raw => format!("{:+.3}", rounded(self.moved, 1000.0)),
         }
     }
 
