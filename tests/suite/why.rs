@@ -128,6 +128,8 @@ fn a_link_beside_the_answer_opens_the_panel() {
     assert!(bench.harness.query_by_label("Why?").is_none(), "no answer yet");
     run_out(&mut bench);
     bench.harness.run_steps(2);
+    // The strongest reason stands beside it.
+    bench.until_shown(true, "left pad force in the hold");
     bench.harness.get_by_label("Why?").click();
     bench.until_shown(true, "Channel by phase");
     // A nearest trial opens in Inspect mode, and is explained there; it is not among its own nearest.

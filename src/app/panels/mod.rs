@@ -61,8 +61,8 @@ pub const ALL: [PanelKind; 35] = [
     panel("other", "Other channels", |ui, app, actions| curves::other_ui(ui, &app.shown(), actions)),
     panel("line", "Line pressure", |ui, app, actions| curves::line_pressure_ui(ui, &app.shown(), actions)),
     panel("recognition", "Recognition", |ui, app, actions| {
-        let learned = app.recognition.learned.as_ref();
-        recognition::ui(ui, &app.shown(), &app.tools, learned, &app.thumbnails, actions);
+        let recognition = (app.recognition.learned.as_ref(), &app.recognition.explainer);
+        recognition::ui(ui, &app.shown(), &app.tools, recognition, &app.thumbnails, actions);
     }),
     panel("why", "Why", |ui, app, actions| {
         why::ui(ui, &app.shown(), &app.recognition.explainer, &app.thumbnails, actions);

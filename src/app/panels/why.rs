@@ -250,6 +250,9 @@ fn nearest_ui(
             wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
         }
         None => {
+            // The answer may have been weighed beside it already.
+            let request = request.clone();
+            actions.push(move |app| app.recognition.explainer.explain(&request));
             let words = nearest.running().map(|running| running.progress.words).filter(|words| !words.is_empty());
             ui.weak(words.unwrap_or_else(|| "Reading the store ..".to_owned()));
         }

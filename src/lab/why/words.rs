@@ -52,6 +52,12 @@ impl Attribution {
         })
     }
 
+    /// The strongest reason for the first class, or that there is no single one.
+    pub fn because(&self) -> String {
+        let [spoke_for, _] = self.reasons();
+        spoke_for.into_iter().next().map_or_else(|| "no single part decides".to_owned(), |reason| reason.part)
+    }
+
     /// Reasons in sentences: what spoke for the first class, and what against it.
     pub fn sentences(&self) -> Vec<String> {
         let title = object_title(&self.first.name);

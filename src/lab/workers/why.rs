@@ -55,18 +55,29 @@ impl Explainer {
         Self { why, nearest }
     }
 
-    /// Explains a grasp instead of the one before, unless it is the same.
+    /// Explains a grasp instead of the one before, unless it is the same, without a look into the store: some dozens of
+    /// answers of the model, a few milliseconds.
+    pub fn weigh(&self, request: &ExplainRequest) {
+        start_once(&self.why, request);
+    }
+
+    /// The same, with the nearest trials.
     pub fn explain(&self, request: &ExplainRequest) {
-        let is_asked = self.why.running().is_some_and(|running| running.command.is_like(request));
-        if !is_asked && self.explained(request).is_none() {
-            self.why.start(request.clone());
-            self.nearest.start(request.clone());
-        }
+        start_once(&self.why, request);
+        start_once(&self.nearest, request);
     }
 
     /// Explanation of a grasp; none before there is one.
     pub fn explained(&self, request: &ExplainRequest) -> Option<EndedJob<ExplainRequest, Attribution>> {
         self.why.last().filter(|ended| ended.command.is_like(request))
+    }
+}
+
+/// Starts a job on a grasp that is neither running nor the last one.
+fn start_once<T: Clone + Send + Sync + 'static>(job: &Job<ExplainRequest, T>, request: &ExplainRequest) {
+    let is_running = job.running().is_some_and(|running| running.command.is_like(request));
+    if !is_running && !job.last().is_some_and(|ended| ended.command.is_like(request)) {
+        job.start(request.clone());
     }
 }
 

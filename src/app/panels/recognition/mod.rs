@@ -23,7 +23,7 @@ use egui::{
 };
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
-use palpate_lab::workers::{Command, Job, THRESHOLDS};
+use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use std::sync::Arc;
 use words::{FOREIGN, Headline, percent, reason};
@@ -105,7 +105,7 @@ pub(super) fn ui(
     ui: &mut Ui,
     data: &DisplayedData<'_>,
     tools: &GripperTools,
-    learned: Option<&Learned>,
+    (learned, explainer): (Option<&Learned>, &Explainer),
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -131,7 +131,8 @@ pub(super) fn ui(
                     failed_sensors_ui(ui, gripper);
                 }
                 let told = ui.cursor().top() - top;
-                let mut part = Part { data, pictures, recognised: &recognised, view: &view, measures, actions };
+                let mut part =
+                    Part { data, pictures, explainer, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
                 let advised = part.advice_ui(ui, &tools.advice) + told;
                 if let Some(truth) = &recognised.truth {
@@ -260,6 +261,7 @@ fn calmed(ui: &Ui, view: &Arc<IdentificationView>) -> Arc<IdentificationView> {
 struct Part<'a, 'b> {
     data: &'a DisplayedData<'b>,
     pictures: &'a Thumbnails,
+    explainer: &'a Explainer,
     recognised: &'a Recognised<'a>,
     view: &'a IdentificationView,
     measures: &'static Measures,
@@ -406,6 +408,16 @@ impl Part<'_, '_> {
         }
     }
 
+    /// The strongest reason for the answer to the last grasp, once it is known.
+    fn because(&mut self) -> Option<String> {
+        let request = self.data.grasp_to_explain().ok()?;
+        let Some(explained) = self.explainer.explained(&request) else {
+            self.actions.push(move |app| app.recognition.explainer.weigh(&request));
+            return None;
+        };
+        Some(explained.outcome.ok()?.because())
+    }
+
     /// Threshold as a number.
     fn threshold_ui(&mut self, ui: &mut Ui) {
         let size = vec2(ui.available_width(), THRESHOLD_LINE);
@@ -427,17 +439,18 @@ impl Part<'_, '_> {
                 self.actions.push(move |app| app.set_threshold(classes::stepped(threshold / 100.0)));
             }
             if self.view.last.is_some() {
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let hint = "What spoke for and against this answer (panel Why)";
-                    if ui.link("Why?").on_hover_text(hint).clicked() {
-                        self.actions.push(|app| app.show_panel("why"));
-                    }
-                    let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
-                    let is_unknown = self.view.is_unknown() && self.data.source == ViewSource::Gripper;
-                    if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
-                        self.actions.push(|app| app.show_panel("label"));
-                    }
-                });
+                let hint = "Label the trial with a new name; the panel Training teaches the model named objects";
+                let is_unknown = self.view.is_unknown() && self.data.source == ViewSource::Gripper;
+                if is_unknown && ui.link("Name it").on_hover_text(hint).clicked() {
+                    self.actions.push(|app| app.show_panel("label"));
+                }
+                let hint = "What spoke for and against this answer (panel Why)";
+                if ui.link("Why?").on_hover_text(hint).clicked() {
+                    self.actions.push(|app| app.show_panel("why"));
+                }
+                if let Some(because) = self.because() {
+                    ui.add(Label::new(RichText::new(because).weak()).truncate());
+                }
             }
         });
     }
