@@ -4,7 +4,7 @@ use crate::app::plots::static_plot;
 use crate::app::theme::{self, colour};
 use crate::app::widgets::{capital, failure_ui, remark_ui, text_field, warning_ui, wrapped};
 use egui::{Button, ComboBox, Grid, Id, Modal, RichText, ScrollArea, Ui};
-use egui_plot::{AxisHints, Legend, Line};
+use egui_plot::{AxisHints, Line};
 use palpate_exchange::{Import, Mapping, PROFILES, SPLIT_GAP_S, columns_of, plain_name, read_trials};
 use palpate_geometry::palette::series_colour;
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
@@ -257,7 +257,7 @@ impl ImportDialog {
                     failure_ui(ui, cause);
                 }
                 match &outcome {
-                    None => remark_ui(ui, "Reading the file .."),
+                    None => remark_ui(ui, "Reading the file …"),
                     Some(Err(cause)) => failure_ui(ui, cause),
                     Some(Ok(outcome)) => match &outcome.import {
                         Ok(import) => import_ui(ui, import),
@@ -302,7 +302,7 @@ impl ImportDialog {
                 for name in std::iter::once("").chain(PROFILES.iter().map(|(name, _)| *name)) {
                     ui.selectable_value(&mut profile, name.to_owned(), title(name));
                 }
-                if ui.selectable_label(false, "a profile of yours ..").clicked() {
+                if ui.selectable_label(false, "a profile of yours …").clicked() {
                     *asked = Some(Asked::OpenProfile);
                 }
             });
@@ -310,7 +310,7 @@ impl ImportDialog {
                 self.use_profile(profile);
             }
             if ui
-                .button("Save profile ..")
+                .button("Save profile …")
                 .on_hover_text("Keep these roles for other files of this kind, as TOML")
                 .clicked()
             {
@@ -378,9 +378,14 @@ fn import_ui(ui: &mut Ui, import: &Import) {
             format!("The first, \"{}\"; each channel is drawn from its least to its largest value.", trial.label),
         );
         let theme = theme::of(ui);
+        ui.horizontal_wrapped(|ui| {
+            for (channel, name) in trial.signals.channels.iter().enumerate().take(MOST_CURVES) {
+                ui.label(RichText::new(name).small().color(colour(series_colour(channel, theme))));
+            }
+        });
         let seconds = AxisHints::new_x()
             .formatter(|mark: egui_plot::GridMark, _| format!("{}\u{a0}s", (mark.value * 1e9).round() / 1e9));
-        let plot = static_plot(theme, "import preview", 130.0, "", seconds, 0.0).legend(Legend::default());
+        let plot = static_plot(theme, "import preview", 130.0, "", seconds, 0.0);
         plot.show_axes([true, false]).show(ui, |plot| {
             let signals = &trial.signals;
             let width = signals.channels.len();

@@ -105,6 +105,8 @@ pub struct WindowOptions {
 /// First and smallest size of the window (points).
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
 const LEAST_SIZE: [f32; 2] = [720.0, 480.0];
+/// Height of what desktops put around windows: title bar, bars at the edges (points).
+const AROUND: f32 = 80.0;
 /// Icon of the window where the desktop has none (PNG).
 const ICON: &[u8] = include_bytes!("../../assets/desktop/palpate-128.png");
 
@@ -156,6 +158,11 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
     failed.map_or(Ok(()), |error| Err(WindowError::Other(error.to_string())))
 }
 
+/// True where the window with what is around it is larger than the screen: maximised, the desktop makes it fit.
+fn overflows(size: egui::Vec2, screen: egui::Vec2) -> bool {
+    size.x > screen.x || size.y + AROUND > screen.y
+}
+
 /// Key of the view state in eframe's storage.
 const VIEW_KEY: &str = "view";
 
@@ -177,6 +184,10 @@ struct Window {
 impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.frames += 1;
+        let screen = ui.input(|input| input.viewport().monitor_size);
+        if self.frames == 1 && screen.is_some_and(|screen| overflows(ui.ctx().content_rect().size(), screen)) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Maximized(true));
+        }
         if let Some(start) = self.start.take_if(|_| self.frames > FIRST_FRAMES) {
             match start(ui.ctx()) {
                 Ok(workbench) => self.workbench = Some(workbench),
@@ -191,7 +202,7 @@ impl eframe::App for Window {
             None => {
                 let ink = theme::colour(self.theme.colours().quiet_text);
                 let (middle, font) = (ui.max_rect().center(), egui::FontId::proportional(16.0));
-                ui.painter().text(middle, egui::Align2::CENTER_CENTER, "Palpate: preparing the graphics ..", font, ink);
+                ui.painter().text(middle, egui::Align2::CENTER_CENTER, "Palpate: preparing the graphics …", font, ink);
                 ui.ctx().request_repaint();
             }
         }
@@ -211,5 +222,17 @@ impl eframe::App for Window {
     /// The layout is stored in the view state, not in egui's memory.
     fn persist_egui_memory(&self) -> bool {
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_that_does_not_fit_the_screen_is_maximised() {
+        let overflows = |screen: [f32; 2]| overflows(FIRST_SIZE.into(), screen.into());
+        assert!(overflows([1280.0, 800.0]) && overflows([1366.0, 768.0]) && overflows([1024.0, 1200.0]));
+        assert!(!overflows([1920.0, 1080.0]));
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn ui(app: &App, actions: &mut Actions) {
     let drawn = area.show(ctx, |ui| {
         frame.show(ui, |ui| {
             ui.set_width(width - 16.0);
-            let field = text_field(&mut search.text, id.with("field")).hint_text("find an action, object or panel ..");
+            let field = text_field(&mut search.text, id.with("field")).hint_text("find an action, object or panel …");
             let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SearchInput, true, "Find an action"));
             if response.changed() {

@@ -122,9 +122,10 @@ const ROLLING_S: f64 = 10.0;
 const TRIAL_S: f64 = 4.0;
 
 impl<'a> DisplayedData<'a> {
-    /// Time that is shown (s): the cursor, or the newest sample.
+    /// Time that is shown (s): the cursor, that at which a finished round is shown, or the newest sample.
     pub(super) fn time_s(&self) -> Option<f64> {
-        self.playback.cursor_s.or_else(|| self.traces.current()?.t.last().copied())
+        let newest = || self.traces.current()?.t.last().copied();
+        self.playback.cursor_s.or_else(|| self.held_s()).or_else(newest)
     }
 
     /// Sample that is shown, or the last before it.
@@ -159,7 +160,7 @@ impl<'a> DisplayedData<'a> {
     pub(super) fn held_s(&self) -> Option<f64> {
         let snapshot = self.snapshot.filter(|now| self.source == ViewSource::Simulation && now.status.finished)?;
         let [_, end] = self.hold().filter(|_| self.playback.cursor_s.is_none())?;
-        let trace = self.traces.current()?;
+        let trace = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp)?;
         let force = |frame: &Frame| snapshot.stage.force_on_object(frame);
         let before = || trace.frames.iter().flatten().take_while(|frame| frame.t <= end + 1e-9);
         if before().last().is_none_or(|frame| force(frame).is_some()) {
@@ -173,6 +174,15 @@ impl<'a> DisplayedData<'a> {
     fn past_answer(&self) -> Option<&'a Arc<IdentificationView>> {
         self.playback.cursor_s?;
         self.traces.current()?.answers.get(self.sample()?)?.as_ref()
+    }
+
+    /// Newest answer to a live gripper, wherever the cursor is.
+    pub(super) fn newest_answer(&self) -> Option<&'a Arc<IdentificationView>> {
+        match self.source {
+            ViewSource::Simulation => self.snapshot?.identification.as_ref(),
+            ViewSource::Gripper => self.gripper?.identification.as_ref(),
+            ViewSource::Trial => None,
+        }
     }
 
     /// Phases of the grasp that is shown: as measured, or else the hold of the programme. They are found once per frame, for
@@ -212,12 +222,13 @@ impl<'a> DisplayedData<'a> {
             let grasp = last.ok_or_else(|| format!("No answer to explain: {off}."))?;
             return Ok(ExplainRequest { grasp, trial: Some(trial.id) });
         }
-        let recognised = self.recognised().ok_or("Waiting for the first grasp ..")?;
+        let recognised = self.recognised().ok_or("Waiting for the first grasp …")?;
         let Some(view) = recognised.view else {
             let off = recognised.off.unwrap_or("there is no recognition model");
             return Err(format!("Recognition is off: {off}. Without an answer there is nothing to explain."));
         };
-        let Some(grasp) = view.last.clone() else {
+        // Also where the cursor is in the past.
+        let Some(grasp) = self.newest_answer().unwrap_or(view).last.clone() else {
             let start = match self.source {
                 ViewSource::Simulation => "press play (Space)",
                 ViewSource::Gripper => "record a trial (R)",
@@ -288,7 +299,7 @@ impl<'a> DisplayedData<'a> {
                 let truth = snapshot.truth();
                 let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
                 Recognised {
-                    view: self.past_answer().or(snapshot.identification.as_ref()),
+                    view: self.past_answer().or(self.newest_answer()),
                     off: snapshot.recognition_off.as_deref(),
                     truth: Some((truth, title)),
                     waiting: if snapshot.status.playing { "Fingers closing" } else { "Press play to start a grasp" },
@@ -297,7 +308,7 @@ impl<'a> DisplayedData<'a> {
                 }
             }),
             ViewSource::Gripper => self.gripper.map(|gripper| Recognised {
-                view: self.past_answer().or(gripper.identification.as_ref()),
+                view: self.past_answer().or(self.newest_answer()),
                 off: gripper.recognition_off.as_deref(),
                 truth: None,
                 waiting: if gripper.trial.is_some() { "Fingers closing" } else { "Press R to start a grasp" },

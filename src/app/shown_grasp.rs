@@ -101,7 +101,7 @@ impl<'a> ShownGrasp<'a> {
     /// What to do where there is none.
     pub(super) fn missing(data: &DisplayedData<'_>) -> &'static str {
         match data.source {
-            ViewSource::Trial if data.opening => "Opening the trial ..",
+            ViewSource::Trial if data.opening => "Opening the trial …",
             ViewSource::Trial => "Choose a trial in the library.",
             ViewSource::Simulation => "Start a grasp: press Space.",
             ViewSource::Gripper => "Connect the gripper (Ctrl+G), then record a grasp (R).",

@@ -152,9 +152,16 @@ impl Behavior<String> for Tiling<'_> {
         response.response.on_hover_text("All tabs");
         let Some(place) = titles.iter().position(|(id, _)| tabs.is_active(*id)) else { return };
         let start = if place > 0 { ends[place - 1] } else { 0.0 };
-        let arrows = 2.0 * (self.tab_bar_height(ui.style()) + ui.spacing().item_spacing.x);
-        let room = (ui.available_width() - arrows).max(0.0);
+        let arrow = self.tab_bar_height(ui.style()) + ui.spacing().item_spacing.x;
+        let room = (ui.available_width() - 2.0 * arrow).max(0.0);
         scroll_to_active(ui, (tile, titles[place].0, room), [start, ends[place]], scroll);
+        // The bar has an arrow at either side where tabs go on there. The last tab in sight is whole: none ends within a word.
+        let left = if *scroll > self.tab_bar_height(ui.style()) { arrow } else { 0.0 };
+        let seen = *scroll + ui.available_width() - left;
+        let seen = if ends.last().is_some_and(|last| *last > seen) { seen - arrow } else { seen };
+        if let Some(end) = ends.iter().rfind(|end| **end <= seen).filter(|end| **end > *scroll) {
+            ui.add_space(seen - end);
+        }
     }
 
     fn simplification_options(&self) -> SimplificationOptions {

@@ -3,12 +3,14 @@
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::theme::{self, colour, veil};
+use egui::text::{LayoutJob, TextWrapping};
 use egui::text_edit::TextEditState;
 use egui::{
-    AsIdSalt, Button, Color32, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense, Stroke, TextEdit, Ui,
-    UiBuilder, Widget, WidgetInfo, pos2, vec2,
+    Align2, AsIdSalt, Button, Color32, FontId, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense, Stroke,
+    TextEdit, Ui, UiBuilder, Widget, WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::{Rgb, Trace};
+pub(super) use palpate_geometry::units::capital;
 use palpate_lab::workers::{GripperCommand, GripperView, Job, JobFailure};
 use palpate_store::labels::Sparkline;
 use palpate_tactile::trial::Control;
@@ -45,12 +47,6 @@ pub(super) fn failed_sensors_ui(ui: &mut Ui, gripper: &GripperView) {
         let ink = theme::of(ui).colours().warning;
         chip(ui, failed.as_ref(), ink).on_hover_text(about);
     }
-}
-
-/// A text with a capital at its beginning.
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Row that can be chosen, with its name for screen readers.
@@ -187,6 +183,17 @@ pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: 
     );
     let button = button.on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand");
     actions.on(&button, |app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
+}
+
+/// Writes one line, cut where there is no room; its right end.
+pub(super) fn put_line(ui: &Ui, place: Rect, align: Align2, text: &str, size: f32, ink: Color32) -> f32 {
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), ink);
+    job.wrap = TextWrapping::truncate_at_width(place.width().max(0.0));
+    let galley = ui.painter().layout_job(job);
+    let at = align.align_size_within_rect(galley.size(), place);
+    let right = at.right();
+    ui.painter().with_clip_rect(place.expand2(vec2(1.0, 0.0)).intersect(ui.clip_rect())).galley(at.min, galley, ink);
+    right
 }
 
 /// Least range of a sparkline: a newton, or a count.

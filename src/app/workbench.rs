@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::files::{FileFeature, drop_hint};
-use crate::app::features::gripper::GripperFeature;
+use crate::app::features::gripper::{GRASPS, GripperFeature};
 use crate::app::features::inspect::InspectFeature;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::features::library::LibraryFeature;
@@ -94,9 +94,6 @@ impl WorkbenchSetup<'_> {
         }
     }
 }
-
-/// Most grasps of an object: the paper's plateau is at three to four.
-const GRASPS: u32 = 4;
 
 /// Contents of the window: all features, and how they are drawn.
 pub struct Workbench {

@@ -148,12 +148,12 @@ fn about(sensor: &AdaptedSensor) -> String {
     match &calibration.curve {
         Curve::Flex(curve) => {
             let flat = three_digits(curve.flat_ohm * 1e-3);
-            format!("{flat} kOhm flat, {:.2} times that at 90 degrees", curve.bent_over_flat())
+            format!("{flat} kΩ flat, {:.2} times that at 90 degrees", curve.bent_over_flat())
         }
         Curve::Pad(curve) => {
             let bending = calibration.record.bending.as_ref().map(|own| own.preload(curve, own.reaches()));
             let shown = bending.map(|force| format!(", bending shows {} N, subtracted", three_digits(force)));
-            format!("{} kOhm at 1 N{}", three_digits(1e-3 / curve.gain), shown.unwrap_or_default())
+            format!("{} kΩ at 1 N{}", three_digits(1e-3 / curve.gain), shown.unwrap_or_default())
         }
     }
 }

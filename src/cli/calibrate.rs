@@ -163,7 +163,7 @@ fn points_text(calibration: &Calibration, page: &mut Page) {
         let (shown, counts) = (format!("{:.3}", kind.shown(point.stimulus)), format!("{:.1}", point.counts));
         [shown, counts, kilo, off.map(residual).unwrap_or_default()]
     });
-    page.table(&[stimulus, "counts", "kOhm", off], rows);
+    page.table(&[stimulus, "counts", "kΩ", off], rows);
     page.line(calibration.summary());
     calibration.warnings.iter().for_each(|warning| page.warn(warning));
 }

@@ -2,10 +2,12 @@
 
 use super::prelude::*;
 use super::terminal::error;
-use palpate_lab::grasping::{CONTACT_FORCE, GraspSummary, HoldSummary, Identification, Row, grasp};
+use palpate_lab::grasping::{CONTACT_FORCE, EndState, GraspSummary, HoldSummary, Identification, Row, grasp};
 use palpate_learn::{Shipped, StopRule};
 use palpate_sim::PHYSICS_VERSION;
+use palpate_sim::frame::TrustLevel;
 use palpate_sim::gripper::Side;
+use palpate_sim::objects::ObjectModel;
 use palpate_sim::poses::jittered;
 use palpate_sim::scene::Scene;
 use palpate_study::accuracy::{StatedError, stated_error};
@@ -153,7 +155,9 @@ fn measured(arguments: &CheckArguments) -> Result<Golden, Failure> {
     };
     let seed = arguments.seed.unwrap_or(0);
     let trial = grasp(&scene, object.as_ref(), seed);
-    if let Some(cause) = trial.data.quality.misses() {
+    if arguments.bless {
+        warn_unless_trusted(&trial, object.as_ref());
+    } else if let Some(cause) = trial.data.quality.misses() {
         warn(&cause);
     }
     let finer = scene.solver.finer().filter(|_| arguments.bless).map(|solver| {
@@ -195,6 +199,25 @@ fn measured(arguments: &CheckArguments) -> Result<Golden, Failure> {
         signals: golden.collect(),
         verdicts,
     })
+}
+
+/// Warns about a grasp that becomes golden and is not to be trusted, in the words of `palpate grasp`.
+pub(super) fn warn_unless_trusted(trial: &SimulatedTrial, object: Option<&ObjectModel>) {
+    let (scene, mut quality) = (&trial.header.scene, trial.data.quality.clone());
+    if quality.is_sound()
+        && let Some(found) = palpate_lab::grasping::compare(
+            scene,
+            object,
+            trial.header.seed,
+            EndState::of(trial.frames()).as_ref(),
+            &|| false,
+        )
+    {
+        found.note(&mut quality);
+    }
+    if let (TrustLevel::Red, cause) = quality.trust() {
+        warn(&format!("trust red: {cause}; written all the same"));
+    }
 }
 
 fn yes_or_no(is_so: bool) -> String {

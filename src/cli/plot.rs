@@ -73,6 +73,7 @@ pub(super) fn run(arguments: &PlotArguments, store: Option<&Path>) -> Result<(),
             mean: arguments.mean,
             raw: arguments.raw,
             heat: arguments.heat,
+            ..FigureOptions::default()
         },
     )?;
     let columns = figure.columns.max(1);

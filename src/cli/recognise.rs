@@ -209,13 +209,19 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
 impl Report for RecogniseReport {
     fn text(&self, page: &mut Page) {
         let percent = |p: f64| format!("{:.0} %", 100.0 * p);
+        // Many models have one stage only.
+        let staged = self.trials.iter().any(|trial| trial.stage_one.is_some());
         let row = |trial: &TrialReport| {
             let properties = trial.stage_one.as_ref().map(|s| format!("{}, {}", s.size, s.shape));
             let truth = shown_title(trial.truth.as_deref().unwrap_or_default());
-            let decided = shown_title(&trial.decided);
-            [trial.trial.to_string(), truth, properties.unwrap_or_default(), decided, percent(trial.probability)]
+            let mut cells = vec![trial.trial.to_string(), truth];
+            cells.extend(staged.then(|| properties.unwrap_or_default()));
+            cells.extend([shown_title(&trial.decided), percent(trial.probability)]);
+            cells
         };
-        let header = ["trial", "label", "stage one", "recognised as", "probability"];
+        let stage = staged.then_some("stage one");
+        let header: Vec<&str> =
+            ["trial", "label"].into_iter().chain(stage).chain(["recognised as", "probability"]).collect();
         page.table(&header, self.trials.iter().map(row));
         for trial in &self.trials {
             trial

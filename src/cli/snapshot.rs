@@ -1,5 +1,6 @@
 //! `palpate snapshot`: draws a scene or a stored trial to a PNG file, without a window.
 
+use super::check::warn_unless_trusted;
 use super::output::TemporaryFolder;
 use super::prelude::*;
 use super::setup::store_path;
@@ -9,7 +10,7 @@ use clap::Parser as _;
 use glam::Vec2;
 use palpate_geometry::drawing::{DrawList, StandardView};
 use palpate_geometry::palette::Theme;
-use palpate_lab::grasping::prepare;
+use palpate_lab::grasping::{grasp, prepare};
 use palpate_lab::inspection::{Keep, OpenOptions, OpenTrial};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, THRESHOLDS};
@@ -274,6 +275,11 @@ fn draw(arguments: &SnapshotArguments, store: Option<&Path>, drawers: &mut Drawe
     let drawn = if arguments.panels { window(arguments, store)? } else { scene_picture(arguments, store, drawers)? };
     if let Some(out) = arguments.out.as_ref().or(blessed) {
         write_new(out, FileKind::Png, &drawn.to_png()?)?;
+    }
+    if blessed.is_some() && arguments.trial.is_none() {
+        let scene = arguments.scene.scene(arguments.object.as_deref())?;
+        let object = load_object(&scene)?;
+        warn_unless_trusted(&grasp(&scene, object.as_ref(), 0), object.as_ref());
     }
     let is_same = golden?.map_or(Ok(true), |golden| compare(arguments, &drawn, &golden))?;
     if let Some(out) = arguments.out.as_ref().or(blessed).filter(|_| is_same) {

@@ -66,6 +66,9 @@ struct TeachReport<'a> {
     classes: Vec<&'a str>,
     seconds: f64,
     cpu_s: f64,
+    /// What `palpate demo` grasps with it.
+    #[serde(skip)]
+    grasped: &'a str,
 }
 
 pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -108,7 +111,8 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
     save_model(&taught, &out)?;
     let classes: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
     let (seconds, cpu_s) = (began.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-    TeachReport { model: &out, taught: &taught.card.taught, classes, seconds, cpu_s }.print(arguments.json)
+    let grasped = arguments.files.first().filter(|_| !arguments.real).map_or("--port PORT", String::as_str);
+    TeachReport { model: &out, taught: &taught.card.taught, classes, seconds, cpu_s, grasped }.print(arguments.json)
 }
 
 impl Report for TeachReport<'_> {
@@ -117,5 +121,9 @@ impl Report for TeachReport<'_> {
         page.fact("classes", format!("{}: {}", self.classes.len(), self.classes.join(", ")));
         page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));
         page.fact("saved", self.model.display().to_string());
+        let (model, grasped) = (self.model.display(), self.grasped);
+        page.line("Commands use it where they are told to:");
+        page.line(format!("  palpate recognise TRIAL --model {model}"));
+        page.line(format!("  palpate demo {grasped} --model {model}"));
     }
 }

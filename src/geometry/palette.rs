@@ -246,6 +246,7 @@ impl Trace {
 pub const fn series_colour(number: usize, theme: Theme) -> Rgb {
     match theme {
         _ if number == NO_SERIES => theme.colours().quiet_text,
+        _ if number == SHOWN_SERIES => theme.colours().text,
         Theme::Dark => SERIES_DARK[number % SERIES_COLOURS],
         Theme::Light => SERIES_LIGHT[number % SERIES_COLOURS],
     }
@@ -253,6 +254,9 @@ pub const fn series_colour(number: usize, theme: Theme) -> Rgb {
 
 /// Number of the colour of what stands for no series of its own, such as the key of line styles.
 pub const NO_SERIES: usize = usize::MAX;
+
+/// Number of the colour of a trial that others are compared with.
+pub const SHOWN_SERIES: usize = NO_SERIES - 1;
 
 /// Number of different series colours.
 pub const SERIES_COLOURS: usize = 7;

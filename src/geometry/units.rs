@@ -65,6 +65,12 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() { true_minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
 }
 
+/// A text with a capital at its beginning.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// A printed number with a true minus; without one where it is zero. Nothing printed is a dash.
 pub fn true_minus(text: &str) -> String {
     match text.strip_prefix('-') {

@@ -370,7 +370,7 @@ pub(super) mod tests {
             let estimate = Readout::new(&Board::default(), &serving.calibrations)?.estimate(&reading);
             Ok(estimate.value(Sensor::FLEX_LEFT).ok_or("calibrated")?.to_degrees())
         };
-        // 36 kOhm are a right angle of a strip of 18, and 45 degrees of one of 24.
+        // 36 kΩ are a right angle of a strip of 18, and 45 degrees of one of 24.
         let old = store.calibrations().add(&strip("A", 18e3))?.id;
         assert!((degrees(&store, &[])? - 90.0).abs() < 1e-2);
         let new = store.calibrations().add(&strip("A", 24e3))?.id;
@@ -383,7 +383,7 @@ pub(super) mod tests {
         store.calibrations().add(&strip("A", 90e3))?;
         let serving = store.calibrations().serving(Some(trial), &[])?;
         assert_eq!(serving.ids, [new]);
-        assert!(serving.warnings.iter().any(|w| w.contains("is skipped") && w.contains("90.0 kOhm")), "{serving:?}");
+        assert!(serving.warnings.iter().any(|w| w.contains("is skipped") && w.contains("90.0 kΩ")), "{serving:?}");
         Ok(())
     }
 }

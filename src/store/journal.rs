@@ -98,6 +98,8 @@ impl Change {
     pub fn sentence(&self) -> String {
         let name = |label: &Option<String>| shown_title(label.as_deref().unwrap_or_default());
         match self {
+            Self::Label { from: None, to } => format!("labelled {}", name(to)),
+            Self::Label { from, to: None } => format!("label {} removed", name(from)),
             Self::Label { from, to } => format!("label {} -> {}", name(from), name(to)),
             Self::Discarded => "discarded".to_owned(),
             Self::Restored => "restored".to_owned(),
@@ -201,7 +203,7 @@ impl JournalEntry {
         };
         match (label(self), &self.change) {
             (Some(to), _) if self.others.iter().all(|other| label(other) == Some(to.clone())) => {
-                format!("label -> {}", shown_title(to.as_deref().unwrap_or_default()))
+                format!("labelled {}", shown_title(to.as_deref().unwrap_or_default()))
             }
             (Some(_), _) => "labels changed".to_owned(),
             (None, Change::Tags { .. }) => "tags changed".to_owned(),

@@ -53,7 +53,7 @@ fn a_label_is_given_changed_undone_and_done_again_across_restarts() -> Outcome {
     assert_eq!((labels(&store)?, store.journal().redo()?), (vec![Some("cube".to_owned())], None));
     let entries: Vec<String> = store.journal().entries(100)?.iter().map(JournalEntry::sentence).collect();
     assert_eq!(entries.len(), 6);
-    assert_eq!(entries[5], "trial 1: label unlabelled -> Lemon");
+    assert_eq!(entries[5], "trial 1: labelled Lemon");
     assert_eq!(entries[3], "trial 1: label Puzzle cube (cube) -> Lemon (undoes 2)");
     assert_eq!(store.journal().entries(2)?.len(), 2);
     Ok(())
@@ -102,7 +102,7 @@ fn the_journal_is_only_added_to() -> Outcome {
     assert_eq!(store.purge()?, 1);
     let entries = store.journal().entries(9)?;
     assert_eq!((entries.len(), entries[1].trial), (2, None));
-    assert!(entries[1].sentence().ends_with("(purged): label unlabelled -> Lemon"), "{}", entries[1].sentence());
+    assert!(entries[1].sentence().ends_with("(purged): labelled Lemon"), "{}", entries[1].sentence());
     assert_eq!(store.journal().undo()?, None, "there is nothing left to put it back on");
     Ok(())
 }
@@ -169,13 +169,13 @@ fn changes_of_many_trials_are_one_step_of_undo() -> Outcome {
     assert_eq!(labels(&store)?, mug());
     let entries = store.journal().entries(99)?;
     assert_eq!((entries.len(), entries[0].others.len()), (2, 2));
-    assert_eq!(entries[0].sentence(), "trials 1, 2, 3: label -> mug");
+    assert_eq!(entries[0].sentence(), "trials 1, 2, 3: labelled mug");
     for _ in 0..2 {
         let undone = store.journal().undo()?.ok_or("all three")?;
-        assert!(undone.sentence().starts_with("trials 1, 2, 3: label -> mug"), "{}", undone.sentence());
+        assert!(undone.sentence().starts_with("trials 1, 2, 3: labelled mug"), "{}", undone.sentence());
         assert_eq!(labels(&store)?, before);
         let redone = store.journal().redo()?.ok_or("all three again")?;
-        assert_eq!((redone.restored().as_str(), labels(&store)?), ("trials 1, 2, 3: label -> mug", mug()));
+        assert_eq!((redone.restored().as_str(), labels(&store)?), ("trials 1, 2, 3: labelled mug", mug()));
     }
     // Tags are added and removed one by one; a trial that has one already is no change.
     let tags = |store: &Store| -> Result<Vec<Vec<String>>, StoreError> {

@@ -10,9 +10,9 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, ViewSource};
 use palpate_lab::gripper::Listen;
-use palpate_lab::workers::{GripperCommand, LabellingAction};
+use palpate_lab::workers::{GripperCommand, LabellingAction, Snapshot};
 use palpate_sim::objects::{EMPTY, object_title};
-use palpate_store::Store;
+use palpate_store::{Store, TrialPlace};
 use palpate_tactile::trial::Control;
 
 fn desk() -> Bench {
@@ -109,17 +109,21 @@ fn an_afternoon_by_keys_alone() {
     desk.until_labelled(&[(1, Some(&next), false)]);
     desk.until_shown(true, "1 of 800 trials");
     desk.until_shown(true, "The model predicts Lemon");
-    // The next one is not the same again; it is recorded twice, because the first went wrong.
+    // The next one is not the same again; it is recorded twice, and the first stays without a label.
     assert_ne!(desk.next_object(), next);
     desk.record();
     desk.record();
-    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, None, false)]);
+    desk.until_told("Trial 2 is kept without a label.");
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, false), (3, None, false)]);
     // Typing finds an object; Enter gives the label.
     desk.press(Key::Slash);
     desk.type_text("stop");
     desk.press(Key::Enter);
-    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, false), (3, Some("button"), false)]);
     desk.until_shown(true, "2 of 800 trials");
+    desk.until_shown(true, "Trial 2: which object?");
+    desk.press(Key::D);
+    desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false)]);
     desk.record();
     desk.press(Key::Escape);
     desk.tell(|app| app.label(LabellingAction::Search(String::new())));
@@ -274,6 +278,20 @@ fn blind_hides_the_models_guess_until_the_label_is_given() {
     desk.until_shown(true, "is hidden until you label the trial");
     desk.press(Key::N);
     desk.until_shown(false, "is hidden until you label the trial");
+}
+
+#[test]
+fn a_board_that_leaves_gives_back_where_grasps_are_recorded() {
+    let mut desk = desk();
+    let grasps = |snapshot: &Snapshot| (snapshot.status.recording, snapshot.status.grasps);
+    desk.tell(|app| app.connect(None));
+    desk.until(|snapshot| grasps(snapshot) == (None, 1));
+    for _ in 0..2 {
+        desk.tell(|app| _ = app.gripper.send(GripperCommand::Disconnect));
+        desk.until(|snapshot| grasps(snapshot) == (Some(TrialPlace::DemoLog), 4));
+        desk.tell(|app| app.connect(None));
+        desk.until(|snapshot| grasps(snapshot) == (None, 1));
+    }
 }
 
 #[test]

@@ -102,7 +102,7 @@ fn an_afternoon_of_labels_from_the_terminal() {
         assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
         ran.out
     };
-    assert!(said(&["trials", "undo"]).contains("Undone: trial 1: label unlabelled -> lemmon"));
+    assert!(said(&["trials", "undo"]).contains("Undone: trial 1: labelled lemmon"));
     assert!(said(&["trials", "label", "1", "lemon", "--unsure"]).contains("Lemon, unsure"));
     said(&["trials", "note", "1", "slipped at the end"]);
     said(&["trials", "tag", "1", "wet", "late"]);

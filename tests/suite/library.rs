@@ -82,7 +82,7 @@ fn the_terminal_lists_and_changes_what_matches() {
     let (out, _) = said(&["trials", "label", "1,3-6", "tomato"]);
     assert!(out.contains("3 trials labelled tomato; 2 are simulated or imported and keep their object"), "{out}");
     assert_eq!(list(&["--object", &title("tomato")]), [2, 3, 4, 5]);
-    assert!(said(&["trials", "undo"]).0.contains("trials 3, 4, 5: label -> Tomato"));
+    assert!(said(&["trials", "undo"]).0.contains("trials 3, 4, 5: labelled Tomato"));
     assert_eq!((list(&["--unlabelled"]), list(&["--object", "cube"])), (vec![5], vec![4]));
     refused(at, &["trials", "label", "1,6", "ball"], &["only trials of the real gripper"]);
     said(&["trials", "discard", "2-4", "6"]);

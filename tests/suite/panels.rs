@@ -357,7 +357,7 @@ fn effects_are_switched_and_both_numbers_move() {
     bench.until(|s| s.object.is_none());
     bench.harness.get_by_label("Effects").click();
     bench.harness.run_steps(2);
-    assert!(bench.harness.query_by_label("finger-contact is on").is_some());
+    assert!(bench.harness.query_by_label("finger contact is on").is_some());
     assert!(bench.harness.query_by_label_contains("measuring").is_some(), "it says so while it is not known");
     bench.until_effects_are_measured();
     // Without contact the empty hand feels nothing; what that costs is in front of it.
@@ -365,7 +365,7 @@ fn effects_are_switched_and_both_numbers_move() {
     assert!(bench.harness.query_all_by_label_contains(cost).count() == Effect::ALL.len());
     assert!(bench.harness.query_all_by_label_contains("without it: curvature").count() >= 3);
     let before = bench.workbench().snapshot().unwrap();
-    bench.harness.get_by_role_and_label(Role::Button, "finger-contact off").click();
+    bench.harness.get_by_role_and_label(Role::Button, "finger contact off").click();
     let after = bench.until(|s| s.grasp > before.grasp);
     assert!(before.plan.is_on("finger-contact") && !after.plan.is_on("finger-contact"));
     assert_eq!(after.scene.effects.get(Effect::FingerContact), Setting::Off);
@@ -380,18 +380,18 @@ fn effects_are_switched_and_both_numbers_move() {
     bench.until_effects_are_measured();
     assert_eq!(old(&bench), 0);
     assert_eq!(row(&bench), place, "nothing jumps");
-    assert!(bench.harness.query_by_label("finger-contact is off").is_some());
+    assert!(bench.harness.query_by_label("finger contact is off").is_some());
     assert!(bench.harness.query_by_label_contains("onset at").is_some(), "what putting it in would change");
     // Words on demand.
     let words = "The pads of the two fingers touch each other";
     assert!(bench.harness.query_by_label_contains(words).is_none());
-    bench.harness.get_by_label("about finger-contact").click();
+    bench.harness.get_by_label("about finger contact").click();
     bench.harness.run_steps(2);
     assert!(bench.harness.query_by_label_contains(words).is_some());
-    bench.harness.get_by_label("about finger-contact").click();
+    bench.harness.get_by_label("about finger contact").click();
     bench.harness.run_steps(2);
     assert!(bench.harness.query_by_label_contains(words).is_none());
-    bench.harness.get_by_role_and_label(Role::Button, "finger-contact auto").click();
+    bench.harness.get_by_role_and_label(Role::Button, "finger contact auto").click();
     bench.until(|s| s.plan.is_on("finger-contact"));
 }
 

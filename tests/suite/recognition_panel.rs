@@ -48,7 +48,7 @@ fn a_grasp_is_followed_until_it_is_sure() {
     let mut bench = alone(Theme::Dark);
     assert!(says(&bench, "Ready") && says(&bench, "Press play to start a grasp"));
     bench.advance_to(0.5);
-    assert!(says(&bench, "Sensing .."));
+    assert!(says(&bench, "Sensing …"));
     bench.advance_to(2.6);
     assert!(says(&bench, "Lemon, 61 %") && says(&bench, "Grasp 1 of up to 4, needed 90 %"));
     assert!(says(&bench, "large 95 %") && says(&bench, "spherical 96 %"));
@@ -243,13 +243,13 @@ fn an_object_from_a_file_is_learned_by_itself() {
         view.is_some_and(|view| view.labels.class("carton").is_some())
     };
     bench.tell(|app| app.open(&file.to_string_lossy()));
-    bench.until_shown(true, "Learning carton");
+    bench.until_shown(true, "Learning Carton");
     bench.harness.get_by_label("Stop").click();
-    bench.until_shown(false, "Learning carton");
+    bench.until_shown(false, "Learning Carton");
     assert!(!knows(&bench) && bench.workbench().messages().iter().any(|text| text == "Model unchanged."));
 
     bench.tell(|app| app.teach_object());
-    bench.until_told("Learned \"carton\".");
+    bench.until_told("Learned \"Carton\".");
     while !knows(&bench) {
         bench.wait();
     }
@@ -265,7 +265,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.tell(|app| app.open(&file.to_string_lossy()));
     bench.until(|s| s.truth() == "carton");
     bench.harness.run_steps(5);
-    assert!(bench.harness.query_by_label_contains("Learning carton").is_none());
+    assert!(bench.harness.query_by_label_contains("Learning Carton").is_none());
 
     // Another name is its class, its truth and its name in scene files, also when it is opened again.
     bench.harness.get_by_label("Rename").click();
@@ -275,7 +275,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.harness.get_by_label("Name of the object").type_text("crate");
     bench.harness.run_steps(2);
     bench.harness.get_by_label("Save").click();
-    bench.until_told("Learned \"crate\".");
+    bench.until_told("Learned \"Crate\".");
     let named = bench.until(|s| s.truth() == "crate");
     assert!(named.scene.to_toml().contains("name = \"crate\""), "{}", named.scene.to_toml());
     let saved = bench.workbench().view().simulation_model.clone().unwrap();

@@ -154,7 +154,7 @@ fn findings_are_told_by_words_and_rows_open_trials() {
         scripted_result(store);
     };
     let mut bench = bench(Theme::Light, [1400.0, 1000.0], fill);
-    bench.until_shown(true, "4 claims: 1 confirmed, 1 in part, 1 not, 1 not measured");
+    bench.until_shown(true, "4 claims: agrees 1, partly 1, disagrees 1, not measured 1");
     for word in ["✔ agrees", "✖ disagrees", "± partly", "– not measured"] {
         assert!(bench.harness.query_by_label(word).is_some(), "{word}");
     }

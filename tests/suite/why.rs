@@ -6,7 +6,7 @@ use crate::golden::compare;
 use crate::program::{json, refused, run};
 use crate::scripted;
 use egui_kittest::kittest::Queryable as _;
-use palpate::app::{ALL_PANELS, Mode, PanelKind};
+use palpate::app::{ALL_PANELS, Mode, PanelKind, Seek};
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::grasp;
 use palpate_lab::workers::Command;
@@ -103,6 +103,7 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     assert!(bench.harness.query_by_label_contains("appears when a grasp ends: press play").is_some());
     run_out(&mut bench);
     bench.until_shown(true, "Trial 1, Lemon, sim, distance 0.00, same readings");
+    assert!(bench.harness.query_by_label("At the end of grasp 1.").is_some());
     compare("why_found", &bench.picture(), "the CPU renderer of the tests");
     // The model weighs the pads alone: curvature counts nothing, in no phase.
     for label in ["left curvature: 0 points", "left curvature, hold: 0 points", "pre-shaping: "] {
@@ -112,6 +113,11 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     assert!(of_force.rect().right() <= size[0], "nothing is cut off");
     assert!(bench.harness.query_by_label_contains("For Lemon: left pad force").is_some());
     assert!(bench.harness.query_by_label_contains("Trial 2, Earphone case").is_some());
+    // It is explained wherever the cursor is in its past.
+    bench.tell(|app| app.seek(Seek::To(1.0)));
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label_contains("At the end of grasp 1").is_some());
+    assert!(bench.harness.query_by_label_contains("For Lemon: left pad force").is_some());
 }
 
 #[test]
@@ -130,6 +136,8 @@ fn a_link_beside_the_answer_opens_the_panel() {
     bench.harness.run_steps(2);
     // The strongest reason stands beside it.
     bench.until_shown(true, "left pad force in the hold");
+    // The time is that of the picture, which shows the hand as it was held.
+    bench.until_shown(true, "3.00 / 4.00 s");
     bench.harness.get_by_label("Why?").click();
     bench.until_shown(true, "Channel by phase");
     // A nearest trial opens in Inspect mode, and is explained there; it is not among its own nearest.

@@ -200,7 +200,7 @@ fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
         let picture = bench.picture();
         // The roles are kept for other files, and read from their profile.
         let profile = folder.path().join(format!("{theme:?}.toml"));
-        bench.harness.get_by_label("Save profile ..").click();
+        bench.harness.get_by_label("Save profile …").click();
         bench.harness.run_steps(3);
         press(&mut bench, Modifiers::COMMAND, Key::A);
         type_text(&mut bench, profile.to_str().unwrap());
@@ -214,7 +214,7 @@ fn trials_of_another_program_are_imported_by_saying_what_the_columns_are() {
         bench.until_shown(true, "samples per second");
         bench.harness.get_by_value("its own names").click();
         bench.harness.run_steps(2);
-        bench.harness.get_by_label("a profile of yours ..").click();
+        bench.harness.get_by_label("a profile of yours …").click();
         bench.harness.run_steps(3);
         press(&mut bench, Modifiers::COMMAND, Key::A);
         type_text(&mut bench, profile.to_str().unwrap());

@@ -120,17 +120,17 @@ fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         let mut item = |ui: &mut Ui, name: &str, key: &str, action: fn(&mut App)| {
             actions.on(&ui.add(egui::Button::new(name).shortcut_text(key)), action);
         };
-        item(ui, "Find an action ..", "Ctrl+K", |app| app.view.palette_shown = true);
+        item(ui, "Find an action …", "Ctrl+K", |app| app.view.palette_shown = true);
         ui.separator();
-        item(ui, "Open an object ..", "Ctrl+O", App::ask_for_object);
-        item(ui, "Import trials ..", "", App::ask_for_trials);
-        item(ui, "Save the scene ..", "Ctrl+S", App::save_scene);
-        item(ui, "Save a picture ..", "Ctrl+P", |app| {
+        item(ui, "Open an object …", "Ctrl+O", App::ask_for_object);
+        item(ui, "Import trials …", "", App::ask_for_trials);
+        item(ui, "Save the scene …", "Ctrl+S", App::save_scene);
+        item(ui, "Save a picture …", "Ctrl+P", |app| {
             if let Err(why) = view3d::save_picture(app) {
                 app.notices.info(why);
             }
         });
-        item(ui, "Export ..", "Ctrl+E", |app| match app.view.mode {
+        item(ui, "Export …", "Ctrl+E", |app| match app.view.mode {
             Mode::Demo | Mode::Inspect => app.export_figure(FigureOptions::default()),
             Mode::Label => app.export_labelled(),
             Mode::Study => app.export_study_figure(),

@@ -18,8 +18,10 @@ pub(super) fn ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
             let button = ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about);
             actions.on(&button, action);
         };
-        let record = if trial.is_some() { "Again  R" } else { "Record  R" };
-        let about = "Record a grasp; during a trial, discard it and start again (R)";
+        let (record, about) = match trial {
+            Some(_) => ("Restart  R", "Discard the running trial and record from the beginning (R)"),
+            None => ("Record  R", "Record a grasp; a trial without a label is kept (R)"),
+        };
         button(connected, record, about, |app| app.label(LabellingAction::Record));
         let about = "End the trial and keep it (Q)";
         button(trial.is_some(), "End  Q", about, |app| _ = app.gripper.send(GripperCommand::End));

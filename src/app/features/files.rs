@@ -3,7 +3,7 @@
 use super::App;
 use crate::app::export::{ExportRequest, export_job};
 use palpate_exchange::Mapping;
-use palpate_geometry::palette::Theme;
+use palpate_geometry::palette::{SHOWN_SERIES, Theme};
 use palpate_lab::inspection::{FigureOptions, OpenOptions, OpenTrial, comparison_figure};
 use palpate_lab::workers::{Job, Wake};
 use palpate_sim::scene::Scene;
@@ -187,10 +187,12 @@ impl App {
         let Some(own) = self.inspect.inspected() else {
             return self.notices.warning("Figures are made of stored trials: open one in Inspect mode.");
         };
-        let others = own.pinned.iter().map(|pinned| &pinned.trial).filter(|trial| trial.id != own.trial.id);
-        let trials: Vec<&OpenTrial> = std::iter::once(own.trial).chain(others).map(Arc::as_ref).collect();
+        let others = own.pinned.iter().filter(|pinned| pinned.trial.id != own.trial.id);
+        let others = others.map(|pinned| (pinned.trial.as_ref(), pinned.colour));
+        let shown = std::iter::once((own.trial.as_ref(), SHOWN_SERIES));
+        let (trials, colours): (Vec<&OpenTrial>, Vec<usize>) = shown.chain(others).unzip();
         let (align, mean) = (self.inspect.alignment, self.inspect.spread);
-        match comparison_figure(&trials, &FigureOptions { align, mean, ..options }) {
+        match comparison_figure(&trials, &FigureOptions { align, mean, colours, ..options }) {
             Ok(figure) => self.files.export(ExportRequest::Figure(figure, Theme::Light, FIGURE_SIZE)),
             Err(cause) => self.notices.warning(cause.to_string()),
         }

@@ -20,6 +20,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, JoinHandle};
 use std::time::Instant;
 
+/// Most grasps of an object: the paper's plateau is at three to four.
+pub(in crate::app) const GRASPS: u32 = 4;
+
 /// State of the real gripper in the window.
 pub struct GripperFeature {
     /// Dropped before the worker.
@@ -34,7 +37,7 @@ pub struct GripperFeature {
     /// Part of the trial at the last look.
     part: Option<GraspStage>,
     /// Recording and number of grasps of the simulation before it began to follow the gripper.
-    before_following: Option<(Option<TrialPlace>, u32)>,
+    before_following: (Option<TrialPlace>, u32),
     /// Scene that the gripper's thread has.
     scene: Scene,
     /// Scene from before the empty hand is shown to adapt to.
@@ -66,7 +69,7 @@ impl GripperFeature {
             connected: false,
             heard: Instant::now(),
             part: None,
-            before_following: None,
+            before_following: (Some(TrialPlace::DemoLog), GRASPS),
             scene,
             before_adapting: None,
         }
@@ -122,6 +125,8 @@ impl App {
         }
         gripper.view = gripper.worker.view();
         let Some(now) = gripper.view.clone() else { return };
+        // Grasps read through other calibrations are not comparable.
+        gripper.traces.forget_before(now.calibrated);
         if gripper.connected != now.is_connected() {
             gripper.connected = now.is_connected();
             if now.is_connected() {
@@ -201,14 +206,14 @@ impl App {
     /// While a gripper is connected, the simulation waits for it and stores nothing.
     fn hand_over(&mut self) {
         let commands = if self.gripper.connected {
-            let status = self.snapshot().map(|snapshot| snapshot.status.clone()).unwrap_or_default();
-            self.gripper.before_following = Some((status.recording, status.grasps));
+            // Nothing is known yet where the window opens with a gripper.
+            let now = self.snapshot().map(|snapshot| (snapshot.status.recording, snapshot.status.grasps));
+            let known = now.filter(|(recording, _)| recording.is_some());
+            self.gripper.before_following = known.unwrap_or(self.gripper.before_following);
             vec![Command::SetRecording(None), Command::SetGrasps(1), Command::Reset, Command::Pause]
         } else {
-            let before = self.gripper.before_following.take();
-            before.map_or_else(Vec::new, |(recording, grasps)| {
-                vec![Command::SetRecording(recording), Command::SetGrasps(grasps.max(1))]
-            })
+            let (recording, grasps) = self.gripper.before_following;
+            vec![Command::SetRecording(recording), Command::SetGrasps(grasps)]
         };
         commands.into_iter().for_each(|command| self.simulation.send(command));
     }

@@ -368,8 +368,10 @@ impl App {
             self.simulation.send(Command::Pause);
         }
         let live = self.view.source != ViewSource::Trial;
-        let times = self.times();
-        self.playback().seek(to, &times, live);
+        let (times, shown) = (self.times(), self.shown().time_s());
+        let playback = self.playback();
+        playback.cursor_s = playback.cursor_s.or(shown);
+        playback.seek(to, &times, live);
     }
 
     /// Plays or pauses.
@@ -386,9 +388,8 @@ impl App {
 
     /// Puts mark A (0) or B (1) at the cursor; there already, it is taken away.
     pub(in crate::app) fn put_mark(&mut self, which: usize) {
-        let [_, last] = span_of(&self.times());
+        let at = self.shown().time_s().unwrap_or(0.0);
         let playback = self.playback();
-        let at = playback.cursor_s.unwrap_or(last);
         if let Some(mark) = playback.marks.get_mut(which) {
             *mark = if *mark == Some(at) { None } else { Some(at) };
         }

@@ -17,10 +17,10 @@ const REMEDIES: [Remedy; 8] = [
     Remedy("object.collision = \"hull\"", "Use its hull", App::use_hull),
     Remedy("set object.scale to decide", "Treat as mm", |app| app.set_object_scale(1e-3)),
     Remedy("set object.scale to decide", "Treat as m", |app| app.set_object_scale(1.0)),
-    Remedy("cannot read \"", "Choose a file ..", App::ask_for_object),
-    Remedy("cannot read the mesh", "Choose a file ..", App::ask_for_object),
-    Remedy("not calibrated", "Calibrate ..", |app| app.show_panel("calibration")),
-    Remedy("no calibration", "Calibrate ..", |app| app.show_panel("calibration")),
+    Remedy("cannot read \"", "Choose a file …", App::ask_for_object),
+    Remedy("cannot read the mesh", "Choose a file …", App::ask_for_object),
+    Remedy("not calibrated", "Calibrate …", |app| app.show_panel("calibration")),
+    Remedy("no calibration", "Calibrate …", |app| app.show_panel("calibration")),
     Remedy(UNDONE_BY_KEY, "Undo", |app| app.edit_labels(LabelCommand::Undo)),
 ];
 
@@ -178,17 +178,18 @@ impl Notices {
                 let mut closed = false;
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     closed = ui.small_button("×").on_hover_text("Dismiss").clicked();
+                    // The number of others comes and goes; what is clicked stays where it is.
+                    for Remedy(_, button, does) in remedies(text) {
+                        if ui.button(RichText::new(*button).small()).clicked() {
+                            chosen = Some(*does);
+                        }
+                    }
                     if others > 0 {
                         ui.menu_button(RichText::new(format!("{others} more")).small(), |ui| {
                             for shown in self.shown.iter().rev() {
                                 ui.label(&shown.text);
                             }
                         });
-                    }
-                    for Remedy(_, button, does) in remedies(text) {
-                        if ui.button(RichText::new(*button).small()).clicked() {
-                            chosen = Some(*does);
-                        }
                     }
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                         ui.add(Label::new(RichText::new(text).small().color(colour(ink))).wrap());
@@ -241,6 +242,23 @@ mod tests {
     }
 
     #[test]
+    fn a_button_stays_where_it_is_while_other_messages_come_and_go() {
+        use egui_kittest::kittest::Queryable as _;
+        let (mut notices, undo) = (Notices::default(), "trial 7 discarded; Ctrl+Z brings it back");
+        notices.info("Trial 6 stored.");
+        notices.warning(undo);
+        let draw = |ui: &mut Ui, notices: &mut Notices| assert!(notices.line(ui, Theme::Dark).is_none());
+        let mut harness = egui_kittest::Harness::new_ui_state(draw, notices);
+        let place = |harness: &egui_kittest::Harness<'_, Notices>| harness.get_by_label("Undo").rect();
+        let before = place(&harness);
+        assert!(harness.query_by_label("1 more").is_some());
+        harness.state_mut().shown.retain(|shown| shown.text == undo);
+        harness.step();
+        assert!(harness.query_by_label("1 more").is_none());
+        assert_eq!(place(&harness), before);
+    }
+
+    #[test]
     fn warnings_carry_the_buttons_that_help() {
         let of = |text: &str| remedies(text).map(|Remedy(_, button, _)| *button).collect::<Vec<_>>();
         let open = MeshError::Open { holes: 1, widest_mm: 20.0 };
@@ -254,7 +272,7 @@ mod tests {
             scene.object.source = folder.path().join(name).to_string_lossy().into_owned();
             scene.load_object()
         };
-        assert_eq!(of(&load("gone.obj").expect_err("no file").to_string()), ["Choose a file .."]);
+        assert_eq!(of(&load("gone.obj").expect_err("no file").to_string()), ["Choose a file …"]);
         let corners = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\n";
         let cube = format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
         std::fs::write(folder.path().join("large.obj"), cube).expect("writes");

@@ -3,6 +3,7 @@
 use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
+use palpate_geometry::units::capital;
 use palpate_lab::grasping::{LESSON_GRASPS, RecognisedGrasp};
 use palpate_lab::workers::{Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Model, Models, Shipped};
@@ -159,7 +160,7 @@ impl App {
         let Some(Learned { title, source, before: (model, _), .. }) = &self.recognition.learned else { return };
         let (title, source) = (title.clone(), source.clone());
         let name = match class_name(name) {
-            Ok(name) if name == title => return,
+            Ok(name) if capital(&name) == title => return,
             Ok(name) if model.card.labels.class(&name).is_none() => name,
             Ok(name) => return self.notices.failed("name", format!("The model knows another \"{name}\".")),
             Err(cause) => return self.notices.failed("name", cause.to_string()),
@@ -257,7 +258,7 @@ impl App {
             Ok(trained) if simulated.iter().any(is_current) => {
                 let before = self.view.simulation_model.replace(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
-                let title = object_title(&command.name);
+                let title = capital(&object_title(&command.name));
                 self.notices.info(format!("Learned \"{title}\"."));
                 self.recognition.learned = command.object.as_ref().map(|object| Learned {
                     title,

@@ -179,7 +179,7 @@ impl App {
             view.frame_all(snapshot);
         }
         if source != EMPTY && !catalogue().iter().any(|b| b.name == *source) {
-            view.remember_file(source);
+            view.remember_file(source, snapshot.object.as_ref().map(|object| object.title.as_str()));
             if simulation.seen.is_some()
                 && let Some(object) = &snapshot.object
             {

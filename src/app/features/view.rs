@@ -5,13 +5,15 @@ use crate::app::theme;
 use egui_tiles::Tree;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
+use palpate_geometry::units::capital;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{BendUnit, LoadUnit};
 use palpate_lab::workers::{Command, LabelCommand, Snapshot};
+use palpate_sim::objects::object_title;
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Camera, theme, layout and settings.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -87,6 +89,8 @@ pub struct ViewState {
     pub scale: f32,
     /// Files opened last, newest first.
     pub recent: Vec<String>,
+    /// Titles of the objects in them.
+    pub titles: BTreeMap<String, String>,
 }
 
 /// Mode of the window.
@@ -227,6 +231,7 @@ impl Default for ViewState {
             palette_shown: false,
             scale: 1.0,
             recent: Vec::new(),
+            titles: BTreeMap::new(),
         }
     }
 }
@@ -245,11 +250,19 @@ impl ViewState {
         self.framed = Some(self.camera);
     }
 
+    /// Title of the object in a file: that which it had when it was opened last.
+    pub(in crate::app) fn title_of(&self, path: &str) -> String {
+        let stem = || Path::new(path).file_stem().map_or(path.into(), |stem| stem.to_string_lossy());
+        self.titles.get(path).cloned().unwrap_or_else(|| capital(&object_title(&stem())))
+    }
+
     /// Puts a file in front of the recent ones.
-    pub(in crate::app) fn remember_file(&mut self, path: &str) {
+    pub(in crate::app) fn remember_file(&mut self, path: &str, title: Option<&str>) {
         self.recent.retain(|known| known != path);
         self.recent.insert(0, path.to_owned());
         self.recent.truncate(MOST_RECENT);
+        self.titles.extend(title.map(|title| (path.to_owned(), title.to_owned())));
+        self.titles.retain(|path, _| self.recent.contains(path));
     }
 }
 

@@ -43,7 +43,7 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
         None => running
             .map(|running| running.progress.words)
             .filter(|words| !words.is_empty())
-            .unwrap_or_else(|| "measuring ..".to_owned()),
+            .unwrap_or_else(|| "measuring …".to_owned()),
     };
     let fresh = fresh.is_some();
     let mut scene = simulation.scene.clone();
@@ -132,11 +132,11 @@ impl Row<'_> {
     fn setting_ui(&self, ui: &mut Ui, now: Setting, open: bool, unfolded: &mut Option<Effect>) -> Option<Setting> {
         let (row, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
         let [lamp, name, settings, cost, change] = columns(row);
-        lamp_ui(ui, lamp, self.theme, self.effect.name(), self.planned.is_some_and(|planned| planned.on));
+        lamp_ui(ui, lamp, self.theme, &words(self.effect), self.planned.is_some_and(|planned| planned.on));
         if self.name_ui(ui, name, open) {
             *unfolded = if open { None } else { Some(self.effect) };
         }
-        let clicked = settings_ui(ui, settings, self.effect.name(), now);
+        let clicked = settings_ui(ui, settings, &words(self.effect), now);
         if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
             let colours = self.theme.colours();
             let saves = explained.cost_share < 0.0;
@@ -159,9 +159,9 @@ impl Row<'_> {
         let ink = if response.hovered() || open { colours.accent } else { colours.text };
         let font = egui::TextStyle::Body.resolve(ui.style());
         let painter = ui.painter().with_clip_rect(rect.expand2(vec2(GAP, 0.0)));
-        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, self.effect.name(), font, colour(ink));
+        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, words(self.effect), font, colour(ink));
         response.widget_info(|| {
-            egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", self.effect.name()))
+            egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", words(self.effect)))
         });
         let clicked = response.clicked();
         if let Some(planned) = self.planned {
@@ -183,7 +183,7 @@ impl Row<'_> {
         }
         let words = if self.fresh { words.to_owned() } else { format!("{words} ({BEFORE})") };
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &words));
-        response.on_hover_text(format!("{}: {words}", self.effect.name()));
+        response.on_hover_text(format!("{}: {words}", self::words(self.effect)));
     }
 
     /// Reason, cost and change in words.
@@ -208,6 +208,11 @@ impl Row<'_> {
             }
         });
     }
+}
+
+/// Name of an effect in words.
+fn words(effect: Effect) -> String {
+    effect.name().replace('-', " ")
 }
 
 /// Reason of a decision with its number.

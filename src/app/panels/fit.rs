@@ -27,7 +27,7 @@ pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, scene: &Scene, actions: &mut
         let hint = "Fits the simulated finger to empty closes and grasps of a fixed object.";
         remark_ui(ui, hint);
         let controls = |ui: &mut Ui, actions: &mut Actions| match tools.trials.last().map(|ended| ended.outcome) {
-            None => remark_ui(ui, "loading trials .."),
+            None => remark_ui(ui, "loading trials …"),
             Some(Ok(rows)) => choice_ui(ui, &rows, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
         };
@@ -103,7 +103,8 @@ fn fitted_ui(ui: &mut Ui, now: &Scene, fitted: &FittedFinger, actions: &mut Acti
                 app.notices.info("Fitted finger in use.");
             });
         }
-        if ui.button("Save as scene ..").on_hover_text("Scene of the first trial with this finger, as TOML").clicked() {
+        if ui.button("Save as scene …").on_hover_text("Scene of the first trial with this finger, as TOML").clicked()
+        {
             let scene = scene.clone();
             actions.push(|app| app.save_scene_as(scene));
         }

@@ -15,7 +15,7 @@ use palpate_tactile::Quantity;
 
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let Some(snapshot) = data.snapshot else {
-        ui.weak("Waiting for the first grasp ..");
+        ui.weak("Waiting for the first grasp …");
         return;
     };
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
@@ -92,8 +92,8 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
     let quality = &last.summary.quality;
     let (level, reason) = quality.trust();
     let reason = match checking {
-        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with another simulation ..".to_owned(),
-        Some(Checking::ComputingAgain) => "computing again at finer accuracy ..".to_owned(),
+        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with another simulation …".to_owned(),
+        Some(Checking::ComputingAgain) => "computing again at finer accuracy …".to_owned(),
         _ => reason,
     };
     ui.horizontal(|ui| {

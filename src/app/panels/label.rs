@@ -7,6 +7,7 @@ use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, remark_ui, selectable_row, text_field, warning_ui, wrapped};
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_geometry::units;
 use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
@@ -24,7 +25,7 @@ pub(super) fn ui(
     actions: &mut Actions,
 ) {
     let Some(view) = &labelling.labels else {
-        ui.weak("Reading the store ..");
+        ui.weak("Reading the store …");
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -105,7 +106,7 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
 
 /// Pose of the object, in words.
 fn cue(next: &NextTrial) -> String {
-    let turn = format!("turn {:.0}°", next.cue.turn_deg);
+    let turn = format!("turn {}°", units::fixed(next.cue.turn_deg, 0));
     let [along, across] = next.cue.shift_mm;
     let part = |by: f64, positive: &str, negative: &str| match by.round() {
         by if by > 0.0 => format!(", {by:.0} mm {positive}"),
@@ -193,10 +194,8 @@ fn question_ui(
         actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(theme::of(ui)))), |app| {
             app.label(LabellingAction::GiveLabel);
         });
-        let again = if trial.object.is_none() { "Again  R" } else { "Record  R" };
-        actions.on(&ui.button(again).on_hover_text("Record again; an unlabelled trial is discarded"), |app| {
-            app.label(LabellingAction::Record);
-        });
+        let record = ui.button("Record  R").on_hover_text("Record a grasp; a trial without a label is kept (R)");
+        actions.on(&record, |app| app.label(LabellingAction::Record));
         actions.on(&ui.button("Discard  D"), |app| app.label(LabellingAction::Discard));
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {

@@ -2,18 +2,19 @@
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
+use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{capital, selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue, object_title};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
 pub(super) fn ui<'a>(
     ui: &mut Ui,
-    (chosen, recent): (&str, &[String]),
+    (chosen, view): (&str, &ViewState),
     learned_as: impl Fn(&str) -> Option<&'a str>,
     pictures: &Thumbnails,
     actions: &mut Actions,
@@ -31,13 +32,12 @@ pub(super) fn ui<'a>(
     open_row(ui, actions);
     ui.add_space(2.0);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for path in recent {
-            let class = learned_as(path);
-            let stem = || std::path::Path::new(path).file_stem()?.to_str();
-            let name = class.or_else(stem).unwrap_or(path);
+        for path in &view.recent {
             let texture = pictures.get(path);
+            let class = learned_as(path);
+            let title = class.map_or_else(|| view.title_of(path), |class| capital(&object_title(class)));
             let learned = if class.is_some() { "learned, " } else { "" };
-            let clicked = row(ui, chosen == path, texture, &capital(name), &format!("{learned}{path}"));
+            let clicked = row(ui, chosen == path, texture, &title, &format!("{learned}{path}"));
             follow(chosen == path, &clicked);
             let source = path.clone();
             actions.on(&clicked, move |app| app.open(&source));
@@ -56,11 +56,11 @@ pub(super) fn ui<'a>(
 
 /// Button and field for files.
 fn open_row(ui: &mut Ui, actions: &mut Actions) {
-    let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL .."));
+    let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL …").truncate());
     actions.on(&open.on_hover_text("Ctrl+O, or drop a file anywhere on the window"), App::ask_for_object);
     let id = egui::Id::unique("object path");
     let mut path = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_default();
-    let field = text_field(&mut path, id.with("field")).hint_text(".. or paste a path");
+    let field = text_field(&mut path, id.with("field")).hint_text("… or paste a path");
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
         let source = std::mem::take(&mut path);

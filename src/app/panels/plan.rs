@@ -2,7 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::theme::{self, colour, veil};
-use crate::app::widgets::{number_field, text_field};
+use crate::app::widgets::{number_field, put_line, text_field};
 use egui::{DragValue, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView};
 use palpate_sim::objects::{class_of, object_title};
@@ -13,7 +13,7 @@ const WANTED: u32 = 50;
 
 pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions) {
     let Some(view) = labels else {
-        ui.weak("Reading the store ..");
+        ui.weak("Reading the store …");
         return;
     };
     let (done, wanted) = (view.progress.done(), view.progress.wanted());
@@ -37,7 +37,7 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
 fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     let id = egui::Id::unique("plan addition");
     let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
-    let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object ..").char_limit(80));
+    let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object …").char_limit(80));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
         let added = std::mem::take(&mut name);
@@ -72,14 +72,10 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
             painter.rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Inside);
         }
         let (font, ink) = (egui::FontId::proportional(12.5), colour(colours.text));
-        painter.text(
-            rect.left_center() + vec2(6.0, 0.0),
-            egui::Align2::LEFT_CENTER,
-            object_title(name),
-            font.clone(),
-            ink,
-        );
-        painter.text(rect.right_center() - vec2(6.0, 0.0), egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
+        let count = rect.right_center() - vec2(6.0, 0.0);
+        let count = painter.text(count, egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
+        let room = rect.with_min_x(rect.left() + 6.0).with_max_x(count.left() - 6.0);
+        put_line(ui, room, egui::Align2::LEFT_CENTER, &object_title(name), 12.5, ink);
         let mut new = *wanted;
         let drag = DragValue::new(&mut new).range(0..=MOST_WANTED).speed(0.2);
         let sized = |ui: &mut Ui| ui.add_sized([40.0, 22.0], drag);

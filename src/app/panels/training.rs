@@ -39,7 +39,7 @@ pub(super) fn ui(
         match data.map(|data| &data.classes) {
             Some(Ok(classes)) => classes_ui(ui, model, classes, actions),
             Some(Err(cause)) => failure_ui(ui, cause),
-            None => remark_ui(ui, "loading labelled trials .."),
+            None => remark_ui(ui, "loading labelled trials …"),
         }
         models_ui(ui, chosen, data, actions);
     });

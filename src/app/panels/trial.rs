@@ -95,7 +95,8 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
         facts.push(("peak pressure", format!("{:.2}{SPACE}bar", header.scene.programme.peak_bar)));
     }
     if let Some(own) = &trial.simulated {
-        let on: Vec<&str> = own.plan.effects.iter().filter(|effect| effect.on).map(|e| e.name.as_str()).collect();
+        let on = own.plan.effects.iter().filter(|effect| effect.on);
+        let on: Vec<String> = on.map(|effect| effect.name.replace('-', " ")).collect();
         facts.push(("effects", if on.is_empty() { "none".to_owned() } else { on.join(", ") }));
     }
     if let Some(collection) = &header.collection {

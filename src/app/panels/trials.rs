@@ -3,8 +3,8 @@
 use crate::app::actions::Actions;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{selectable_row, sparkline};
-use egui::{Align2, FontId, Rect, RichText, ScrollArea, Ui, pos2, vec2};
+use crate::app::widgets::{put_line, selectable_row, sparkline};
+use egui::{Align2, Rect, RichText, ScrollArea, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::{LabelledTrial, TrialEdit};
@@ -17,7 +17,7 @@ const PICTURE: f32 = 74.0;
 
 pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
     let Some(view) = &labelling.labels else {
-        ui.weak("Reading the store ..");
+        ui.weak("Reading the store …");
         return;
     };
     let draft = labelling.session.draft();
@@ -82,11 +82,10 @@ fn row_ui(
     sparkline(ui, &trial.sparkline, picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);
     let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
-    let painter = ui.painter_at(words);
     let ink = if trial.object.is_some() { colours.text } else { colours.warning };
     let mark = if trial.unsure { "?" } else { "" };
     let title = format!("{}  {name}{mark}", trial.id);
-    painter.text(words.left_top(), Align2::LEFT_TOP, title, FontId::proportional(13.0), colour(ink));
+    put_line(ui, words, Align2::LEFT_TOP, &title, 13.0, colour(ink));
     let blind = labelling.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
@@ -99,7 +98,7 @@ fn row_ui(
         }
         (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
     };
-    painter.text(words.left_bottom(), Align2::LEFT_BOTTOM, below, FontId::proportional(11.0), colour(ink));
+    put_line(ui, words, Align2::LEFT_BOTTOM, &below, 11.0, colour(ink));
     let clicked = response.clicked();
     let about = || {
         format!(

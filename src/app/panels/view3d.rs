@@ -21,7 +21,6 @@ use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_sim::objects::object_title;
 use std::sync::Arc;
 
 /// What the 3-D view reads.
@@ -73,7 +72,7 @@ pub(super) fn ui(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
     buttons(ui, rect, own, actions);
     if let Some(loading) = own.data.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
         // Below the buttons.
-        let text = format!("Loading {} ..", object_title(loading));
+        let text = format!("Loading {} …", own.data.view.title_of(loading));
         let (font, ink) = (egui::FontId::proportional(14.0), colour(own.data.view.theme.colours().text));
         let galley = ui.painter().layout(text, font, ink, (rect.width() - 24.0).max(60.0));
         let place = rect.center_top() + egui::vec2(-0.5 * galley.size().x, 48.0);
@@ -86,13 +85,13 @@ pub(super) fn ui(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
 /// Why there is nothing to draw.
 fn why_nothing(own: &View3d<'_>) -> &'static str {
     match own.data.source {
-        ViewSource::Trial if own.data.opening => "Opening the trial ..",
+        ViewSource::Trial if own.data.opening => "Opening the trial …",
         ViewSource::Trial if own.data.inspected.is_some() => {
             "Nothing to draw: this trial has no poses, and no calibrated flex strip from which the fingers could be \
              reconstructed."
         }
         ViewSource::Trial => "Choose a trial in the library.",
-        ViewSource::Simulation | ViewSource::Gripper => "Loading the object ..",
+        ViewSource::Simulation | ViewSource::Gripper => "Loading the object …",
     }
 }
 

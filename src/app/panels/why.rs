@@ -8,6 +8,7 @@ use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{capital, remark_ui, wrapped};
 use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_geometry::units;
 use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
 use palpate_lab::workers::{ExplainRequest, Explainer};
@@ -50,13 +51,15 @@ pub(super) fn ui(
     };
     let Some(explained) = explainer.explained(&request) else {
         actions.push(move |app| app.recognition.explainer.explain(&request));
-        ui.weak("Leaving out channels and phases ..");
+        ui.weak("Leaving out channels and phases …");
         return;
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
         match &explained.outcome {
             Ok(why) => {
+                ui.add(egui::Label::new(RichText::new(why.answer()).heading()).wrap());
+                wrapped(ui, RichText::new(which_grasp(data, &request, why)).small().weak());
                 evidence_ui(ui, why);
                 nearest_ui(ui, explainer, pictures, &request, actions);
             }
@@ -68,8 +71,26 @@ pub(super) fn ui(
     });
 }
 
+/// The grasp that is explained, and where the answer at the time shown is another, that one.
+fn which_grasp(data: &DisplayedData<'_>, request: &ExplainRequest, why: &Attribution) -> String {
+    let grasps = request.grasp.belief.grasps();
+    let now = data.recognised().and_then(|recognised| recognised.view);
+    let explained = match request.trial {
+        Some(id) => format!("At the end of trial {id}"),
+        None => format!("At the end of grasp {grasps}"),
+    };
+    if data.newest_answer().is_some_and(|view| view.listening) {
+        return format!("{explained}; grasp {} is running.", grasps + 1);
+    }
+    let shown = now.and_then(|view| view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last()));
+    let shown = shown.map(|pmf| percent(pmf.probabilities()[why.first.class]));
+    match (shown.filter(|shown| *shown != percent(why.first.probability)), data.time_s()) {
+        (Some(shown), Some(t)) => format!("{explained}; at {} it is {shown}.", units::shown(t, "s")),
+        _ => format!("{explained}."),
+    }
+}
+
 fn evidence_ui(ui: &mut Ui, why: &Attribution) {
-    ui.add(egui::Label::new(RichText::new(why.answer()).heading()).wrap());
     for sentence in why.sentences() {
         wrapped(ui, RichText::new(sentence));
     }
@@ -254,7 +275,7 @@ fn nearest_ui(
             let request = request.clone();
             actions.push(move |app| app.recognition.explainer.explain(&request));
             let words = nearest.running().map(|running| running.progress.words).filter(|words| !words.is_empty());
-            ui.weak(words.unwrap_or_else(|| "Reading the store ..".to_owned()));
+            ui.weak(words.unwrap_or_else(|| "Reading the store …".to_owned()));
         }
     }
 }

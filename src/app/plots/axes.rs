@@ -16,6 +16,14 @@ pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, 
     if (shown.end() - mark.value) / range < 0.02 || (crowded && !fifth) { String::new() } else { text }
 }
 
+/// Value at the axis of a plot so many points high. Empty where it would stand on the first time below.
+pub(super) fn value_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, height: f64) -> String {
+    let above = (mark.value - shown.start()) / (shown.end() - shown.start()) * height;
+    if above < LEAST_ABOVE { String::new() } else { plain(mark.value) }
+}
+
+/// Least height of a value above the axis of time (points).
+const LEAST_ABOVE: f64 = 2.5;
 /// Width of a letter of a label, and least distance between labels (points).
 const LETTER: f64 = 6.5;
 const BETWEEN_LABELS: f64 = 12.0;
@@ -77,6 +85,12 @@ mod tests {
         }
         assert!(value_marks(1.0, 1.0).is_empty());
         assert!(value_marks(f64::NAN, 1.0).is_empty());
+    }
+
+    #[test]
+    fn a_value_does_not_stand_on_the_first_time() {
+        let zero = |height: f64| value_at(GridMark { value: 0.0, step_size: 1.0 }, &(-0.6..=12.0), height);
+        assert_eq!((zero(120.0).as_str(), zero(50.0).as_str()), ("0", ""));
     }
 
     #[test]

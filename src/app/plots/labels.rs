@@ -2,12 +2,14 @@
 //! place of a legend, which would cover curves.
 
 use crate::app::theme::colour;
-use egui::{Align2, Color32, FontId, Pos2, Rect, Ui, pos2};
+use egui::{Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::number;
 
 /// Width of the names beside a plot (points).
-pub(super) const WIDTH: f32 = 132.0;
+pub(super) const WIDTH: f32 = 144.0;
+/// Length of the piece of a curve's line before its name (points).
+const SAMPLE: f32 = 14.0;
 /// Distance between two lines (points).
 const LINE: f32 = 14.0;
 
@@ -15,6 +17,8 @@ const LINE: f32 = 14.0;
 pub(super) struct CurveLabel<'a> {
     pub(super) name: String,
     pub(super) ink: Color32,
+    /// Its line is dashed.
+    pub(super) dashed: bool,
     /// Unit of its values.
     pub(super) unit: &'a str,
     /// Value at the cursor; none where it is undefined.
@@ -49,7 +53,15 @@ pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<
     let clip = Rect::from_min_max(pos2(frame.right(), frame.top()), pos2(frame.right() + WIDTH, frame.bottom()));
     let painter = ui.painter_at(clip);
     for (label, y) in labels.iter().zip(places) {
-        let place: Pos2 = pos2(frame.right() + 8.0, y);
+        // A piece of its line tells curves of one colour apart.
+        let line = [pos2(frame.right() + 6.0, y), pos2(frame.right() + 6.0 + SAMPLE, y)];
+        let stroke = Stroke::new(1.8, label.ink);
+        if label.dashed {
+            painter.extend(Shape::dashed_line(&line, stroke, 5.0, 4.0));
+        } else {
+            painter.line_segment(line, stroke);
+        }
+        let place: Pos2 = line[1] + vec2(5.0, 0.0);
         painter.text(place, Align2::LEFT_CENTER, label.text(), FontId::proportional(11.5), label.ink);
     }
     if hidden > 0 {
@@ -115,6 +127,7 @@ mod tests {
         let label = CurveLabel {
             name: "left".to_owned(),
             ink: Color32::WHITE,
+            dashed: false,
             unit: "N",
             value: Some(1.234),
             difference: Some(0.5),

@@ -22,8 +22,8 @@ use crate::app::widgets::adapt_button;
 use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;
-use palpate_geometry::palette::{Trace, series_colour};
-use palpate_geometry::units::{self, mark as plain};
+use palpate_geometry::palette::{SHOWN_SERIES, Trace, series_colour};
+use palpate_geometry::units;
 use palpate_tactile::trial::TrialSource;
 
 /// Value of one row of a trace; `None` where it is undefined.
@@ -80,7 +80,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let [low, high] = value_range(data, &plot, [from, to], ui.available_height());
     let labelled = ui.available_width() > ROOM_FOR_LABELS;
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
-    let plotted = f64::from(width - Y_AXIS);
+    let (plotted, plotted_height) = (f64::from(width - Y_AXIS), f64::from(ui.available_height() - TIMES));
     let seconds = AxisHints::new_x()
         .formatter(move |mark: GridMark, shown| axes::seconds_at(mark, shown, plotted))
         .label_spacing(egui::Rangef::new(24.0, 40.0));
@@ -101,7 +101,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .grid_spacing(10.0..=44.0)
         .y_grid_spacer(|grid: GridInput| axes::value_marks(grid.bounds.0, grid.bounds.1))
         .custom_x_axes(vec![seconds])
-        .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
+        .y_axis_formatter(move |mark: GridMark, shown| axes::value_at(mark, shown, plotted_height))
         .set_margin_fraction(egui::Vec2::ZERO);
     let nothing = nothing_read(data, &plot);
     // No sentence across grid lines.
@@ -175,7 +175,8 @@ const ROOM_FOR_LABELS: f32 = 380.0;
 /// Colour of a curve of the grasp shown: that of its sensor, or the text colour where trials are compared.
 fn own_ink(data: &DisplayedData<'_>, curve: &PlotCurve) -> Color32 {
     let theme = data.view.theme;
-    colour(if data.comparison.traces.is_empty() { curve.trace.colour(theme) } else { theme.colours().text })
+    let alone = data.comparison.traces.is_empty();
+    colour(if alone { curve.trace.colour(theme) } else { series_colour(SHOWN_SERIES, theme) })
 }
 
 /// Names of all curves, with their values at the cursor.
@@ -188,7 +189,7 @@ fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &P
         let value = at(now);
         let difference = marks[0].and_then(at).zip(marks[1].and_then(at)).map(|(a, b)| b - a);
         let y = value.map(|value| transform.position_from_point(&PlotPoint::new(now, value)).y);
-        CurveLabel { name: curve.name.clone(), ink, unit: plot.unit, value, difference, y }
+        CurveLabel { name: curve.name.clone(), ink, dashed: curve.dashed, unit: plot.unit, value, difference, y }
     };
     let own = data.traces.current().into_iter();
     let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));

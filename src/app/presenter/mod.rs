@@ -42,7 +42,7 @@ pub(super) fn ui(ui: &Ui, app: &App, message: Option<&str>) {
     let colours = app.view.theme.colours();
     let page = Page { app, unit };
     if !view3d::picture_ui(ui, picture, &View3d::of(app), 1.1 * unit / PICTURE_LETTERS) {
-        let text = page.line(ui, "Loading the object ..", 1.5 * unit, picture.width(), colour(colours.text));
+        let text = page.line(ui, "Loading the object …", 1.5 * unit, picture.width(), colour(colours.text));
         put(ui, text, picture, Align2::CENTER_CENTER);
     }
     ui.painter().rect_filled(column, 0.0, colour(colours.raised));

@@ -7,7 +7,7 @@ use crate::serial::LinkStatus;
 use palpate_geometry::units::three_digits;
 use palpate_tactile::board::SensorKind;
 
-/// Counts of 4095 that an idle pad may read: 10 MOhm over 4.7 kOhm is 2.
+/// Counts of 4095 that an idle pad may read: 10 MΩ over 4.7 kΩ is 2.
 const IDLE_COUNTS: f64 = 20.0;
 
 /// Counts of 4095 below which a strip never reads, however it is bent.

@@ -133,7 +133,7 @@ pub(super) fn saturation(seen: &Evidence<'_>) -> CheckFinding {
         return Failed.seen(format!("{} saturated for more than half a second", high.join(", "))).because(
             "The divider is on 5 V, which damages a Due; or the pad is shorted; or its resistor to ground is missing or far too \
              large",
-            "Unplug and measure: the divider belongs on 3.3 V, with 4.7 kOhm from the pin to ground",
+            "Unplug and measure: the divider belongs on 3.3 V, with 4.7 kΩ from the pin to ground",
         );
     }
     match seen.traces(false).map(|trace| trace.most).reduce(f64::max) {
@@ -160,7 +160,7 @@ pub(super) fn open_circuit(seen: &Evidence<'_>) -> CheckFinding {
             seen.named(|own| own.is_flex && own.saturation == Some(Saturation::Low)),
             "at zero",
             "The pin is shorted to ground, or the resistor to 3.3 V is missing",
-            "Measure 47 kOhm from 3.3 V to the pin, and 17 to 70 kOhm from the pin to ground",
+            "Measure 47 kΩ from 3.3 V to the pin, and 17 to 70 kΩ from the pin to ground",
         ),
     ] {
         if !names.is_empty() {

@@ -77,7 +77,7 @@ struct Reader {
     last_s: Option<f64>,
 }
 
-/// Divider resistor up to which a strip, which has at least 17.5 kOhm (data sheet), stays above a quarter of the range (ohm).
+/// Divider resistor up to which a strip, which has at least 17.5 kΩ (data sheet), stays above a quarter of the range (ohm).
 const LARGEST_BESIDE_A_STRIP: f64 = 50e3;
 
 /// Parts of the line in which an ESP32 and an ESP8266 give the reason of a restart.

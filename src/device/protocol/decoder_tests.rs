@@ -191,7 +191,7 @@ fn ten_bits_are_suspected_from_strips_and_wider_counts_from_any_sensor() {
     assert_eq!(range(HELLO, 350, 0), (LooksTenBit, None), "a strip is above a quarter of the range");
     assert_eq!(range(HELLO, 1021, 0), (LooksTenBit, Some(Saturation::High)), "and this one is open");
     assert_eq!(range(HELLO, 1400, 900), (Fits, None));
-    assert_eq!(range(&HELLO.replace("47000", "100000"), 800, 0), (Fits, None), "beside 100 kOhm it may be lower");
+    assert_eq!(range(&HELLO.replace("47000", "100000"), 800, 0), (Fits, None), "beside 100 kΩ it may be lower");
     assert_eq!(range(HELLO, 0, 900), (Fits, Some(Saturation::Low)), "a pad may be anywhere");
     assert_eq!(range(&HELLO.replace("adc=12", "adc=10"), 350, 0), (Fits, None), "as stated");
     assert_eq!(range(HELLO, 5700, 0), (Exceeded, None));

@@ -17,7 +17,7 @@ const AFTER_S: f64 = 0.5;
 /// Counts within this share of the range of an end are at it: 8 of 4096, 2 of 1024. Open or shorted inputs pick up noise,
 /// half of which the end cuts off. With a deviation of 2 counts of 12 bits, and no average taken, one reading in a thousand
 /// is 6 counts away, one in 300 000 more than 8; the mean of eight conversions is never more than 3 away. With 10 bits,
-/// the same noise goes 2 counts far, or half a count. A sound pad under its largest load (49 N) is 100 counts away beside 4.7 kOhm,
+/// the same noise goes 2 counts far, or half a count. A sound pad under its largest load (49 N) is 100 counts away beside 4.7 kΩ,
 /// and 48 beside 10.
 const NEAR: f32 = 1.0 / 512.0;
 /// Full scale of the Due as our firmware sets it up.
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn noise_hides_no_open_circuit_and_makes_none_of_a_sound_channel() {
-        // A pad under its largest load beside 10 kOhm: 49 N, 1.04 times 49 / 6 mS.
+        // A pad under its largest load beside 10 kΩ: 49 N, 1.04 times 49 / 6 mS.
         let ratio = 10.0 * 1.04 * 49.0 / 6.0;
         let pressed = ratio / (1.0 + ratio);
         for levels in [4096.0, 1024.0] {

@@ -9,11 +9,11 @@ use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time, t
 use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
-use palpate_geometry::palette::NO_SERIES;
+use palpate_geometry::palette::{NO_SERIES, SHOWN_SERIES};
 use palpate_sim::gripper::Side;
 use palpate_sim::scene::Scene;
 use palpate_tactile::SignalDefinition;
-use palpate_tactile::trial::TrialSource;
+use palpate_tactile::trial::{TrialId, TrialSource};
 
 /// What a heat map shows over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct FigureOptions {
     pub raw: bool,
     /// Heat maps over time, in place of curves.
     pub heat: Option<HeatKind>,
+    /// Number of the colour of each trial; their places where empty.
+    pub colours: Vec<usize>,
 }
 
 /// Reason why there is no figure.
@@ -258,6 +260,7 @@ fn curves(
         ..Plot::default()
     };
     for (place, (trial, origin)) in trials.iter().zip(origins).enumerate() {
+        let own = options.colours.get(place).copied().unwrap_or(place);
         let (curves, unit) = found(trial, term, options.raw)?;
         plot.y = PlotAxis::linear(axis_title(term, unit));
         for (number, curve) in curves.into_iter().enumerate().filter(|_| !options.mean) {
@@ -265,8 +268,8 @@ fn curves(
             let (name, colour) = match trials {
                 [_] => (one_name(curve.name, term), number / if curve.side.is_some() { 2 } else { 1 }),
                 // The right finger is the dashed line of the same colour.
-                _ if dashed => (String::new(), place),
-                _ => (format!("{}, trial {}", trial.title, trial.id), place),
+                _ if dashed => (String::new(), own),
+                _ => (format!("{}, trial {}", trial.title, trial.id), own),
             };
             let samples = trial.t_s.iter().enumerate();
             let points = samples.map(|(k, t_s)| [t_s - origin, (curve.values)(k) * curve.factor]);
@@ -288,7 +291,12 @@ fn curves(
 
 /// Mean of the trials of each object as a line, and its standard deviation as a band.
 fn means(trials: &[&OpenTrial], term: &str, options: &FigureOptions, plot: &mut Plot) -> Result<(), FigureDataError> {
-    for (colour, (title, own)) in by_title(trials).iter().enumerate() {
+    let colours: Vec<(TrialId, usize)> =
+        trials.iter().map(|trial| trial.id).zip(options.colours.iter().copied()).collect();
+    for (place, (title, own)) in by_title(trials).iter().enumerate() {
+        // The first of its trials that is compared gives the colour, as in the window.
+        let given = colours.iter().filter(|(id, _)| own.iter().any(|trial| trial.id == *id)).map(|(_, colour)| *colour);
+        let colour = given.min_by_key(|colour| *colour == SHOWN_SERIES).unwrap_or(place);
         let Some(mean) = MeanTrial::of(own, options.align) else { continue };
         let (curves, _) = found(own[0], term, options.raw)?;
         for curve in curves {
@@ -449,6 +457,13 @@ mod tests {
         assert_eq!(plot.series[0].name, "Lemon (n = 2)");
         // Two equal trials have no spread.
         assert!(plot.bands[0].points.iter().all(|[_, low, high]| high.is_nan() || high - low <= 1e-9));
+        // Colours of the window: the second trial was pinned before the third, which it no longer is beside.
+        let colours = vec![SHOWN_SERIES, 4, 1];
+        let coloured = comparison_figure(&trials, &FigureOptions { colours: colours.clone(), ..options.clone() })?;
+        let of = |figure: &Figure| figure.plots[0].series.iter().map(|s| s.colour).collect::<Vec<_>>();
+        assert_eq!(of(&coloured), [SHOWN_SERIES, SHOWN_SERIES, 4, 4, 1, 1]);
+        let coloured = comparison_figure(&trials, &FigureOptions { mean: true, colours, ..options.clone() })?;
+        assert_eq!(of(&coloured), [4, 4, 1, 1], "the class has the colour of its first compared trial");
         let unknown = FigureOptions { channels: vec!["warmth".to_owned()], ..options };
         let error = comparison_figure(&trials, &unknown).expect_err("no such channel").to_string();
         assert!(error.contains("\"warmth\"; it has curvature_left, "), "{error}");

@@ -28,7 +28,7 @@ const GAP_S: f64 = 0.25;
 const JUMP_WITHIN_S: f64 = 0.05;
 /// Share of the range that an idle pad reads at most: 20 counts of 12 bits.
 const IDLE: f32 = 0.005;
-/// Share of the range from which a pad is loaded, about half a newton beside 4.7 kOhm: below it, contact begins and ends at once.
+/// Share of the range from which a pad is loaded, about half a newton beside 4.7 kΩ: below it, contact begins and ends at once.
 const LOADED: f32 = 0.3;
 /// Least jump of a strip, as a share of the range: ten times what the fastest release moves it in a reading at 50 Hz.
 const STRIP_JUMP: f32 = 0.025;

@@ -1,7 +1,7 @@
 //! Contact forces on each finger, as arrows with numbers: the force across the pad, and the friction along it.
 
 use super::PictureView;
-use super::annotations::Annotator;
+use super::annotations::{Annotator, MARGIN, Plate, SCALE_BAR, shows_legends};
 use glam::{DVec3, Vec2, Vec3};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Align, Arrow};
@@ -74,6 +74,40 @@ pub(super) fn arrows(
         }
     }
     arrows
+}
+
+/// Force of the arrow in the key (N), and the height of its tip and of the middle of the key above the scale bar (points).
+const KEY: f64 = 0.2;
+const KEY_TIP: f32 = 10.0;
+const KEY_MIDDLE: f32 = 17.0;
+
+/// An arrow of a known force above the scale bar, where there is room.
+pub(super) fn add_key(annotator: &mut Annotator<'_>) {
+    let view = annotator.view;
+    if !shows_legends(view) || view.size.y < LOW {
+        return;
+    }
+    let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
+    let length = view.size.y * (PER_NEWTON * KEY) as f32;
+    let (tail, ink) = (tip - Vec2::new(length, 0.0), pressure_colour(0.35 + 0.65 * (KEY / FULL_SCALE) as f32));
+    let half = Vec2::new((0.5 * length).max(0.25 * TEXT * 6.0) + 5.0, LINE);
+    let middle = Vec2::new(
+        0.5 * (tail.x + tip.x).min(2.0 * (view.size.x - half.x) - 16.0),
+        view.size.y - SCALE_BAR - KEY_MIDDLE,
+    );
+    annotator.add_plate(Plate { middle, half });
+    let overlay = &mut annotator.overlay;
+    overlay.line(tail, tip, 2.0, ink);
+    for side in [-4.0, 4.0] {
+        overlay.line(tip, tip + Vec2::new(-6.0, side), 2.0, ink);
+    }
+    overlay.text(
+        Vec2::new(middle.x, tip.y - 14.0),
+        Align::Centre,
+        TEXT,
+        view.theme.colours().text,
+        units::shown(KEY, "N"),
+    );
 }
 
 /// Their numbers, beyond the tips or near by: a plate for each finger.

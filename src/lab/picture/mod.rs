@@ -155,6 +155,9 @@ impl Stage {
         let inset = self.touch_inset(frame, view);
         let hand = self.held_points(frame).into_iter().filter_map(|point| view.camera.project(point, view.size));
         let mut annotator = Annotator::new(view, inset.as_ref(), hand.collect());
+        if view.forces && view.numbers {
+            forces::add_key(&mut annotator);
+        }
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let layout = view.layout.as_ref().filter(|_| view.circles && view.annotations);

@@ -5,8 +5,9 @@ use super::job::{Job, Newer};
 use super::messages::Wake;
 use super::training::TrainedModel;
 use crate::grasping::{LESSON_GRASPS, LessonStage, Lessons};
+use palpate_geometry::units::capital;
 use palpate_learn::Model;
-use palpate_sim::objects::titled;
+use palpate_sim::objects::object_title;
 use palpate_sim::scene::ObjectSetup;
 use palpate_store::Store;
 use std::path::PathBuf;
@@ -33,7 +34,7 @@ pub struct TeachRequest {
 /// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
 pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, TrainedModel> {
     Job::new("teach", Newer::Waits, wake, move |request: &TeachRequest, run| {
-        let name = titled(&request.name).to_lowercase();
+        let name = capital(&object_title(&request.name));
         let progress = |stage: LessonStage| {
             let (share, words) = match stage {
                 LessonStage::Simulating(done, of) => {

@@ -1,6 +1,7 @@
 //! The held object: loaded model, and its description for display.
 
 use super::messages::ObjectCard;
+use palpate_geometry::units::capital;
 use palpate_sim::objects::{LoadOptions, ObjectModel, object_title};
 use palpate_sim::scene::Scene;
 use std::sync::Arc;
@@ -33,10 +34,4 @@ pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
         friction: scene.object.friction.value().unwrap_or(model.friction),
         size: model.bounds.size(),
     }
-}
-
-/// A title begins with a capital, that of a file too.
-fn capital(title: &str) -> String {
-    let mut letters = title.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

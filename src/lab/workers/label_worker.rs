@@ -195,7 +195,7 @@ mod tests {
         }
         labels.send(LabelCommand::Redo);
         let is_done = |begin: &'static str, end: String| move |notice: &Notice| matches!(notice, Notice::Info(text) if text.starts_with(begin) && text.ends_with(&end));
-        told_of(&labels, &woken, is_done("redone: ", format!("label unlabelled -> {}", shown_title(&next))));
+        told_of(&labels, &woken, is_done("redone: ", format!("labelled {}", shown_title(&next))));
         labels.send(LabelCommand::Undo);
         shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         told_of(&labels, &woken, is_done("Undone: ", String::new()));
@@ -220,7 +220,7 @@ mod tests {
         shown(&labels, &woken, |view| view.unlabelled().is_some_and(|trial| trial.id == id));
         theirs.labels().set_label(id, "mug").expect("labels");
         let labelled = shown(&labels, &woken, |view| view.unlabelled().is_none());
-        assert_eq!(labelled.journal[0].sentence(), format!("trial {id}: label unlabelled -> mug"));
+        assert_eq!(labelled.journal[0].sentence(), format!("trial {id}: labelled mug"));
         theirs.delete(&[id]).expect("discards");
         shown(&labels, &woken, |view| view.trials.iter().all(|trial| trial.discarded));
         theirs.purge().expect("purges");

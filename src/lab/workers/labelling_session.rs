@@ -4,7 +4,7 @@
 //! ```text
 //!  record -> trial ends -> question "what was it?" -> label -> next object of the plan
 //!     ^         typing ahead answers the question          |
-//!     '---- record again: the unlabelled trial is discarded'
+//!     '---- record: the unlabelled trial waits -------------'
 //! ```
 
 use super::gripper::GripperView;
@@ -36,7 +36,7 @@ pub struct SessionContext<'a> {
 /// User action in a labelling session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LabellingAction {
-    /// Record a grasp. A running trial, or one without a label, is discarded first.
+    /// Record a grasp. A running trial is discarded first; a stored one without a label is kept.
     Record,
     /// Discard the running trial, or the one in question.
     Discard,
@@ -412,15 +412,15 @@ impl LabellingSession {
         self.is_beginning(now) || now.gripper.is_some_and(|gripper| gripper.trial.is_some())
     }
 
-    /// Records a grasp. A running trial is discarded for it; so is an unlabelled one in a labelling session, because it is
-    /// recorded again.
+    /// Records a grasp. A running trial is discarded for it; a stored one without a label is kept, and asked about later.
     fn record(&mut self, now: &SessionContext<'_>) -> Vec<LabellingEffect> {
-        let again = now.labelling && now.gripper.is_some_and(GripperView::is_connected);
         let mut effects = Vec::new();
         if self.has_trial(now) {
             effects.push(LabellingEffect::DiscardRunning);
-        } else if let Some(trial) = self.in_question(now).filter(|trial| again && trial.object.is_none()) {
-            effects.push(LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Discard)));
+        } else if let Some(trial) = self.in_question(now).filter(|trial| now.labelling && trial.object.is_none()) {
+            let unsaved = now.labels.map(|labels| self.draft.unsaved(labels)).unwrap_or_default();
+            effects.extend(unsaved.into_iter().map(LabellingEffect::Edit));
+            effects.push(LabellingEffect::Inform(format!("Trial {} is kept without a label.", trial.id)));
         }
         self.draft.reset();
         let request = TrialRequest { object: None, length_s: None, control: now.control, adds: !now.labelling };

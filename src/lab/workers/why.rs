@@ -49,7 +49,7 @@ impl Explainer {
             let Some(signatures) = grasp.model.signatures.clone() else { return Ok(None) };
             let view = SensorView::of_model(&grasp.model.card);
             let query = NearestQuery { signatures, view, except: request.trial, count: NEAREST };
-            let progress = |done: usize, of: usize| run.count(done, of, format!("Comparing .. {done} of {of}"));
+            let progress = |done: usize, of: usize| run.count(done, of, format!("Comparing … {done} of {of}"));
             Ok(index.nearest(&Store::open(&store)?, &grasp.grasp, &query, run.stop(), &progress)?)
         });
         Self { why, nearest }

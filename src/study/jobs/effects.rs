@@ -39,7 +39,7 @@ pub fn effects_job(explain: Explain, wake: Wake) -> Job<Scene, Explanation> {
             std::thread::sleep(LOOK);
         }
         let progress =
-            |StudyProgress { done, of, .. }: StudyProgress| run.count(done, of, format!("measuring .. {done} of {of}"));
+            |StudyProgress { done, of, .. }: StudyProgress| run.count(done, of, format!("measuring … {done} of {of}"));
         let how = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
         let Some(explanation) = explain(scene, &how)? else { return Ok(None) };
         kept.push_back((scene.clone(), explanation.clone()));

@@ -6,7 +6,7 @@
 //! the angle set, not of the mean of its readings. The angle is spread evenly over the active length L of the strip, so
 //! that the curvature is kappa = theta / L; a right angle is 28.4 1/m.
 //!
-//! Plausible parts follow the data sheet of the FS-L-0055-253-ST: 25 kOhm flat, off by 30 % at most; distributors
+//! Plausible parts follow the data sheet of the FS-L-0055-253-ST: 25 kΩ flat, off by 30 % at most; distributors
 //! measure 2 to 2.5 times that at 90 degrees.
 
 use super::CalibrationFault;
@@ -19,7 +19,7 @@ use palpate_geometry::units::three_digits;
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
 
-/// Flat resistance of such parts (ohm): 17.5 to 32.5 kOhm.
+/// Flat resistance of such parts (ohm): 17.5 to 32.5 kΩ.
 const FLAT_OHM: [f64; 2] = [
     StripPart::NOMINAL_OHM * (1.0 - StripPart::FLAT_TOLERANCE),
     StripPart::NOMINAL_OHM * (1.0 + StripPart::FLAT_TOLERANCE),
@@ -123,8 +123,8 @@ impl FlexCurve {
             let [low, high] = FLAT_OHM.map(|flat| three_digits(1e-3 * resistor * flat / self.flat_ohm));
             let said = three_digits(1e-3 * resistor);
             return Err(CalibrationFault(format!(
-                "the flat strip comes out at {} kOhm, but such parts have 17.5 to 32.5: the resistor beside it is not the \
-                 {said} kOhm entered but {low} to {high}, or it is another part",
+                "the flat strip comes out at {} kΩ, but such parts have 17.5 to 32.5: the resistor beside it is not the \
+                 {said} kΩ entered but {low} to {high}, or it is another part",
                 three_digits(self.flat_ohm * 1e-3)
             )));
         }
@@ -168,7 +168,7 @@ fn rises(distinct: &[Point], input: &Input) -> Result<(), CalibrationFault> {
     for pair in distinct.windows(2) {
         let (before, after) = (input.ohm(pair[0].counts), input.ohm(pair[1].counts));
         if after <= before {
-            let kilo = |ohm: f64| format!("{} kOhm", three_digits(ohm * 1e-3));
+            let kilo = |ohm: f64| format!("{} kΩ", three_digits(ohm * 1e-3));
             let [from, to] = [0, 1].map(|i| SensorKind::Flex.with_unit(pair[i].stimulus));
             return Err(CalibrationFault(format!(
                 "between {from} and {to} the resistance falls from {} to {}, but it must rise: the strip bends towards its \
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn a_wrong_resistor_is_reported_with_the_likely_range() {
-        // Behind 10 kOhm instead of 47, a strip of 25 kOhm looks like one of 117.
+        // Behind 10 kΩ instead of 47, a strip of 25 kΩ looks like one of 117.
         let actual = Input { divider: Divider::of_strip(10e3), ..input() };
         let text = fault(&points(25e3, 2.2, &[0.0, 45.0, 90.0], &actual));
         assert!(text.contains("117") || text.contains("118"), "{text}");

@@ -22,7 +22,7 @@ const RAIL_COUNTS: f64 = 1.5;
 
 impl Input {
     /// The divider of a sensor on a board: as the board reports it, else as in the gripper file, else as our firmware wires it:
-    /// strips to ground beside 47 kOhm, pads to the supply beside 4.7 kOhm.
+    /// strips to ground beside 47 kΩ, pads to the supply beside 4.7 kΩ.
     pub fn on(board: &Board, sensor: Sensor) -> Self {
         let stated = sensor.row().divider_ohm;
         let usual = match sensor.is_flex() {
@@ -119,9 +119,9 @@ mod tests {
             assert_eq!(input.counts(input.divider.fixed_ohm), 2048.0);
             assert!((input.ohm(2048.0) - input.divider.fixed_ohm).abs() < 1e-9);
         }
-        // 25 kOhm below 47 kOhm: 25 / 72 of 4096.
+        // 25 kΩ below 47 kΩ: 25 / 72 of 4096.
         assert!((inputs()[0].counts(25e3) - 4096.0 * 25.0 / 72.0).abs() < 1e-9);
-        // 1 kOhm above 4.7 kOhm: 4.7 / 5.7.
+        // 1 kΩ above 4.7 kΩ: 4.7 / 5.7.
         assert!((inputs()[1].counts(1e3) - 4096.0 * 4.7 / 5.7).abs() < 1e-9);
     }
 

@@ -34,7 +34,7 @@ const MOST: f64 = 5.0 * STANDARD_GRAVITY;
 /// Plausible exponents: 0.6 to 1 in tables of such pads, with a margin for weights set by hand.
 const EXPONENTS: [f64; 2] = [0.6, 1.2];
 
-/// Plausible resistance under 1 N (ohm): four times less and more than the 6 kOhm of an Interlink 402 (the table
+/// Plausible resistance under 1 N (ohm): four times less and more than the 6 kΩ of an Interlink 402 (the table
 /// of Adafruit; there is none for the FSR07).
 const OHM_AT_1_N: [f64; 2] = [1.5e3, 25e3];
 
@@ -128,8 +128,8 @@ impl PadCurve {
             let [low, high] = OHM_AT_1_N.map(|wanted| three_digits(1e-3 * input.divider.fixed_ohm * wanted / ohm));
             let said = three_digits(1e-3 * input.divider.fixed_ohm);
             return Err(CalibrationFault(format!(
-                "under 1 N the pad comes out at {} kOhm, but such parts have about 6 (1.5 to 25): the resistor beside it is \
-                 not the {said} kOhm entered but {low} to {high}, or weights were given in another unit than kg",
+                "under 1 N the pad comes out at {} kΩ, but such parts have about 6 (1.5 to 25): the resistor beside it is \
+                 not the {said} kΩ entered but {low} to {high}, or weights were given in another unit than kg",
                 three_digits(ohm * 1e-3)
             )));
         }

@@ -70,10 +70,10 @@ fn too_few_too_close_and_too_light_weights_are_refused() {
 fn wrong_resistors_wiring_units_and_weights_are_named() {
     let behind =
         |resistor_ohm: f64| points(6e3, 0.9, &WEIGHTS, &Input { divider: Divider::of_pad(resistor_ohm), ..input() });
-    // 47 kOhm where 4.7 is entered: the pad looks ten times too conductive.
+    // 47 kΩ where 4.7 is entered: the pad looks ten times too conductive.
     let text = fault(&behind(47e3));
-    assert!(text.contains("0.600 kOhm") && text.contains("is not the 4.70 kOhm"), "{text}");
-    assert!(fault(&behind(330.0)).contains("is not the 4.70 kOhm"));
+    assert!(text.contains("0.600 kΩ") && text.contains("is not the 4.70 kΩ"), "{text}");
+    assert!(fault(&behind(330.0)).contains("is not the 4.70 kΩ"));
     let swapped = Input { divider: Divider::of_strip(4.7e3), ..input() };
     let text = fault(&points(6e3, 0.9, &WEIGHTS[2..], &swapped));
     assert!(text.contains("falls") && text.contains("the other way round"), "{text}");
@@ -81,9 +81,9 @@ fn wrong_resistors_wiring_units_and_weights_are_named() {
     (mixed[3].counts, mixed[4].counts) = (mixed[4].counts, mixed[3].counts);
     assert!(fault(&mixed).contains("mixed up"));
     assert!(fault(&points(6e3, 0.4, &WEIGHTS, &input())).contains("partly beside the pad"));
-    // 1 kOhm under 1 N fills the range at 0.5 kg and more.
+    // 1 kΩ under 1 N fills the range at 0.5 kg and more.
     let text = fault(&points(3.0, 0.9, &WEIGHTS, &input()));
-    assert!(text.contains("saturates") && text.contains("3.3 kOhm"), "{text}");
+    assert!(text.contains("saturates") && text.contains("3.3 kΩ"), "{text}");
 }
 
 #[test]

@@ -106,8 +106,8 @@ pub(super) fn check(points: &[Point], kind: SensorKind, input: &Input, most: f64
                 "at {at} the strip reads {counts:.0} counts: it is short-circuited, or its pin is connected to ground"
             ),
             (SensorKind::Pad, Some(RangeEnd::Short)) => format!(
-                "at {at} the pad reads {counts:.0} counts, the end of the range: with {} kOhm in its divider it \
-                 saturates. Take smaller weights, or a smaller resistor (3.3 kOhm)",
+                "at {at} the pad reads {counts:.0} counts, the end of the range: with {} kΩ in its divider it \
+                 saturates. Take smaller weights, or a smaller resistor (3.3 kΩ)",
                 three_digits(input.divider.fixed_ohm * 1e-3)
             ),
         };

@@ -123,7 +123,7 @@ impl Readout {
             {
                 let [was, now] = [made_with.divider.fixed_ohm, ohm].map(|ohm| three_digits(ohm * 1e-3));
                 warnings.push(format!(
-                    "the {label} was calibrated beside {was} kOhm, but the board reports {now}; the board's value is used"
+                    "the {label} was calibrated beside {was} kΩ, but the board reports {now}; the board's value is used"
                 ));
             }
             let input = made_with.seen_by(board, sensor);

@@ -232,7 +232,7 @@ fn missing_channels_and_calibrations_give_warnings() {
     let readout = Readout::new(&board, &only).unwrap();
     let warnings = readout.warnings().join("\n");
     assert!(warnings.contains("no channel \"flexR\""), "{warnings}");
-    assert!(warnings.contains("calibrated beside 47.0 kOhm, but the board reports 33.0"), "{warnings}");
+    assert!(warnings.contains("calibrated beside 47.0 kΩ, but the board reports 33.0"), "{warnings}");
     let wrong = [(Sensor::PAD_LEFT, only[0].1.clone())];
     let text = Readout::new(&board, &wrong).expect_err("a strip is no pad").to_string();
     assert!(text.contains("flexL") && text.contains("left pad"), "{text}");

@@ -138,7 +138,7 @@ impl Calibration {
             Curve::Flex(curve) => {
                 let middle = std::f64::consts::FRAC_PI_4;
                 format!(
-                    "{:.2} kOhm flat, {:.2} times that at 90 degrees; 45 degrees{}",
+                    "{:.2} kΩ flat, {:.2} times that at 90 degrees; 45 degrees{}",
                     curve.flat_ohm * 1e-3,
                     curve.bent_over_flat(),
                     often(curve.angle_interval(middle).map(f64::to_degrees), "degrees")

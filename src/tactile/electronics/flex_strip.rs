@@ -30,7 +30,7 @@ impl StripPart {
     /// Tolerance of a part's flat resistance, as a share of the nominal (data sheet).
     pub const FLAT_TOLERANCE: f64 = 0.30;
 
-    /// Resistance at 90 degrees over flat, from part to part: 2 (25 to 50 kOhm, amperka) to 2.5 (30 to 70 kOhm,
+    /// Resistance at 90 degrees over flat, from part to part: 2 (25 to 50 kΩ, amperka) to 2.5 (30 to 70 kΩ,
     /// SparkFun, is 2.3). The nominal part is in the middle.
     pub const BENT_OVER_FLAT: [f64; 2] = [2.0, 2.5];
 

@@ -27,7 +27,7 @@ impl PadPart {
     /// Sensing area, a disc of 14.70 mm (m²) (data sheet): a pad's pressure is its force over this.
     pub const ACTIVE_AREA: f64 = std::f64::consts::FRAC_PI_4 * 0.0147 * 0.0147;
 
-    /// Conductance at 1 N (S): 6 kOhm (Interlink 402, the table of Adafruit; there is none for the FSR07).
+    /// Conductance at 1 N (S): 6 kΩ (Interlink 402, the table of Adafruit; there is none for the FSR07).
     pub const NOMINAL_SIEMENS: f64 = 1.0 / 6e3;
 
     /// Exponent b from part to part: 0.8 to 1 (the same table; Interlink's guide). The nominal part is in the middle.

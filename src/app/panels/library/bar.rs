@@ -67,7 +67,7 @@ fn edits_ui(
             actions.push(App::export_tables);
             ui.close();
         }
-        if ui.button("MCAP or NPZ file ..").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
+        if ui.button("MCAP or NPZ file …").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
             actions.push(move |app| app.export_trials(taxels));
             ui.close();
         }

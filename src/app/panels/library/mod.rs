@@ -23,7 +23,7 @@ pub(super) fn ui(
     actions: &mut Actions,
 ) {
     let Some(view) = &library.view else {
-        ui.weak("Reading the store ..");
+        ui.weak("Reading the store …");
         actions.push(|app| app.library.find(TrialQuery::default()));
         return;
     };
@@ -71,7 +71,7 @@ fn count_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut A
         let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept));
         ui.label(RichText::new(text).small().weak());
         if !view.complete {
-            ui.label(RichText::new("reading older ones ..").small().weak());
+            ui.label(RichText::new("reading older ones …").small().weak());
         }
         if query.is_filtered() && ui.small_button("Clear").on_hover_text("Remove search and filters").clicked() {
             let cleared = query.cleared();
@@ -84,14 +84,14 @@ fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView, actions: &mut Actio
     ui.add_space(12.0);
     ui.vertical_centered(|ui| {
         if !view.complete {
-            ui.weak("Reading the store ..");
+            ui.weak("Reading the store …");
         } else if filtered {
             ui.weak("No trial matches. Clear the search and the filters to see all.");
         } else {
             ui.weak("No trials yet.");
             ui.weak("Play a grasp in Demo mode (Ctrl+1), record one of the real gripper with R, or import a file.");
             let hint = "CSV, MCAP, NPZ or Parquet; or drop the file anywhere on the window";
-            actions.on(&ui.button("Import ..").on_hover_text(hint), App::ask_for_trials);
+            actions.on(&ui.button("Import …").on_hover_text(hint), App::ask_for_trials);
         }
     });
 }

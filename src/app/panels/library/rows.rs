@@ -6,8 +6,7 @@ use crate::app::features::App;
 use crate::app::features::library::{LibraryFeature, LibrarySelection, Reach};
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::sparkline;
-use egui::text::{LayoutJob, TextWrapping};
+use crate::app::widgets::{put_line as text, sparkline};
 use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::ThemeColours;
 use palpate_lab::workers::LibraryView;
@@ -264,14 +263,20 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &LibraryT
         sparkline(ui, lines, picture);
     }
     let words = Rect::from_min_max(pos2(picture.right() + GAP, inside.top()), inside.max);
-    let date = cell(view, trial, TrialColumn::Date);
+    let (date, name) = (cell(view, trial, TrialColumn::Date), cell(view, trial, TrialColumn::Object));
     let quiet = colour(colours.quiet_text);
-    let width = ui.painter().layout_no_wrap(date.clone(), FontId::proportional(11.5), quiet).size().x;
+    let width_of = |text: &str, size: f32| {
+        ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(size), quiet).size().x
+    };
+    // The name comes before the time of day, and that before the day: the hint has them.
+    let room = words.width() - width_of(&name, 13.5) - GAP;
+    let day = date.split(' ').next().unwrap_or_default();
+    let date = [date.as_str(), day].into_iter().find(|text| width_of(text, 11.5) <= room).unwrap_or_default();
+    let width = width_of(date, 11.5);
     let upper = Rect::from_min_max(words.min, pos2(words.right(), words.center().y));
-    text(ui, upper, Align2::RIGHT_CENTER, &date, 11.5, quiet);
+    text(ui, upper, Align2::RIGHT_CENTER, date, 11.5, quiet);
     let title = Rect::from_min_max(upper.min, pos2(upper.right() - width - GAP, upper.bottom()));
     let ink_of = |column: TrialColumn| colour(ink(&colours, trial, column));
-    let name = cell(view, trial, TrialColumn::Object);
     text(ui, title, Align2::LEFT_CENTER, &name, 13.5, ink_of(TrialColumn::Object));
     let lower = Rect::from_min_max(pos2(words.left(), words.center().y), words.max);
     let quality = cell(view, trial, TrialColumn::Quality);
@@ -309,15 +314,4 @@ fn thumbnail(ui: &Ui, pictures: &Thumbnails, trial: &LibraryTrial, place: Rect) 
     let side = place.width().min(place.height());
     let square = Rect::from_center_size(place.center(), vec2(side, side));
     egui::Image::new(texture).corner_radius(3.0).paint_at(ui, square);
-}
-
-/// Writes one line, cut where there is no room; its right end.
-fn text(ui: &Ui, place: Rect, align: Align2, text: &str, size: f32, ink: Color32) -> f32 {
-    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), ink);
-    job.wrap = TextWrapping::truncate_at_width(place.width().max(0.0));
-    let galley = ui.painter().layout_job(job);
-    let at = align.align_size_within_rect(galley.size(), place);
-    let right = at.right();
-    ui.painter().with_clip_rect(place.expand2(vec2(1.0, 0.0)).intersect(ui.clip_rect())).galley(at.min, galley, ink);
-    right
 }

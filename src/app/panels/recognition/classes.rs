@@ -50,11 +50,11 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     for (place, class) in order.iter().enumerate() {
         let own = places[place / rows.max(1)];
         let top = all.top() + line * (place % rows.max(1)) as f32;
-        // A thin line sets the shapes apart.
+        // A thin line between the bars sets the shapes apart; names have no room for it.
         let before = place.checked_sub(1).filter(|_| place % rows != 0).map(|before| order[before]);
         if before.is_some_and(|before| group(labels, before) != group(labels, *class)) {
             let stroke = Stroke::new(1.0, colour(part.colours().border));
-            ui.painter().hline(own.left..=own.right, top, stroke);
+            ui.painter().hline(own.bars[0]..=own.bars[1], top, stroke);
         }
         class_ui(ui, part, *class, pmf, (own, top));
     }

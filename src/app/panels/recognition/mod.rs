@@ -16,7 +16,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, failed_sensors_ui, number_field, text_field};
+use crate::app::widgets::{failed_sensors_ui, number_field, text_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
@@ -110,7 +110,7 @@ pub(super) fn ui(
     actions: &mut Actions,
 ) {
     let Some(recognised) = data.recognised() else {
-        ui.weak("Waiting for the first grasp ..");
+        ui.weak("Waiting for the first grasp …");
         return;
     };
     if data.blind {
@@ -172,12 +172,7 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
             });
         } else if let Some(learned) = learned {
             ui.horizontal_wrapped(|ui| {
-                ui.label(
-                    RichText::new(format!("Learned {}", capital(&learned.title)))
-                        .heading()
-                        .strong()
-                        .color(colour(good)),
-                );
+                ui.label(RichText::new(format!("Learned {}", learned.title)).heading().strong().color(colour(good)));
                 ui.label(format!("from {} simulated grasps in {:.0}\u{a0}s", learned.grasps, learned.seconds));
                 let id = egui::Id::unique("name of what was learned");
                 if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {

@@ -50,7 +50,7 @@ impl Headline {
     pub(in crate::app) fn text(self, labels: &Labels) -> (String, Option<f64>) {
         match self {
             Self::Waiting => ("Ready".to_owned(), None),
-            Self::Sensing => ("Sensing ..".to_owned(), None),
+            Self::Sensing => ("Sensing …".to_owned(), None),
             Self::Unknown => ("Unknown".to_owned(), None),
             Self::Guess(class, p) => (format!("Best guess: {}", title(labels, class)), Some(p)),
             Self::Leading(class, p) | Self::Decided(class, p) => (title(labels, class), Some(p)),

@@ -84,7 +84,7 @@ fn measured_rows(ui: &mut Ui, simulation: &SimulationFeature) {
         ui.label(name).on_hover_text(hover);
         match value {
             Some(text) => ui.add(Label::new(text).wrap()),
-            None => ui.weak("measuring .."),
+            None => ui.weak("measuring …"),
         };
         ui.end_row();
     };

@@ -24,7 +24,7 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
         ui.add_space(4.0);
         named_scenes_ui(ui, &mut scene);
         ui.horizontal_wrapped(|ui| {
-            actions.on(&ui.button("Save scene ..").on_hover_text("As a TOML file (Ctrl+S)"), App::save_scene);
+            actions.on(&ui.button("Save scene …").on_hover_text("As a TOML file (Ctrl+S)"), App::save_scene);
             if ui.button("Reset all").on_hover_text("All settings as at first; the object stays").clicked() {
                 let (source, name) = (std::mem::take(&mut scene.object.source), scene.object.name.take());
                 scene = Scene::default();

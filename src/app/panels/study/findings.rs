@@ -15,14 +15,9 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     let findings = &result.stored.result.findings;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let count = |verdict: Agreement| findings.iter().filter(|finding| finding.verdict == verdict).count();
-        let counts = [
-            (Agreement::Agrees, "confirmed"),
-            (Agreement::Partly, "in part"),
-            (Agreement::Disagrees, "not"),
-            (Agreement::NotMeasured, "not measured"),
-        ]
-        .map(|(verdict, name)| (count(verdict), name));
-        let shown = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
+        let all = [Agreement::Agrees, Agreement::Partly, Agreement::Disagrees, Agreement::NotMeasured];
+        let counts = all.map(|verdict| (count(verdict), verdict.name()));
+        let shown = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{name} {count}"));
         let plural = if findings.len() == 1 { "claim" } else { "claims" };
         let text = format!("{} {plural}: {}", findings.len(), shown.collect::<Vec<_>>().join(", "));
         wrapped(

@@ -79,7 +79,7 @@ fn row_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, chosen: bool, action
 /// Progress of a study, while it runs.
 fn progress(studies: &Studies, key: &str) -> Option<JobProgress> {
     let JobProgress { share, words } = studies.running().filter(|running| running.command.key == key)?.progress;
-    let words = if words.is_empty() { "begins ..".to_owned() } else { words };
+    let words = if words.is_empty() { "begins …".to_owned() } else { words };
     Some(JobProgress { share, words })
 }
 
@@ -95,7 +95,7 @@ fn state(studies: &Studies, key: &str, colours: &ThemeColours) -> (String, Rgb) 
         return ("failed".to_owned(), colours.error);
     }
     let Some(StudyFiles { results, begun, .. }) = studies.files(key) else {
-        return ("..".to_owned(), colours.quiet_text);
+        return ("…".to_owned(), colours.quiet_text);
     };
     let stopped = if begun.is_empty() { "" } else { "; your run is paused" };
     let text = match results.first() {

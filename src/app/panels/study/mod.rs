@@ -33,7 +33,7 @@ fn result_ui(
     if result.is_none() {
         let card = studies.chosen().card();
         let text = match studies.running() {
-            _ if studies.files(card.key).is_none() => "Reading the results ..".to_owned(),
+            _ if studies.files(card.key).is_none() => "Reading the results …".to_owned(),
             Some(running) if running.command.key == card.key => {
                 format!("{}: its {what} appear here when the run is over.", card.title)
             }

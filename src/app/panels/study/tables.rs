@@ -4,6 +4,7 @@ use super::{about_row_ui, cell_text, opening, part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
+use crate::app::widgets::put_line;
 use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::symbol;
@@ -54,7 +55,9 @@ fn columns(ui: &Ui, table: &StudyTable) -> Vec<(f32, f32, bool)> {
     for (k, column) in table.columns.iter().enumerate() {
         let cells = || table.rows.iter().take(MEASURED).filter_map(move |row| row.cells.get(k));
         let widest = cells().map(|cell| width(cell_text(cell, column))).fold(width(symbol(&column.titled())), f32::max);
-        let right = left + widest.min(WIDEST);
+        // The last one has room to the right.
+        let most = if k + 1 == table.columns.len() { f32::INFINITY } else { WIDEST };
+        let right = left + widest.min(most);
         places.push((left, right, cells().all(|cell| !matches!(cell, Cell::Text(_)))));
         left = right + GAP;
     }
@@ -107,15 +110,10 @@ fn row_ui(
 
 /// Texts in their columns: numbers to the right.
 fn texts(ui: &Ui, row: Rect, places: &[(f32, f32, bool)], texts: impl Iterator<Item = String>, ink: Color32) {
-    let font = FontId::proportional(SIZE);
     for ((left, right, number), text) in places.iter().zip(texts) {
         let [left, right] = [left, right].map(|x| row.left() + x);
         let room = Rect::from_min_max(pos2(left, row.top()), pos2(right + 1.0, row.bottom()));
-        let painter = ui.painter().with_clip_rect(room.intersect(ui.clip_rect()));
-        if *number {
-            painter.text(room.right_center(), Align2::RIGHT_CENTER, text, font.clone(), ink);
-        } else {
-            painter.text(room.left_center(), Align2::LEFT_CENTER, text, font.clone(), ink);
-        }
+        let align = if *number { Align2::RIGHT_CENTER } else { Align2::LEFT_CENTER };
+        put_line(ui, room, align, &text, SIZE, ink);
     }
 }

@@ -171,6 +171,8 @@ pub struct GripperView {
     pub ended: Option<Arc<EndedTrial>>,
     /// Number of the newest stretch of trace rows.
     pub grasp: u64,
+    /// Number of the first one with the present calibrations.
+    pub calibrated: u64,
     /// Recognition; absent without a model, and without the channels that it reads.
     pub identification: Option<Arc<IdentificationView>>,
     /// Reason why recognition is off.

@@ -93,6 +93,8 @@ pub(super) struct GripperSession {
     observing: Vec<Observing>,
     /// Which stretch of rows is being sent, and the time that counts as its zero (s).
     stretch: (u64, f64),
+    /// The first stretch with the present calibrations.
+    calibrated: u64,
     /// Sensors of the gripper that the store remembers, and their channels.
     sensors: SensorList,
     channels: Arc<[Channel]>,
@@ -136,6 +138,7 @@ impl GripperSession {
             crosstalk: CrosstalkView::default(),
             observing: Vec::new(),
             stretch: (0, 0.0),
+            calibrated: 0,
             sensors: SensorList::default(),
             channels: SensorList::default().channels().into(),
             revision: 0,
@@ -416,6 +419,7 @@ impl GripperSession {
             watching: self.watching.clone(),
             ended: self.ended.clone(),
             grasp: self.stretch.0,
+            calibrated: self.calibrated,
             identification: self.recognition.as_ref().and_then(LiveRecognition::view),
             recognition_off: self.recognition.as_ref().and_then(LiveRecognition::why_off),
             failed: self.failed_sensors(),

@@ -125,13 +125,16 @@ fn a_label_goes_to_the_trial_in_question_and_settles_a_disagreement() {
 }
 
 #[test]
-fn recording_again_discards_what_has_no_label() {
+fn recording_keeps_what_has_no_label() {
     let labels = view();
     let mut session = LabellingSession::default();
     let begin = LabellingEffect::BeginTrial(request());
-    // Without a connection nothing is thrown away.
+    // The stored trial in question, and what was written about it, stay in the store.
     let gripper = GripperView::default();
-    assert_eq!(session.apply(LabellingAction::Record, &now(&gripper, &labels)), std::slice::from_ref(&begin));
+    session.apply(LabellingAction::WriteNote(4, "slipped".to_owned()), &now(&gripper, &labels));
+    let note = edit(LabelCommand::Edit(4, TrialEdit::Note("slipped".to_owned())));
+    let kept = LabellingEffect::Inform("Trial 4 is kept without a label.".to_owned());
+    assert_eq!(session.apply(LabellingAction::Record, &now(&gripper, &labels)), [note, kept, begin.clone()]);
     let gripper = running(5);
     assert_eq!(
         session.apply(LabellingAction::Record, &now(&gripper, &labels)),

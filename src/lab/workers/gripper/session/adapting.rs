@@ -31,7 +31,7 @@ impl GripperSession {
         });
         match adapted {
             Ok(adaptation) => {
-                self.read_calibrations();
+                self.calibrated_anew();
                 adaptation.warnings.iter().for_each(|text| self.publisher.notify(Notice::Warning(text.clone())));
                 self.publisher.notify(notice_of(&adaptation));
                 !adaptation.is_complete()

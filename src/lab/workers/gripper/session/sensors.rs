@@ -73,6 +73,14 @@ impl GripperSession {
         }
     }
 
+    /// Reads the board through new calibrations; what was read before, the last trial among it, is no longer comparable.
+    pub(super) fn calibrated_anew(&mut self) {
+        self.read_calibrations();
+        self.begin_stretch(0.0);
+        self.calibrated = self.stretch.0;
+        self.ended = None;
+    }
+
     // Zeros.
 
     /// Takes the zeros of a trial from the readings just before its closing.
@@ -146,7 +154,7 @@ impl GripperSession {
                 };
                 if let Some(kept) = kept {
                     self.end_calibration(Some(kept));
-                    self.read_calibrations();
+                    self.calibrated_anew();
                 }
             }
             CalibrationCommand::EmptyClose => {
