@@ -174,14 +174,16 @@ impl ObjectRounds<'_> {
             let trial = grasp_soundly(&scene, self.object, seed_of(number), Recompute::Unsettled);
             let read = |view: &SensorView| view.signals_on(&trial, seed).map(|signals| sequence_of(&signals));
             let read: Vec<Sequence> = self.views.iter().map(read).collect::<Result<_, LayoutError>>()?;
-            let drawn = sampler.draw_after(self.object, seed_of(number + 1), trial.frames().last()).0;
-            let guided = guide.as_mut().zip(read.first()).and_then(|((model, advisor, belief), grasp)| {
-                feel(model, belief, grasp);
-                let (model, belief) = (Arc::clone(model), belief.clone());
-                let last = RecognisedGrasp { model, grasp: grasp.clone(), hold_s: None, belief };
-                advisor.next(&last, [&scene, &drawn], sampler, self.object)
-            });
-            scene = guided.map_or(drawn, |(_, scene)| scene);
+            if number + 1 < count as u64 {
+                let drawn = sampler.draw_after(self.object, seed_of(number + 1), trial.frames().last()).0;
+                let guided = guide.as_mut().zip(read.first()).and_then(|((model, advisor, belief), grasp)| {
+                    feel(model, belief, grasp);
+                    let (model, belief) = (Arc::clone(model), belief.clone());
+                    let last = RecognisedGrasp { model, grasp: grasp.clone(), hold_s: None, belief };
+                    advisor.next(&last, [&scene, &drawn], sampler, self.object)
+                });
+                scene = guided.map_or(drawn, |(_, scene)| scene);
+            }
             grasps.push(read);
         }
         Ok(grasps)
@@ -220,7 +222,9 @@ mod tests {
         let mut grasps = |between: Between, guide: Option<&Arc<Model>>| {
             scene.pose.between = between;
             let rounds = GraspRounds { rounds: 1, grasps: 2, seed: 3, progress: &|_, _| (), stop: &stop };
-            let mut all = rounds.simulated(&scene, &[view.clone()], &[(0, "box".to_owned())], guide).expect("grasped");
+            let mut all = rounds
+                .simulated(&scene, std::slice::from_ref(&view), &[(0, "box".to_owned())], guide)
+                .expect("grasped");
             all.remove(0).grasps
         };
         let (left, guided) = (grasps(Between::AsReleased, None), grasps(Between::Guided, Some(&model)));
