@@ -444,7 +444,7 @@ impl Part<'_, '_> {
                     self.actions.push(|app| app.show_panel("why"));
                 }
                 if let Some(because) = self.because() {
-                    ui.add(Label::new(RichText::new(because).weak()).truncate());
+                    ui.add(Label::new(RichText::new(because).small().weak()).truncate());
                 }
             }
         });
