@@ -185,6 +185,11 @@ pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: 
     actions.on(&button, |app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
 }
 
+/// The name of an effect or a check in words.
+pub(super) fn words(name: &str) -> String {
+    name.replace('-', " ")
+}
+
 /// Writes one line, cut where there is no room; its right end.
 pub(super) fn put_line(ui: &Ui, place: Rect, align: Align2, text: &str, size: f32, ink: Color32) -> f32 {
     let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), ink);

@@ -26,8 +26,8 @@ pub(super) struct EvaluateArguments {
     data: DataArguments,
     /// Split into training and test trials: 40/40/20 (shares; the second for stage two), folds:5 (cross-validation),
     /// first:50 or first:50:100 (the oldest of each object for training, those after them for testing),
-    /// leave-a-pose-out or leave-a-session-out (a session ends with the day, after ten minutes without a trial, with a tare, and with an
-    /// imported file) (default: first:50 where there are more, else folds:5).
+    /// leave-a-pose-out or leave-a-session-out (a session ends with the day, after ten minutes without a trial, with a
+    /// tare, and with an imported file) (default: first:50 where there are more, else folds:5).
     #[arg(long, value_name = "PLAN", conflicts_with_all = ["train_trials", "test_trials"])]
     split: Option<SplitPlan>,
     /// Repeat a random split N times, each with new draws.

@@ -16,8 +16,8 @@ use std::sync::Arc;
 
 The model then names the classes that are left after each grasp. The true one is among them in as many rounds of grasps as \
 promised, whenever grasping stops. Each grasp of a round finds the object put down anew (or as --as-released or --guided say), in \
-simulation, by the gripper that the model learned from; sets are shown in rounds of the same kind. A grasp ends a round by itself only at a confidence at which the decisions are wrong no more often; where \
-there is none, it never does.
+simulation, by the gripper that the model learned from; sets are shown in rounds of the same kind. A grasp ends a round by \
+itself only at a confidence at which the decisions are wrong no more often; where there is none, it never does.
 
 See also: palpate help recognition")]
 pub(super) struct PromiseArguments {

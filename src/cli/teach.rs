@@ -122,7 +122,7 @@ impl Report for TeachReport<'_> {
         page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));
         page.fact("saved", self.model.display().to_string());
         let (model, grasped) = (self.model.display(), self.grasped);
-        page.line("Commands use it where they are told to:");
+        page.line("Name it where it is to be used:");
         page.line(format!("  palpate recognise TRIAL --model {model}"));
         page.line(format!("  palpate demo {grasped} --model {model}"));
     }

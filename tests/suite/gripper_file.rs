@@ -13,7 +13,6 @@ use palpate_device::protocol::{BoardEvent, Decoder};
 use palpate_lab::datasets::{DatasetQuery, SensorView, trial_signals};
 use palpate_lab::grasping::{Adaptation, GraspController, GraspPlan, Identification, Row};
 use palpate_lab::gripper::Listen;
-
 use palpate_learn::{Dataset, Fitting, Model, Models, StopRule};
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
@@ -97,10 +96,10 @@ fn adapted(store: &mut Store) {
 }
 
 /// Grasps of three objects, and what was grasped.
-fn grasped(store: &mut Store, each: u64) -> (Vec<(TrialId, &'static str)>, Dataset) {
+fn grasped(store: &mut Store) -> (Vec<(TrialId, &'static str)>, Dataset) {
     let trials = ["ball", "box", "syringe"]
         .into_iter()
-        .flat_map(|object| (0..each).map(move |k| (object, k)))
+        .flat_map(|object| (0..6).map(move |k| (object, k)))
         .map(|(object, k)| (recorded(store, &parts(), object, 20 + k, Vec::new()), object))
         .collect();
     let view = SensorView::default().of_store(store).unwrap();
@@ -119,7 +118,7 @@ fn in_the_window_a_grasp_of_it_is_recorded_recognised_and_explained() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     adapted(&mut store);
-    let model = learned(&grasped(&mut store, 6).1);
+    let model = learned(&grasped(&mut store).1);
     let listen: Listen =
         Arc::new(|_, _| Ok(Box::new(streams::emulated(emulated(&parts(), "box", 40, Vec::new()), FAST))));
     let models = Ok(Models::all(&scripted::model()).with_real(Some(model)));
@@ -145,7 +144,7 @@ fn a_gripper_of_another_file_is_calibrated_recorded_learned_and_recognised() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(&folder.path().join("trials.sqlite")).unwrap();
     adapted(&mut store);
-    let (trials, data) = grasped(&mut store, 6);
+    let (trials, data) = grasped(&mut store);
     let wanted = [
         "curvature_left",
         "curvature_right",

@@ -5,7 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::icons::{self, Icon};
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{capital, command_ui, failure_ui, job_ui, port_field, remark_ui, warning_ui, wrapped};
+use crate::app::widgets::{capital, command_ui, failure_ui, job_ui, port_field, remark_ui, warning_ui, words, wrapped};
 use egui::text::{LayoutJob, TextFormat};
 use egui::{CollapsingHeader, Color32, Grid, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_device::doctor::{
@@ -197,7 +197,7 @@ fn headline_ui(ui: &mut Ui, theme: Theme, finding: &CheckFinding) {
     let seen = if finding.verdict >= CheckStatus::NotChecked { colours.text } else { colours.quiet_text };
     let font = egui::TextStyle::Body.resolve(ui.style());
     let mut line = LayoutJob::default();
-    line.append(&finding.check.replace('-', " "), 0.0, TextFormat::simple(font.clone(), colour(name)));
+    line.append(&words(finding.check), 0.0, TextFormat::simple(font.clone(), colour(name)));
     // A number and its unit stay in one line.
     let seen_text = finding.seen.replace(" %", "\u{a0}%");
     line.append(&seen_text, 10.0, TextFormat::simple(font, colour(seen)));

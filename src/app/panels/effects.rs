@@ -5,7 +5,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::theme::{self, colour, veil};
-use crate::app::widgets::capital;
+use crate::app::widgets::{capital, words};
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{symbol, three_digits};
@@ -132,11 +132,11 @@ impl Row<'_> {
     fn setting_ui(&self, ui: &mut Ui, now: Setting, open: bool, unfolded: &mut Option<Effect>) -> Option<Setting> {
         let (row, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
         let [lamp, name, settings, cost, change] = columns(row);
-        lamp_ui(ui, lamp, self.theme, &words(self.effect), self.planned.is_some_and(|planned| planned.on));
+        lamp_ui(ui, lamp, self.theme, &words(self.effect.name()), self.planned.is_some_and(|planned| planned.on));
         if self.name_ui(ui, name, open) {
             *unfolded = if open { None } else { Some(self.effect) };
         }
-        let clicked = settings_ui(ui, settings, &words(self.effect), now);
+        let clicked = settings_ui(ui, settings, &words(self.effect.name()), now);
         if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
             let colours = self.theme.colours();
             let saves = explained.cost_share < 0.0;
@@ -159,9 +159,9 @@ impl Row<'_> {
         let ink = if response.hovered() || open { colours.accent } else { colours.text };
         let font = egui::TextStyle::Body.resolve(ui.style());
         let painter = ui.painter().with_clip_rect(rect.expand2(vec2(GAP, 0.0)));
-        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, words(self.effect), font, colour(ink));
+        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, words(self.effect.name()), font, colour(ink));
         response.widget_info(|| {
-            egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", words(self.effect)))
+            egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", words(self.effect.name())))
         });
         let clicked = response.clicked();
         if let Some(planned) = self.planned {
@@ -183,7 +183,7 @@ impl Row<'_> {
         }
         let words = if self.fresh { words.to_owned() } else { format!("{words} ({BEFORE})") };
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &words));
-        response.on_hover_text(format!("{}: {words}", self::words(self.effect)));
+        response.on_hover_text(format!("{}: {words}", self::words(self.effect.name())));
     }
 
     /// Reason, cost and change in words.
@@ -208,11 +208,6 @@ impl Row<'_> {
             }
         });
     }
-}
-
-/// Name of an effect in words.
-fn words(effect: Effect) -> String {
-    effect.name().replace('-', " ")
 }
 
 /// Reason of a decision with its number.

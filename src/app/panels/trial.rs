@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::colour;
-use crate::app::widgets::{capital, chip, wrapped};
+use crate::app::widgets::{capital, chip, words, wrapped};
 use egui::{Grid, RichText, ScrollArea, Ui};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::SPACE;
@@ -96,7 +96,7 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
     }
     if let Some(own) = &trial.simulated {
         let on = own.plan.effects.iter().filter(|effect| effect.on);
-        let on: Vec<String> = on.map(|effect| effect.name.replace('-', " ")).collect();
+        let on: Vec<String> = on.map(|effect| words(&effect.name)).collect();
         facts.push(("effects", if on.is_empty() { "none".to_owned() } else { on.join(", ") }));
     }
     if let Some(collection) = &header.collection {

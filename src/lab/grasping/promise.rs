@@ -51,7 +51,7 @@ pub enum PromiseError {
     #[error(transparent)]
     Layout(#[from] LayoutError),
     #[error(
-        "no guide for this model: it reads channels of which no grasps in known poses are at hand. Leave --between out"
+        "no grasps in known poses are at hand for the channels of this model, by which a guide could choose. Leave --guided out"
     )]
     NoGuide,
     #[error("{0} rounds are too few: take at least {least} in all, and {least} of each class for a promise of its own", least = 3 * ROUNDS_OF_A_CLASS)]

@@ -90,11 +90,9 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>) {
     let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
     let length = view.size.y * (PER_NEWTON * KEY) as f32;
     let (tail, ink) = (tip - Vec2::new(length, 0.0), pressure_colour(0.35 + 0.65 * (KEY / FULL_SCALE) as f32));
-    let half = Vec2::new((0.5 * length).max(0.25 * TEXT * 6.0) + 5.0, LINE);
-    let middle = Vec2::new(
-        0.5 * (tail.x + tip.x).min(2.0 * (view.size.x - half.x) - 16.0),
-        view.size.y - SCALE_BAR - KEY_MIDDLE,
-    );
+    let half = Vec2::new((0.5 * length).max(1.5 * TEXT) + 5.0, LINE);
+    let middle_x = (tip.x - 0.5 * length).min(view.size.x - half.x - 8.0);
+    let middle = Vec2::new(middle_x, view.size.y - SCALE_BAR - KEY_MIDDLE);
     annotator.add_plate(Plate { middle, half });
     let overlay = &mut annotator.overlay;
     overlay.line(tail, tip, 2.0, ink);
