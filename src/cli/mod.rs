@@ -118,7 +118,7 @@ enum Command {
     Check(check::CheckArguments),
     /// Draw curves or heat maps of stored trials to an SVG or PNG file.
     Plot(plot::PlotArguments),
-    /// Write a stored trial as a movie: animated PNG, GIF or a folder of pictures.
+    /// Write a stored trial as a movie (animated PNG, GIF, MP4, pictures) or an animated 3-D model (.glb).
     Movie(movie::MovieArguments),
     /// Explain which effects a scene calls for, and what each costs and changes.
     Scene(scene::SceneCommandArguments),

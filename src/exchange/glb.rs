@@ -168,10 +168,15 @@ impl Model {
         let item = json!({ "componentType": INDEX, "count": indices.len(), "type": "SCALAR" });
         let indices = self.accessor(&bytes, item, Some(INDEX_BUFFER));
         let mut primitive = json!({ "attributes": attributes, "indices": indices, "material": 0 });
+        let mut mesh = json!({ "name": name });
         if !targets.is_empty() {
             primitive["targets"] = json!(targets);
+            // The first target is the first frame, as the poses of nodes are. F3D 4.0 (VTK) crashes without weights.
+            let weights = (0..targets.len()).map(|target| f32::from(u8::from(target == 0)));
+            mesh["weights"] = weights.collect();
         }
-        add(&mut self.meshes, json!({ "name": name, "primitives": [primitive] }))
+        mesh["primitives"] = json!([primitive]);
+        add(&mut self.meshes, mesh)
     }
 
     /// Moves a part of a node: `path` of glTF.
