@@ -155,7 +155,7 @@ impl Progress {
 
     /// Work whose share cannot be told: what it is, and how long it has taken.
     pub(super) fn waiting(what: &str) -> Self {
-        let progress = Self::new("{msg} .. {elapsed}");
+        let progress = Self::new("{msg} … {elapsed}");
         progress.0.set_message(what.to_owned());
         progress.0.enable_steady_tick(Duration::from_millis(200));
         progress

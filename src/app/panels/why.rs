@@ -226,7 +226,8 @@ fn spoken(points: f64) -> String {
 fn hint_of(name: &str, evidence: &Evidence) -> String {
     let side = if evidence.points < 0.0 { "against" } else { "for" };
     let points = points_words(evidence.points);
-    format!("{name}: {points} points {side} the answer, {:+.1} decibans against the second class", evidence.decibans)
+    let decibans = units::true_minus(&format!("{:+.1}", evidence.decibans));
+    format!("{name}: {points} points {side} the answer, {decibans} decibans against the second class")
 }
 
 /// Row over the whole width, with its text for screen readers.

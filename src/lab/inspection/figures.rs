@@ -71,7 +71,7 @@ pub fn caption(trials: &[&OpenTrial]) -> String {
     let mut lines: Vec<String> = trials.iter().take(NAMED).map(|trial| line(&trial)).collect();
     if trials.len() > NAMED {
         let ids: Vec<String> = trials[NAMED..].iter().take(20).map(|trial| trial.id.to_string()).collect();
-        let more = if trials.len() > NAMED + ids.len() { ".." } else { "" };
+        let more = if trials.len() > NAMED + ids.len() { "…" } else { "" };
         lines.push(format!("and {} more: {}{more}", trials.len() - NAMED, ids.join(", ")));
     }
     let read = trials.iter().find(|trial| trial.source == TrialSource::Simulated);
@@ -232,7 +232,7 @@ fn found<'a>(trial: &'a OpenTrial, term: &str, raw: bool) -> Result<(Vec<Curve<'
     if curves.is_empty() {
         let mut names: Vec<&str> = shown(trial, raw).map(|column| column.name.as_str()).collect();
         names.push("line");
-        let more = if names.len() > LISTED { ", .." } else { "" };
+        let more = if names.len() > LISTED { ", …" } else { "" };
         names.truncate(LISTED);
         let (id, known) = (trial.id, names.join(", "));
         return Err(FigureDataError(format!("trial {id} has no channel \"{term}\"; it has {known}{more}")));

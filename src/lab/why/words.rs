@@ -2,6 +2,7 @@
 
 use super::occlusion::{Attribution, Evidence};
 use crate::inspection::{PhaseSpan, TouchPhase};
+use palpate_geometry::units::true_minus;
 use palpate_sim::objects::object_title;
 use palpate_tactile::{Quantity, unit_of_channel};
 
@@ -125,13 +126,13 @@ pub fn channel_words(name: &str) -> String {
     }
 }
 
-/// Percent points with their sign: `+38`, `-0.4`; `0` for none.
+/// Percent points with their sign: `+38`, `−0.4`; `0` for none.
 pub fn points_words(points: f64) -> String {
-    match points.abs() {
+    true_minus(&match points.abs() {
         size if size < 0.05 => "0".to_owned(),
         size if size < 0.95 => format!("{points:+.1}"),
         _ => format!("{points:+.0}"),
-    }
+    })
 }
 
 /// Percentage, rounded down so that a probability below a threshold never seems to reach it; above 99 % with a decimal.
@@ -194,6 +195,6 @@ mod tests {
         let names = ["force_right", "pressure_left_pair_1", "contact_pressure_left", "grip", "my_own_sensor"];
         let words = ["right pad force", "left pad pressure, pair 1", "left contact pressure", "grip", "my own sensor"];
         assert_eq!(names.map(channel_words), words);
-        assert_eq!([0.01, 0.31, -0.4, 12.4, -7.6].map(points_words), ["0", "+0.3", "-0.4", "+12", "-8"]);
+        assert_eq!([0.01, 0.31, -0.4, 12.4, -7.6].map(points_words), ["0", "+0.3", "−0.4", "+12", "−8"]);
     }
 }

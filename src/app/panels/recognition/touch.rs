@@ -65,10 +65,10 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
-/// An estimate in words: `34 mm (30 .. 38)`.
+/// An estimate in words: `34 mm (30 to 38)`.
 fn words(estimate: &MeasureEstimate, unit: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    format!("{value:.0}{unit} ({from:.0} .. {to:.0})")
+    format!("{value:.0}{unit} ({from:.0} to {to:.0})")
 }
 
 fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
