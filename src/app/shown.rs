@@ -230,11 +230,12 @@ impl<'a> DisplayedData<'a> {
         // Also where the cursor is in the past.
         let Some(grasp) = self.newest_answer().unwrap_or(view).last.clone() else {
             let start = match self.source {
-                ViewSource::Simulation => "press play (Space)",
-                ViewSource::Gripper => "record a trial (R)",
-                ViewSource::Trial => "open a trial",
+                ViewSource::Simulation if self.snapshot.is_some_and(|snapshot| snapshot.status.playing) => "",
+                ViewSource::Simulation => ": press play (Space)",
+                ViewSource::Gripper => ": record a trial (R)",
+                ViewSource::Trial => ": open a trial",
             };
-            return Err(format!("The explanation appears when a grasp ends: {start}."));
+            return Err(format!("The explanation appears when a grasp ends{start}."));
         };
         Ok(ExplainRequest { grasp, trial: None })
     }
@@ -290,7 +291,7 @@ impl<'a> DisplayedData<'a> {
                     view: trial.at(cursor_s).and_then(|now| now.answer),
                     off: trial.recognition_off.as_deref(),
                     truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
-                    waiting: "No contact yet",
+                    waiting: "Fingers closing",
                     again: GRASPING_AGAIN,
                     finished: true,
                 }

@@ -454,7 +454,7 @@ fn a_driven_trial_ends_when_the_board_does_not_do_what_it_is_told() {
     let mut desk = Desk::on(emulated(&parts(1, false), None, FAST, 10));
     desk.connect();
     let id = desk.trial(Control::Driven, false);
-    desk.until_said("trial ended and fingers told to vent: the board refused a command (above-maximum");
+    desk.until_said("trial ended: the board refused a command (above-maximum");
     desk.until(|view| view.latest.as_ref().is_some_and(|latest| latest.line_bar < Some(0.01)));
     let trial = desk.store().board_log(id).unwrap().unwrap();
     // The refused step is the last that it was told.

@@ -46,7 +46,7 @@ fn says(bench: &Bench, label: &str) -> bool {
 #[test]
 fn a_grasp_is_followed_until_it_is_sure() {
     let mut bench = alone(Theme::Dark);
-    assert!(says(&bench, "Ready") && says(&bench, "Press play to start a grasp"));
+    assert!(says(&bench, "No contact yet") && says(&bench, "Press play to start a grasp"));
     bench.advance_to(0.5);
     assert!(says(&bench, "Sensing …"));
     bench.advance_to(2.6);

@@ -293,7 +293,8 @@ pub(super) fn bottom(ui: &mut Ui, app: &App, actions: &mut Actions) {
     if records && !shown.looks_back() {
         return trial::ui(ui, app, actions);
     }
-    let status = app.snapshot().map(|s| s.status.clone()).unwrap_or_default();
+    // Nothing is known before the first state of the simulation.
+    let Some(status) = app.snapshot().map(|snapshot| snapshot.status.clone()) else { return };
     ui.horizontal_centered(|ui| {
         if shown.replays() {
             replay_buttons(ui, app, actions);

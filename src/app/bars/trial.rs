@@ -6,6 +6,7 @@ use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
+use palpate_geometry::units::SPACE;
 use palpate_lab::grasping::{GraspStage, LEAD_S};
 use palpate_lab::workers::{GripperCommand, GripperView, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
@@ -13,6 +14,7 @@ use palpate_sim::gripper::Phase;
 pub(super) fn ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     let trial = app.gripper_view().and_then(|gripper| gripper.trial.as_ref());
     let connected = app.gripper_view().is_some_and(GripperView::is_connected);
+    let silent_s = app.gripper.silent_s();
     ui.horizontal_centered(|ui| {
         let mut button = |on: bool, text: &str, about: &str, action: fn(&mut App)| {
             let button = ui.add_enabled(on, Button::new(text)).on_hover_text(about).on_disabled_hover_text(about);
@@ -22,23 +24,26 @@ pub(super) fn ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
             Some(_) => ("Restart  R", "Discard the running trial and record from the beginning (R)"),
             None => ("Record  R", "Record a grasp; a trial without a label is kept (R)"),
         };
-        button(connected, record, about, |app| app.label(LabellingAction::Record));
+        button(connected && silent_s.is_none(), record, about, |app| app.label(LabellingAction::Record));
         let about = "End the trial and keep it (Q)";
         button(trial.is_some(), "End  Q", about, |app| _ = app.gripper.send(GripperCommand::End));
         let about = "Discard the trial (D)";
         button(trial.is_some(), "Discard  D", about, |app| app.label(LabellingAction::Discard));
         ui.separator();
         let colours = app.view.theme.colours();
-        match trial {
-            Some(trial) => {
+        match (trial, silent_s) {
+            (Some(trial), _) => {
                 let (text, ink) = (instruction(trial), part_colour(app, trial.stage));
                 ui.label(RichText::new(text).heading().strong().color(colour(ink)));
                 progress_ui(ui, trial, ink, colours.raised);
             }
-            None if connected => {
+            (None, None) if connected => {
                 ui.weak("ready");
             }
-            None => {
+            (None, Some(silent_s)) => {
+                ui.weak(format!("no readings for {silent_s}{SPACE}s: is the board plugged in?"));
+            }
+            (None, None) => {
                 ui.weak("no gripper connected");
             }
         }

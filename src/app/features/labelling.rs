@@ -27,6 +27,11 @@ impl LabellingFeature {
         Self { worker, labels: None, session: LabellingSession::default(), blind: false, shown: None }
     }
 
+    /// The trial that the card asks about is shown, whatever was shown meanwhile.
+    pub(super) fn show_again(&mut self) {
+        self.shown = None;
+    }
+
     /// Reads the store again.
     pub(super) fn refresh(&self) {
         self.worker.send(LabelCommand::Refresh);

@@ -98,7 +98,8 @@ impl App {
             phases: &self.inspect.phases,
             comparison: ComparedTrials {
                 pinned: &self.inspect.pinned,
-                traces: &self.inspect.compared,
+                // Beside a grasp of the demo they are curves without a name.
+                traces: if self.view.mode == view::Mode::Demo { &[] } else { &self.inspect.compared },
                 alignment: self.inspect.alignment,
                 spread: self.inspect.spread,
             },

@@ -34,6 +34,9 @@ const LINE: f32 = 18.0;
 /// Time that a message with a button stays.
 const WITH_BUTTON: Duration = Duration::from_secs(30);
 
+/// Time for which the last message can still be read after it, in quiet letters.
+const QUIET: Duration = Duration::from_secs(60);
+
 /// In messages of a store that is lost, which stay until they are dismissed: whatever is recorded goes nowhere.
 const STORE_LOST: &str = "while it was open";
 /// Time that they stay: a day's work.
@@ -61,6 +64,8 @@ struct Shown {
 pub(in crate::app) struct Notices {
     shown: Vec<Shown>,
     messages: VecDeque<String>,
+    /// When the last message came.
+    told: Option<Instant>,
 }
 
 /// Remedies for a message.
@@ -78,6 +83,7 @@ impl Notices {
         self.shown.retain(|shown| shown.text != text);
         self.shown.push(Shown { level, failed: None, text: text.clone(), until: Instant::now() + time });
         self.messages.push_back(text);
+        self.told = Some(Instant::now());
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
         }
@@ -139,14 +145,14 @@ impl Notices {
         &self.messages
     }
 
-    /// The message to show now: the most urgent, and among those the newest.
+    /// The message to show now: the newest warning or error, else the newest.
     fn first(&mut self, ctx: &egui::Context) -> Option<usize> {
         let now = Instant::now();
         self.shown.retain(|shown| shown.until > now);
         if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
             ctx.request_repaint_after(next - now);
         }
-        (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level, *k))
+        (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level > Level::Info, *k))
     }
 
     /// The message to show now where there is no line: warnings about single grasps are left out.
@@ -166,7 +172,8 @@ impl Notices {
             ui.horizontal(|ui| {
                 ui.set_min_height(LINE);
                 let Some(first) = first else {
-                    return quiet_line(ui, colours.quiet_text, self.messages.back());
+                    let late = self.told.is_none_or(|told| told.elapsed() > QUIET);
+                    return quiet_line(ui, colours.quiet_text, self.messages.back().filter(|_| !late));
                 };
                 let Shown { level, text, .. } = &self.shown[first];
                 let ink = match level {

@@ -269,7 +269,9 @@ impl ViewState {
 impl App {
     /// Changes to another mode.
     pub fn set_mode(&mut self, mode: Mode) {
-        self.view.mode = mode;
+        if std::mem::replace(&mut self.view.mode, mode) == mode {
+            self.labelling.show_again();
+        }
         self.labelling.refresh();
         self.enter_mode(mode);
     }

@@ -30,7 +30,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         ui.add_space(6.0);
         match &snapshot.last {
             Some(last) => {
-                ui.weak(format!("result of grasp {}", last.grasp));
+                ui.weak(if last.grasp == snapshot.grasp { "result" } else { "result of the grasp before" });
                 trust_ui(ui, data.view.theme, last, snapshot.status.checking, actions);
                 last_ui(ui, last);
             }
@@ -52,16 +52,19 @@ fn object_ui(ui: &mut Ui, object: &ObjectCard) {
     }
 }
 
-/// Newest values of the channels, left and right.
+/// Values of the channels at the time shown, left and right.
 fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
-    let newest = |quantity: Quantity, side: Side| -> Option<f64> {
-        let trace = data.traces.current().filter(|t| t.grasp == snapshot.grasp)?;
+    let trace = data.traces.current().filter(|trace| trace.grasp == snapshot.grasp);
+    let sample = data.sample();
+    let value = |quantity: Quantity, side: Side| -> Option<f64> {
         let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side() == Some(side))?;
-        trace.channels.get(index)?.last().map(|value| f64::from(*value))
+        trace?.channels.get(index)?.get(sample?).map(|value| f64::from(*value))
     };
+    let past = data.playback.cursor_s.or_else(|| data.held_s());
+    let frame = data.moment().map_or(snapshot.frame.as_ref(), |moment| moment.frame);
     ui.spacing_mut().interact_size.y = 18.0;
     Grid::new("readings").num_columns(3).spacing([14.0, 3.0]).show(ui, |ui| {
-        ui.weak("now");
+        ui.weak(past.map_or_else(|| "now".to_owned(), |t| format!("at {}", with_unit(t, "s"))));
         for side in ["left", "right"] {
             ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(side).weak()));
         }
@@ -74,15 +77,17 @@ fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
             ui.label(format!("{name}, {}", symbol(unit)));
             for side in Side::BOTH {
                 // A fixed width: columns do not move while digits change.
-                let text = newest(quantity, side).map_or("–".to_owned(), |v| number(v * factor, unit));
+                let text = value(quantity, side).map_or("–".to_owned(), |v| number(v * factor, unit));
                 ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(text).monospace()));
             }
             ui.end_row();
         }
         ui.label("line, bar");
-        let line = RichText::new(format!("{:.2}", snapshot.frame.line_bar)).monospace();
+        let line = RichText::new(format!("{:.2}", frame.line_bar)).monospace();
         ui.add_sized([52.0, 18.0], egui::Label::new(line));
-        ui.weak(snapshot.frame.phase.name());
+        ui.end_row();
+        ui.label("phase");
+        ui.label(frame.phase.name());
         ui.end_row();
     });
 }

@@ -215,12 +215,12 @@ fn value_text(latest: &LatestReading, sensor: Sensor) -> String {
 fn drift_badge(ui: &mut Ui, drift: &Drift) {
     let colours = theme::of(ui).colours();
     let (word, ink) = match drift.level {
-        DriftLevel::Steady => ("stable", colours.quiet_text),
-        DriftLevel::Moved => ("drifted", colours.warning),
-        DriftLevel::TooFar => ("too large", colours.error),
+        DriftLevel::Steady => ("zero", colours.quiet_text),
+        DriftLevel::Moved => ("zero drifted", colours.warning),
+        DriftLevel::TooFar => ("zero too far off", colours.error),
     };
-    let about = drift.remark().unwrap_or_else(|| "Zero as calibrated".to_owned());
-    chip(ui, format!("{word} {}", drift.with_unit()), ink).on_hover_text(about);
+    let about = drift.remark().unwrap_or_else(|| "Shift of its zero since the calibration: small".to_owned());
+    chip(ui, format!("{word} {}", true_minus(&drift.with_unit())), ink).on_hover_text(about);
 }
 
 /// Actuation, and automatic detection of trials.

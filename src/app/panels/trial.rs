@@ -97,7 +97,7 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
     if let Some(own) = &trial.simulated {
         let on = own.plan.effects.iter().filter(|effect| effect.on);
         let on: Vec<String> = on.map(|effect| words(&effect.name)).collect();
-        facts.push(("effects", if on.is_empty() { "none".to_owned() } else { on.join(", ") }));
+        facts.push(("effects at the start", if on.is_empty() { "none".to_owned() } else { on.join(", ") }));
     }
     if let Some(collection) = &header.collection {
         facts.push(("collection", collection.clone()));

@@ -33,7 +33,7 @@ pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Action
     let listed = draft.filter.of(view);
     if listed.is_empty() {
         let text = match draft.filter {
-            TrialFilter::Kept => "No trials of the real gripper yet. Connect it and press R.",
+            TrialFilter::Kept => "No trials of the real gripper yet: with it connected, R records one.",
             TrialFilter::Disagreeing => "The model agrees with all labels.",
             TrialFilter::Unlabelled | TrialFilter::Flagged | TrialFilter::Discarded => "None.",
         };
@@ -96,6 +96,7 @@ fn row_ui(
             let labels: Vec<&str> = trial.flags.iter().map(|flag| flag.flag.label()).collect();
             (labels.join(", "), colours.warning)
         }
+        (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
         (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
     };
     put_line(ui, words, Align2::LEFT_BOTTOM, &below, 11.0, colour(ink));

@@ -297,7 +297,11 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
     if let Some(inspected) = own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
         return (inspected.trial.remarks.join(" "), None);
     }
-    let held = own.data.held_s().map(|t| format!("As it was held, at {t:.1}\u{a0}s"));
+    let held = own.data.held_s().map(|t| {
+        let in_hand = own.data.moment().is_some_and(|now| now.stage.force_on_object(now.frame).is_some());
+        let words = if in_hand { "As it was held" } else { "The hand has not held it" };
+        format!("{words}, at {t:.1}{}s", units::SPACE)
+    });
     if own.data.source == ViewSource::Gripper {
         let text = match (own.silent_s, key.real) {
             (_, None) => "The fingers are not drawn: their flex strips are not calibrated".to_owned(),

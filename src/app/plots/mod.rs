@@ -127,7 +127,9 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
             layers::add_bands(plot_ui, trace, &plot, theme);
             layers::add_curves(plot_ui, trace, &plot, |c| own_ink(data, c), 1.8);
         }
-        layers::add_cursor(plot_ui, data);
+        if nothing.is_none() {
+            layers::add_cursor(plot_ui, data);
+        }
         let bounds = plot_ui.plot_bounds();
         mouse::TimeDrag {
             pointer: plot_ui.pointer_coordinate().map(|p: PlotPoint| p.x),
@@ -150,6 +152,8 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         let above = if adapts { 18.0 } else { 0.0 };
         let corner = rect.center() - 0.5 * galley.size() - egui::vec2(0.0, above);
         let below = corner.y + galley.size().y + 8.0;
+        let ground = egui::Rect::from_min_size(corner, galley.size()).expand(6.0);
+        ui.painter().rect_filled(ground, 3.0, ui.visuals().panel_fill);
         ui.painter().galley(corner, galley, ink);
         if adapts {
             let place = egui::Rect::from_center_size(egui::pos2(rect.center().x, below + 13.0), egui::vec2(80.0, 26.0));

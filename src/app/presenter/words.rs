@@ -1,12 +1,13 @@
 //! Sentences of presenter mode, for people who have never heard of the project.
 
-use crate::app::panels::recognition::words::{left, newest, percent, ranked, title};
+use crate::app::panels::recognition::words::{Headline, left, newest, percent, ranked, title};
 use crate::app::widgets::capital;
 use palpate_geometry::units::mm;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::Snapshot;
 use palpate_learn::{Measure, StopReason};
 use palpate_sim::gripper::{Mount, Phase};
+use palpate_sim::objects::EMPTY;
 
 /// What the picture shows.
 pub(super) const ENCODING: &str = "Colour: how hard each spot presses. Arrows: the force.";
@@ -56,17 +57,21 @@ pub(super) fn reason(view: &IdentificationView) -> String {
     [felt(view), others, follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The width that it has measured.
+/// The width that it has measured; none of an empty hand.
 fn felt(view: &IdentificationView) -> String {
+    if newest(view).is_some_and(|pmf| view.labels.class(EMPTY) == Some(pmf.top().0)) {
+        return String::new();
+    }
     let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));
     width.map_or_else(String::new, |width| format!("It feels about {:.0} mm wide.", mm(width.value)))
 }
 
-/// What else it may be, where that is worth a word.
+/// What else it may be beside the class that is named, where that is worth a word.
 fn rival(view: &IdentificationView) -> String {
     /// Least probability worth a word.
     const WORTH_NAMING: f64 = 0.05;
-    let Some(pmf) = newest(view).filter(|_| view.decision.is_none()) else { return String::new() };
+    let named = view.decision.is_none() && Headline::of(view).class().is_some();
+    let Some(pmf) = newest(view).filter(|_| named) else { return String::new() };
     let Some(second) = ranked(pmf).get(1).copied() else { return String::new() };
     let p = pmf.probabilities()[second];
     if p < WORTH_NAMING {

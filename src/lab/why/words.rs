@@ -83,7 +83,7 @@ impl Attribution {
             format!("For {title}: {}.", listed(&spoke_for))
         };
         let against_it = if against.is_empty() {
-            "Nothing spoke against it.".to_owned()
+            "Nothing spoke against it by a point or more.".to_owned()
         } else {
             format!("Against {title}: {}.", listed(&against))
         };
@@ -175,7 +175,7 @@ mod tests {
             why.sentences(),
             [
                 "For Lemon: left pad pressure in the hold (+38 points), left pad pressure in contact (+12).",
-                "Against Lemon: right curvature, distal in contact (-9 points)."
+                "Against Lemon: right curvature, distal in contact (−9 points)."
             ]
         );
         // No part alone changes the answer by a point.
@@ -184,7 +184,7 @@ mod tests {
             sure.sentences()[0],
             "No single part decides: without any one of them Lemon still has 90 % or more."
         );
-        assert_eq!(sure.sentences()[1], "Nothing spoke against it.");
+        assert_eq!(sure.sentences()[1], "Nothing spoke against it by a point or more.");
         // A whole phase does, although no channel in it does alone.
         let together = Attribution { by_phase: [0.0, 44.0].map(evidence).to_vec(), ..sure };
         assert_eq!(together.sentences()[0], "For Lemon: all channels in the hold (+44 points).");

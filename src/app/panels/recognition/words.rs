@@ -49,7 +49,7 @@ impl Headline {
     /// Text and probability.
     pub(in crate::app) fn text(self, labels: &Labels) -> (String, Option<f64>) {
         match self {
-            Self::Waiting => ("Ready".to_owned(), None),
+            Self::Waiting => ("No contact yet".to_owned(), None),
             Self::Sensing => ("Sensing …".to_owned(), None),
             Self::Unknown => ("Unknown".to_owned(), None),
             Self::Guess(class, p) => (format!("Best guess: {}", title(labels, class)), Some(p)),
@@ -219,7 +219,7 @@ mod tests {
         let listening =
             |now: f64, beliefs: &[f64]| IdentificationView { listening: true, ..view(Some(now), beliefs, None) };
         let cases = [
-            (view(None, &[], None), "Ready", "Fingers closing"),
+            (view(None, &[], None), "No contact yet", "Fingers closing"),
             (listening(0.35, &[]), "Tomato", "Grasp 1 of up to 4, needed 90 %"),
             (listening(0.61, &[]), "Lemon", "Grasp 1 of up to 4, needed 90 %"),
             (listening(0.7, &[0.61]), "Lemon", "Grasp 2 of up to 4. So far: lemon 61 %, tomato 35 %"),

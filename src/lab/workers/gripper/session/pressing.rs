@@ -42,9 +42,8 @@ impl GripperSession {
             pressing.abort(error.to_string());
         }
         let Some(cause) = pressing.abort_cause().map(str::to_owned) else { return };
-        // Where this cannot be sent, the board vents within a second.
-        let _sent = connection.gripper.vent();
         self.pressing = None;
-        self.publisher.notify(Notice::Warning(format!("fingers told to vent: {cause}")));
+        let told = self.tell_to_vent();
+        self.publisher.notify(Notice::Warning(format!("{cause}; {told}")));
     }
 }

@@ -88,9 +88,18 @@ impl GripperSession {
     /// Ends an aborted trial.
     pub(super) fn end_aborted(&mut self) {
         let cause = self.recording.as_ref().and_then(|recording| recording.controller.abort_cause());
-        let Some(cause) = cause else { return };
-        self.publisher.notify(Notice::Warning(format!("trial ended and fingers told to vent: {cause}")));
+        let Some(cause) = cause.map(str::to_owned) else { return };
+        let told = self.tell_to_vent();
+        self.publisher.notify(Notice::Warning(format!("trial ended: {cause}; {told}")));
         self.end(false, None);
+    }
+
+    /// Tells the fingers to vent after a fault; says whether that could be sent. Our firmware vents within a second without it.
+    pub(super) fn tell_to_vent(&mut self) -> &'static str {
+        match self.connection.as_mut().map(|connection| connection.gripper.vent()) {
+            Some(Ok(())) => "fingers told to vent",
+            Some(Err(_)) | None => "the fingers could not be told to vent: vent at the control box",
+        }
     }
 
     /// Begins a phase; readings before `until_s` are passed to recognition afterwards.
