@@ -135,6 +135,9 @@ fn an_afternoon_by_keys_alone() {
     desk.until_shown(true, "Trial 1: labelled");
     // What is shown is that trial, not the live stream.
     desk.until_inspected(Some(1));
+    desk.tell(|app| app.set_mode(Mode::Label));
+    desk.wait();
+    desk.until_inspected(Some(1));
     desk.press(Key::Slash);
     desk.type_text("garlic");
     desk.press(Key::Enter);

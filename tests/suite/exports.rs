@@ -183,7 +183,11 @@ fn a_model_has_the_fingers_where_the_frames_have_them() {
         assert_eq!(floats(&document, bytes, &attributes[name]).len(), size * (41 * 13 + 2 * 9), "{name}");
     }
     let targets = left["primitives"][0]["targets"].as_array().unwrap().len();
-    assert_eq!((targets, &left["weights"]), (5, &serde_json::json!([1, 0, 0, 0, 0])), "viewers that read no animation");
+    assert_eq!(
+        (targets, &left["weights"]),
+        (5, &serde_json::json!([1.0, 0.0, 0.0, 0.0, 0.0])),
+        "viewers that read no animation"
+    );
     let weights = floats(&document, bytes, &attributes["WEIGHTS_0"]);
     assert!(weights.chunks(4).all(|four| (four.iter().sum::<f32>() - 1.0).abs() < 1e-6));
 

@@ -266,6 +266,9 @@ fn the_ghost_of_a_finished_grasp_has_both_captions() {
     while !says(&bench) {
         bench.wait();
     }
+    // Its numbers are those of the time that is shown.
+    bench.tell(|app| app.show_panel("grasp"));
+    bench.until_shown(true, "at 3.00\u{a0}s");
 }
 
 /// The window through the driver that the pictures above are drawn with.

@@ -260,12 +260,12 @@ fn results_of_an_earlier_object_vanish() {
     bench.until(|s| s.status.finished && s.last.is_some());
     bench.harness.get_by_label("This grasp").click();
     bench.harness.run_steps(2);
-    assert!(bench.harness.query_by_label_contains("result of grasp").is_some());
+    assert!(bench.harness.query_by_label_contains("result of ").is_some());
     bench.tell(|app| app.simulation.send(Command::Pause));
     bench.tell(|app| app.open("tomato"));
     let changed = bench.until(|s| s.truth() == "tomato");
     assert!(changed.last.is_none() && changed.scene_since == changed.grasp);
-    assert!(bench.harness.query_by_label_contains("result of grasp").is_none());
+    assert!(bench.harness.query_by_label_contains("result of ").is_none());
 }
 
 #[test]

@@ -30,7 +30,11 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         ui.add_space(6.0);
         match &snapshot.last {
             Some(last) => {
-                ui.weak(if last.grasp == snapshot.grasp { "result" } else { "result of the grasp before" });
+                ui.weak(if last.grasp == snapshot.grasp {
+                    "result of this grasp"
+                } else {
+                    "result of the grasp before"
+                });
                 trust_ui(ui, data.view.theme, last, snapshot.status.checking, actions);
                 last_ui(ui, last);
             }

@@ -126,6 +126,8 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
     if view.size.y < LEAST_HEIGHT {
         return;
     }
+    let tips: Vec<f32> = all.iter().filter_map(|forces| Some(ends(forces, forces.normal)?.0.x)).collect();
+    let middle = if tips.len() == 2 { 0.5 * (tips[0] + tips[1]) } else { 0.5 * view.size.x };
     for forces in all {
         let Some((from, to)) = ends(&forces, forces.normal) else { continue };
         let letter = match forces.side {
@@ -153,14 +155,17 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         };
         let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * lines as f32 + 2.0);
         let along = (to - from).normalize_or(Vec2::Y);
-        // Beyond the tip, or else on either side of the arrow.
+        // Beyond the tip, or else on a side of the arrow.
         let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
         let aside = |sign: f32| {
             let edge = if sign < 0.0 { from.x.min(to.x) } else { from.x.max(to.x) };
             Vec2::new(edge + sign * (GAP + half.x), 0.5 * (from.y + to.y))
         };
         let over = Vec2::new(0.0, -2.5 * half.y);
-        let places = [beyond, aside(-1.0), aside(1.0), aside(-1.0) + over, aside(1.0) + over];
+        // Sooner further up or down than beside the other finger.
+        let outward = (from.x - middle).signum();
+        let outside = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0].map(|rows| aside(outward) + rows * over);
+        let places = [&[beyond], &outside[..], &[aside(-outward), aside(-outward) + over]].concat();
         let Some(plate) = annotator.place(&places, half, f32::INFINITY) else { continue };
         annotator.add_plate(plate);
         let mut at = plate.middle - half + Vec2::new(7.0, 2.0 + 0.5 * LINE);

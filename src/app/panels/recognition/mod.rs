@@ -359,7 +359,7 @@ impl Part<'_, '_> {
             // A stored trial keeps no secret.
             None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
             None => {
-                let text = if shown { "Right or wrong? Shown once it decides" } else { "Truth hidden" };
+                let text = if shown { "Truth shown when it decides" } else { "Truth hidden" };
                 (text.to_owned(), text.to_owned(), None)
             }
         };

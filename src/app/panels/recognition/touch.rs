@@ -45,7 +45,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
         for (k, (measure, name, about)) in SHOWN.into_iter().enumerate() {
             let corner = pos2(line.left() + share * k as f32, line.top());
             let place = Rect::from_min_size(corner, vec2(share - 4.0, line.height()));
-            let text = of(measure).map_or_else(|| "–".to_owned(), words);
+            let text = of(measure).map_or_else(|| "–".to_owned(), |estimate| words(estimate, "–"));
             explain(ui, place, (name, about), of(measure));
             let ink = colour(if of(measure).is_some() { part.colours().text } else { part.colours().quiet_text });
             put(ui, fitted(ui, format!("{name} {text}"), height - 1.0, place.width(), ink), place, Align2::LEFT_CENTER);
@@ -58,7 +58,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 
 /// Text of an estimate for people who point at it, and for screen readers.
 fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
-    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), words);
+    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
     let spoken = format!("{name} {text}");
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
         .on_hover_text(format!("{about}: median, and the range that holds the true value with 90 % probability"))
@@ -66,15 +66,15 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&
 }
 
 /// An estimate in words: `34 mm (30 to 38)`.
-fn words(estimate: &MeasureEstimate) -> String {
+fn words(estimate: &MeasureEstimate, between: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    format!("{value:.0} mm ({from:.0} to {to:.0})")
+    format!("{value:.0} mm ({from:.0}{between}{to:.0})")
 }
 
 fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
     let (colours, height) = (part.colours(), part.measures.class);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
-    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), words);
+    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
     explain(ui, rect, (name, about), estimate);
     let quiet = colour(colours.quiet_text);
     let (left, right) = (rect.left() + NAME, rect.right() - VALUE);
