@@ -146,6 +146,7 @@ mod tests {
         };
         assert_eq!(name("Lemon (2), Tomato (1)", &["pressure (kPa)"]), "lemon_2_tomato_1_pressure");
         assert_eq!(name("Lemon, trial 7", &["force (N)", "line"]), "lemon_trial_7");
+        assert_eq!(name("Lemon (3): trials 23 to 25", &[]), "lemon_3_trials_23_to_25");
         assert_eq!(name("", &[]), "palpate");
     }
 

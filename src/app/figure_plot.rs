@@ -9,6 +9,7 @@ use egui_plot::{
 use palpate_geometry::drawing::{CellAxis, DataSeries, HeatMap, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, Theme, series_colour};
 use palpate_geometry::units::symbol;
+use palpate_render::placed_labels;
 use std::ops::RangeInclusive;
 
 /// A plot on the screen.
@@ -115,14 +116,6 @@ pub(super) fn show(
         }
         for series in &plot.series {
             add_series(plot_ui, plot, series, colour(series_colour(series.colour, theme)));
-            for point in series.points.iter().filter(|point| labelled(&point.label)) {
-                let Some([x, y]) = plot.place(point.at) else { continue };
-                let beyond = x - x_bounds.start() > 0.8 * (x_bounds.end() - x_bounds.start());
-                let side = if beyond { Align2::RIGHT_CENTER } else { Align2::LEFT_CENTER };
-                let word = RichText::new(format!("  {}  ", point.label)).small();
-                let text = Text::new("", PlotPoint::new(x, y), word).color(colour(theme.colours().text));
-                plot_ui.text(text.anchor(side));
-            }
         }
         for line in plot.references.iter().filter(|line| !line.text.is_empty()) {
             let axis = if line.horizontal { &plot.y } else { &plot.x };
@@ -142,7 +135,41 @@ pub(super) fn show(
     if let Some(heat) = &plot.heat {
         cells(ui, &shown, plot, heat);
     }
+    labels(ui, theme, &shown, plot, labelled);
     shown
+}
+
+/// Labels of points, clear of each other, of points and of lines.
+fn labels(ui: &Ui, theme: Theme, shown: &ShownPlot, plot: &Plot, labelled: impl Fn(&str) -> bool) {
+    let rect = *shown.transform.frame();
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let galley = |text: &str| painter.layout_no_wrap(text.to_owned(), font.clone(), colour(theme.colours().text));
+    let size = |text: &str| {
+        let egui::Vec2 { x, y } = galley(text).size();
+        Ok::<_, std::convert::Infallible>([x, y].map(f64::from))
+    };
+    let at = |at| shown.position(plot, at).filter(|place| rect.contains(*place)).map(|p| [p.x, p.y].map(f64::from));
+    let position = |[x, y]: [f64; 2]| egui::pos2(x as f32, y as f32);
+    let corners = |rect: Rect| [rect.min, rect.max].map(|corner| [corner.x, corner.y].map(f64::from));
+    let obstacles = plot.references.iter().filter_map(|line| {
+        let axis = if line.horizontal { &plot.y } else { &plot.x };
+        let at = axis.coordinate(line.at)?;
+        let at = shown.transform.position_from_point(&PlotPoint::new(at, at));
+        let drawn = if line.horizontal {
+            Rect::from_x_y_ranges(rect.x_range(), at.y - 1.5..=at.y + 1.5)
+        } else {
+            Rect::from_x_y_ranges(at.x - 1.5..=at.x + 1.5, rect.y_range())
+        };
+        Some(corners(drawn))
+    });
+    let Ok(labels) = placed_labels(plot, at, size, labelled, (obstacles.collect(), corners(rect)));
+    for label in labels {
+        if let Some(ends) = label.lead {
+            painter.line_segment(ends.map(position), Stroke::new(0.6, colour(theme.colours().quiet_text)));
+        }
+        painter.galley(position(label.room[0]), galley(label.text), colour(theme.colours().text));
+    }
 }
 
 /// Most width of the names of rows, as a share of the plot's; width of a letter and height of a line (points).
@@ -171,8 +198,11 @@ fn wrapped_name(text: &str, most: usize, lines: usize) -> String {
     wrapped.join("\n")
 }
 
-/// Names of all series with their colours and signs.
-pub(super) fn legend_ui<'a>(ui: &mut Ui, theme: Theme, series: impl Iterator<Item = &'a DataSeries>) {
+/// An entry of a legend: name, number of the colour, sign and line.
+type Entry<'a> = (&'a str, usize, Marker, LineStyle);
+
+/// Entries of a legend, each once.
+fn entries<'a>(series: impl Iterator<Item = &'a DataSeries>) -> Vec<Entry<'a>> {
     let mut seen = Vec::new();
     for series in series.filter(|series| !series.name.is_empty()) {
         let key = (series.name.as_str(), series.colour, series.marker, series.line);
@@ -180,6 +210,19 @@ pub(super) fn legend_ui<'a>(ui: &mut Ui, theme: Theme, series: impl Iterator<Ite
             seen.push(key);
         }
     }
+    seen
+}
+
+/// True where one legend of these plots would give a colour, sign and line to several names: each plot needs its own.
+pub(super) fn is_ambiguous(plots: &[Plot]) -> bool {
+    let seen = entries(plots.iter().flat_map(|plot| &plot.series));
+    let look = |entry: &Entry<'_>| (entry.1, entry.2, entry.3);
+    seen.iter().enumerate().any(|(k, entry)| seen[..k].iter().any(|other| look(other) == look(entry)))
+}
+
+/// Names of all series with their colours and signs.
+pub(super) fn legend_ui<'a>(ui: &mut Ui, theme: Theme, series: impl Iterator<Item = &'a DataSeries>) {
+    let seen = entries(series);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
         for (name, number, marker, line) in seen {
@@ -297,6 +340,16 @@ fn add_series(plot_ui: &mut egui_plot::PlotUi<'_>, plot: &Plot, series: &DataSer
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_study::accuracy::{SceneGroup, accuracy_plot, stored_accuracy};
+
+    #[test]
+    fn plots_that_give_a_colour_to_several_names_need_legends_of_their_own() {
+        let figure = stored_accuracy().expect("stored").result.figure().figure;
+        assert!(is_ambiguous(&figure.plots));
+        assert!(figure.plots.iter().all(|plot| !is_ambiguous(std::slice::from_ref(plot))));
+        let free = accuracy_plot(&stored_accuracy().expect("stored").result, SceneGroup::Free);
+        assert!(!is_ambiguous(&[free.clone(), free]));
+    }
 
     #[test]
     fn long_names_are_wrapped_and_then_cut() {

@@ -2,7 +2,7 @@
 
 use crate::app::actions::{Act, Actions};
 use crate::app::features::App;
-use crate::app::features::view::{SCALES, ViewSource};
+use crate::app::features::view::{Mode, SCALES, ViewSource};
 use crate::app::keys;
 use crate::app::modes;
 use crate::app::panels;
@@ -13,6 +13,7 @@ use egui::{Align2, FontId, Key, ScrollArea, Ui, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
 use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_study::all_studies;
 
 /// Entry of the palette.
 struct Entry {
@@ -145,6 +146,14 @@ fn entries(app: &App) -> Vec<Entry> {
     }
     for panel in &panels::ALL {
         add("Panel", panel.title.to_owned(), Box::new(|app| app.show_panel(panel.name)));
+    }
+    for study in all_studies() {
+        let card = study.card();
+        let run = move |app: &mut App| {
+            app.set_mode(Mode::Study);
+            app.studies.choose(card.key);
+        };
+        add("Study", card.title.to_owned(), Box::new(run));
     }
     let built_in = catalogue().iter().map(|built_in| (built_in.title.clone(), built_in.name.clone()));
     let empty = std::iter::once(("Empty hand".to_owned(), EMPTY.to_owned()));

@@ -14,7 +14,7 @@ use palpate_sim::objects::object_title;
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Board;
-use palpate_tactile::trial::{Control, TrialSource};
+use palpate_tactile::trial::{Control, TrialId, TrialSource};
 use std::sync::Arc;
 
 /// Data of the source that is shown, and how they are shown.
@@ -30,6 +30,8 @@ pub(super) struct DisplayedData<'a> {
     pub(super) scene: &'a Scene,
     /// A trial is being opened.
     pub(super) opening: bool,
+    /// Trial of the simulation's last grasp, where it was recorded.
+    pub(super) last_trial: Option<TrialId>,
     /// Phases of the grasp, as far as they are known.
     pub(super) phases: &'a [PhaseSpan],
     /// Trials beside it.
@@ -155,9 +157,18 @@ impl<'a> DisplayedData<'a> {
         Some(Moment { grasp: snapshot.grasp, stage: &snapshot.stage, frame })
     }
 
-    /// Time at which the object of a finished round is shown: at the end of the hold (s), not fallen; where it has slipped out of
-    /// the hand by then, when it was held most firmly. None while grasps follow, and where the user looks at another time.
+    /// The stored trial, where one is shown.
+    pub(super) fn shown_trial(&self) -> Option<Inspected<'a>> {
+        self.inspected.filter(|_| self.source == ViewSource::Trial)
+    }
+
+    /// Time at which the object of a finished round, or of a trial that was just opened, is shown: at the end of the hold (s),
+    /// not fallen; where it has slipped out of the hand in a round by then, when it was held most firmly. None while grasps
+    /// follow, and where the user looks at another time.
     pub(super) fn held_s(&self) -> Option<f64> {
+        if let Some(own) = self.shown_trial().filter(|_| self.playback.cursor_s.is_none()) {
+            return own.trial.last_of(TouchPhase::Hold);
+        }
         let snapshot = self.snapshot.filter(|now| self.source == ViewSource::Simulation && now.status.finished)?;
         let [_, end] = self.hold().filter(|_| self.playback.cursor_s.is_none())?;
         let trace = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp)?;
@@ -288,7 +299,11 @@ impl<'a> DisplayedData<'a> {
             ViewSource::Trial => self.inspected.map(|Inspected { trial, cursor_s, .. }| {
                 let object = trial.header.object.as_str();
                 Recognised {
-                    view: trial.at(cursor_s).and_then(|now| now.answer),
+                    // Before the cursor is moved, the answer to the whole grasp.
+                    view: match self.playback.cursor_s {
+                        None => trial.answers.last(),
+                        Some(_) => trial.at(cursor_s).and_then(|now| now.answer),
+                    },
                     off: trial.recognition_off.as_deref(),
                     truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
                     waiting: "Fingers closing",

@@ -11,6 +11,7 @@ use egui::{
 };
 use palpate_geometry::palette::{Rgb, Trace};
 pub(super) use palpate_geometry::units::capital;
+use palpate_geometry::units::message;
 use palpate_lab::workers::{GripperCommand, GripperView, Job, JobFailure};
 use palpate_store::labels::Sparkline;
 use palpate_tactile::trial::Control;
@@ -77,7 +78,7 @@ pub(super) fn choice_ui<T: PartialEq + Copy>(
 
 /// Why something failed, in red.
 pub(super) fn failure_ui(ui: &mut Ui, cause: impl Display) {
-    wrapped(ui, RichText::new(cause.to_string()).color(ui.visuals().error_fg_color));
+    wrapped(ui, RichText::new(message(&cause.to_string())).color(ui.visuals().error_fg_color));
 }
 
 /// A job in a panel: its controls or, while it runs, its progress, a remark, and a button that stops it, with a hint that says

@@ -151,7 +151,7 @@ const PHYSICS: &[Column<CostRow>] = &[
     ("max", |row| row.newton_max.to_string()),
     ("unconverged", |row| row.unconverged_steps.to_string()),
     ("x real time", |row| format!("{:.0}", row.times_real_time)),
-    ("error 1/km", |row| row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m * 1e3))),
+    ("error 1/m", |row| row.error.map_or(String::new(), |error| three_digits(error.curvature_per_m))),
     ("error mN", |row| row.error.map_or(String::new(), |error| three_digits(error.force_n * 1e3))),
 ];
 

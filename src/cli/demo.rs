@@ -6,7 +6,7 @@ mod simulated;
 
 use super::prelude::*;
 use super::recognise::{StageOne, left_in_words, named};
-use palpate_geometry::units::{mm, three_digits};
+use palpate_geometry::units::{mm, percent, three_digits};
 use palpate_lab::grasping::{GraspSummary, Identification, SHAPES};
 use palpate_learn::{Measure, Model, OTHER, StopReason, StopRule};
 use palpate_sim::objects::titled;
@@ -154,7 +154,7 @@ fn grasp_until_recognised(
             let mut page = Page::default();
             grasp.text(&mut page);
             if decision.is_none() {
-                page.line(format!("  Below the threshold of {:.0} %: grasping again.", 100.0 * rule.threshold));
+                page.line(format!("  Below the threshold of {}: grasping again.", percent(rule.threshold)));
             }
             page.print()?;
         }
@@ -198,7 +198,7 @@ impl Report for GraspReport {
         }
         self.warnings.iter().for_each(|warning| page.warn(warning));
         if let Some(Some(StageOne { size, size_probability, shape, shape_probability })) = &self.stage_one {
-            let [sure, formed] = [size_probability, shape_probability].map(|p| format!("{:.0} %", 100.0 * p));
+            let [sure, formed] = [size_probability, shape_probability].map(|p| percent(*p));
             page.line(format!("  Stage one: {size} ({sure}), {shape} ({formed})."));
         }
         self.touch.iter().for_each(|touch| page.line(format!("  Felt: {touch}.")));
@@ -233,7 +233,7 @@ fn likely(pmf: &BTreeMap<String, f64>) -> String {
     let mut likely: Vec<(&String, &f64)> = pmf.iter().collect();
     likely.sort_by(|a, b| b.1.total_cmp(a.1));
     let shown = likely.iter().take(3).filter(|(_, p)| **p >= 0.005);
-    shown.map(|(name, p)| format!("{} {:.0} %", titled(name), 100.0 * **p)).collect::<Vec<_>>().join(", ")
+    shown.map(|(name, p)| format!("{} {}", titled(name), percent(**p))).collect::<Vec<_>>().join(", ")
 }
 
 /// Estimated size and shape of the object, with the ranges that hold the true values in nine of ten grasps.
@@ -267,7 +267,7 @@ impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let of = |[value, low, high]: [f64; 3]| format!("{value:.0} mm ({low:.0} to {high:.0})");
         let (width, height, shape) = (of(self.width_mm), of(self.height_mm), self.shape);
-        write!(f, "{width} wide, {height} high, {shape} ({:.0} %)", 100.0 * self.shape_probability)
+        write!(f, "{width} wide, {height} high, {shape} ({})", percent(self.shape_probability))
     }
 }
 

@@ -3,6 +3,7 @@
 mod why;
 
 use super::prelude::*;
+use palpate_geometry::units::percent;
 use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_learn::{Belief, Labels, Model, Pmf, Shipped, Verdict};
 use palpate_store::TrialRow;
@@ -208,7 +209,6 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
 
 impl Report for RecogniseReport {
     fn text(&self, page: &mut Page) {
-        let percent = |p: f64| format!("{:.0} %", 100.0 * p);
         // Many models have one stage only.
         let staged = self.trials.iter().any(|trial| trial.stage_one.is_some());
         let row = |trial: &TrialReport| {

@@ -3,6 +3,7 @@
 use super::prelude::*;
 use super::recognise::{StageOne, load_model, named, shipped_for, warn_of_perfect_sensors};
 use palpate_device::serial::{LinkOptions, SerialLink};
+use palpate_geometry::units::percent;
 use palpate_lab::grasping::{Identification, Row};
 use palpate_lab::gripper::SerialGripper;
 use palpate_lab::recording::Replay;
@@ -130,7 +131,7 @@ pub(super) fn run(arguments: &ReplayArguments, store: Option<&Path>) -> Result<(
         })?;
     } else {
         match (decided, not_recognised) {
-            (Some((class, p)), None) => note(&format!("recognised as {class} ({:.0} %)", 100.0 * p)),
+            (Some((class, p)), None) => note(&format!("recognised as {class} ({})", percent(p))),
             (_, cause) => note(&format!("no recognition: {}", cause.unwrap_or_default())),
         }
     }

@@ -65,10 +65,24 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value.is_finite() { true_minus(&format!("{value:.decimals$}")) } else { "–".to_owned() }
 }
 
+/// Percentage, rounded down so that a probability below a threshold never seems to reach it; above 99 % with a decimal.
+pub fn percent(p: f64) -> String {
+    let tenths = (p * 1e3 + 1e-6).floor().clamp(0.0, 999.0);
+    if tenths > 990.0 { format!("{:.1} %", tenths / 10.0) } else { format!("{:.0} %", (tenths / 10.0).floor()) }
+}
+
 /// A text with a capital at its beginning.
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A message as the window says it: with a capital, and without the numbers of the system's errors.
+pub fn message(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut said = parts.next().unwrap_or_default().to_owned();
+    parts.for_each(|part| said.push_str(part.split_once(')').map_or("", |(_number, rest)| rest)));
+    capital(&said)
 }
 
 /// A printed number with a true minus; without one where it is zero. Nothing printed is a dash.
@@ -108,6 +122,18 @@ mod tests {
         assert_eq!(texts, ["0.57 N", "0.00 N", "31.0 kPa", "−7.29 m⁻¹", "−1.50 m⁻¹/s", "0.00412 V"]);
         assert_eq!([mark(-0.5), mark(20.0), mark(0.25), mark(-1e-9)], ["−0.5", "20", "0.25", "0"]);
         assert_eq!(number(f64::NAN, "N"), "–");
+    }
+
+    #[test]
+    fn messages_begin_with_a_capital_and_have_no_numbers_of_the_system() {
+        assert_eq!(message("cannot read \"a\": No such file (os error 2)"), "Cannot read \"a\": No such file");
+        assert_eq!(message("twice (os error 2), twice (os error 13)."), "Twice, twice.");
+        assert_eq!(message(""), "");
+    }
+
+    #[test]
+    fn a_percentage_never_seems_to_reach_what_it_does_not() {
+        assert_eq!([0.8999, 0.9, 0.997, 0.9999, 1.0].map(percent), ["89 %", "90 %", "99.7 %", "99.9 %", "99.9 %"]);
     }
 
     #[test]

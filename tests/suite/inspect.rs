@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
+use crate::scripted;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, Seek, ViewSource};
@@ -156,13 +157,56 @@ fn a_trial_is_stepped_through_by_keys_and_closed() {
 }
 
 #[test]
+fn an_opened_trial_shows_the_answer_to_its_whole_grasp() {
+    let mut model = palpate_learn::Model::clone(&scripted::weighing());
+    model.card.stop.threshold = 0.5;
+    let models = Ok(scripted::models(&Arc::new(model)));
+    let setup = BenchSetup { models, fill: three_trials, size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(|app| app.view.truth_shown = true);
+    bench.tell(|app| app.open_trial(1));
+    bench.until_shown(true, "TRIAL 1, SIMULATED");
+    bench.harness.run_steps(3);
+    let held = bench.workbench().inspected().map(|own| (own.cursor_s, own.trial.span_s()[1])).unwrap();
+    assert!(held.0 < held.1 - 0.5, "it is shown as it was held: {held:?}");
+    let said =
+        |bench: &Bench| ["Right: Lemon", "Wrong: Lemon"].map(|text| bench.harness.query_by_label(text).is_some());
+    assert!(said(&bench).contains(&true), "no answer");
+    // Within the grasp it is still open.
+    bench.tell(|app| app.seek(Seek::To(0.5)));
+    bench.look();
+    assert_eq!(said(&bench), [false, false]);
+}
+
+#[test]
+fn compared_trials_are_exported_without_an_open_one() {
+    let setup = BenchSetup { fill: three_trials, size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(|app| app.set_mode(Mode::Inspect));
+    for id in [1, 3] {
+        bench.tell(|app| app.pin(id));
+    }
+    bench.until_shown(true, "Lemon, trial 3, simulated");
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    bench.harness.run_steps(3);
+    let field = bench.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "Path").value();
+    assert!(field.is_some_and(|path| path.ends_with("lemon_2_trials_1_3.svg")));
+}
+
+#[test]
 fn compared_trials_have_a_line_each_or_a_mean() {
     let mut bench = inspecting(1);
-    for id in [2, 3] {
+    for id in [1, 2, 3] {
         bench.tell(|app| app.pin(id));
     }
     bench.until_shown(true, "Tomato, trial 2, simulated");
     bench.until_shown(true, "Lemon, trial 3, simulated");
+    // The one that is shown stands in the list once, and can be taken out of it.
+    bench.until_shown(true, "Lemon, trial 1, shown");
+    assert!(bench.harness.query_by_label_contains("Lemon, trial 1, simulated").is_none());
+    bench.harness.get_by_label("Remove trial 1 from the comparison").click();
+    bench.look();
+    bench.until_shown(false, "Remove trial 1 from");
     bench.tell(|app| app.inspect.spread = true);
     bench.look();
     bench.until_shown(true, "Lemon, simulated, mean of 1");

@@ -110,7 +110,7 @@ fn an_afternoon_of_labels_from_the_terminal() {
     assert!(list.contains("unsure, [wet, late], \"slipped at the end\""), "{list}");
     said(&["trials", "discard", "2"]);
     assert!(said(&["trials", "undo"]).contains("trial 2: discarded"));
-    assert!(said(&["trials", "redo"]).contains("redone: "));
+    assert!(said(&["trials", "redo"]).contains("Redone: "));
     said(&["trials", "delete", "1"]);
     refused(at, &["trials", "label", "1", "ball"], &["trial 1", "restore"]);
     said(&["trials", "restore", "1"]);

@@ -227,7 +227,20 @@ fn the_window_trains_and_uses_what_it_trained() {
             bench.harness.step();
             std::thread::sleep(Duration::from_millis(5));
         }
-        assert_eq!(bench.workbench().view().gripper_model, Some(used));
+        assert_eq!(bench.workbench().view().gripper_model.as_ref(), Some(&used));
+        // A model from elsewhere is offered again after another one is used.
+        let elsewhere = tempfile::tempdir().unwrap();
+        let mine = elsewhere.path().join("mine.safetensors");
+        std::fs::copy(&used, &mine).unwrap();
+        for (path, next) in [(&mine, &used), (&used, &mine)] {
+            bench.tell(|app| app.use_model(Some(path.clone())));
+            while bench.workbench().view().gripper_model.as_ref() != Some(path) {
+                bench.harness.step();
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            let next = format!("Use {}", next.file_stem().unwrap().to_string_lossy());
+            bench.until_shown(true, &next);
+        }
         bench.harness.get_by_label("Use the shipped model").click();
         bench.harness.run_steps(2);
         assert_eq!(bench.workbench().view().gripper_model, None);

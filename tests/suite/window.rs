@@ -49,6 +49,10 @@ fn the_palette_finds_and_runs_every_kind_of_action() {
     // A panel of another mode opens that mode.
     run(&mut bench, "calibration");
     assert_eq!(bench.workbench().view().mode, Mode::Label);
+    run(&mut bench, "worth of accuracy");
+    assert_eq!(bench.workbench().view().mode, Mode::Study);
+    bench.until_shown(true, "own simulation: shipped result");
+    run(&mut bench, "calibration");
     // Arrows choose, Escape closes and runs nothing.
     press(&mut bench, Modifiers::COMMAND, Key::K);
     type_text(&mut bench, "demo mode");

@@ -184,13 +184,15 @@ impl App {
 
     /// Exports a figure of the trial that is open and of those compared with it.
     pub(in crate::app) fn export_figure(&mut self, options: FigureOptions) {
-        let Some(own) = self.inspect.inspected() else {
-            return self.notices.warning("Figures are made of stored trials: open one in Inspect mode.");
-        };
-        let others = own.pinned.iter().filter(|pinned| pinned.trial.id != own.trial.id);
+        let own = self.inspect.inspected().map(|own| own.trial.as_ref());
+        let others = self.inspect.pinned.iter().filter(|pinned| own.is_none_or(|own| own.id != pinned.trial.id));
         let others = others.map(|pinned| (pinned.trial.as_ref(), pinned.colour));
-        let shown = std::iter::once((own.trial.as_ref(), SHOWN_SERIES));
+        let shown = own.into_iter().map(|own| (own, SHOWN_SERIES));
         let (trials, colours): (Vec<&OpenTrial>, Vec<usize>) = shown.chain(others).unzip();
+        if trials.is_empty() {
+            let text = "Figures are made of stored trials: open one in Inspect mode, or compare some (P).";
+            return self.notices.warning(text);
+        }
         let (align, mean) = (self.inspect.alignment, self.inspect.spread);
         match comparison_figure(&trials, &FigureOptions { align, mean, colours, ..options }) {
             Ok(figure) => self.files.export(ExportRequest::Figure(figure, Theme::Light, FIGURE_SIZE)),

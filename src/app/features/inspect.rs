@@ -20,6 +20,8 @@ pub(in crate::app) const MOST_PINNED: usize = 60;
 #[derive(Clone, Debug, Default, PartialEq)]
 struct ComparisonKey {
     names: Vec<String>,
+    /// Stored trial that is shown: it has its own curves.
+    shown: Option<TrialId>,
     origin_s: f64,
     alignment: Alignment,
     spread: bool,
@@ -99,7 +101,7 @@ impl InspectFeature {
     /// The open trial with its cursor and the trials compared; none without one.
     pub(in crate::app) fn inspected(&self) -> Option<Inspected<'_>> {
         let trial = self.open.as_ref()?;
-        let cursor_s = self.stored.cursor_s.unwrap_or(trial.span_s()[1]);
+        let cursor_s = self.stored.cursor_s.or_else(|| trial.last_of(TouchPhase::Hold)).unwrap_or(trial.span_s()[1]);
         Some(Inspected { trial, cursor_s, pinned: &self.pinned })
     }
 
@@ -135,8 +137,8 @@ impl InspectFeature {
         self.history.clear();
         self.history.show(trace_of(&trial));
         if !again {
-            self.stored =
-                Playback { cursor_s: trial.last_of(TouchPhase::Hold), speed: self.stored.speed, ..Playback::default() };
+            // As it was held, with the answer to the whole grasp.
+            self.stored = Playback { speed: self.stored.speed, ..Playback::default() };
         }
         self.open = Some(trial);
         self.revision += 1;
@@ -200,12 +202,12 @@ impl InspectFeature {
     }
 
     /// Takes in the phases of what is shown, and builds the curves of compared trials again where something has changed.
-    /// `names` are the columns of the trace that is shown.
-    pub(super) fn compare(&mut self, names: Vec<String>, phases: Vec<PhaseSpan>) {
+    /// `names` are the columns of the trace that is shown, `shown` is its stored trial.
+    pub(super) fn compare(&mut self, names: Vec<String>, phases: Vec<PhaseSpan>, shown: Option<TrialId>) {
         let origin_s = self.alignment.origin_of(&phases).unwrap_or(0.0);
         self.phases = phases;
-        let key =
-            ComparisonKey { names, origin_s, alignment: self.alignment, spread: self.spread, revision: self.revision };
+        let Self { alignment, spread, revision, .. } = *self;
+        let key = ComparisonKey { names, shown, origin_s, alignment, spread, revision };
         if key == self.key {
             return;
         }
@@ -231,7 +233,7 @@ impl InspectFeature {
             let name = format!("{}, trial {}", trial.title, trial.id);
             ComparedTrace { name, colour: pinned.colour, trace, spread: Vec::new() }
         };
-        self.pinned.iter().map(compared).collect()
+        self.pinned.iter().filter(|pinned| Some(pinned.trial.id) != key.shown).map(compared).collect()
     }
 
     fn means(&self, key: &ComparisonKey) -> Vec<ComparedTrace> {

@@ -20,7 +20,7 @@ pub enum Reach {
 }
 
 /// Query and selection.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct LibrarySelection {
     /// Query as it was asked last; the answer may be on its way.
     pub query: TrialQuery,
@@ -33,6 +33,20 @@ pub struct LibrarySelection {
     pub trials: Vec<Arc<LibraryTrial>>,
     /// Trial from which a range reaches.
     anchor: Option<TrialId>,
+}
+
+impl Default for LibrarySelection {
+    /// Trials of data sets are not shown at first: a study adds hundreds.
+    fn default() -> Self {
+        Self {
+            query: TrialQuery { without_collected: true, ..TrialQuery::default() },
+            focus_search: false,
+            selected: BTreeSet::new(),
+            cursor: None,
+            trials: Vec::new(),
+            anchor: None,
+        }
+    }
 }
 
 impl LibrarySelection {

@@ -95,6 +95,7 @@ impl App {
             playback: self.inspect.playback(self.view.source),
             traces: self.traces(),
             scene: &self.simulation.scene,
+            last_trial: self.simulation.last_trial.map(|(id, _)| id),
             phases: &self.inspect.phases,
             comparison: ComparedTrials {
                 pinned: &self.inspect.pinned,
@@ -143,8 +144,9 @@ impl App {
         self.poll_inspection();
         let shown = self.shown();
         let (names, phases) = (shown.column_names(), shown.find_phases());
+        let own = shown.shown_trial().map(|own| own.trial.id);
         let span = shown.traces.current().map_or([0.0; 2], GraspTrace::span);
         self.inspect.move_cursor(&self.ctx, self.view.source, span);
-        self.inspect.compare(names, phases);
+        self.inspect.compare(names, phases, own);
     }
 }

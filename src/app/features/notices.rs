@@ -5,6 +5,7 @@ use super::App;
 use crate::app::theme::colour;
 use egui::{Frame, Label, Margin, Panel, RichText, Ui};
 use palpate_geometry::palette::{Rgb, Theme};
+use palpate_geometry::units::{capital, message};
 use palpate_lab::workers::{LabelCommand, Notice};
 use palpate_store::Stored;
 use std::collections::VecDeque;
@@ -70,12 +71,13 @@ pub(in crate::app) struct Notices {
 
 /// Remedies for a message.
 fn remedies(text: &str) -> impl Iterator<Item = &'static Remedy> + '_ {
-    REMEDIES.iter().filter(|Remedy(phrase, ..)| text.contains(phrase))
+    REMEDIES.iter().filter(|Remedy(phrase, ..)| text.contains(phrase) || text.starts_with(&capital(phrase)))
 }
 
 impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
-    fn tell(&mut self, level: Level, text: String) {
+    fn tell(&mut self, level: Level, text: &str) {
+        let text = message(text);
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
         let time = if text.contains(STORE_LOST) { LASTING } else { time };
@@ -106,15 +108,15 @@ impl Notices {
     }
 
     pub(in crate::app) fn info(&mut self, text: impl Into<String>) {
-        self.tell(Level::Info, text.into());
+        self.tell(Level::Info, &text.into());
     }
 
     pub(in crate::app) fn warning(&mut self, text: impl Into<String>) {
-        self.tell(Level::Warning, text.into());
+        self.tell(Level::Warning, &text.into());
     }
 
     pub(in crate::app) fn error(&mut self, text: impl Into<String>) {
-        self.tell(Level::Error, text.into());
+        self.tell(Level::Error, &text.into());
     }
 
     /// Shows why an action has failed, until it succeeds.
@@ -233,7 +235,7 @@ mod tests {
         let ctx = egui::Context::default();
         let hour = Instant::now() + Duration::from_secs(3600);
         notices.shown.retain(|shown| shown.until > hour);
-        assert_eq!(notices.current(&ctx), Some(lost.as_str()));
+        assert_eq!(notices.current(&ctx), Some(message(&lost).as_str()));
     }
 
     #[test]
@@ -243,7 +245,7 @@ mod tests {
         notices.failed("study", "the study failed");
         notices.done("scene");
         let ctx = egui::Context::default();
-        assert_eq!(notices.current(&ctx), Some("the study failed"));
+        assert_eq!(notices.current(&ctx), Some("The study failed"));
         notices.done("study");
         assert!(notices.current(&ctx).is_none() && notices.messages().is_empty());
     }
@@ -251,7 +253,7 @@ mod tests {
     #[test]
     fn a_button_stays_where_it_is_while_other_messages_come_and_go() {
         use egui_kittest::kittest::Queryable as _;
-        let (mut notices, undo) = (Notices::default(), "trial 7 discarded; Ctrl+Z brings it back");
+        let (mut notices, undo) = (Notices::default(), "Trial 7 discarded; Ctrl+Z brings it back");
         notices.info("Trial 6 stored.");
         notices.warning(undo);
         let draw = |ui: &mut Ui, notices: &mut Notices| assert!(notices.line(ui, Theme::Dark).is_none());
@@ -286,6 +288,6 @@ mod tests {
         let large = load("large.obj").expect("loads").expect("an object");
         let scale = large.warnings.iter().find(|warning| warning.contains("scale")).expect("a warning of its size");
         assert_eq!(of(scale), ["Treat as mm", "Treat as m"]);
-        assert_eq!(of("trial 7 discarded; Ctrl+Z brings it back"), ["Undo"]);
+        assert_eq!(of("Trial 7 discarded; Ctrl+Z brings it back"), ["Undo"]);
     }
 }

@@ -217,7 +217,7 @@ impl App {
 
     /// Uses a model from a file for the real gripper from now on.
     fn use_file_for_gripper(&mut self, trained: &TrainedModel) {
-        self.view.gripper_model = Some(trained.path.clone());
+        self.view.set_gripper_model(&trained.path);
         self.use_for_gripper(Some(Arc::clone(&trained.model)));
         self.notices.info(format!("Model for the real gripper: {}", trained.about));
     }
@@ -297,7 +297,8 @@ impl App {
             Some(Ok(finished)) => {
                 self.notices.done("training");
                 let f1 = finished.judged.evaluation.f1_macro;
-                self.notices.info(format!("Trained: macro F1 {f1:.2} on held-back trials."));
+                let [_, tested] = finished.judged.trials;
+                self.notices.info(format!("Trained: macro F1 {f1:.2} on {tested} held-back trials."));
                 self.use_file_for_gripper(&finished.trained);
             }
             Some(Err(cause)) => self.notices.failed("training", format!("Training failed: {cause}")),

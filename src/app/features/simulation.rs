@@ -44,7 +44,7 @@ pub struct SimulationFeature {
     /// Scene that was refused last.
     refused: Option<Scene>,
     /// Trial that holds the last grasp, and where it was when the grasp ended.
-    last_trial: Option<(TrialId, TrialPlace)>,
+    pub(super) last_trial: Option<(TrialId, TrialPlace)>,
     ended: bool,
 }
 

@@ -60,6 +60,8 @@ pub struct ViewState {
     pub blind: bool,
     /// Recognition model for the real gripper; the shipped one where none is named.
     pub gripper_model: Option<PathBuf>,
+    /// Models used for the real gripper, newest first.
+    pub gripper_models: Vec<PathBuf>,
     /// Recognition model for the simulation; the shipped one where none is named.
     pub simulation_model: Option<PathBuf>,
     /// Time shown by all plots (s); `None` for the whole grasp.
@@ -219,6 +221,7 @@ impl Default for ViewState {
             port: None,
             blind: true,
             gripper_model: None,
+            gripper_models: Vec::new(),
             simulation_model: None,
             time_window: None,
             keys_shown: false,
@@ -254,6 +257,14 @@ impl ViewState {
     pub(in crate::app) fn title_of(&self, path: &str) -> String {
         let stem = || Path::new(path).file_stem().map_or(path.into(), |stem| stem.to_string_lossy());
         self.titles.get(path).cloned().unwrap_or_else(|| capital(&object_title(&stem())))
+    }
+
+    /// Uses a model for the real gripper, which is offered again after others.
+    pub(super) fn set_gripper_model(&mut self, path: &Path) {
+        self.gripper_models.retain(|known| known != path);
+        self.gripper_models.insert(0, path.to_owned());
+        self.gripper_models.truncate(MOST_RECENT);
+        self.gripper_model = Some(path.to_owned());
     }
 
     /// Puts a file in front of the recent ones.

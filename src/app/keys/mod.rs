@@ -150,16 +150,13 @@ pub(super) fn sheet(app: &App, mode: Mode, actions: &mut Actions) {
     let window = window.default_width(COLUMN * columns as f32).max_width(room.x).default_height(room.y);
     window.pivot(egui::Align2::CENTER_CENTER).default_pos(ctx.content_rect().center()).show(ctx, |ui| {
         let lines = sheet_lines(ctx, mode);
+        // Its bar shows that there is more.
+        ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
         egui::ScrollArea::vertical().max_height(room.y).show(ui, |ui| {
             ui.columns(columns, |columns| {
-                let many = columns.len();
-                let all: usize = lines.iter().map(|(_, lines)| lines.len() + 2).sum();
-                let mut above = 0;
-                for (title, lines) in &lines {
-                    // A group stands in the column of its middle.
-                    let middle = above + lines.len() / 2;
-                    above += lines.len() + 2;
-                    group_ui(&mut columns[(middle * many / all).min(many - 1)], title, lines);
+                let left = if columns.len() > 1 { in_left(&lines) } else { lines.len() };
+                for (k, (title, lines)) in lines.iter().enumerate() {
+                    group_ui(&mut columns[usize::from(k >= left)], title, lines);
                 }
             });
         });
@@ -167,6 +164,20 @@ pub(super) fn sheet(app: &App, mode: Mode, actions: &mut Actions) {
     if shown && !open {
         actions.push(|app| app.view.keys_shown = false);
     }
+}
+
+/// Letters of a line of the sheet, beside its key.
+const LETTERS: usize = 38;
+
+/// Groups that stand in the left of two columns, so that both are about as high.
+fn in_left(groups: &[(&str, Vec<(String, &str)>)]) -> usize {
+    let heights = groups.iter().map(|(_, lines)| {
+        let lines = lines.iter().map(|(_, does)| does.chars().count().div_ceil(LETTERS).max(1));
+        2 + lines.sum::<usize>()
+    });
+    let heights: Vec<usize> = heights.collect();
+    let higher = |left: &usize| heights[..*left].iter().sum::<usize>().max(heights[*left..].iter().sum());
+    (0..=groups.len()).min_by_key(higher).unwrap_or(0)
 }
 
 /// Lines of the sheet by group: how, and what it does.
@@ -198,6 +209,22 @@ mod tests {
     use super::*;
     use crate::manual::TOPICS;
     use egui::Modifiers;
+
+    #[test]
+    fn both_columns_of_the_sheet_are_about_as_high() {
+        let ctx = egui::Context::default();
+        for kind in &modes::ALL {
+            let groups = sheet_lines(&ctx, kind.mode);
+            let left = in_left(&groups);
+            let lines = |groups: &[(&str, Vec<(String, &str)>)]| groups.iter().map(|(_, own)| own.len()).sum::<usize>();
+            let [left, right] = [&groups[..left], &groups[left..]].map(lines);
+            assert!(left.abs_diff(right) < 12, "{}: {left} and {right}", kind.title);
+        }
+        let long = "a".repeat(3 * LETTERS);
+        let line = |does: &'static str| (String::new(), does);
+        let groups = [("a", vec![(String::new(), long.as_str())]), ("b", vec![line("b"); 3])];
+        assert_eq!(in_left(&groups), 1);
+    }
 
     #[test]
     fn no_key_does_two_things() {

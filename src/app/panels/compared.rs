@@ -11,6 +11,7 @@ use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::series_colour;
 use palpate_geometry::units::{number, symbol};
 use palpate_lab::inspection::Alignment;
+use palpate_tactile::trial::TrialId;
 
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let comparison = data.comparison;
@@ -32,8 +33,15 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     }
     ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let own = data.shown_trial().map(|own| own.trial.id);
+        let own = comparison.pinned.iter().find(|pinned| Some(pinned.trial.id) == own).map(|pinned| pinned.trial.id);
+        let remove_ui = |ui: &mut Ui, id: TrialId, actions: &mut Actions| {
+            let remove = format!("Remove trial {id} from the comparison");
+            actions.on(&icons::button(ui, Icon::Cross, &remove, &remove), move |app| app.inspect.unpin(id));
+        };
         if let Some(shown) = shown_name(data) {
             ui.horizontal(|ui| {
+                own.into_iter().for_each(|id| remove_ui(ui, id, actions));
                 stroke_ui(ui, colour(data.view.theme.colours().text));
                 ui.add(Label::new(shown).truncate());
             });
@@ -44,12 +52,12 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
             }
             ui.separator();
         }
-        for pinned in comparison.pinned {
+        // The one that is shown stands above.
+        for pinned in comparison.pinned.iter().filter(|pinned| Some(pinned.trial.id) != own) {
             let (id, trial) = (pinned.trial.id, &pinned.trial);
             ui.horizontal(|ui| {
                 let colour = if comparison.spread { None } else { Some(pinned.colour) };
-                let remove = format!("Remove trial {} from the comparison", trial.id);
-                actions.on(&icons::button(ui, Icon::Cross, &remove, &remove), move |app| app.inspect.unpin(id));
+                remove_ui(ui, id, actions);
                 if let Some(colour) = colour {
                     stroke_ui(ui, ink_of(data, colour));
                 }

@@ -7,7 +7,7 @@ use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, remark_ui, selectable_row, text_field, warning_ui, wrapped};
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
-use palpate_geometry::units;
+use palpate_geometry::units::{self, percent};
 use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
@@ -147,13 +147,13 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
     let (colours, title) = (theme::of(ui).colours(), object_title(label));
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
-            (format!("trial {}: {title}. The model agrees ({:.0} %)", trial.id, 100.0 * guess.p), colours.accent)
+            (format!("trial {}: {title}. The model agrees ({})", trial.id, percent(guess.p)), colours.accent)
         }
         Some(guess) => {
-            let (class, p) = (object_title(&guess.class), 100.0 * guess.p);
+            let (class, p) = (object_title(&guess.class), percent(guess.p));
             let (state, ink) =
                 if trial.reviewed { ("reviewed", colours.quiet_text) } else { ("please review", colours.warning) };
-            (format!("trial {}: {title}. The model predicts {class} ({p:.0} %): {state}", trial.id), ink)
+            (format!("trial {}: {title}. The model predicts {class} ({p}): {state}", trial.id), ink)
         }
         None => (format!("trial {}: {title}", trial.id), colours.quiet_text),
     };

@@ -97,7 +97,7 @@ pub const ALL: [PanelKind; 35] = [
     }),
     panel("hysteresis", "Hysteresis", |ui, app, _| hysteresis::ui(ui, &app.shown())),
     panel("training", "Training", |ui, app, actions| {
-        training::ui(ui, &app.tools, app.recognition.gripper_model(), app.view.gripper_model.as_deref(), actions);
+        training::ui(ui, &app.tools, app.recognition.gripper_model(), &app.view, actions);
     }),
     panel("studies", "Studies", |ui, app, actions| study::list::ui(ui, &app.studies, actions)),
     panel("study-figure", "Figure", |ui, app, actions| study::figure::ui(ui, &app.studies, actions)),

@@ -4,6 +4,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::tools::{DEFAULT_METHOD, GripperTools, TRAINING_SEED};
+use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
 use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
@@ -14,15 +15,10 @@ use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::comparison::in_table_order;
 use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, Model, counted, method};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-pub(super) fn ui(
-    ui: &mut Ui,
-    tools: &GripperTools,
-    model: Option<&Model>,
-    chosen: Option<&Path>,
-    actions: &mut Actions,
-) {
+pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, model: Option<&Model>, view: &ViewState, actions: &mut Actions) {
+    let chosen = view.gripper_model.as_deref();
     if just_opened(ui, "training") {
         actions.push(|app| _ = app.tools.data.start(()));
     }
@@ -33,6 +29,8 @@ pub(super) fn ui(
         let stop = (None, "Cancel; nothing is saved", (|app| app.tools.training.stop()) as fn(&mut App));
         match job_ui(ui, &tools.training, stop, actions, controls) {
             Some(Ok(finished)) => finished_ui(ui, chosen, &finished, actions),
+            // Too few trials are said above.
+            Some(Err(_)) if data.is_some_and(|data| data.too_little().is_some()) => {}
             Some(Err(cause)) => failure_ui(ui, cause),
             None => {}
         }
@@ -41,7 +39,7 @@ pub(super) fn ui(
             Some(Err(cause)) => failure_ui(ui, cause),
             None => remark_ui(ui, "loading labelled trials …"),
         }
-        models_ui(ui, chosen, data, actions);
+        models_ui(ui, view, data, actions);
     });
 }
 
@@ -78,18 +76,27 @@ fn begin_ui(ui: &mut Ui, data: Option<&TrainingData>, actions: &mut Actions) {
     ui.data_mut(|data| data.insert_temp(id, chosen));
 }
 
+/// Fewer test trials tell nothing: with ten, all right, the true share of right answers is still anywhere above 69 %.
+const FEW_TESTED: usize = 10;
+
 fn finished_ui(ui: &mut Ui, chosen: Option<&Path>, finished: &FinishedTraining, actions: &mut Actions) {
     let FinishedTraining { trained, judged } = finished;
     let [low, high] = judged.evaluation.ci95;
     ui.add_space(6.0);
     let f1 = judged.evaluation.f1_macro;
-    wrapped(ui, RichText::new(format!("Macro F1 {f1:.2} ({low:.2} to {high:.2})")).heading());
     let [learned, held_back] = judged.trials;
     let title = method(&trained.model.card.method).map_or("", |method| method.title);
-    let text = format!("{title}: trained on {learned} trials, evaluated on {held_back} others; 95 % interval");
-    remark_ui(ui, text);
+    let about = format!("{title}: trained on {learned} trials, evaluated on {held_back} others");
+    if held_back < FEW_TESTED {
+        wrapped(ui, RichText::new(format!("Macro F1 {f1:.2}")).heading());
+        warning_ui(ui, format!("{about}: too few to tell how good it is"));
+    } else {
+        wrapped(ui, RichText::new(format!("Macro F1 {f1:.2} ({low:.2} to {high:.2})")).heading());
+        remark_ui(ui, format!("{about}; 95 % interval"));
+    }
     for class in &judged.too_few {
-        let text = format!("\"{}\" left out: {} usable trials, {LEAST_TRIALS} needed", class.name, class.trials);
+        let trials = if class.trials == 1 { "trial" } else { "trials" };
+        let text = format!("\"{}\" left out: {} usable {trials}, {LEAST_TRIALS} needed", class.name, class.trials);
         warning_ui(ui, text);
     }
     let data = &trained.model.card.data;
@@ -136,10 +143,9 @@ fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], act
         return;
     }
     remark_ui(ui, format!("{all} trials of {} objects", classes.len()));
-    let most = classes.iter().map(|class| class.trials).max().unwrap_or(1).max(1);
     ui.spacing_mut().item_spacing.y = 2.0;
     for class in classes {
-        class_ui(ui, theme::of(ui), class, class.trials as f32 / most as f32);
+        class_ui(ui, theme::of(ui), class);
     }
     let Some(model) = model.filter(|model| model.learns_new_objects()) else { return };
     let is_new = |class: &&LabelledClass| class.is_enough() && model.card.labels.class(&class.name).is_none();
@@ -153,8 +159,9 @@ fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], act
     }
 }
 
-/// Name, bar and number of an object's trials.
-fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
+/// Name, bar and number of an object's trials. A full bar is enough.
+fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass) {
+    let share = (class.trials as f32 / LEAST_TRIALS as f32).min(1.0);
     let colours = theme.colours();
     let (number, bar, ink) = match class.is_enough() {
         true => (class.trials.to_string(), colours.accent, colours.text),
@@ -178,7 +185,8 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass, share: f32) {
 const BUTTON: f32 = 72.0;
 
 /// Saved models and the shipped one.
-fn models_ui(ui: &mut Ui, chosen: Option<&Path>, data: Option<&TrainingData>, actions: &mut Actions) {
+fn models_ui(ui: &mut Ui, view: &ViewState, data: Option<&TrainingData>, actions: &mut Actions) {
+    let chosen = view.gripper_model.as_deref();
     let saved = data.map_or(&[][..], |data| &data.models);
     ui.add_space(8.0);
     ui.horizontal(|ui| {
@@ -186,12 +194,14 @@ fn models_ui(ui: &mut Ui, chosen: Option<&Path>, data: Option<&TrainingData>, ac
         actions.on(&ui.button("Refresh").on_hover_text("Reload trials and models"), |app| _ = app.tools.data.start(()));
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
-    // A model from outside the folder.
-    let other = chosen.filter(|own| saved.iter().all(|m| m.path != *own));
-    let other = other.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
+    // Models from outside the folder.
+    let is_chosen = |path: &&Path| view.gripper_models.iter().all(|known| known != path);
+    let others = chosen.filter(is_chosen).into_iter().chain(view.gripper_models.iter().map(PathBuf::as_path));
+    let others = others.filter(|own| saved.iter().all(|m| m.path != *own));
+    let others = others.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
     let saved =
         saved.iter().map(|model| (name_of(&model.path).into_owned(), model.about.clone(), Some(model.path.as_path())));
-    for (name, about, path) in std::iter::once(shipped).chain(other).chain(saved) {
+    for (name, about, path) in std::iter::once(shipped).chain(others).chain(saved) {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - BUTTON).max(80.0);
             ui.vertical(|ui| {

@@ -23,11 +23,13 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, library: Option<&Library
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.heading(&trial.title);
         labels_ui(ui, trial, library, colours.accent);
-        for remark in trial.remarks.iter().chain(&trial.header.warnings) {
-            wrapped(ui, RichText::new(remark).color(colour(colours.warning)));
+        let trust = trial.simulated.as_ref().map(|facts| facts.quality.trust());
+        // What the trust says is not said twice.
+        let is_said = |remark: &&String| trust.as_ref().is_some_and(|(_, why)| why == *remark);
+        for remark in trial.remarks.iter().chain(&trial.header.warnings).filter(|remark| !is_said(remark)) {
+            wrapped(ui, RichText::new(capital(remark)).color(colour(colours.warning)));
         }
-        if let Some(facts) = &trial.simulated {
-            let (level, why) = facts.quality.trust();
+        if let Some((level, why)) = trust {
             let ink = match level {
                 TrustLevel::Green => colours.text,
                 TrustLevel::Amber => colours.warning,

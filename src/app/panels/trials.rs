@@ -5,6 +5,7 @@ use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, colour};
 use crate::app::widgets::{put_line, selectable_row, sparkline};
 use egui::{Align2, Rect, RichText, ScrollArea, Ui, pos2, vec2};
+use palpate_geometry::units::percent;
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::{LabelledTrial, TrialEdit};
@@ -89,9 +90,7 @@ fn row_ui(
     let blind = labelling.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
-        (_, _, Some(found)) => {
-            (format!("model: {} {:.0} %", object_title(&found.guess), 100.0 * found.p), colours.warning)
-        }
+        (_, _, Some(found)) => (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning),
         (_, Some(_), None) => {
             let labels: Vec<&str> = trial.flags.iter().map(|flag| flag.flag.label()).collect();
             (labels.join(", "), colours.warning)

@@ -294,14 +294,14 @@ const INVITED: f32 = 600.0;
 /// What is said about a picture, and the colour of the ghost in it.
 fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
     let theme = own.data.view.theme;
-    if let Some(inspected) = own.data.inspected.filter(|_| own.data.source == ViewSource::Trial) {
-        return (inspected.trial.remarks.join(" "), None);
-    }
     let held = own.data.held_s().map(|t| {
-        let in_hand = own.data.moment().is_some_and(|now| now.stage.force_on_object(now.frame).is_some());
-        let words = if in_hand { "As it was held" } else { "The hand has not held it" };
+        let in_hand = own.data.moment().is_none_or(|now| now.stage.force_on_object(now.frame).is_some());
+        let words = if in_hand { "As it was held" } else { "Nothing is held" };
         format!("{words}, at {t:.1}{}s", units::SPACE)
     });
+    if let Some(inspected) = own.data.shown_trial() {
+        return (inspected.trial.remarks.iter().cloned().chain(held).collect::<Vec<_>>().join(" "), None);
+    }
     if own.data.source == ViewSource::Gripper {
         let text = match (own.silent_s, key.real) {
             (_, None) => "The fingers are not drawn: their flex strips are not calibrated".to_owned(),

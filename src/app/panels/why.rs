@@ -13,6 +13,7 @@ use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
 use palpate_lab::workers::{ExplainRequest, Explainer};
 use palpate_sim::objects::object_title;
+use palpate_tactile::trial::TrialId;
 
 /// Height of a row (points).
 const ROW: f32 = 20.0;
@@ -61,7 +62,7 @@ pub(super) fn ui(
                 ui.add(egui::Label::new(RichText::new(why.answer()).heading()).wrap());
                 wrapped(ui, RichText::new(which_grasp(data, &request, why)).small().weak());
                 evidence_ui(ui, why);
-                nearest_ui(ui, explainer, pictures, &request, actions);
+                nearest_ui(ui, (explainer, data.last_trial), pictures, &request, actions);
             }
             Err(cause) => {
                 ui.heading("No explanation");
@@ -258,7 +259,7 @@ fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink
 
 fn nearest_ui(
     ui: &mut Ui,
-    explainer: &Explainer,
+    (explainer, last): (&Explainer, Option<TrialId>),
     pictures: &Thumbnails,
     request: &ExplainRequest,
     actions: &mut Actions,
@@ -266,7 +267,7 @@ fn nearest_ui(
     heading(ui, "Nearest stored trials", "By the root mean square difference of all channels over the grasp");
     let nearest = &explainer.nearest;
     match nearest.last().filter(|ended| ended.command.is_like(request)).map(|ended| ended.outcome) {
-        Some(Ok(report)) => report_ui(ui, pictures, &report, actions),
+        Some(Ok(report)) => report_ui(ui, pictures, &report, last, actions),
         Some(Err(cause)) => {
             let ink = colour(theme::of(ui).colours().error);
             wrapped(ui, RichText::new(format!("The store cannot be read: {cause}.")).color(ink));
@@ -281,13 +282,14 @@ fn nearest_ui(
     }
 }
 
-fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, actions: &mut Actions) {
+fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: Option<TrialId>, actions: &mut Actions) {
     if report.trials.is_empty() {
         remark_ui(ui, "No stored trial has these channels. Record grasps, or run palpate collect.");
         return;
     }
     let colours = theme::of(ui).colours();
-    for trial in &report.trials {
+    // The grasp itself, as it was just stored, is none of its neighbours.
+    for trial in report.trials.iter().filter(|own| own.distance >= SAME || Some(own.id) != last) {
         let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { object_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
         let text = format!("Trial {}, {name}, {}, distance {:.2}{same}", trial.id, trial.source, trial.distance);

@@ -94,7 +94,7 @@ pub(super) fn run(command: &LabelCommand, store: &mut Store) -> Result<(), Failu
             None => say("nothing to undo"),
         },
         LabelCommand::Redo => match store.journal().redo()? {
-            Some(entry) => say(format!("redone: {}", entry.restored())),
+            Some(entry) => say(format!("Redone: {}", entry.restored())),
             None => say("nothing to redo"),
         },
         LabelCommand::Journal { last, json } => JournalReport(store.journal().entries(*last)?).print(*json),

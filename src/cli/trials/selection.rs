@@ -53,6 +53,7 @@ impl Filters {
             preset,
             sensors,
             collection,
+            without_collected: false,
             since,
             until,
             shown,

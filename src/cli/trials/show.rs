@@ -2,6 +2,7 @@
 
 use super::super::grasp::summary_facts;
 use super::super::prelude::*;
+use palpate_geometry::units::percent;
 use palpate_lab::grasping::GraspSummary;
 use palpate_sim::frame::Plan;
 use palpate_store::labels::{LabelledTrial, cadence_line, shown_title};
@@ -156,7 +157,7 @@ fn labels_text(labels: &LabelledTrial, page: &mut Page) {
         page.line(format!("tags {}", labels.tags.join(", ")));
     }
     if let Some(guess) = &labels.guess {
-        page.line(format!("{} guessed {} ({:.0} %)", guess.model, shown_title(&guess.class), 100.0 * guess.p));
+        page.line(format!("{} guessed {} ({})", guess.model, shown_title(&guess.class), percent(guess.p)));
     }
 }
 

@@ -94,7 +94,7 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
     };
     let title = match trials {
         [one] => format!("{}, trial {}", one.title, one.id),
-        _ => titles(trials),
+        _ => format!("{}: {}", titles(trials), numbers(trials)),
     };
     let plots = match options.heat {
         Some(kind) => heat_plots(trials, kind)?,
@@ -141,6 +141,29 @@ fn titles(trials: &[&OpenTrial]) -> String {
     let texts: Vec<String> = by_title(trials).iter().map(|(title, own)| format!("{title} ({})", own.len())).collect();
     texts.join(", ")
 }
+
+/// Numbers of several trials: `trials 3 to 7`, `trials 3, 5, 9 …`.
+fn numbers(trials: &[&OpenTrial]) -> String {
+    numbers_of(trials.iter().map(|trial| trial.id).collect())
+}
+
+fn numbers_of(mut ids: Vec<TrialId>) -> String {
+    ids.sort_unstable();
+    ids.dedup();
+    match ids[..] {
+        [first, .., last] if ids.len() > 2 && ids.windows(2).all(|pair| pair[1] == pair[0] + 1) => {
+            format!("trials {first} to {last}")
+        }
+        _ => {
+            let more = if ids.len() > LISTED_IDS { " …" } else { "" };
+            let ids: Vec<String> = ids.iter().take(LISTED_IDS).map(TrialId::to_string).collect();
+            format!("trials {}{more}", ids.join(", "))
+        }
+    }
+}
+
+/// Numbers listed in a title.
+const LISTED_IDS: usize = 6;
 
 /// Trials of each object, in their order.
 fn by_title<'a>(trials: &[&'a OpenTrial]) -> Vec<(&'a str, Vec<&'a OpenTrial>)> {
@@ -402,6 +425,12 @@ mod tests {
             OpenTrial::open(&store, id, &options).expect("opens")
         };
         objects.iter().map(open).collect()
+    }
+
+    #[test]
+    fn a_title_tells_which_trials_are_shown() {
+        let texts = [vec![25, 23, 24], vec![7, 3], vec![5, 5], (1..9).map(|k| 2 * k).collect()].map(numbers_of);
+        assert_eq!(texts, ["trials 23 to 25", "trials 3, 7", "trials 5", "trials 2, 4, 6, 8, 10, 12 …"]);
     }
 
     #[test]

@@ -20,5 +20,6 @@ mod words;
 pub use bands::{Band, bands_for};
 pub use nearest::{NEWEST_TRIALS, NearestQuery, NearestReport, NearestTrial, TrialIndex};
 pub use occlusion::{Attribution, BeliefMove, ClassShare, Evidence, WhyError, explain};
+pub use palpate_geometry::units::percent;
 pub use phases::phases_of;
-pub use words::{MEASURED_HOW, Reason, channel_words, percent, points_words};
+pub use words::{MEASURED_HOW, Reason, channel_words, points_words};

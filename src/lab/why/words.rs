@@ -2,7 +2,7 @@
 
 use super::occlusion::{Attribution, Evidence};
 use crate::inspection::{PhaseSpan, TouchPhase};
-use palpate_geometry::units::true_minus;
+use palpate_geometry::units::{percent, true_minus};
 use palpate_sim::objects::object_title;
 use palpate_tactile::{Quantity, unit_of_channel};
 
@@ -133,12 +133,6 @@ pub fn points_words(points: f64) -> String {
         size if size < 0.95 => format!("{points:+.1}"),
         _ => format!("{points:+.0}"),
     })
-}
-
-/// Percentage, rounded down so that a probability below a threshold never seems to reach it; above 99 % with a decimal.
-pub fn percent(p: f64) -> String {
-    let tenths = (p * 1e3 + 1e-6).floor().clamp(0.0, 999.0);
-    if tenths > 990.0 { format!("{:.1} %", tenths / 10.0) } else { format!("{:.0} %", (tenths / 10.0).floor()) }
 }
 
 #[cfg(test)]

@@ -109,7 +109,7 @@ impl LabelService {
     fn handle(&mut self, command: &LabelCommand) -> Result<Option<String>, JobError> {
         let store = self.store.open()?;
         let undone = |entry: JournalEntry| format!("Undone: {}", entry.sentence());
-        let redone = |entry: JournalEntry| format!("redone: {}", entry.restored());
+        let redone = |entry: JournalEntry| format!("Redone: {}", entry.restored());
         let outcome = |text: Option<String>, none: &str| Some(text.unwrap_or_else(|| none.to_owned()));
         let done = match command {
             LabelCommand::Refresh => Ok(None),
@@ -118,8 +118,8 @@ impl LabelService {
                 store.labels().edit(&[*id], edit).map(|_edited| (*edit == TrialEdit::Discard).then(discarded))
             }
             LabelCommand::Reviewed(id) => store.labels().mark_reviewed(*id).map(|()| None),
-            LabelCommand::Undo => store.journal().undo().map(|entry| outcome(entry.map(undone), "nothing to undo")),
-            LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "nothing to redo")),
+            LabelCommand::Undo => store.journal().undo().map(|entry| outcome(entry.map(undone), "Nothing to undo")),
+            LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "Nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
         };
@@ -154,9 +154,9 @@ mod tests {
     use super::super::job::watch::waker;
     use super::super::worker::watch::{shown, told};
     use super::*;
+    use palpate_sim::objects::object_title;
     use palpate_sim::scene::Scene;
     use palpate_store::BoardInfo;
-    use palpate_store::labels::shown_title;
     use palpate_tactile::trial::TrialHeader;
     use std::sync::mpsc::Receiver;
 
@@ -195,7 +195,7 @@ mod tests {
         }
         labels.send(LabelCommand::Redo);
         let is_done = |begin: &'static str, end: String| move |notice: &Notice| matches!(notice, Notice::Info(text) if text.starts_with(begin) && text.ends_with(&end));
-        told_of(&labels, &woken, is_done("redone: ", format!("labelled {}", shown_title(&next))));
+        told_of(&labels, &woken, is_done("Redone: ", format!("labelled {}", object_title(&next))));
         labels.send(LabelCommand::Undo);
         shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         told_of(&labels, &woken, is_done("Undone: ", String::new()));

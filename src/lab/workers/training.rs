@@ -129,9 +129,10 @@ impl TrainingData {
     pub fn too_little(&self) -> Option<String> {
         let Ok(classes) = &self.classes else { return None };
         let enough = classes.iter().filter(|class| class.is_enough()).count();
-        let so_far = match classes.len() {
-            0 => String::new(),
-            of => format!(" (now {enough} of {of})"),
+        let so_far = match (enough, classes.len()) {
+            (_, 0) => String::new(),
+            (0, _) => ", and none has as many yet".to_owned(),
+            (_, of) => format!(", and one of {of} has as many"),
         };
         (enough < 2).then(|| {
             format!(

@@ -1,7 +1,7 @@
 //! Lines, signs and text in points, on any backend of plotters.
 
 use super::FigureError;
-use palpate_geometry::drawing::{Align, Marker};
+use palpate_geometry::drawing::{Align, LineStyle, Marker};
 use palpate_geometry::palette::{Rgb, Theme, ThemeColours};
 use plotters::prelude::{DrawingBackend, FontStyle, IntoFont, RGBColor, ShapeStyle, TextStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -12,6 +12,19 @@ use std::fmt::Display;
 pub(super) const SUBPIXELS: u32 = 4;
 /// Fonts of text, the first of which is the shipped one.
 const FONT: &str = "Ubuntu, Helvetica, Arial, sans-serif";
+
+/// Radius of a marker, and width of a thin curve (points).
+pub(super) const RADIUS: f64 = 3.25;
+pub(super) const CURVE: f64 = 1.25;
+
+/// Width of a line (points); none where there is no line.
+pub(super) fn line_width(line: LineStyle) -> Option<f64> {
+    match line {
+        LineStyle::None => None,
+        LineStyle::Thin | LineStyle::Dashed => Some(CURVE),
+        LineStyle::Bold => Some(3.0),
+    }
+}
 
 /// How a backend places text.
 #[derive(Clone, Copy, Debug)]

@@ -1,28 +1,88 @@
-//! Places for labels beside points, so that they cover neither each other nor points.
+//! Places for labels beside points, so that they cover neither each other nor points: in files and in the window.
+
+use super::canvas::{RADIUS, line_width};
+use palpate_geometry::drawing::{Marker, Plot};
 
 /// A rectangle: lower and upper corner (points).
 pub(super) type Box2 = [[f64; 2]; 2];
 
+/// A label of a plot in its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedLabel<'a> {
+    pub text: &'a str,
+    /// Number of its series' colour.
+    pub colour: usize,
+    pub room: Box2,
+    /// Line from its point, where it is farther away.
+    pub lead: Option<[[f64; 2]; 2]>,
+}
+
+/// Places labels of points that are chosen by `labelled` within a room; those without a free place are left out. `at`
+/// is the place of values, `size` that of a text; obstacles are kept clear beside points and lines.
+pub fn placed_labels<'a, E>(
+    plot: &'a Plot,
+    at: impl Fn([f64; 2]) -> Option<[f64; 2]>,
+    size: impl Fn(&str) -> Result<[f64; 2], E>,
+    labelled: impl Fn(&str) -> bool,
+    (mut obstacles, room): (Vec<Box2>, Box2),
+) -> Result<Vec<PlacedLabel<'a>>, E> {
+    let around = |[x, y]: [f64; 2], radius: f64| [[x - radius, y - radius], [x + radius, y + radius]];
+    let (mut wanted, mut texts) = (Vec::new(), Vec::new());
+    // Those of later series are placed first.
+    for series in plot.series.iter().rev() {
+        let places: Vec<Option<[f64; 2]>> = series.points.iter().map(|point| at(point.at)).collect();
+        if series.marker != Marker::None {
+            obstacles.extend(places.iter().flatten().map(|place| around(*place, RADIUS + 1.5)));
+        }
+        let known: Vec<[f64; 2]> = places.iter().flatten().copied().collect();
+        if let Some(width) = line_width(series.line) {
+            obstacles.extend(known.windows(2).flat_map(|pair| along(pair[0], pair[1])).map(|at| around(at, width)));
+        }
+        let is_labelled = |label: &str| !label.is_empty() && labelled(label);
+        for (point, place) in series.points.iter().zip(places).filter(|(point, _)| is_labelled(&point.label)) {
+            let Some(at) = place else { continue };
+            wanted.push(Wanted { at, size: size(&point.label)? });
+            texts.push((point.label.as_str(), series.colour));
+        }
+    }
+    let placed = wanted.iter().zip(place(&wanted, &obstacles, room)).zip(texts);
+    let label = |((label, room), (text, colour)): ((&Wanted, Option<Box2>), (&'a str, usize))| {
+        let room = room?;
+        let nearest = [0, 1].map(|k| label.at[k].clamp(room[0][k], room[1][k]));
+        let distance = (nearest[0] - label.at[0]).hypot(nearest[1] - label.at[1]);
+        let from = [0, 1].map(|k| label.at[k] + (nearest[k] - label.at[k]) * (RADIUS / distance));
+        Some(PlacedLabel { text, colour, room, lead: (distance > NEAR).then_some([from, nearest]) })
+    };
+    Ok(placed.filter_map(label).collect())
+}
+
+/// Places along a line, for labels to avoid.
+fn along(from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
+    const EVERY: f64 = 4.0;
+    let pieces = ((to[0] - from[0]).hypot(to[1] - from[1]) / EVERY).ceil().max(1.0);
+    (0..pieces as usize).map(|n| [0, 1].map(|k| from[k] + (to[k] - from[k]) * (n as f64 / pieces))).collect()
+}
+
 /// A label to be placed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
+struct Wanted {
     /// Point that it belongs to.
-    pub(super) at: [f64; 2],
+    at: [f64; 2],
     /// Width and height of its text.
-    pub(super) size: [f64; 2],
+    size: [f64; 2],
 }
 
 /// Distances of a label from its point (points); farther ones get a line to it.
 const DISTANCES: [f64; 4] = [5.0, 12.0, 22.0, 36.0];
 /// A label this near needs no line to its point (points).
-pub(super) const NEAR: f64 = 9.0;
+const NEAR: f64 = 9.0;
 /// Directions from the point to the nearest edge of the label, best first.
 const DIRECTIONS: [[f64; 2]; 8] =
     [[1.0, 0.0], [0.7, -0.7], [0.7, 0.7], [-1.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-0.7, -0.7], [-0.7, 0.7]];
 
 /// Place of each label, in order; `None` if it would cover another label or leave the room. If no place is free of
 /// obstacles, the place that covers the least of them is taken, and nearer ones are preferred.
-pub(super) fn place(wanted: &[Wanted], obstacles: &[Box2], room: Box2) -> Vec<Option<Box2>> {
+fn place(wanted: &[Wanted], obstacles: &[Box2], room: Box2) -> Vec<Option<Box2>> {
     let mut placed: Vec<Option<Box2>> = Vec::new();
     for label in wanted {
         let candidates =

@@ -2,9 +2,9 @@
 
 use super::FigureError;
 use super::areas::{bar_room, draw_band, draw_bar, draw_cells};
-use super::canvas::{Canvas, Text};
+use super::canvas::{CURVE, Canvas, RADIUS, Text, line_width};
 use super::frame::{Frame, SMALL};
-use super::labels::{Box2, NEAR, Wanted, place};
+use super::labels::{Box2, PlacedLabel, placed_labels};
 use palpate_geometry::drawing::{Align, DataSeries, Figure, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, series_colour};
 use plotters::prelude::DrawingBackend;
@@ -18,8 +18,6 @@ const MARGIN: f64 = 14.0;
 const BETWEEN: f64 = 26.0;
 /// Height of a line of small text.
 const LINE: f64 = 15.0;
-/// Radius of a marker.
-const RADIUS: f64 = 3.25;
 /// Length of a line in the legend.
 const SAMPLE: f64 = 20.0;
 
@@ -289,15 +287,7 @@ fn dashes<B: DrawingBackend>(
 /// Lengths of a dash and of a gap, and the width, of a reference line.
 const REFERENCE_DASHES: ([f64; 2], f64) = ([5.0, 4.0], 0.9);
 /// Lengths of a dash and of a gap, and the width, of a dashed curve.
-const CURVE_DASHES: ([f64; 2], f64) = ([7.0, 4.0], 1.25);
-
-fn line_width(line: LineStyle) -> Option<f64> {
-    match line {
-        LineStyle::None => None,
-        LineStyle::Thin | LineStyle::Dashed => Some(CURVE_DASHES.1),
-        LineStyle::Bold => Some(3.0),
-    }
-}
+const CURVE_DASHES: ([f64; 2], f64) = ([7.0, 4.0], CURVE);
 
 fn draw_line<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
@@ -362,10 +352,9 @@ fn draw_series<B: DrawingBackend>(
     Ok(())
 }
 
-/// Labels of all points. Those of later series are placed first.
+/// Labels of all points.
 fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &Frame) -> Result<(), FigureError> {
     const SIZE: f64 = SMALL - 0.5;
-    let around = |[x, y]: [f64; 2], radius: f64| [[x - radius, y - radius], [x + radius, y + radius]];
     let mut obstacles: Vec<Box2> = Vec::new();
     for PlacedReference { ends: [[left, top], [right, bottom]], text, ground } in
         placed_references(canvas, plot, frame)?
@@ -373,43 +362,15 @@ fn draw_labels<B: DrawingBackend>(canvas: &mut Canvas<B>, plot: &Plot, frame: &F
         obstacles.push([[left - 1.5, top - 1.5], [right + 1.5, bottom + 1.5]]);
         obstacles.extend((!text.is_empty()).then_some(ground));
     }
-    let mut wanted = Vec::new();
-    let mut texts = Vec::new();
-    for series in plot.series.iter().rev() {
-        let places: Vec<Option<[f64; 2]>> = series.points.iter().map(|point| frame.of(plot, point.at)).collect();
-        if series.marker != Marker::None {
-            obstacles.extend(places.iter().flatten().map(|place| around(*place, RADIUS + 1.5)));
+    let size = |text: &str| Ok::<_, FigureError>([canvas.width(text, SIZE)?, SIZE + 1.5]);
+    let labels = placed_labels(plot, |at| frame.of(plot, at), size, |_| true, (obstacles, frame.room))?;
+    for PlacedLabel { text, colour, room: [low, high], lead } in labels {
+        if let Some(ends) = lead {
+            canvas.path(&ends, 0.6, canvas.colours.quiet_text)?;
         }
-        let known: Vec<[f64; 2]> = places.iter().flatten().copied().collect();
-        if let Some(width) = line_width(series.line) {
-            obstacles.extend(known.windows(2).flat_map(|pair| along(pair[0], pair[1])).map(|at| around(at, width)));
-        }
-        for (point, place) in series.points.iter().zip(places).filter(|(point, _)| !point.label.is_empty()) {
-            let Some(at) = place else { continue };
-            wanted.push(Wanted { at, size: [canvas.width(&point.label, SIZE)?, SIZE + 1.5] });
-            texts.push((point.label.as_str(), series.colour));
-        }
-    }
-    for ((label, place), (text, colour)) in wanted.iter().zip(place(&wanted, &obstacles, frame.room)).zip(texts) {
-        let Some([low, high]) = place else { continue };
-        let nearest = [0, 1].map(|k| label.at[k].clamp(low[k], high[k]));
-        let distance = (nearest[0] - label.at[0]).hypot(nearest[1] - label.at[1]);
-        let colour = series_colour(colour, canvas.theme);
-        if distance > NEAR {
-            let share = RADIUS / distance;
-            let from = [0, 1].map(|k| label.at[k] + (nearest[k] - label.at[k]) * share);
-            canvas.path(&[from, nearest], 0.6, canvas.colours.quiet_text)?;
-        }
-        let colour = colour.mix(canvas.colours.text, 0.45);
+        let colour = series_colour(colour, canvas.theme).mix(canvas.colours.text, 0.45);
         let at = [0.5 * (low[0] + high[0]), high[1] - 0.24 * SIZE];
         canvas.text(&Text { text, at, align: Align::Centre, size: SIZE, colour })?;
     }
     Ok(())
-}
-
-/// Places along a line, for labels to avoid.
-fn along(from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
-    const EVERY: f64 = 4.0;
-    let pieces = ((to[0] - from[0]).hypot(to[1] - from[1]) / EVERY).ceil().max(1.0);
-    (0..pieces as usize).map(|n| [0, 1].map(|k| from[k] + (to[k] - from[k]) * (n as f64 / pieces))).collect()
 }

@@ -9,6 +9,8 @@ mod frame;
 mod labels;
 mod layout;
 
+pub use labels::{PlacedLabel, placed_labels};
+
 use crate::Picture;
 use canvas::{Canvas, SUBPIXELS, TextMetrics};
 use palpate_geometry::drawing::Figure;

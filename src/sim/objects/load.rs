@@ -76,7 +76,10 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
         return shape.build(options).map(Some);
     }
     let content = Content::default();
-    let object = blueprint(source, &content)?.build(options)?;
+    let path = Path::new(source);
+    let blueprint = blueprint(source, &content).map_err(|cause| cause.in_file(&stem(path), path))?;
+    let name = blueprint.name.clone();
+    let object = blueprint.build(options).map_err(|cause| cause.in_file(&name, path))?;
     Ok(Some(content.stamped(object)))
 }
 

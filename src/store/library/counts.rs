@@ -17,6 +17,8 @@ pub struct LibraryCounts {
     pub discarded: usize,
     /// Trials of the demo log.
     pub demo_log: usize,
+    /// Trials that were simulated for data sets.
+    pub collected: usize,
     /// Names of objects, most frequent first.
     pub objects: Vec<Counted>,
     /// Tags, most frequent first.
@@ -36,6 +38,7 @@ impl LibraryCounts {
             }
             counts.kept += 1;
             counts.demo_log += usize::from(row.place == TrialPlace::DemoLog);
+            counts.collected += usize::from(row.is_collected());
             if row.object.is_empty() {
                 counts.unlabelled += 1;
             } else {

@@ -99,6 +99,8 @@ pub struct TrialQuery {
     pub sensors: Option<String>,
     /// Data set.
     pub collection: Option<String>,
+    /// Leaves out trials that were simulated for data sets, unless one of these is asked for.
+    pub without_collected: bool,
     /// Begun on this day or later.
     pub since: Option<Day>,
     /// Begun on this day or earlier.
@@ -111,7 +113,12 @@ pub struct TrialQuery {
 impl TrialQuery {
     /// The same order without search and filters.
     pub fn cleared(&self) -> Self {
-        Self { order: self.order, ..Self::default() }
+        Self { order: self.order, without_collected: self.without_collected, ..Self::default() }
+    }
+
+    /// True where it leaves out trials that were simulated for data sets.
+    pub fn hides_collected(&self) -> bool {
+        self.without_collected && self.collection.is_none()
     }
 
     /// True where it leaves anything out but deleted trials.
@@ -162,6 +169,7 @@ impl Matcher<'_> {
             && query.tag.as_ref().is_none_or(|tag| row.tags.contains(tag))
             && query.preset.as_ref().is_none_or(|name| row.preset.is_some_and(|own| own.eq_ignore_ascii_case(name)))
             && query.collection.as_ref().is_none_or(|name| row.collections().any(|own| own == name))
+            && !(query.hides_collected() && row.is_collected())
             && self.since.as_ref().is_none_or(|since| day >= since.as_str())
             && self.until.as_ref().is_none_or(|until| day <= until.as_str())
             && self.object.as_ref().is_none_or(|name| is_named(trial, name))

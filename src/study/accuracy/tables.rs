@@ -65,8 +65,8 @@ impl AccuracyStudy {
                 format!("{}{}", row.setting.name, if row.setting.is_default() { ", default" } else { "" }).into()
             }),
             Column("CPU", "ms", &|row| Some(row.cost.cpu_ms.median).into()),
-            Column("curvature", "1/km", &|row| {
-                let [low, estimate, high] = <[f64; 3]>::from(row.cost.curvature_per_m).map(|error| 1e3 * error);
+            Column("curvature", "1/m", &|row| {
+                let [low, estimate, high] = <[f64; 3]>::from(row.cost.curvature_per_m);
                 Cell::Interval(Interval { estimate, low, high })
             }),
             Column("force", "mN", &|row| Some(1e3 * row.cost.force_n.median).into()),

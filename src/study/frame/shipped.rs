@@ -6,6 +6,7 @@ const SHIPPED: &[(&str, &str)] = &[
     ("layouts", include_str!("../../../assets/studies/paper/layouts.json")),
     ("modality", include_str!("../../../assets/studies/paper/modality.json")),
     ("stages", include_str!("../../../assets/studies/paper/stages.json")),
+    ("region", include_str!("../../../assets/studies/paper/region.json")),
     ("training-size", include_str!("../../../assets/studies/paper/training-size.json")),
     ("models", include_str!("../../../assets/studies/paper/models.json")),
     ("grasps", include_str!("../../../assets/studies/paper/grasps.json")),

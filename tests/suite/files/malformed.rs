@@ -282,6 +282,9 @@ fn broken_trees_of_links_are_refused() {
     refused("x.urdf", &robot(""), "no link");
     refused("x.urdf", &robot("<link name='a'/>"), "no shape");
     refused("x.urdf", b"<mujoco><worldbody/></mujoco>", "urdf");
+    // The file is named with its ending.
+    refused("empty.urdf", b"", "\"empty.urdf\" is malformed");
+    refused("empty.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "\"empty.obj\" cannot be grasped");
     // Nesting without end is not followed without end.
     refused("x.urdf", "<robot>".repeat(200_000).as_bytes(), "malformed");
 }

@@ -40,6 +40,13 @@ pub(super) fn ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &
                 wanted.place = (!logged).then_some(TrialPlace::DemoLog);
             }
         }
+        if counts.collected > 0 {
+            let text = format!("data sets {}", counts.collected);
+            let hint = "Show trials of data sets, too: grasps that studies and palpate collect simulated";
+            if ui.selectable_label(!query.without_collected, small(&text)).on_hover_text(hint).clicked() {
+                wanted.without_collected = !query.without_collected;
+            }
+        }
         let gone = query.shown == Shown::Discarded;
         if gone || counts.discarded > 0 {
             let text = format!("discarded {}", counts.discarded);

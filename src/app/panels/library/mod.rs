@@ -24,7 +24,7 @@ pub(super) fn ui(
 ) {
     let Some(view) = &library.view else {
         ui.weak("Reading the store …");
-        actions.push(|app| app.library.find(TrialQuery::default()));
+        actions.push(|app| app.library.find(app.library.selection.query.clone()));
         return;
     };
     if !library.selection.trials.is_empty() {
@@ -36,19 +36,25 @@ pub(super) fn ui(
     }
     search_ui(ui, &library.selection, view, actions);
     filters::ui(ui, &library.selection.query, view, actions);
-    if library.selection.query.is_filtered() || !view.complete {
-        count_ui(ui, &library.selection.query, view, actions);
+    let query = &library.selection.query;
+    if query.is_filtered() || !view.complete || hidden(query, view) > 0 {
+        count_ui(ui, query, view, actions);
     }
     if view.found.is_empty() {
-        return empty_ui(ui, library.selection.query.is_filtered(), view, actions);
+        return empty_ui(ui, query, view, actions);
     }
     rows::ui(ui, library, pictures, view, actions);
+}
+
+/// Trials of data sets that are left out.
+fn hidden(query: &TrialQuery, view: &LibraryView) -> usize {
+    if query.hides_collected() { view.counts.collected } else { 0 }
 }
 
 /// Field for words; its text is asked for with every letter.
 fn search_ui(ui: &mut Ui, picked: &LibrarySelection, view: &LibraryView, actions: &mut Actions) {
     let mut search = picked.query.search.clone();
-    let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept));
+    let hint = format!("Search {} trials  ( / )", grouped(view.counts.kept - hidden(&picked.query, view)));
     let id = Id::unique("library search");
     if picked.focus_search && focus_field(ui, id) {
         actions.push(|app| app.library.selection.focus_search = false);
@@ -67,9 +73,16 @@ fn search_ui(ui: &mut Ui, picked: &LibrarySelection, view: &LibraryView, actions
 
 /// How many trials were found; without filters the search field says how many there are.
 fn count_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut Actions) {
-    ui.horizontal(|ui| {
-        let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept));
-        ui.label(RichText::new(text).small().weak());
+    let hidden = hidden(query, view);
+    ui.horizontal_wrapped(|ui| {
+        if query.is_filtered() || !view.complete {
+            let text = format!("{} of {} trials", grouped(view.found.len()), grouped(view.counts.kept - hidden));
+            ui.label(RichText::new(text).small().weak());
+        }
+        if hidden > 0 {
+            let verb = if hidden == 1 { "trial of data sets is" } else { "trials of data sets are" };
+            ui.label(RichText::new(format!("{} {verb} hidden", grouped(hidden))).small().weak());
+        }
         if !view.complete {
             ui.label(RichText::new("reading older ones …").small().weak());
         }
@@ -80,12 +93,14 @@ fn count_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut A
     });
 }
 
-fn empty_ui(ui: &mut Ui, filtered: bool, view: &LibraryView, actions: &mut Actions) {
+fn empty_ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut Actions) {
     ui.add_space(12.0);
     ui.vertical_centered(|ui| {
         if !view.complete {
             ui.weak("Reading the store …");
-        } else if filtered {
+        } else if hidden(query, view) > 0 && !query.is_filtered() {
+            ui.weak("No trials but those of data sets: \"data sets\" above shows them.");
+        } else if query.is_filtered() {
             ui.weak("No trial matches. Clear the search and the filters to see all.");
         } else {
             ui.weak("No trials yet.");

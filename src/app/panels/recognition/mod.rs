@@ -359,8 +359,8 @@ impl Part<'_, '_> {
             // A stored trial keeps no secret.
             None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
             None => {
-                let text = if shown { "Truth shown when it decides" } else { "Truth hidden" };
-                (text.to_owned(), text.to_owned(), None)
+                let text = if shown { "shown when it decides" } else { "hidden" };
+                (text.to_owned(), format!("Truth {text}"), None)
             }
         };
         let size = vec2(ui.available_width(), self.measures.truth);
@@ -371,12 +371,9 @@ impl Part<'_, '_> {
         ui.interact(row, ui.scope_id().with("truth"), Sense::hover())
             .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
         let mut left = row.left();
-        // Without an answer the sentence says it all.
-        if right.is_some() || spoken.starts_with("Truth") {
-            let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
-            left += label.size().x + 8.0;
-            put(ui, label, row, Align2::LEFT_CENTER);
-        }
+        let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
+        left += label.size().x + 8.0;
+        put(ui, label, row, Align2::LEFT_CENTER);
         if let Some((icon, ink)) = sign {
             icons::sign(
                 ui,

@@ -1,11 +1,11 @@
 //! Figures of the chosen study: its plots, from which the pointer leads to rows and trials.
 
-use super::plot::plot_ui;
+use super::plot::{plot_ui, title_ui};
 use super::{part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::studies::Studies;
-use crate::app::figure_plot::legend_ui;
+use crate::app::figure_plot::{is_ambiguous, legend_ui};
 use crate::app::theme;
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Ui};
@@ -27,8 +27,9 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
         ui.weak("This result has no figure.");
         return;
     };
-    let series = linked.figure.plots.iter().flat_map(|plot| &plot.series);
-    legend_ui(ui, theme::of(ui), series);
+    if !is_ambiguous(&linked.figure.plots) {
+        legend_ui(ui, theme::of(ui), linked.figure.plots.iter().flat_map(|plot| &plot.series));
+    }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         plots_ui(ui, &result, linked, actions);
         for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
@@ -92,9 +93,22 @@ fn plots_ui(ui: &mut Ui, result: &StudyResult, linked: &LinkedFigure, actions: &
     let columns = most.min(plots.len()).min(fitting).max(1);
     // A single row fills the panel.
     let room = (ui.available_height() - BELOW, plots.len() <= columns);
+    let own_legends = is_ambiguous(plots);
     for (row, chunk) in plots.chunks(columns).enumerate() {
+        // Above the plots, so that the axes of a row are in line.
+        if own_legends {
+            ui.columns(columns, |uis| {
+                for (ui, plot) in uis.iter_mut().zip(chunk) {
+                    title_ui(ui, plot);
+                    legend_ui(ui, theme::of(ui), plot.series.iter());
+                }
+            });
+        }
         ui.columns(columns, |uis| {
             for (k, (ui, _)) in uis.iter_mut().zip(chunk).enumerate() {
+                if !own_legends {
+                    title_ui(ui, &plots[row * columns + k]);
+                }
                 plot_ui(ui, result, (linked, row * columns + k), room, actions);
             }
         });

@@ -120,7 +120,11 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     } else {
         "Its grasps are not kept."
     };
-    let cost = format!("In full: {}. Quick: less than a minute, not to be quoted.", card.budget);
+    // Measured where the full run comes with the program, as below its figure.
+    let results = || studies.files(key).into_iter().flat_map(|files| &files.results);
+    let measured = results().find(|result| result.origin.is_like(StudyOrigin::Shipped));
+    let budget = measured.map_or_else(|| card.budget.to_owned(), |own| format!("about {}", own.stored.cpu_time()));
+    let cost = format!("In full: {budget}. Quick: less than a minute, not to be quoted. {kept}");
     wrapped(ui, RichText::new(cost).small().weak());
     let running = progress(studies, key);
     if let Some(JobProgress { share, words }) = &running {
@@ -143,7 +147,7 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
             if size == StudySize::Quick {
                 button = button.fill(accented(theme::of(ui)));
             }
-            if ui.add(button).on_hover_text(format!("{kept} ({shortcut})")).clicked() {
+            if ui.add(button).on_hover_text(format!("{title} ({shortcut})")).clicked() {
                 run(key, size, false, actions);
             }
         }

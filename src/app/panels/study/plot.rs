@@ -21,6 +21,13 @@ const HEIGHTS: [f32; 2] = [190.0, 380.0];
 /// Labelled points of a plot up to which the labels are shown.
 const MOST_LABELS: usize = 8;
 
+/// Title of a plot, where it has one.
+pub(super) fn title_ui(ui: &mut Ui, plot: &Plot) {
+    if !plot.title.is_empty() {
+        ui.add(egui::Label::new(RichText::new(capital(&plot.title)).small().strong()).truncate());
+    }
+}
+
 pub(super) fn plot_ui(
     ui: &mut Ui,
     result: &StudyResult,
@@ -29,9 +36,6 @@ pub(super) fn plot_ui(
     actions: &mut Actions,
 ) {
     let plot = &linked.figure.plots[number];
-    if !plot.title.is_empty() {
-        ui.add(egui::Label::new(RichText::new(capital(&plot.title)).small().strong()).truncate());
-    }
     let [least, most] = HEIGHTS;
     let rows = plot.heat.as_ref().map_or(plot.y.ticks.len(), |heat| heat.y.count);
     let height = if rows > 0 {
