@@ -49,7 +49,7 @@ fn every_panel_in_both_themes() {
             let mut bench = bench(BenchSetup { theme, size, panel: Some(panel), fill, ..BenchSetup::default() });
             bench.advance_to(2.6);
             match panel.name {
-                "studies" => bench.until_shown(true, "not run"),
+                "studies" => bench.until_shown(true, "shipped result"),
                 "study-figure" | "study-tables" | "study-findings" => {
                     bench.tell(|app| app.studies.choose("models"));
                     bench.harness.run_steps(4);
