@@ -127,7 +127,12 @@ impl<'a> DisplayedData<'a> {
     /// Time that is shown (s): the cursor, that at which a finished round is shown, or the newest sample.
     pub(super) fn time_s(&self) -> Option<f64> {
         let newest = || self.traces.current()?.t.last().copied();
-        self.playback.cursor_s.or_else(|| self.held_s()).or_else(newest)
+        self.past_s().or_else(newest)
+    }
+
+    /// Time that is shown in place of the newest sample (s): the cursor, or that at which a finished round is shown.
+    pub(super) fn past_s(&self) -> Option<f64> {
+        self.playback.cursor_s.or_else(|| self.held_s())
     }
 
     /// Sample that is shown, or the last before it.
@@ -150,7 +155,7 @@ impl<'a> DisplayedData<'a> {
         let snapshot = self.snapshot?;
         let past = || {
             let trace = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp)?;
-            trace.frames.get(trace.sample_at(self.playback.cursor_s.or_else(|| self.held_s())?)?)?.as_deref()
+            trace.frames.get(trace.sample_at(self.past_s()?)?)?.as_deref()
         };
         let simulated = self.source == ViewSource::Simulation;
         let frame = past().filter(|_| simulated).unwrap_or(&snapshot.frame);

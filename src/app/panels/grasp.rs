@@ -64,11 +64,10 @@ fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
         let index = snapshot.channels.iter().position(|c| shows(quantity, c) && c.side() == Some(side))?;
         trace?.channels.get(index)?.get(sample?).map(|value| f64::from(*value))
     };
-    let past = data.playback.cursor_s.or_else(|| data.held_s());
     let frame = data.moment().map_or(snapshot.frame.as_ref(), |moment| moment.frame);
     ui.spacing_mut().interact_size.y = 18.0;
     Grid::new("readings").num_columns(3).spacing([14.0, 3.0]).show(ui, |ui| {
-        ui.weak(past.map_or_else(|| "now".to_owned(), |t| format!("at {}", with_unit(t, "s"))));
+        ui.weak(data.past_s().map_or_else(|| "now".to_owned(), |t| format!("at {}", with_unit(t, "s"))));
         for side in ["left", "right"] {
             ui.add_sized([52.0, 18.0], egui::Label::new(RichText::new(side).weak()));
         }
