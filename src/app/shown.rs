@@ -95,12 +95,21 @@ pub(super) struct Recognised<'a> {
     pub(super) off: Option<&'a str>,
     /// Class name and title of the object in the hand, where known.
     pub(super) truth: Option<(&'a str, String)>,
+    /// The object had left the hand at the end of the hold.
+    pub(super) nothing_held: bool,
     /// Text before the first answer.
     pub(super) waiting: &'static str,
     /// Text where another grasp is due.
     pub(super) again: &'static str,
     /// No further grasp follows automatically.
     pub(super) finished: bool,
+}
+
+impl Recognised<'_> {
+    /// Whether the decision is right, where there is one and the truth is known.
+    pub(super) fn is_right(&self) -> Option<bool> {
+        self.view?.is_right(self.truth.as_ref()?.0, self.nothing_held)
+    }
 }
 
 /// Text where another grasp follows by itself.
@@ -311,6 +320,7 @@ impl<'a> DisplayedData<'a> {
                     },
                     off: trial.recognition_off.as_deref(),
                     truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
+                    nothing_held: trial.nothing_held(),
                     waiting: "Fingers closing",
                     again: GRASPING_AGAIN,
                     finished: true,
@@ -323,6 +333,7 @@ impl<'a> DisplayedData<'a> {
                     view: self.past_answer().or(self.newest_answer()),
                     off: snapshot.recognition_off.as_deref(),
                     truth: Some((truth, title)),
+                    nothing_held: snapshot.status.nothing_held,
                     waiting: if snapshot.status.playing { "Fingers closing" } else { "Press play to start a grasp" },
                     again: GRASPING_AGAIN,
                     finished: snapshot.status.finished,
@@ -332,6 +343,7 @@ impl<'a> DisplayedData<'a> {
                 view: self.past_answer().or(self.newest_answer()),
                 off: gripper.recognition_off.as_deref(),
                 truth: None,
+                nothing_held: false,
                 waiting: if gripper.trial.is_some() { "Fingers closing" } else { "Press R to start a grasp" },
                 again: "press R to grasp again",
                 finished: false,

@@ -164,8 +164,10 @@ fn grasp_until_recognised(
         }
     };
     let view = identification.view();
+    let last = grasps.last().and_then(|grasp| grasp.summary.as_ref());
+    let lost = last.is_some_and(GraspSummary::lost_object);
     let report = DemoReport {
-        is_right: truth.as_ref().and_then(|truth| view.is_right(truth)),
+        is_right: truth.as_ref().and_then(|truth| view.is_right(truth, lost)),
         truth,
         decided: view.decided().unwrap_or("unknown").to_owned(),
         stopped_because,
@@ -219,7 +221,7 @@ fn summary_text(summary: &GraspSummary, page: &mut Page) {
         let [left, right] = hold.force_n.map(three_digits);
         let [low, high] = hold.pressure_pa.map(|p| three_digits(p * 1e-3));
         page.line(format!("  force {left} and {right} N, pressure {low} and {high} kPa."));
-        if summary.object_moved_m.is_some() && summary.contact_onset_s.is_some() && hold.force_n == [0.0, 0.0] {
+        if summary.lost_object() && summary.contact_onset_s.is_some() {
             page.line("  The object slipped out of the grasp.");
         }
     }

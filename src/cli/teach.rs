@@ -66,9 +66,9 @@ struct TeachReport<'a> {
     classes: Vec<&'a str>,
     seconds: f64,
     cpu_s: f64,
-    /// What `palpate demo` grasps with it.
+    /// What `palpate demo` grasps with it, as its option.
     #[serde(skip)]
-    grasped: &'a str,
+    grasped: String,
 }
 
 pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<(), Failure> {
@@ -108,10 +108,18 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         Err(LessonError::Learn(LearnError::Stopped)) => return Err("stopped; no model was saved".into()),
         taught => taught?,
     };
+    if let Some(warning) = taught.warning() {
+        warn(&warning);
+    }
+    let taught = taught.model;
     save_model(&taught, &out)?;
     let classes: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
     let (seconds, cpu_s) = (began.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-    let grasped = arguments.files.first().filter(|_| !arguments.real).map_or("--port PORT", String::as_str);
+    let grasped = arguments
+        .files
+        .first()
+        .filter(|_| !arguments.real)
+        .map_or("--port PORT".to_owned(), |file| format!("--object {file}"));
     TeachReport { model: &out, taught: &taught.card.taught, classes, seconds, cpu_s, grasped }.print(arguments.json)
 }
 
@@ -121,7 +129,7 @@ impl Report for TeachReport<'_> {
         page.fact("classes", format!("{}: {}", self.classes.len(), self.classes.join(", ")));
         page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));
         page.fact("saved", self.model.display().to_string());
-        let (model, grasped) = (self.model.display(), self.grasped);
+        let (model, grasped) = (self.model.display(), &self.grasped);
         page.line("Name it where it is to be used:");
         page.line(format!("  palpate recognise TRIAL --model {model}"));
         page.line(format!("  palpate demo {grasped} --model {model}"));

@@ -106,7 +106,7 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     assert!(bench.harness.query_by_label("At the end of grasp 1.").is_some());
     compare("why_found", &bench.picture(), "the CPU renderer of the tests");
     // The model weighs the pads alone: curvature counts nothing, in no phase.
-    for label in ["left curvature: 0 points", "left curvature, hold: 0 points", "pre-shaping: "] {
+    for label in ["left curvature: 0 percentage points", "left curvature, hold: 0 percentage points", "pre-shaping: "] {
         assert!(bench.harness.query_all_by_label_contains(label).next().is_some(), "no {label}");
     }
     let of_force = bench.harness.get_by_label_contains("left pad force, hold: +");

@@ -53,9 +53,8 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
             let room = ui.available_width();
             if let Some(driver) = app.driver.as_deref().filter(|_| room > 240.0) {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let quiet =
-                        RichText::new(drawn_by(app, driver)).small().color(colour(app.view.theme.colours().quiet_text));
-                    ui.add(egui::Label::new(quiet).truncate());
+                    let quiet = RichText::new(driver).small().color(colour(app.view.theme.colours().quiet_text));
+                    ui.add(egui::Label::new(quiet).truncate()).on_hover_text(drawn_by(app, driver));
                 });
             }
         });

@@ -325,9 +325,13 @@ impl App {
         self.inspect.show_live(&mut self.view);
     }
 
-    /// Shows the open trial in Inspect mode, and the live gripper in the others.
+    /// Shows the open trial in Inspect mode, or the newest of the library unless a real gripper is connected; in the others
+    /// the live gripper.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        match (mode, self.inspect.wanted) {
+        let newest = || self.library.view.as_ref()?.found.first().map(|trial| trial.row.id);
+        let simulated = self.view.source == ViewSource::Simulation;
+        let wanted = self.inspect.wanted.or_else(|| newest().filter(|_| simulated));
+        match (mode, wanted) {
             (Mode::Inspect, Some(id)) => self.show_trial(id),
             (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => {
                 self.inspect.show_live(&mut self.view);

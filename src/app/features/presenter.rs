@@ -52,7 +52,7 @@ impl PresenterFeature {
         self.judged = snapshot.grasp;
         let grasps = snapshot.status.grasp_of_round;
         let round = snapshot.grasp.saturating_sub(u64::from(grasps));
-        let right = snapshot.identification.as_ref().and_then(|view| view.is_right(snapshot.truth()));
+        let right = snapshot.identification.as_ref().and_then(|view| snapshot.is_right(view));
         if let Some((before, right)) = self.last.replace((round, right))
             && before == round
             && let Some(count) = self.score.count(right)

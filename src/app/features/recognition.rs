@@ -4,8 +4,8 @@ use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
 use palpate_geometry::units::capital;
-use palpate_lab::grasping::{LESSON_GRASPS, RecognisedGrasp};
-use palpate_lab::workers::{Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
+use palpate_lab::grasping::RecognisedGrasp;
+use palpate_lab::workers::{Command, EndedJob, Explainer, FinishedLesson, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Model, Models, Shipped};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::class_name;
@@ -40,6 +40,8 @@ pub(in crate::app) struct Learned {
     /// Number of simulated grasps, and the time that the lesson took (s).
     pub(in crate::app) grasps: usize,
     pub(in crate::app) seconds: f64,
+    /// What is wrong with the grasps, if anything.
+    pub(in crate::app) warning: Option<String>,
     /// File that the object is from.
     source: String,
     /// The model without it, and its file; none for a shipped one.
@@ -249,20 +251,22 @@ impl App {
     }
 
     /// Takes in a lesson that has ended.
-    fn take_lesson(&mut self, EndedJob { command, outcome, .. }: EndedJob<TeachRequest, TrainedModel>) {
+    fn take_lesson(&mut self, EndedJob { command, outcome, .. }: EndedJob<TeachRequest, FinishedLesson>) {
         let models = &self.recognition.models;
         let is_current = |kind: &Shipped| models.of(*kind).is_some_and(|model| Arc::ptr_eq(model, &command.model));
         let simulated = [false, true].map(Shipped::simulated);
         match outcome {
-            Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&trained),
-            Ok(trained) if simulated.iter().any(is_current) => {
+            Ok(lesson) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&lesson.trained),
+            Ok(lesson) if simulated.iter().any(is_current) => {
+                let FinishedLesson { trained, grasps, warning } = &*lesson;
                 let before = self.view.simulation_model.replace(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
                 let title = capital(&object_title(&command.name));
                 self.notices.info(format!("Learned \"{title}\"."));
                 self.recognition.learned = command.object.as_ref().map(|object| Learned {
                     title,
-                    grasps: LESSON_GRASPS,
+                    grasps: *grasps,
+                    warning: warning.as_ref().map(|warning| format!("{}.", capital(warning))),
                     seconds: self.recognition.asked.elapsed().as_secs_f64(),
                     source: object.source.clone(),
                     before: (Arc::clone(&command.model), before),
@@ -273,7 +277,8 @@ impl App {
                 }
             }
             // Another model is in use by now.
-            Ok(trained) => {
+            Ok(lesson) => {
+                let trained = &lesson.trained;
                 self.notices.info(format!("Taught {}, saved as {}.", command.name, trained.path.display()));
             }
             Err(cause) => self.notices.warning(format!("The model did not learn {}: {cause}", command.name)),

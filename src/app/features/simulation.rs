@@ -1,7 +1,7 @@
 //! The simulated gripper: its thread, its scene and its traces.
 
 use super::App;
-use super::view::ViewState;
+use super::view::{ViewSource, ViewState};
 use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::workers::{Command, GhostGrasp, Job, MeasuredAccuracy, Notice, Refusal, SimWorker, Snapshot};
@@ -215,6 +215,9 @@ impl App {
         // A file that the model has learned keeps the name that it had then.
         scene.object.name = self.learned_as(&scene.object.source).map(str::to_owned);
         self.set_scene(scene);
+        if self.view.source == ViewSource::Gripper {
+            self.notices.info("Set in the simulation; the real gripper is shown. Click SIMULATED to see it.");
+        }
     }
 
     /// Grasps another built-in object, drawn at random.

@@ -195,8 +195,8 @@ fn models_ui(ui: &mut Ui, view: &ViewState, data: Option<&TrainingData>, actions
     });
     let shipped = ("Shipped model".to_owned(), "trained on simulated grasps".to_owned(), None);
     // Models from outside the folder.
-    let is_chosen = |path: &&Path| view.gripper_models.iter().all(|known| known != path);
-    let others = chosen.filter(is_chosen).into_iter().chain(view.gripper_models.iter().map(PathBuf::as_path));
+    let is_unlisted = |path: &&Path| view.gripper_models.iter().all(|known| known != path);
+    let others = chosen.filter(is_unlisted).into_iter().chain(view.gripper_models.iter().map(PathBuf::as_path));
     let others = others.filter(|own| saved.iter().all(|m| m.path != *own));
     let others = others.map(|path| (name_of(path).into_owned(), path.display().to_string(), Some(path)));
     let saved =

@@ -289,7 +289,7 @@ fn paint(ui: &Ui, rect: Rect, own: &View3d<'_>, moment: Moment<'_>, letters: f32
 /// Line of the first start.
 const INVITATION: &str = "Drop an object of yours here (URDF, OBJ or STL): it is grasped and learned";
 /// Least width of the picture in which that is one line, below the object (points).
-const INVITED: f32 = 600.0;
+const INVITED: f32 = 700.0;
 
 /// What is said about a picture, and the colour of the ghost in it.
 fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
@@ -300,7 +300,8 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
         format!("{words}, at {t:.1}{}s", units::SPACE)
     });
     if let Some(inspected) = own.data.shown_trial() {
-        return (inspected.trial.remarks.iter().cloned().chain(held).collect::<Vec<_>>().join(" "), None);
+        // The time bar tells the time.
+        return (inspected.trial.remarks.join(" "), None);
     }
     if own.data.source == ViewSource::Gripper {
         let text = match (own.silent_s, key.real) {

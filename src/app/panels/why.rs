@@ -221,14 +221,16 @@ impl Rows {
 }
 
 fn spoken(points: f64) -> String {
-    format!("{} points", points_words(points))
+    format!("{} percentage points", points_words(points))
 }
 
 fn hint_of(name: &str, evidence: &Evidence) -> String {
     let side = if evidence.points < 0.0 { "against" } else { "for" };
-    let points = points_words(evidence.points);
-    let decibans = units::true_minus(&format!("{:+.1}", evidence.decibans));
-    format!("{name}: {points} points {side} the answer, {decibans} decibans against the second class")
+    let times = units::three_digits(10_f64.powf(0.1 * evidence.decibans));
+    format!(
+        "{name}: {} {side} the answer; odds against the second class {times} times as high as without it",
+        spoken(evidence.points)
+    )
 }
 
 /// Row over the whole width, with its text for screen readers.

@@ -168,7 +168,7 @@ impl Page<'_> {
         let truth = snapshot.truth();
         let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
         let finished = snapshot.status.finished;
-        let right = self.answer().filter(|_| finished).and_then(|view| view.is_right(truth));
+        let right = self.answer().filter(|_| finished).and_then(|view| snapshot.is_right(view));
         let (word, ink) = match right {
             Some(true) => ("Right", colours.good),
             Some(false) => ("Wrong", colours.error),
@@ -192,6 +192,7 @@ impl Page<'_> {
         put(ui, self.line(ui, word, 2.2 * unit, words.width(), colour(ink)), words, Align2::LEFT_CENTER);
         let decided = self.answer().is_some_and(|view| view.decision.is_some());
         let name = match (finished, decided) {
+            (true, _) if snapshot.status.nothing_held => format!("It was: {title}. It left the hand"),
             (true, _) => format!("It is: {title}"),
             (false, true) => "Shown once it lets go.".to_owned(),
             (false, false) => "Shown once it decides.".to_owned(),

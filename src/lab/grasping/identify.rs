@@ -9,6 +9,7 @@ use palpate_learn::{
     Signatures, StopReason, StopRule, Verdict,
 };
 use palpate_sim::gripper::{GripperModel, Phase};
+use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Between;
 use palpate_tactile::trial::EarlierGrasps;
 use palpate_tactile::{Channel, LayoutError};
@@ -153,10 +154,14 @@ impl IdentificationView {
         self.decision == Some(StopReason::Unknown) || self.decided() == Some(OTHER)
     }
 
-    /// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class.
-    pub fn is_right(&self, truth: &str) -> Option<bool> {
+    /// True where the decision is right; none before it. "Unknown" and "other" are right for an object that is no class, an
+    /// empty hand also for an object that has left it (`nothing_held`).
+    pub fn is_right(&self, truth: &str, nothing_held: bool) -> Option<bool> {
         let decided = self.decided()?;
-        Some(if self.is_unknown() { self.labels.class(truth).is_none() } else { decided == truth })
+        if self.is_unknown() {
+            return Some(self.labels.class(truth).is_none());
+        }
+        Some(decided == truth || nothing_held && decided == EMPTY)
     }
 }
 

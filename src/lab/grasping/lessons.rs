@@ -7,6 +7,7 @@ use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
 use palpate_learn::{
     Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence,
 };
+use palpate_sim::frame::GraspFailure;
 use palpate_sim::objects::{ObjectError, ObjectModel};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{ObjectSetup, PosePreset, Scene};
@@ -57,6 +58,26 @@ pub struct Lessons<'a> {
     pub stop: &'a AtomicBool,
 }
 
+/// What was learned, and from what.
+#[derive(Debug)]
+pub struct Taught {
+    /// The model, which knows the new objects.
+    pub model: Model,
+    /// Simulated grasps that it learned from.
+    pub grasps: usize,
+    /// Those of them in which the object left the hand, or was never touched.
+    pub lost: usize,
+}
+
+impl Taught {
+    /// A warning where the hand was empty in many of the grasps.
+    pub fn warning(&self) -> Option<String> {
+        let Self { grasps, lost, .. } = self;
+        let words = "was not held: it slid away or was never touched. Fix it in place, or see `palpate grasp`";
+        (4 * lost >= *grasps && *lost > 0).then(|| format!("in {lost} of {grasps} grasps the object {words}"))
+    }
+}
+
 /// Reason why a model learned nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum LessonError {
@@ -86,7 +107,7 @@ fn refused(cause: impl Into<String>) -> LessonError {
 
 impl Lessons<'_> {
     /// Teaches a model these objects. The store is read only for recorded grasps.
-    pub fn teach(&self, model: &Model, store: Option<&Store>) -> Result<Model, LessonError> {
+    pub fn teach(&self, model: &Model, store: Option<&Store>) -> Result<Taught, LessonError> {
         model.check_learns_new_objects()?;
         let view = view_of(&model.card);
         let nothing = || refused("name an object file, or a label with --recorded");
@@ -108,6 +129,7 @@ impl Lessons<'_> {
         for (class, (content, source)) in &taught_from {
             classes.take(class, *content, source, SEPARATE)?;
         }
+        let (mut grasps, mut lost) = (0, 0);
         for (number, setup) in self.objects.iter().enumerate() {
             let mut scene = scene.clone();
             let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
@@ -126,7 +148,9 @@ impl Lessons<'_> {
             }
             classes.take(&object.name, object.content, &setup.source, SEPARATE)?;
             taught_from.insert(object.name.clone(), (object.content, setup.source.clone()));
-            add(self.simulated(number, &scene, &object, &view)?)?;
+            let (data, of_them) = self.simulated(number, &scene, &object, &view)?;
+            (grasps, lost) = (grasps + data.examples.len(), lost + of_them);
+            add(data)?;
         }
         for name in self.recorded {
             let store = store.ok_or_else(nothing)?;
@@ -142,20 +166,20 @@ impl Lessons<'_> {
         fitting.check()?;
         let mut taught = model.taught(&lessons, &fitting)?;
         taught.card.taught_from = taught_from;
-        Ok(taught)
+        Ok(Taught { model: taught, grasps, lost })
     }
 
-    /// Simulated grasps of one object.
+    /// Simulated grasps of one object, and the number of those in which it left the hand.
     fn simulated(
         &self,
         number: usize,
         scene: &Scene,
         object: &ObjectModel,
         view: &SensorView,
-    ) -> Result<Dataset, LessonError> {
+    ) -> Result<(Dataset, usize), LessonError> {
         let sampler = PoseSampler::new(scene, Some(object));
         let seeds: Vec<u64> = seeds_of(object, self.seed).take(self.grasps).collect();
-        let done = AtomicUsize::new(number * self.grasps);
+        let (done, lost) = (AtomicUsize::new(number * self.grasps), AtomicUsize::new(0));
         let of = self.objects.len() * self.grasps;
         let read = |(k, seed): (usize, &u64)| -> Result<Option<Example>, LessonError> {
             if self.stop.load(Ordering::Relaxed) {
@@ -169,6 +193,9 @@ impl Lessons<'_> {
             }
             let mut readings = view.readings(&trial)?.into_iter().map(|signals| Arc::new(sequence_of(&signals)));
             let Some(grasp) = readings.next() else { return Ok(None) };
+            let failure = trial.data.quality.failure;
+            let is_lost = matches!(failure, Some(GraspFailure::LostObject | GraspFailure::NeverTouched));
+            lost.fetch_add(usize::from(is_lost), Ordering::Relaxed);
             let content = grasp.content();
             Ok(Some(Example { id: k as i64, grasp, content, further: readings.collect(), ..Example::default() }))
         };
@@ -180,12 +207,13 @@ impl Lessons<'_> {
         }
         let class = Class { name: object.name.clone(), size: None, shape: None };
         let channels = view.learnt()?.channels(&scene.gripper, view.signals)?;
-        Ok(Dataset {
+        let data = Dataset {
             channels: channels.iter().map(Channel::name).collect(),
             labels: Labels { classes: vec![class], ..Labels::default() },
             about: DataCard { grasps: examples.len(), ..DataCard::default() },
             examples,
-        })
+        };
+        Ok((data, lost.into_inner()))
     }
 }
 

@@ -113,7 +113,7 @@ mod tests {
                 return rounds;
             }
             let name = scene.object.source.clone();
-            rounds.push((name.clone(), grasps, identification.view().is_right(&name)));
+            rounds.push((name.clone(), grasps, identification.view().is_right(&name, false)));
             t += TIMES[2];
             presentation.take_note(grasps);
             presentation.next_object(&name).clone_into(&mut scene.object.source);

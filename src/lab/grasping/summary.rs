@@ -68,6 +68,11 @@ pub struct OutOfPlaneSummary {
 }
 
 impl GraspSummary {
+    /// No pad pressed the object at the end of the hold.
+    pub fn lost_object(&self) -> bool {
+        self.object_moved_m.is_some() && self.hold.as_ref().is_some_and(|hold| hold.force_n == [0.0, 0.0])
+    }
+
     /// Reads a trial that was made from `scene`.
     pub fn new(trial: &SimulatedTrial, scene: &Scene) -> Self {
         let count = scene.gripper.taxels().count();

@@ -8,7 +8,7 @@ use crate::recording::{OpenTrialError, Replay};
 use palpate_geometry::Pose;
 use palpate_learn::{Model, Models, Shipped, StopRule};
 use palpate_sim::frame::{Frame, Plan, Quality};
-use palpate_sim::gripper::{GripperModel, Side};
+use palpate_sim::gripper::{GripperModel, Phase, Side};
 use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, Gap, SensorKind};
@@ -118,6 +118,13 @@ pub struct Instant<'a> {
 }
 
 impl OpenTrial {
+    /// The pads of a simulated grasp do not touch the object at the end of its hold.
+    pub fn nothing_held(&self) -> bool {
+        let stage = self.stage.as_ref().filter(|_| self.simulated.is_some() && self.header.object != EMPTY);
+        let end = self.frames.iter().rev().find(|frame| frame.phase == Phase::Hold);
+        stage.zip(end).is_some_and(|(stage, frame)| stage.force_on_object(frame).is_none())
+    }
+
     /// Opens a trial of any source. The recogniser answers as it did live, from the samples alone.
     pub fn open(store: &Store, id: TrialId, options: &OpenOptions) -> Result<Self, OpenTrialError> {
         let trial = store.load(id)?;

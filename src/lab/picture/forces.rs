@@ -134,26 +134,14 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
             Side::Left => "L",
             Side::Right => "R",
         };
-        // In a low picture in one line, without words.
-        let low = view.size.y < LOW;
-        let text = |name: &str, force: DVec3| {
-            let value = units::shown(force.length(), "N");
-            match (low, name) {
-                (false, _) => format!("{letter}  {name} {value}"),
-                (true, "normal") => format!("{letter}  {value}"),
-                (true, _) => value,
-            }
-        };
+        let text = |name: &str, force: DVec3| format!("{letter}  {name} {}", units::shown(force.length(), "N"));
         let mut texts = vec![(text("normal", forces.normal), view.theme.colours().text)];
-        texts.extend(forces.friction.map(|force| (text("friction", force), friction_colour(view.theme))));
+        // A low picture has room for one line.
+        let friction = forces.friction.filter(|_| view.size.y >= LOW);
+        texts.extend(friction.map(|force| (text("friction", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.
-        let widths: Vec<f32> = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).collect();
-        let (width, lines) = if low {
-            (widths.iter().sum::<f32>() + GAP * (widths.len() - 1) as f32, 1)
-        } else {
-            (widths.iter().copied().fold(0.0, f32::max), texts.len())
-        };
-        let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * lines as f32 + 2.0);
+        let width = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).fold(0.0, f32::max);
+        let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * texts.len() as f32 + 2.0);
         let along = (to - from).normalize_or(Vec2::Y);
         // Beyond the tip, or else on a side of the arrow.
         let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
@@ -169,9 +157,9 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         let Some(plate) = annotator.place(&places, half, f32::INFINITY) else { continue };
         annotator.add_plate(plate);
         let mut at = plate.middle - half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
-        for ((text, ink), width) in texts.into_iter().zip(widths) {
+        for (text, ink) in texts {
             annotator.overlay.text(at, Align::Left, TEXT, ink, text);
-            at += if low { Vec2::new(width + GAP, 0.0) } else { Vec2::new(0.0, LINE) };
+            at.y += LINE;
         }
     }
 }

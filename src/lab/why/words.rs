@@ -68,7 +68,7 @@ impl Attribution {
                 .iter()
                 .enumerate()
                 .map(|(k, reason)| {
-                    let unit = if k == 0 { " points" } else { "" };
+                    let unit = if k == 0 { " percentage points" } else { "" };
                     format!("{} ({}{unit})", reason.part, points_words(reason.evidence.points))
                 })
                 .collect();
@@ -83,7 +83,7 @@ impl Attribution {
             format!("For {title}: {}.", listed(&spoke_for))
         };
         let against_it = if against.is_empty() {
-            "Nothing spoke against it by a point or more.".to_owned()
+            "Nothing spoke against it by a percentage point or more.".to_owned()
         } else {
             format!("Against {title}: {}.", listed(&against))
         };
@@ -178,7 +178,7 @@ mod tests {
             sure.sentences()[0],
             "No single part decides: without any one of them Lemon still has 90 % or more."
         );
-        assert_eq!(sure.sentences()[1], "Nothing spoke against it by a point or more.");
+        assert_eq!(sure.sentences()[1], "Nothing spoke against it by a percentage point or more.");
         // A whole phase does, although no channel in it does alone.
         let together = Attribution { by_phase: [0.0, 44.0].map(evidence).to_vec(), ..sure };
         assert_eq!(together.sentences()[0], "For Lemon: all channels in the hold (+44 points).");

@@ -31,8 +31,19 @@ pub struct TeachRequest {
     pub recorded: bool,
 }
 
+/// A model that has learned an object.
+#[derive(Clone, Debug)]
+pub struct FinishedLesson {
+    /// The model, saved.
+    pub trained: TrainedModel,
+    /// Simulated grasps that it learned from.
+    pub grasps: usize,
+    /// What is wrong with them, if anything.
+    pub warning: Option<String>,
+}
+
 /// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
-pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, TrainedModel> {
+pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, FinishedLesson> {
     Job::new("teach", Newer::Waits, wake, move |request: &TeachRequest, run| {
         let name = capital(&object_title(&request.name));
         let progress = |stage: LessonStage| {
@@ -58,8 +69,9 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             progress: &progress,
             stop: run.stop(),
         };
-        let model = lessons.teach(&request.model, Some(&store))?;
-        let trained = TrainedModel::save(model, &models, "taught", &store)?;
-        Ok(run.unless_stopped(trained))
+        let taught = lessons.teach(&request.model, Some(&store))?;
+        let (grasps, warning) = (taught.grasps, taught.warning());
+        let trained = TrainedModel::save(taught.model, &models, "taught", &store)?;
+        Ok(run.unless_stopped(FinishedLesson { trained, grasps, warning }))
     })
 }

@@ -194,7 +194,10 @@ mod tests {
             labels.send(LabelCommand::Undo);
         }
         labels.send(LabelCommand::Redo);
-        let is_done = |begin: &'static str, end: String| move |notice: &Notice| matches!(notice, Notice::Info(text) if text.starts_with(begin) && text.ends_with(&end));
+        let is_done = |begin: &'static str, end: String| {
+            let is_it = move |text: &str| text.starts_with(begin) && text.ends_with(&end);
+            move |notice: &Notice| matches!(notice, Notice::Info(text) if is_it(text))
+        };
         told_of(&labels, &woken, is_done("Redone: ", format!("labelled {}", object_title(&next))));
         labels.send(LabelCommand::Undo);
         shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());

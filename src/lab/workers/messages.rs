@@ -178,6 +178,8 @@ pub struct Status {
     pub checking: Option<Checking>,
     /// Move of the gripper that was chosen for this grasp, if any.
     pub guided: Option<GripperMove>,
+    /// The pads do not touch the object at the end of this grasp's hold, or at the newest time in it.
+    pub nothing_held: bool,
 }
 
 /// Check of how far a finished grasp can be trusted.
@@ -242,6 +244,11 @@ impl Snapshot {
     /// Class name of the held object.
     pub fn truth(&self) -> &str {
         self.object.as_ref().map_or(EMPTY, |object| &object.name)
+    }
+
+    /// Whether the decision is right; none before it.
+    pub fn is_right(&self, view: &IdentificationView) -> Option<bool> {
+        view.is_right(self.truth(), self.status.nothing_held)
     }
 }
 

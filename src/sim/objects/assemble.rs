@@ -27,6 +27,7 @@ pub(super) struct Inertial {
 
 /// Everything gathered from a file, in its own units and in the frame of its root.
 pub(super) struct Blueprint {
+    /// What messages call it: the name of its file, or of a built-in object.
     pub(super) name: String,
     /// Name of the robot in a URDF.
     pub(super) robot: Option<String>,

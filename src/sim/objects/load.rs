@@ -77,9 +77,9 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
     }
     let content = Content::default();
     let path = Path::new(source);
-    let blueprint = blueprint(source, &content).map_err(|cause| cause.in_file(&stem(path), path))?;
-    let name = blueprint.name.clone();
-    let object = blueprint.build(options).map_err(|cause| cause.in_file(&name, path))?;
+    let blueprint = blueprint(source, &content)?;
+    let name = class_in(path, blueprint.robot.as_deref());
+    let object = ObjectModel { name, ..blueprint.build(options)? };
     Ok(Some(content.stamped(object)))
 }
 
@@ -153,6 +153,11 @@ fn class_in(path: &Path, robot: Option<&str>) -> String {
     names.find(|name| is_telling(name)).unwrap_or_else(|| stem(path))
 }
 
+/// Name of a file with its ending: files of several kinds may have one stem.
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "object".to_owned(), |s| s.to_string_lossy().into_owned())
 }
@@ -220,15 +225,13 @@ fn read_urdf(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
             }
         }
     };
-    let mut blueprint = urdf::parse(&stem(path), &bytes, &mesh)?;
-    blueprint.name = class_in(path, blueprint.robot.as_deref());
-    Ok(blueprint)
+    urdf::parse(&file_name(path), &bytes, &mesh)
 }
 
 fn read_mesh_file(path: &Path, content: &Content) -> Result<Blueprint, ObjectError> {
     let read = |path: &str| content.of(read_referenced(Path::new(path)));
     let parts = read_mesh(&path.to_string_lossy(), &read)?;
-    let mut blueprint = Blueprint::new(&class_in(path, None));
+    let mut blueprint = Blueprint::new(&file_name(path));
     blueprint.add_visual(&ShapeSource::Mesh(parts), &Pose::IDENTITY, None);
     Ok(blueprint)
 }

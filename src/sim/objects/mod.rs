@@ -29,13 +29,6 @@ impl ObjectError {
         Self(format!("\"{name}\" is malformed: {cause}"))
     }
 
-    /// The same with the name of the file in place of the object's: files of several kinds may have one stem.
-    fn in_file(self, name: &str, path: &std::path::Path) -> Self {
-        let rest = self.0.strip_prefix(&format!("\"{name}")).filter(|rest| rest.starts_with(['"', ',']));
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        rest.map(|rest| Self(format!("\"{file}{rest}"))).unwrap_or(self)
-    }
-
     /// A mesh that is no solid.
     fn unsound(name: &str, cause: &MeshError) -> Self {
         Self(format!("\"{name}\" cannot be grasped: {cause}"))

@@ -2,6 +2,7 @@
 //! shapes of thousands of triangles.
 
 use super::obj_text;
+use crate::program::run;
 use glam::{DQuat, DVec2, DVec3};
 use palpate_geometry::{Pose, Primitive, TriMesh, lathe};
 use palpate_lab::grasping::{GraspSummary, grasp};
@@ -132,6 +133,19 @@ fn a_ring_of_thousands_of_triangles_keeps_its_hole() {
     assert!(object.field.distance(DVec3::ZERO) > 0.008, "the hole is empty");
     let inside = object.field.distance(DVec3::new(0.024, 0.0, 0.0));
     assert!(inside < -0.003, "the tube is solid, not {inside}");
+}
+
+#[test]
+fn a_lesson_whose_hand_stays_empty_says_so_and_names_a_command_that_works() {
+    let folder = tempfile::tempdir().unwrap();
+    // Lying flat, it slides down.
+    std::fs::write(folder.path().join("ring.obj"), obj_text(&torus(0.03, 0.008, 48, 24))).unwrap();
+    let ran = run(folder.path(), &["teach", "ring.obj", "--grasps", "10", "--out", "m.safetensors"]);
+    assert!(ran.code == Some(0) && ran.err.contains("of 10 grasps the object was not held"), "{ran:?}");
+    let command = ran.out.lines().find_map(|line| line.trim().strip_prefix("palpate demo ")).unwrap();
+    let arguments: Vec<&str> = std::iter::once("demo").chain(command.split(' ')).collect();
+    let demo = run(folder.path(), &[&arguments[..], &["--grasps", "1", "--no-pictures"]].concat());
+    assert!(demo.code == Some(0) && demo.out.contains("slipped out of the grasp"), "{demo:?}");
 }
 
 #[test]

@@ -135,8 +135,8 @@ pub(super) fn ui(
                     Part { data, pictures, explainer, recognised: &recognised, view: &view, measures, actions };
                 part.headline_ui(ui);
                 let advised = part.advice_ui(ui, &tools.advice) + told;
-                if let Some(truth) = &recognised.truth {
-                    part.truth_ui(ui, truth);
+                if let Some((_, title)) = &recognised.truth {
+                    part.truth_ui(ui, title);
                 }
                 properties::ui(ui, &part);
                 let has_touch = touch::ui(ui, &part);
@@ -186,6 +186,9 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
                 }
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
+            if let Some(warning) = &learned.warning {
+                ui.colored_label(colour(theme::of(ui).colours().warning), warning);
+            }
         }
     });
 }
@@ -294,8 +297,7 @@ impl Part<'_, '_> {
         let (text, p) = headline.text(&self.view.labels);
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);
-        let right = self.recognised.truth.as_ref().filter(|_| self.data.view.truth_shown);
-        let right = right.and_then(|(truth, _)| self.view.is_right(truth));
+        let right = self.recognised.is_right().filter(|_| self.data.view.truth_shown);
         let ink = colour(headline.ink(&colours, right));
         let mut left = rect.left();
         if let Some(class) = headline.class() {
@@ -349,10 +351,15 @@ impl Part<'_, '_> {
     }
 
     /// True object, which the simulation knows; set apart from what was recognised.
-    fn truth_ui(&mut self, ui: &mut Ui, (truth, title): &(&str, String)) {
+    fn truth_ui(&mut self, ui: &mut Ui, title: &str) {
         let colours = self.colours();
         let shown = self.data.view.truth_shown;
-        let right = self.view.is_right(truth).filter(|_| shown);
+        let right = self.recognised.is_right().filter(|_| shown);
+        let title = if right.is_some() && self.recognised.nothing_held {
+            format!("{title}, not held")
+        } else {
+            title.to_owned()
+        };
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.good))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),

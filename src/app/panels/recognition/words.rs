@@ -211,7 +211,21 @@ mod tests {
     fn said(view: &IdentificationView) -> (String, String) {
         let text = Headline::of(view).text(&view.labels).0;
         let (waiting, again) = ("Fingers closing", "grasping again");
-        (text, reason(view, &Recognised { view: None, off: None, truth: None, waiting, again, finished: false }))
+        (
+            text,
+            reason(
+                view,
+                &Recognised {
+                    view: None,
+                    off: None,
+                    truth: None,
+                    nothing_held: false,
+                    waiting,
+                    again,
+                    finished: false,
+                },
+            ),
+        )
     }
 
     #[test]
@@ -271,11 +285,23 @@ mod tests {
     #[test]
     fn unknown_is_right_for_an_object_that_is_no_class() {
         let decided = |reason| view(Some(0.95), &[0.95], Some(reason));
-        assert_eq!(view(Some(0.95), &[], None).is_right("lemon"), None);
-        assert_eq!(decided(StopReason::Sure).is_right("lemon"), Some(true));
-        assert_eq!(decided(StopReason::GraspLimit).is_right("tomato"), Some(false));
-        assert_eq!(decided(StopReason::Unknown).is_right("tomato"), Some(false));
-        assert_eq!(decided(StopReason::Unknown).is_right("part of my own"), Some(true));
+        assert_eq!(view(Some(0.95), &[], None).is_right("lemon", false), None);
+        assert_eq!(decided(StopReason::Sure).is_right("lemon", false), Some(true));
+        assert_eq!(decided(StopReason::GraspLimit).is_right("tomato", false), Some(false));
+        assert_eq!(decided(StopReason::Unknown).is_right("tomato", false), Some(false));
+        assert_eq!(decided(StopReason::Unknown).is_right("part of my own", false), Some(true));
+    }
+
+    #[test]
+    fn an_empty_hand_is_right_for_an_object_that_has_left_it() {
+        let labels = labels_of_catalogue();
+        let empty = labels.class("empty").expect("is a class");
+        let belief = Pmf::from_weights((0..labels.classes.len()).map(|k| if k == empty { 0.95 } else { 0.003 }));
+        let told = IdentificationView { beliefs: vec![belief], ..view(None, &[], Some(StopReason::Sure)) };
+        assert_eq!([false, true].map(|gone| told.is_right("tomato", gone)), [Some(false), Some(true)]);
+        let lemon = view(Some(0.95), &[0.95], Some(StopReason::Sure));
+        assert_eq!(lemon.is_right("tomato", true), Some(false));
+        assert_eq!(lemon.is_right("lemon", true), Some(true), "it was felt before it left");
     }
 
     #[test]

@@ -116,6 +116,7 @@ impl Session {
         }
         self.grasp += 1;
         self.status.duration = scene.timing.duration_s;
+        self.status.nothing_held = false;
         // What the recogniser reads beyond the layout is not plotted.
         let reader = reader.with_palm(begun.data.world_from_gripper.position);
         self.channels = reader.channels()[..plotted].into();

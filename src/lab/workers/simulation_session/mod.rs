@@ -19,6 +19,7 @@ use crate::grasping::{Advisor, EndState, GraspSummary, Row};
 use crate::recording::{Recorder, RecorderNotice};
 use jobs::{AccuracyRequest, CheckRequest, CheckResult, GhostRequest, Subject, accuracy_job, check_job, ghost_job};
 use palpate_learn::Models;
+use palpate_sim::gripper::Phase;
 use palpate_sim::objects::ObjectError;
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::Scene;
@@ -340,6 +341,9 @@ impl Session {
         let errors: Box<[f32]> = errors.unwrap_or_default().into_iter().take(plotted).collect();
         let frame = Arc::new(frame);
         current.frame = Arc::clone(&frame);
+        if frame.phase == Phase::Hold {
+            self.status.nothing_held = self.card.is_some() && current.stage.force_on_object(&frame).is_none();
+        }
         sample.values = sample.values[..plotted].into();
         let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
         self.publisher.row(TraceRow { grasp: self.grasp, rolling: false, sample, errors, frame: Some(frame), answer });
