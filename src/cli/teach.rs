@@ -5,7 +5,7 @@ use super::prelude::*;
 use super::recognise::load_model;
 use super::setup::classes_of;
 use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
-use palpate_lab::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons};
+use palpate_lab::grasping::{LESSON_GRASPS, Lesson, LessonError, LessonStage, Lessons};
 use palpate_learn::{LearnError, Shipped};
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::ObjectSetup;
@@ -63,6 +63,7 @@ pub(super) struct TeachArguments {
 struct TeachReport<'a> {
     model: &'a Path,
     taught: &'a [String],
+    lessons: Vec<Lesson>,
     classes: Vec<&'a str>,
     seconds: f64,
     cpu_s: f64,
@@ -108,10 +109,12 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         Err(LessonError::Learn(LearnError::Stopped)) => return Err("stopped; no model was saved".into()),
         taught => taught?,
     };
-    if let Some(warning) = taught.warning() {
-        warn(&warning);
+    for lesson in &taught.lessons {
+        if let Some(warning) = lesson.warning() {
+            warn(&format!("\"{}\": {warning}", lesson.name));
+        }
     }
-    let taught = taught.model;
+    let (taught, lessons) = (taught.model, taught.lessons);
     save_model(&taught, &out)?;
     let classes: Vec<&str> = taught.card.labels.classes.iter().map(|class| class.name.as_str()).collect();
     let (seconds, cpu_s) = (began.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
@@ -120,12 +123,16 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         .first()
         .filter(|_| !arguments.real)
         .map_or("--port PORT".to_owned(), |file| format!("--object {file}"));
-    TeachReport { model: &out, taught: &taught.card.taught, classes, seconds, cpu_s, grasped }.print(arguments.json)
+    TeachReport { model: &out, taught: &taught.card.taught, lessons, classes, seconds, cpu_s, grasped }
+        .print(arguments.json)
 }
 
 impl Report for TeachReport<'_> {
     fn text(&self, page: &mut Page) {
         page.fact("taught", self.taught.join(", "));
+        for lesson in &self.lessons {
+            page.fact("test", format!("{}: {}", lesson.name, lesson.words()));
+        }
         page.fact("classes", format!("{}: {}", self.classes.len(), self.classes.join(", ")));
         page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));
         page.fact("saved", self.model.display().to_string());

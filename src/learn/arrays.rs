@@ -150,6 +150,18 @@ impl Arrays {
         }
     }
 
+    /// Takes a row out of an array of single-precision numbers.
+    pub(crate) fn remove_row(&mut self, name: &str, row: usize) {
+        if let Some(Array { shape, numbers: Numbers::F32(values) }) = self.0.get_mut(name)
+            && let [rows, rest @ ..] = &mut shape[..]
+            && row < *rows
+        {
+            let width = rest.iter().product::<usize>();
+            *rows -= 1;
+            values.drain(row * width..(row + 1) * width);
+        }
+    }
+
     /// Number of elements of all arrays.
     pub fn elements(&self) -> usize {
         self.0.values().map(|array| array.numbers.len()).sum()

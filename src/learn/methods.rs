@@ -221,6 +221,36 @@ impl Model {
     }
 }
 
+impl Model {
+    /// Forgets a class that it was taught; the answers for the others stay in the same proportions.
+    pub fn without(&self, name: &str) -> Result<Self, LearnError> {
+        let taught = |name: &str| self.card.taught.iter().any(|own| own == name);
+        let class = self.card.labels.class(name).filter(|_| taught(name));
+        let class = class.ok_or_else(|| LearnError::Refused(format!("the model was not taught \"{name}\"")))?;
+        let recogniser = self.pupil()?.without(class)?;
+        let signatures = self.signatures.as_ref().map(|own| own.without(class));
+        let mut card = self.card.clone();
+        card.taught.retain(|own| own != name);
+        card.taught_from.remove(name);
+        card.labels.classes.remove(class);
+        card.settings = recogniser.settings();
+        card.parameters = recogniser.parameters();
+        Ok(Self { card, recogniser: Arc::from(recogniser), signatures: None }.with_signatures(signatures))
+    }
+
+    /// Gives a class that it was taught another name.
+    pub fn renamed(&self, name: &str, new: &str) -> Self {
+        let mut model = self.clone();
+        let card = &mut model.card;
+        let names = card.labels.classes.iter_mut().map(|class| &mut class.name).chain(&mut card.taught);
+        names.filter(|own| *own == name).for_each(|own| new.clone_into(own));
+        if let Some(from) = card.taught_from.remove(name) {
+            card.taught_from.insert(new.to_owned(), from);
+        }
+        model
+    }
+}
+
 /// What a fit makes, and its CPU time (s).
 fn on_one_thread<T: Send>(fit: impl FnOnce() -> Result<T, LearnError> + Send) -> Result<(T, f64), LearnError> {
     let timed = || {

@@ -75,6 +75,9 @@ pub trait Recogniser: Send + Sync {
 pub trait Pupil: Sync {
     /// Learns these grasps besides what it knows. Their labels begin with its own.
     fn taught(&self, grasps: &Dataset, fitting: &Fitting<'_>) -> Result<Box<dyn Recogniser>, LearnError>;
+
+    /// Forgets a class; later classes move up.
+    fn without(&self, class: usize) -> Result<Box<dyn Recogniser>, LearnError>;
 }
 
 /// Recogniser that takes one sample at a time.

@@ -63,6 +63,18 @@ impl Signatures {
         Self::with(all.channels, all.grasps, all.t_s, all.mean, all.spread)
     }
 
+    /// These signatures without those of a class; later classes move up.
+    pub(crate) fn without(&self, class: usize) -> Self {
+        let Self { channels, grasps, t_s, .. } = self;
+        let width = channels.len() * t_s.len();
+        let rest = |values: &[f32]| -> Vec<f32> {
+            let of_class = values.chunks_exact(width.max(1)).enumerate().filter(|(k, _)| *k != class);
+            of_class.flat_map(|(_, own)| own.to_vec()).collect()
+        };
+        let grasps = grasps.iter().enumerate().filter(|(k, _)| *k != class).map(|(_, count)| *count).collect();
+        Self::with(channels.clone(), grasps, t_s.clone(), rest(&self.mean), rest(&self.spread))
+    }
+
     /// Computes the signatures of all classes at these times.
     fn at(t_s: Vec<f32>, data: &Dataset) -> Self {
         let (classes, channels, times) = (data.labels.classes.len(), data.channels.len(), t_s.len());

@@ -275,7 +275,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.harness.get_by_label("Name of the object").type_text("crate");
     bench.harness.run_steps(2);
     bench.harness.get_by_label("Save").click();
-    bench.until_told("Learned \"Crate\".");
+    bench.until_told("\"Carton\" is \"Crate\" now.");
     let named = bench.until(|s| s.truth() == "crate");
     assert!(named.scene.to_toml().contains("name = \"crate\""), "{}", named.scene.to_toml());
     let saved = bench.workbench().view().simulation_model.clone().unwrap();
@@ -284,6 +284,13 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.until(|s| s.truth() == "lemon");
     bench.tell(|app| app.open(&file.to_string_lossy()));
     bench.until(|s| s.truth() == "crate");
+
+    // It is forgotten at any time: the card comes back by its row or by an action.
+    bench.tell(|app| app.change_learned(&file.to_string_lossy()));
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("Forget").click();
+    bench.until_told("Forgot \"Crate\".");
+    assert_eq!(bench.workbench().view().simulation_model, None);
 }
 
 #[test]

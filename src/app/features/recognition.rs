@@ -4,8 +4,10 @@ use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
 use palpate_geometry::units::capital;
-use palpate_lab::grasping::RecognisedGrasp;
-use palpate_lab::workers::{Command, EndedJob, Explainer, FinishedLesson, GripperCommand, TeachRequest, TrainedModel};
+use palpate_lab::grasping::{Lesson, RecognisedGrasp};
+use palpate_lab::workers::{
+    ClassChange, Command, EndedJob, Explainer, FinishedLesson, GripperCommand, TeachRequest, TrainedModel,
+};
 use palpate_learn::{Model, Models, Shipped};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::class_name;
@@ -35,17 +37,12 @@ pub(in crate::app) struct RecognitionFeature {
 
 /// An object that the model has just learned.
 pub(in crate::app) struct Learned {
-    /// Its title.
-    pub(in crate::app) title: String,
-    /// Number of simulated grasps, and the time that the lesson took (s).
-    pub(in crate::app) grasps: usize,
-    pub(in crate::app) seconds: f64,
-    /// What is wrong with the grasps, if anything.
-    pub(in crate::app) warning: Option<String>,
+    /// Its class.
+    pub(in crate::app) name: String,
     /// File that the object is from.
     source: String,
-    /// The model without it, and its file; none for a shipped one.
-    before: (Arc<Model>, Option<PathBuf>),
+    /// How well it is known, and the time that the lesson took (s); none where that was before.
+    pub(in crate::app) lesson: Option<(Lesson, f64)>,
 }
 
 impl RecognitionFeature {
@@ -141,41 +138,68 @@ impl App {
             self.snapshot().filter(|snapshot| snapshot.object.as_ref().is_some_and(|object| object.name == name));
         let object = held.map(|snapshot| snapshot.scene.object.clone());
         if let Some(model) = self.recognition.models.of(Shipped::AnyGripper).cloned() {
-            self.tools.teaching.start(TeachRequest { model, name, object, recorded: true });
+            self.tools.teaching.start(TeachRequest { model, name, object, change: ClassChange::Recorded });
         }
     }
 
-    /// Uses the model without the object that it has just learned.
-    pub(in crate::app) fn forget_learned(&mut self) {
-        let Some(Learned { title, source, before: (model, path), .. }) = self.recognition.learned.take() else {
-            return;
+    /// Asks whether an object that was learned is to be forgotten or renamed.
+    pub fn change_learned(&mut self, source: &str) {
+        let Some(name) = self.learned_as(source).map(str::to_owned) else {
+            return self.notices.info("No learned object is in the hand.");
         };
-        self.use_in_simulation(path.is_some().then_some(&model));
-        self.view.simulation_model = path;
-        // It is not learned again by itself.
-        self.recognition.taught = Some(source);
-        self.notices.info(format!("Forgot \"{title}\"."));
+        self.recognition.learned = Some(Learned { name, source: source.to_owned(), lesson: None });
+        self.show_panel("recognition");
     }
 
-    /// Gives the object of the last lesson another name, under which it is learned anew.
+    /// Changes the model of the simulation in the object of the last lesson.
+    fn change_class(&mut self, change: ClassChange) {
+        let Some(Learned { name, .. }) = &self.recognition.learned else { return };
+        let kind = Shipped::simulated(self.simulation.scene.holds_object());
+        let models =
+            [kind, Shipped::simulated(kind == Shipped::simulated(false))].map(|kind| self.recognition.models.of(kind));
+        let knows = |model: &&Arc<Model>| model.card.taught.contains(name);
+        let Some(model) = models.into_iter().flatten().find(knows) else { return };
+        let request = TeachRequest { model: Arc::clone(model), name: name.clone(), object: None, change };
+        self.tools.teaching.start(request);
+    }
+
+    /// Uses the model without the object of the last lesson.
+    pub(in crate::app) fn forget_learned(&mut self) {
+        self.change_class(ClassChange::Forgotten);
+    }
+
+    /// Gives the object of the last lesson another name.
     pub(in crate::app) fn rename_learned(&mut self, name: &str) {
-        let Some(Learned { title, source, before: (model, _), .. }) = &self.recognition.learned else { return };
-        let (title, source) = (title.clone(), source.clone());
+        let Some(learned) = &self.recognition.learned else { return };
+        let models = [false, true].map(|fixed| self.recognition.models.of(Shipped::simulated(fixed)));
+        let is_taken = |name: &str| models.iter().flatten().any(|model| model.card.labels.class(name).is_some());
         let name = match class_name(name) {
-            Ok(name) if capital(&name) == title => return,
-            Ok(name) if model.card.labels.class(&name).is_none() => name,
+            Ok(name) if name == learned.name => return,
+            Ok(name) if !is_taken(&name) => name,
             Ok(name) => return self.notices.failed("name", format!("The model knows another \"{name}\".")),
             Err(cause) => return self.notices.failed("name", cause.to_string()),
         };
         self.notices.done("name");
-        self.forget_learned();
-        let mut scene = match &self.simulation.scene {
-            scene if scene.object.source == source => scene.clone(),
-            _ => self.simulation.scene_with(&source),
-        };
-        scene.object.name = Some(name);
-        self.set_scene(scene);
-        self.recognition.taught = None;
+        self.change_class(ClassChange::Renamed(name));
+    }
+
+    /// Takes in a model in which the object of the last lesson has another name, or is forgotten.
+    fn take_changed(&mut self, trained: &TrainedModel, change: &ClassChange) {
+        let Some(Learned { name, source, .. }) = self.recognition.learned.take() else { return };
+        let title = capital(&object_title(&name));
+        // Without a learned object it is the shipped model again.
+        let is_own = !trained.model.card.taught.is_empty();
+        self.view.simulation_model = is_own.then(|| trained.path.clone());
+        self.use_in_simulation(is_own.then_some(&trained.model));
+        // It is not learned again by itself.
+        self.recognition.taught = Some(source.clone());
+        let ClassChange::Renamed(new) = change else { return self.notices.info(format!("Forgot \"{title}\".")) };
+        self.notices.info(format!("\"{title}\" is \"{}\" now.", capital(&object_title(new))));
+        if self.simulation.scene.object.source == source {
+            let mut scene = self.simulation.scene.clone();
+            scene.object.name = Some(new.clone());
+            self.set_scene(scene);
+        }
     }
 
     /// Says no more about the last lesson.
@@ -246,7 +270,12 @@ impl App {
         (recognition.taught, recognition.asked) = (Some(source.clone()), Instant::now());
         if Path::new(source).is_file() {
             let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
-            tools.teaching.start(TeachRequest { model: Arc::clone(model), name, object, recorded: false });
+            tools.teaching.start(TeachRequest {
+                model: Arc::clone(model),
+                name,
+                object,
+                change: ClassChange::Simulated,
+            });
         }
     }
 
@@ -258,18 +287,18 @@ impl App {
         match outcome {
             Ok(lesson) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&lesson.trained),
             Ok(lesson) if simulated.iter().any(is_current) => {
-                let FinishedLesson { trained, grasps, warning } = &*lesson;
-                let before = self.view.simulation_model.replace(trained.path.clone());
+                let FinishedLesson { trained, lesson } = &*lesson;
+                if let ClassChange::Renamed(_) | ClassChange::Forgotten = command.change {
+                    return self.take_changed(trained, &command.change);
+                }
+                self.view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
-                let title = capital(&object_title(&command.name));
-                self.notices.info(format!("Learned \"{title}\"."));
+                self.notices.info(format!("Learned \"{}\".", capital(&object_title(&command.name))));
+                let seconds = self.recognition.asked.elapsed().as_secs_f64();
                 self.recognition.learned = command.object.as_ref().map(|object| Learned {
-                    title,
-                    grasps: *grasps,
-                    warning: warning.as_ref().map(|warning| format!("{}.", capital(warning))),
-                    seconds: self.recognition.asked.elapsed().as_secs_f64(),
+                    name: command.name.clone(),
                     source: object.source.clone(),
-                    before: (Arc::clone(&command.model), before),
+                    lesson: lesson.clone().map(|lesson| (lesson, seconds)),
                 });
                 // What was decided without the new class is tried again.
                 if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {

@@ -127,7 +127,13 @@ pub(in crate::app) static COMMANDS: &[Act] = &[
     command("Measure effects of the scene", |app| app.simulation.measure_effects()),
     command("Verify the last grasp at finer accuracy", |app| app.simulation.send(Command::ComputeAgain)),
     command("Use the shipped model for the real gripper", |app| app.use_model(None)),
-    command("Teach the model the object file in the hand", App::teach_object),
+    command("Use the shipped model in the simulation: forget all learned objects", |app| {
+        app.use_simulation_model(None)
+    }),
+    command("Learn the object file in the hand", App::teach_object),
+    command("Forget or rename the learned object in the hand", |app| {
+        app.change_learned(&app.simulation.scene.object.source.clone());
+    }),
     command("Detect trials automatically, or by key", App::toggle_watch),
     command("Next actuation: manual, board or untimed", App::next_control),
     command("Adapt to the real gripper by one close of the empty hand", |app| {

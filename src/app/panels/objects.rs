@@ -40,6 +40,12 @@ pub(super) fn ui<'a>(
             let clicked = row(ui, chosen == path, texture, &title, &format!("{learned}{path}"));
             follow(chosen == path, &clicked);
             let source = path.clone();
+            if class.is_some() {
+                clicked.context_menu(|ui| {
+                    let source = source.clone();
+                    actions.on(&ui.button("Forget or rename …"), move |app| app.change_learned(&source));
+                });
+            }
             actions.on(&clicked, move |app| app.open(&source));
         }
         for built_in in catalogue() {

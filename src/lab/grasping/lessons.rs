@@ -4,24 +4,31 @@
 use super::agreement::{Recompute, grasp_soundly};
 use super::known_geometry::seeds_of;
 use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
+use palpate_geometry::units::capital;
 use palpate_learn::{
     Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence,
 };
 use palpate_sim::frame::GraspFailure;
-use palpate_sim::objects::{ObjectError, ObjectModel};
+use palpate_sim::objects::{ObjectError, ObjectModel, catalogue, object_title};
 use palpate_sim::poses::PoseSampler;
-use palpate_sim::scene::{ObjectSetup, PosePreset, Scene};
+use palpate_sim::scene::{ObjectSetup, PosePreset, PoseSpread, Scene};
 use palpate_store::Store;
 use palpate_store::labels::{ClassClash, Classes, compared};
 use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::TrialSource;
 use palpate_tactile::{Channel, LayoutError};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Simulated grasps of a new object by which a model usually learns it.
-pub const LESSON_GRASPS: usize = 80;
+pub const LESSON_GRASPS: usize = 160;
+/// Simulated grasps of each built-in object that the model knows, in the poses of a scene by default: few of the grasps that
+/// it has kept are in these.
+const REHEARSED: usize = 8;
+/// Simulated grasps of a new object by which it is tested.
+const TESTED: usize = 12;
 /// Fewest recorded grasps of an object that a model learns.
 const LEAST_RECORDED: usize = 5;
 /// Grippers with drawn sensors that read each simulated grasp.
@@ -58,23 +65,62 @@ pub struct Lessons<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// What was learned, and from what.
+/// A model that has learned.
 #[derive(Debug)]
 pub struct Taught {
     /// The model, which knows the new objects.
     pub model: Model,
-    /// Simulated grasps that it learned from.
+    /// How well it knows each object whose grasps were simulated.
+    pub lessons: Vec<Lesson>,
+}
+
+/// How an object was learned from simulated grasps.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Lesson {
+    /// Class.
+    pub name: String,
+    /// Grasps that it was learned from.
     pub grasps: usize,
     /// Those of them in which the object left the hand, or was never touched.
     pub lost: usize,
+    /// Further grasps, in poses of a scene by default.
+    pub tested: usize,
+    /// Those of them that are recognised, each on its own.
+    pub recognised: usize,
+    /// Class that most of the others are taken for.
+    pub taken_for: Option<String>,
 }
 
-impl Taught {
-    /// A warning where the hand was empty in many of the grasps.
+impl Lesson {
+    fn test(&mut self, model: &Model, grasps: &[Example]) {
+        let (labels, prior) = (&model.card.labels, model.card.prior());
+        let answers: Vec<usize> =
+            grasps.iter().map(|own| model.recogniser.recognise(&own.grasp, prior.as_ref()).pmf.top().0).collect();
+        let own = labels.class(&self.name);
+        self.tested = answers.len();
+        self.recognised = answers.iter().filter(|class| Some(**class) == own).count();
+        let times = |class: usize| answers.iter().filter(|answer| **answer == class).count();
+        let others = (0..labels.classes.len()).filter(|class| Some(*class) != own && times(*class) > 0);
+        self.taken_for = others.max_by_key(|class| times(*class)).map(|class| labels.classes[class].name.clone());
+    }
+
+    /// How well it is recognised, in words.
+    pub fn words(&self) -> String {
+        let others =
+            self.taken_for.as_ref().map(|class| format!(", others mostly as {}", capital(&object_title(class))));
+        let Self { tested, recognised, .. } = self;
+        format!("{recognised} of {tested} new grasps recognised{}", others.unwrap_or_default())
+    }
+
+    /// A warning where the hand was empty in many of the grasps, or its grasps are like those of another object.
     pub fn warning(&self) -> Option<String> {
         let Self { grasps, lost, .. } = self;
-        let words = "was not held: it slid away or was never touched. Fix it in place, or see `palpate grasp`";
-        (4 * lost >= *grasps && *lost > 0).then(|| format!("in {lost} of {grasps} grasps the object {words}"))
+        if 4 * lost >= *grasps && *lost > 0 {
+            let words = "was not held: it slid away or was never touched. Fix it in place, or see `palpate grasp`";
+            return Some(format!("in {lost} of {grasps} grasps the object {words}"));
+        }
+        let class = self.taken_for.as_ref().filter(|_| 2 * self.recognised < self.tested)?;
+        Some(format!("its grasps are hard to tell from those of {}", capital(&object_title(class))))
     }
 }
 
@@ -124,16 +170,32 @@ impl Lessons<'_> {
         };
         let scene = scene_of(&model.card);
         let has = |name: &str| model.card.labels.classes.iter().any(|class| compared(&class.name) == compared(name));
-        let known = |name: &String| !model.card.taught.contains(name) && has(name);
+        let known = |name: &str| has(name) && !model.card.taught.iter().any(|taught| taught == name);
         let (mut classes, mut taught_from) = (Classes::default(), model.card.taught_from.clone());
         for (class, (content, source)) in &taught_from {
             classes.take(class, *content, source, SEPARATE)?;
         }
-        let (mut grasps, mut lost) = (0, 0);
+        // Half of the grasps are in poses of a scene by default, where any turn and any face are rare.
+        let usual = Scene { pose: PoseSpread { build: scene.pose.build, ..PoseSpread::default() }, ..scene.clone() };
+        let rehearsed: Vec<&str> = catalogue().iter().map(|own| own.name.as_str()).filter(|name| known(name)).collect();
+        let rehearsed = if self.objects.is_empty() { Vec::new() } else { rehearsed };
+        let (done, of) =
+            (AtomicUsize::new(0), self.objects.len() * (self.grasps + TESTED) + rehearsed.len() * REHEARSED);
+        let tick = || (self.progress)(LessonStage::Simulating(done.fetch_add(1, Ordering::Relaxed) + 1, of));
+        let (mut learned, mut tests) = (Vec::new(), Vec::new());
+        for name in rehearsed {
+            let mut scene = usual.clone();
+            name.clone_into(&mut scene.object.source);
+            let Some(object) = scene.load_object()? else { continue };
+            let (examples, _) = self.simulated(&scene, &object, 0..REHEARSED, &view, &tick)?;
+            add(data_of(&object.name, examples, &scene, &view)?)?;
+        }
         for (number, setup) in self.objects.iter().enumerate() {
-            let mut scene = scene.clone();
-            let Scene { object: ObjectSetup { fixed, shift, .. }, .. } = scene;
-            scene.object = ObjectSetup { fixed, shift, ..setup.clone() };
+            let ObjectSetup { fixed, shift, .. } = scene.object;
+            let [scene, usual] = [&scene, &usual].map(|own| {
+                let object = ObjectSetup { fixed, shift, ..setup.clone() };
+                Scene { object, ..own.clone() }
+            });
             let object = scene.load_object()?;
             let mut object = object
                 .ok_or_else(|| refused(format!("\"{}\" is no object; name a URDF, OBJ or STL file", setup.source)))?;
@@ -148,9 +210,18 @@ impl Lessons<'_> {
             }
             classes.take(&object.name, object.content, &setup.source, SEPARATE)?;
             taught_from.insert(object.name.clone(), (object.content, setup.source.clone()));
-            let (data, of_them) = self.simulated(number, &scene, &object, &view)?;
-            (grasps, lost) = (grasps + data.examples.len(), lost + of_them);
-            add(data)?;
+            let half = self.grasps / 2;
+            let (mut examples, of_any) = self.simulated(&scene, &object, 0..self.grasps - half, &view, &tick)?;
+            let (others, of_usual) = self.simulated(&usual, &object, 0..half, &view, &tick)?;
+            examples.extend(others);
+            if examples.is_empty() {
+                let name = &object.name;
+                return Err(refused(format!("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")));
+            }
+            let (name, grasps, lost) = (object.name.clone(), examples.len(), of_any + of_usual);
+            learned.push(Lesson { name, grasps, lost, ..Lesson::default() });
+            tests.push(self.simulated(&usual, &object, half..half + TESTED, &view, &tick)?.0);
+            add(data_of(&object.name, examples, &scene, &view)?)?;
         }
         for name in self.recorded {
             let store = store.ok_or_else(nothing)?;
@@ -166,28 +237,29 @@ impl Lessons<'_> {
         fitting.check()?;
         let mut taught = model.taught(&lessons, &fitting)?;
         taught.card.taught_from = taught_from;
-        Ok(Taught { model: taught, grasps, lost })
+        learned.iter_mut().zip(&tests).for_each(|(lesson, test)| lesson.test(&taught, test));
+        Ok(Taught { model: taught, lessons: learned })
     }
 
-    /// Simulated grasps of one object, and the number of those in which it left the hand.
+    /// Simulated grasps of one object in the poses of a scene, and the number of those in which it left the hand.
     fn simulated(
         &self,
-        number: usize,
         scene: &Scene,
         object: &ObjectModel,
+        grasps: Range<usize>,
         view: &SensorView,
-    ) -> Result<(Dataset, usize), LessonError> {
+        tick: &(dyn Fn() + Sync),
+    ) -> Result<(Vec<Example>, usize), LessonError> {
         let sampler = PoseSampler::new(scene, Some(object));
-        let seeds: Vec<u64> = seeds_of(object, self.seed).take(self.grasps).collect();
-        let (done, lost) = (AtomicUsize::new(number * self.grasps), AtomicUsize::new(0));
-        let of = self.objects.len() * self.grasps;
-        let read = |(k, seed): (usize, &u64)| -> Result<Option<Example>, LessonError> {
+        let seeds: Vec<u64> = seeds_of(object, self.seed).skip(grasps.start).take(grasps.len()).collect();
+        let lost = AtomicUsize::new(0);
+        let read = |seed: &u64| -> Result<Option<Example>, LessonError> {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(LearnError::Stopped.into());
             }
             let (drawn, _) = sampler.draw(Some(object), *seed);
             let trial = grasp_soundly(&drawn, Some(object), *seed, Recompute::Unsettled);
-            (self.progress)(LessonStage::Simulating(done.fetch_add(1, Ordering::Relaxed) + 1, of));
+            tick();
             if !trial.data.quality.is_sound() {
                 return Ok(None);
             }
@@ -197,24 +269,25 @@ impl Lessons<'_> {
             let is_lost = matches!(failure, Some(GraspFailure::LostObject | GraspFailure::NeverTouched));
             lost.fetch_add(usize::from(is_lost), Ordering::Relaxed);
             let content = grasp.content();
-            Ok(Some(Example { id: k as i64, grasp, content, further: readings.collect(), ..Example::default() }))
+            Ok(Some(Example { grasp, content, further: readings.collect(), ..Example::default() }))
         };
-        let examples: Vec<Option<Example>> = seeds.par_iter().enumerate().map(read).collect::<Result<_, _>>()?;
-        let examples: Vec<Example> = examples.into_iter().flatten().collect();
-        if examples.is_empty() {
-            let name = &object.name;
-            return Err(refused(format!("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")));
-        }
-        let class = Class { name: object.name.clone(), size: None, shape: None };
-        let channels = view.learnt()?.channels(&scene.gripper, view.signals)?;
-        let data = Dataset {
-            channels: channels.iter().map(Channel::name).collect(),
-            labels: Labels { classes: vec![class], ..Labels::default() },
-            about: DataCard { grasps: examples.len(), ..DataCard::default() },
-            examples,
-        };
-        Ok((data, lost.into_inner()))
+        let examples: Vec<Option<Example>> = seeds.par_iter().map(read).collect::<Result<_, _>>()?;
+        Ok((examples.into_iter().flatten().collect(), lost.into_inner()))
     }
+}
+
+/// Grasps of one class as a data set.
+fn data_of(name: &str, examples: Vec<Example>, scene: &Scene, view: &SensorView) -> Result<Dataset, LessonError> {
+    let examples = examples.into_iter().enumerate().map(|(k, example)| Example { id: k as i64, ..example });
+    let examples: Vec<Example> = examples.collect();
+    let class = Class { name: name.to_owned(), size: None, shape: None };
+    let channels = view.learnt()?.channels(&scene.gripper, view.signals)?;
+    Ok(Dataset {
+        channels: channels.iter().map(Channel::name).collect(),
+        labels: Labels { classes: vec![class], ..Labels::default() },
+        about: DataCard { grasps: examples.len(), ..DataCard::default() },
+        examples,
+    })
 }
 
 /// Recorded grasps of one object, each counted so often that together they weigh as much as simulated ones.

@@ -1,10 +1,10 @@
 //! Training of one more class, in the background: a model learns a new object from its file or from recorded grasps,
 //! and is saved.
 
-use super::job::{Job, Newer};
+use super::job::{Job, JobError, Newer};
 use super::messages::Wake;
 use super::training::TrainedModel;
-use crate::grasping::{LESSON_GRASPS, LessonStage, Lessons};
+use crate::grasping::{LESSON_GRASPS, Lesson, LessonStage, Lessons};
 use palpate_geometry::units::capital;
 use palpate_learn::Model;
 use palpate_sim::objects::object_title;
@@ -27,8 +27,19 @@ pub struct TeachRequest {
     pub name: String,
     /// The object, if its grasps are simulated.
     pub object: Option<ObjectSetup>,
-    /// True to learn recorded grasps with this name.
-    pub recorded: bool,
+    pub change: ClassChange,
+}
+
+/// What is to become of an object that a model learns, or has learned.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ClassChange {
+    /// It is learned from simulated grasps.
+    Simulated,
+    /// From recorded grasps with its name, and simulated ones where the object is known.
+    Recorded,
+    /// It gets another name.
+    Renamed(String),
+    Forgotten,
 }
 
 /// A model that has learned an object.
@@ -36,10 +47,8 @@ pub struct TeachRequest {
 pub struct FinishedLesson {
     /// The model, saved.
     pub trained: TrainedModel,
-    /// Simulated grasps that it learned from.
-    pub grasps: usize,
-    /// What is wrong with them, if anything.
-    pub warning: Option<String>,
+    /// How well it knows the object; none where it learned from recorded grasps.
+    pub lesson: Option<Lesson>,
 }
 
 /// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
@@ -51,15 +60,23 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
                 LessonStage::Simulating(done, of) => {
                     (SIMULATING * done as f64 / of.max(1) as f64, format!("grasp {done} of {of}"))
                 }
-                LessonStage::Fitting(share) => {
-                    (SIMULATING + (1.0 - SIMULATING) * share, format!("fitting, {:.0} %", 100.0 * share))
-                }
+                LessonStage::Fitting(share) => (SIMULATING + (1.0 - SIMULATING) * share, "fitting".to_owned()),
             };
             run.progress(share, format!("Learning {name}: {words}"));
         };
         let store = Store::open(&store)?;
+        let save = |model| -> Result<_, JobError> {
+            let trained = TrainedModel::save(model, &models, "taught", &store)?;
+            Ok(Some(FinishedLesson { trained, lesson: None }))
+        };
+        match &request.change {
+            ClassChange::Renamed(new) => return save(request.model.renamed(&request.name, new)),
+            ClassChange::Forgotten => return save(request.model.without(&request.name)?),
+            ClassChange::Simulated | ClassChange::Recorded => {}
+        }
         let objects: Vec<ObjectSetup> = request.object.iter().cloned().collect();
-        let recorded: Vec<String> = request.recorded.then(|| request.name.clone()).into_iter().collect();
+        let recorded: Vec<String> =
+            (request.change == ClassChange::Recorded).then(|| request.name.clone()).into_iter().collect();
         let lessons = Lessons {
             objects: &objects,
             classes: &[],
@@ -70,8 +87,7 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             stop: run.stop(),
         };
         let taught = lessons.teach(&request.model, Some(&store))?;
-        let (grasps, warning) = (taught.grasps, taught.warning());
         let trained = TrainedModel::save(taught.model, &models, "taught", &store)?;
-        Ok(run.unless_stopped(FinishedLesson { trained, grasps, warning }))
+        Ok(run.unless_stopped(FinishedLesson { trained, lesson: taught.lessons.into_iter().next() }))
     })
 }

@@ -120,6 +120,7 @@ fn forget_after(view: &mut [f32], felt: usize) {
 
 /// Columns in which the channels of a network stand: one, or those of the parts of a finger, with the factor from their mean to
 /// its unit.
+#[derive(Clone)]
 pub(super) struct Columns(Vec<(Vec<usize>, f32)>);
 
 /// Sensing area of a pad (m²): force and pressure of one pad are two units of one reading.

@@ -62,6 +62,11 @@ struct Head {
 
 /// Name of the last layer.
 const CLASSES: &str = "classes";
+/// An array of it.
+fn last(kind: &str) -> String {
+    format!("{CLASSES}.{kind}")
+}
+
 /// Share of values dropped before and after the dense layer, with few readings and with many.
 const DROPOUT: [f32; 2] = [0.3, 0.1];
 /// Number of readings from which they are many.
@@ -160,7 +165,7 @@ impl GeometryNetwork {
         let (classes, other) = (data.labels.classes.len(), data.labels.other());
         let weights = balanced_weights(other, &truth);
         let mut start = network.arrays();
-        for name in [format!("{CLASSES}.weight"), format!("{CLASSES}.bias")] {
+        for name in ["weight", "bias"].map(last) {
             start.extend_rows(&name, classes);
         }
         let epochs = DRAWS_OF_NEW.div_ceil(views.len().max(1));
@@ -343,6 +348,24 @@ impl Pupil for GeometryNetwork {
     fn taught(&self, data: &Dataset, fitting: &Fitting<'_>) -> std::result::Result<Box<dyn Recogniser>, LearnError> {
         Ok(Box::new(self.with_new(data, fitting)?))
     }
+
+    fn without(&self, class: usize) -> std::result::Result<Box<dyn Recogniser>, LearnError> {
+        let Fitted { learned, columns, network, kept, other, .. } = &*self.0;
+        let mut arrays = network.arrays();
+        let rows = network.by_name.get(&last("bias")).map_or(0, |bias| bias.elem_count());
+        for name in ["weight", "bias"].map(last) {
+            arrays.remove_row(&name, class);
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(0);
+        let network = Variables::<Head>::new(learned.steps.inputs(), rows.saturating_sub(1), &mut random)
+            .map_err(LearnError::failed)?;
+        network.read(&arrays, "").map_err(LearnError::failed)?;
+        let kept = kept.without(class);
+        let learned = Learned { kept: kept.len(), ..learned.clone() };
+        let other = other.map(|other| other - usize::from(other > class));
+        let fitted = Fitted::new(learned, columns.clone(), network, kept, other).map_err(LearnError::failed)?;
+        Ok(Box::new(Self(Arc::new(fitted))))
+    }
 }
 
 /// The network at work on a running grasp.
@@ -438,6 +461,31 @@ mod tests {
         assert_eq!((again.card.labels.classes.len(), again.card.taught.len()), (3, 1));
         let signatures = again.signatures.expect("has signatures");
         assert_eq!(signatures.grasps().len(), 3);
+    }
+
+    #[test]
+    fn it_forgets_and_renames_what_it_was_taught() {
+        let model = method("geometry-network").expect("is one").train(&data(), &quick(1)).expect("fits");
+        let taught = model.taught(&data_of(&["wide"]), &quick(1)).expect("learns");
+        let renamed = taught.renamed("wide", "broad");
+        let names = |model: &Model| -> Vec<String> {
+            model.card.labels.classes.iter().map(|class| class.name.clone()).collect()
+        };
+        assert_eq!((names(&renamed)[2].as_str(), &renamed.card.taught[..]), ("broad", &["broad".to_owned()][..]));
+        let more = renamed.taught(&data_of(&["broad", "thick"]), &quick(1)).expect("learns more");
+        assert_eq!(more.card.labels.classes.len(), 3);
+        let least = renamed.without("broad").expect("forgets");
+        let least = Model::from_bytes("least", &least.to_bytes().expect("writes")).expect("reads");
+        assert_eq!((names(&least), least.card.taught.len()), (names(&model), 0));
+        assert_eq!(least.signatures.as_ref().map(|own| own.grasps().len()), Some(2));
+        for example in &data().examples {
+            let [with, without] = [&renamed, &least].map(|model| model.recogniser.recognise(&example.grasp, None).pmf);
+            let [a, b] = [with, without].map(|pmf| pmf.probabilities()[0] > pmf.probabilities()[1]);
+            assert_eq!(a, b, "the order of the others stays");
+        }
+        assert!(least.taught(&data_of(&["wide"]), &quick(1)).is_ok(), "it still has grasps to learn with");
+        let refused = least.without("thin").map(|model| model.card).expect_err("was not taught");
+        assert!(refused.to_string().contains("was not taught \"thin\""), "{refused}");
     }
 
     #[test]

@@ -40,6 +40,15 @@ impl KeptGrasps {
         Self(chosen.map(|(class, k)| KeptGrasp::of(class, &views[k])).collect())
     }
 
+    /// The same without a class; later classes move up.
+    pub(super) fn without(&self, class: usize) -> Self {
+        let rest = self.0.iter().filter(|kept| kept.class != class);
+        Self(
+            rest.map(|kept| KeptGrasp { class: kept.class - usize::from(kept.class > class), ..kept.clone() })
+                .collect(),
+        )
+    }
+
     /// Number of grasps.
     pub(super) fn len(&self) -> usize {
         self.0.len()

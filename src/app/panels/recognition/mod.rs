@@ -16,7 +16,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{failed_sensors_ui, number_field, text_field};
+use crate::app::widgets::{capital, failed_sensors_ui, number_field, text_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
@@ -25,8 +25,9 @@ use palpate_geometry::palette::ThemeColours;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
+use palpate_sim::objects::object_title;
 use std::sync::Arc;
-use words::{FOREIGN, Headline, percent, reason};
+use words::{BEING_LEARNED, FOREIGN, Headline, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -131,8 +132,20 @@ pub(super) fn ui(
                     failed_sensors_ui(ui, gripper);
                 }
                 let told = ui.cursor().top() - top;
-                let mut part =
-                    Part { data, pictures, explainer, recognised: &recognised, view: &view, measures, actions };
+                let is_being_learned = tools.teaching.running().is_some_and(|running| {
+                    data.source == ViewSource::Simulation
+                        && recognised.truth.as_ref().is_some_and(|(truth, _)| *truth == running.command.name)
+                });
+                let mut part = Part {
+                    data,
+                    pictures,
+                    explainer,
+                    recognised: &recognised,
+                    view: &view,
+                    is_being_learned,
+                    measures,
+                    actions,
+                };
                 part.headline_ui(ui);
                 let advised = part.advice_ui(ui, &tools.advice) + told;
                 if let Some((_, title)) = &recognised.truth {
@@ -172,22 +185,26 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
             });
         } else if let Some(learned) = learned {
             ui.horizontal_wrapped(|ui| {
-                ui.label(RichText::new(format!("Learned {}", learned.title)).heading().strong().color(colour(good)));
-                ui.label(format!("from {} simulated grasps in {:.0}\u{a0}s", learned.grasps, learned.seconds));
+                let title = capital(&object_title(&learned.name));
+                ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(good)));
+                if let Some((lesson, seconds)) = &learned.lesson {
+                    let (grasps, known) = (lesson.grasps, lesson.words());
+                    ui.label(format!("from {grasps} simulated grasps in {seconds:.0}\u{a0}s: {known}."));
+                }
                 let id = egui::Id::unique("name of what was learned");
                 if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {
                     return rename_ui(ui, id, name, actions);
                 }
                 let hint = "Use the model without this object again";
                 actions.on(&ui.small_button("Forget").on_hover_text(hint), App::forget_learned);
-                if ui.small_button("Rename").on_hover_text("Learn it under another name").clicked() {
-                    ui.data_mut(|data| data.insert_temp(id, learned.title.clone()));
+                if ui.small_button("Rename").on_hover_text("Give it another name").clicked() {
+                    ui.data_mut(|data| data.insert_temp(id, title));
                     ui.memory_mut(|memory| memory.request_focus(id.with("field")));
                 }
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
-            if let Some(warning) = &learned.warning {
-                ui.colored_label(colour(theme::of(ui).colours().warning), warning);
+            if let Some(warning) = learned.lesson.as_ref().and_then(|(lesson, _)| lesson.warning()) {
+                ui.colored_label(colour(theme::of(ui).colours().warning), format!("{}.", capital(&warning)));
             }
         }
     });
@@ -262,6 +279,8 @@ struct Part<'a, 'b> {
     explainer: &'a Explainer,
     recognised: &'a Recognised<'a>,
     view: &'a IdentificationView,
+    /// The model is learning the object in the hand.
+    is_being_learned: bool,
     measures: &'static Measures,
     actions: &'a mut Actions,
 }
@@ -274,7 +293,10 @@ impl Part<'_, '_> {
     /// Why the model's answers are not to be trusted on this gripper; none where they are.
     fn distrust(&self) -> Option<&'static str> {
         let is_real = self.data.board().is_some();
-        (self.view.from_perfect_sensors && is_real).then_some(FOREIGN)
+        match self.view.from_perfect_sensors && is_real {
+            true => Some(FOREIGN),
+            false => self.is_being_learned.then_some(BEING_LEARNED),
+        }
     }
 
     /// Picture of a class, or a frame with a question mark.

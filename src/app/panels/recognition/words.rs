@@ -14,6 +14,9 @@ const WORTH_NAMING: f64 = 0.4;
 /// Warning about a model on a gripper whose sensors it does not know.
 pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
 
+/// Warning about an answer of a model that is learning the object in the hand.
+pub(super) const BEING_LEARNED: &str = "Being learned: the answer is one of the objects known so far.";
+
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::app) enum Headline {
