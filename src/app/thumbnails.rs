@@ -31,8 +31,13 @@ impl Thumbnails {
         self.textures.get(name)
     }
 
-    /// Takes in what has been drawn, and has each of these files drawn once.
-    pub(super) fn poll(&mut self, ctx: &egui::Context, files: &[String]) {
+    /// Takes in what has been drawn, and has each of these files drawn once; a learned class has the picture of its file.
+    pub(super) fn poll<'a>(
+        &mut self,
+        ctx: &egui::Context,
+        files: &[String],
+        learned: impl Iterator<Item = (&'a str, &'a str)>,
+    ) {
         for ended in self.portraits.take() {
             let (source, Ok(rgba)) = (&*ended.command, ended.outcome) else { continue };
             let drawn = texture(ctx, source, [PORTRAIT_SIDE; 2], &rgba);
@@ -43,6 +48,11 @@ impl Thumbnails {
                 self.textures.insert(stem.to_owned(), drawn.clone());
             }
             self.textures.insert(source.clone(), drawn);
+        }
+        for (class, file) in learned {
+            if let Some(picture) = self.textures.get(file).filter(|_| !self.textures.contains_key(class)).cloned() {
+                self.textures.insert(class.to_owned(), picture);
+            }
         }
         for file in files {
             if self.asked.insert(file.clone()) {

@@ -196,8 +196,9 @@ impl App {
 
     /// Opens the trial selected last.
     pub(in crate::app) fn open_selected(&mut self) {
-        if let Some(id) = self.library.selection.cursor {
-            self.open_trial(id);
+        match self.library.selection.cursor {
+            Some(id) => self.open_trial(id),
+            None => self.notices.info("No trial is selected: use the arrow keys or click one."),
         }
     }
 

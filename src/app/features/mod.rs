@@ -140,7 +140,8 @@ impl App {
         self.poll_studies();
         self.poll_recognition();
         self.poll_files();
-        self.thumbnails.poll(&self.ctx, &self.view.recent);
+        let learned = self.recognition.learned_from(self.simulation.scene.holds_object());
+        self.thumbnails.poll(&self.ctx, &self.view.recent, learned);
         self.poll_inspection();
         let shown = self.shown();
         let (names, phases) = (shown.column_names(), shown.find_phases());

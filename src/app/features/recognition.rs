@@ -79,6 +79,12 @@ impl RecognitionFeature {
         self.models.of(Shipped::AnyGripper).map(Arc::as_ref)
     }
 
+    /// Classes that the model of the simulation has learned, with their files.
+    pub(super) fn learned_from(&self, fixed: bool) -> impl Iterator<Item = (&str, &str)> {
+        let model = self.models.of(Shipped::simulated(fixed)).into_iter();
+        model.flat_map(|model| &model.card.taught_from).map(|(class, (_, file))| (class.as_str(), file.as_str()))
+    }
+
     /// Loads a model after those that are being loaded.
     fn load(&mut self, path: PathBuf, gripper: ViewSource, tools: &GripperTools) {
         tools.load.start(path);
@@ -209,9 +215,8 @@ impl App {
 
     /// Class as which the model in use has learned the object in this file.
     pub(in crate::app) fn learned_as(&self, source: &str) -> Option<&str> {
-        let fixed = self.simulation.scene.holds_object();
-        let model = self.recognition.models.of(Shipped::simulated(fixed))?;
-        model.card.taught_from.iter().find(|(_, (_, from))| from == source).map(|(class, _)| class.as_str())
+        let mut learned = self.recognition.learned_from(self.simulation.scene.holds_object());
+        learned.find(|(_, file)| *file == source).map(|(class, _)| class)
     }
 
     /// Cancels the lesson.

@@ -77,8 +77,8 @@ pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), Tr
                     }
                 };
                 let label = match model {
-                    SensorModel::Virtual => "ideal",
-                    SensorModel::PhysicalLike => "realistic",
+                    SensorModel::Virtual => "ideal (virtual)",
+                    SensorModel::PhysicalLike => "realistic (physical-like)",
                     SensorModel::Noisy | SensorModel::Adapted | SensorModel::Drawn => model.name(),
                 };
                 if ui.selectable_label(sensors.sensors == model, label).on_hover_text(hint).clicked() {
