@@ -116,7 +116,7 @@ impl Lesson {
     pub fn warning(&self) -> Option<String> {
         let Self { grasps, lost, .. } = self;
         if 4 * lost >= *grasps && *lost > 0 {
-            let words = "was not held: it slid away or was never touched. Fix it in place, or see `palpate grasp`";
+            let words = "was not held: it slid away or was never touched. Fix it in place to learn its shape";
             return Some(format!("in {lost} of {grasps} grasps the object {words}"));
         }
         let class = self.taken_for.as_ref().filter(|_| 2 * self.recognised < self.tested)?;
