@@ -34,7 +34,10 @@ class Palpate:
     """A connection. Requests may come from several threads: `vent` does not wait for a `grasp` to end."""
 
     def __init__(self, port=4747, token=None, token_file=None):
-        connection = socket.create_connection(("127.0.0.1", port))
+        try:
+            connection = socket.create_connection(("127.0.0.1", port))
+        except ConnectionRefusedError:
+            raise PalpateError(f"no `palpate serve` on 127.0.0.1:{port}; start it") from None
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._close = lambda: connection.shutdown(socket.SHUT_RDWR)
         self._use(connection.makefile("rb"), connection.makefile("wb"), token, token_file)
@@ -186,5 +189,8 @@ if __name__ == "__main__":
     parser.add_argument("--grasps", type=int, default=50)
     parser.add_argument("--objects", default="lemon,cube,ball,box,labello")
     chosen = parser.parse_args()
-    with Palpate(chosen.port, token_file=chosen.token_file) as served:
-        unattended(served, chosen.grasps, chosen.objects.split(","))
+    try:
+        with Palpate(chosen.port, token_file=chosen.token_file) as served:
+            unattended(served, chosen.grasps, chosen.objects.split(","))
+    except PalpateError as error:
+        raise SystemExit(f"error: {error}") from None

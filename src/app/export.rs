@@ -57,7 +57,11 @@ impl ExportRequest {
             Self::Figure(figure, theme, size) if is(FileKind::Png) => {
                 figure_picture(figure, *theme, *size)?.to_png()?
             }
-            Self::Figure(..) => return unknown("an .svg or a .png file"),
+            Self::Figure(..) => {
+                return unknown(
+                    "an .svg or a .png file; numbers are exported in the library of Inspect mode: Edit > Export",
+                );
+            }
             Self::View3d(list, size) if is(FileKind::Png) => {
                 let gpu = Gpu::headless(DriverChoice::Any)?;
                 let mut renderer = Renderer::new(&gpu.device, &gpu.queue);
@@ -167,7 +171,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let wrong = ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100]);
         let error = wrong.write(&folder.path().join("a.pdf"), &stop).expect_err("refused").to_string();
-        assert!(error.contains("choose an .svg or a .png file"), "{error}");
+        assert!(error.contains("choose an .svg or a .png file; numbers are exported in the library"), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).expect("reads").count(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! File dialog, inside the window: a path, and the files of its folder. It needs nothing of the desktop.
 
 use crate::app::features::files::Question;
-use crate::app::widgets::{failure_ui, text_field, wrapped};
+use crate::app::widgets::{failure_ui, focus_field, text_field, wrapped};
 use egui::{Button, Id, Key, Modal, RichText, ScrollArea, Ui};
 use std::path::{Path, PathBuf, is_separator};
 
@@ -50,11 +50,13 @@ impl PathDialog {
             ui.set_width((room.x - 60.0).min(560.0));
             ui.heading(title);
             wrapped(ui, RichText::new("Write or paste a path, or choose from its folder.").small().weak());
-            let field = text_field(&mut self.path, Id::unique("path of a file")).hint_text("path of a file");
+            let id = Id::unique("path of a file");
+            let field = text_field(&mut self.path, id).hint_text("path of a file");
             let response = ui.add(field);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Path"));
             if std::mem::take(&mut self.fresh) {
-                response.request_focus();
+                // Behind the path that a click has written, not where the cursor was in the one before.
+                focus_field(ui, id);
             }
             if response.changed() {
                 (self.refused, self.replaced) = (None, None);

@@ -89,9 +89,9 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         true => Vec::new(),
         false => plan.splits(&data, arguments.data.seed, usize::from(arguments.repeats))?,
     };
-    let mut rows = Vec::new();
+    let (mut rows, interrupted) = (Vec::new(), stop_flag()?);
     if !methods.is_empty() {
-        let compared = arguments.data.compare(&data, &splits, &methods, arguments.threads)?;
+        let compared = arguments.data.compare(&data, &splits, &methods, arguments.threads, &interrupted)?;
         rows = compared.rows;
         for (method, reason) in &compared.left_out {
             warn(&format!("{method} is left out: {reason}"));
@@ -102,7 +102,6 @@ pub(super) fn run(arguments: &EvaluateArguments, store: Option<&Path>) -> Result
         [split] => split.test.clone(),
         _ => (0..data.examples.len()).collect(),
     };
-    let interrupted = AtomicBool::new(false);
     for (name, model) in &models {
         let unseen = [data.part(&[]), data.part(&[]), unseen(name, model, &data, &tested)?];
         rows.push(arguments.data.comparison(&unseen, &interrupted).of_fitted(name, model)?);

@@ -25,7 +25,7 @@ pub(super) struct GapArguments {
 
 pub(super) fn run(arguments: &GapArguments, store: Option<&Path>) -> Result<(), Failure> {
     let recorded = arguments.recorded.read(store)?;
-    let (stop, bar) = (stop_flag()?, Progress::of("simulating"));
+    let (stop, bar) = (stop_flag()?, Progress::of_share("simulating"));
     let watch = FitWatch { progress: &|share| bar.share(share), stop: &stop };
     let gap = simulation_gap(&recorded.observations, &recorded.trust, &watch);
     drop(bar);

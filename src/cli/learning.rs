@@ -126,17 +126,17 @@ impl DataArguments {
     }
 
     /// Fits and tests methods on all splits, on this many threads, or one per core. Of several methods, each has a line on
-    /// standard error as it ends.
+    /// standard error as it ends. `interrupted` ends it with an error.
     pub(super) fn compare(
         &self,
         data: &Dataset,
         splits: &[Split],
         methods: &[&'static Method],
         threads: Option<u16>,
+        interrupted: &AtomicBool,
     ) -> Result<Compared, Failure> {
-        let interrupted = AtomicBool::new(false);
         let parts: Vec<[Dataset; 3]> = splits.iter().map(|split| parts(data, split)).collect();
-        let comparisons: Vec<Comparison<'_>> = parts.iter().map(|parts| self.comparison(parts, &interrupted)).collect();
+        let comparisons: Vec<Comparison<'_>> = parts.iter().map(|parts| self.comparison(parts, interrupted)).collect();
         let bar = Progress::of("training and testing");
         bar.show(0, methods.len() * splits.len());
         let progress = |ended: Option<MethodResult>| {
@@ -146,7 +146,10 @@ impl DataArguments {
                 bar.0.suspend(|| note(&line));
             }
         };
-        Ok(compare(&comparisons, methods, setup::threads(threads), &progress)?)
+        let compared = compare(&comparisons, methods, setup::threads(threads), &progress);
+        Ok(compared.map_err(|error| {
+            if interrupted.load(Ordering::Relaxed) { "stopped".to_owned() } else { error.to_string() }
+        })?)
     }
 
     /// Comparison on one split, of its three parts.

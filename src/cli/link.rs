@@ -28,6 +28,9 @@ pub(super) fn open(options: &LinkOptions, wait_s: f64, stop: &AtomicBool) -> Res
             Ok(link) => return Ok(link),
             Err(error) => error,
         };
+        if matches!(error.trouble, PortTrouble::NoBoard | PortTrouble::Several) {
+            return Err(format!("{error}; --port PORT names one, such as the link of `palpate emulate`").into());
+        }
         if error.trouble != PortTrouble::Busy || begun.elapsed().as_secs_f64() >= wait_s {
             return Err(error.into());
         }

@@ -16,6 +16,8 @@ mod help;
 mod interrupt;
 mod learning;
 mod link;
+#[cfg(test)]
+mod manual_tests;
 mod movie;
 mod origin;
 mod output;

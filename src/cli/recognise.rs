@@ -194,6 +194,14 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
             why,
         });
     }
+    let labelled: BTreeSet<&str> = trials.iter().filter_map(|trial| trial.truth.as_deref()).collect();
+    if arguments.together && labelled.len() > 1 {
+        let names: Vec<String> = labelled.into_iter().map(shown_title).collect();
+        warn(&format!(
+            "--together takes these trials for grasps of one object, but their labels are {}",
+            names.join(", ")
+        ));
+    }
     let together = belief.now().filter(|_| arguments.together).map(|pmf| Together {
         decided: labels.classes[pmf.top().0].name.clone(),
         probability: pmf.top().1,

@@ -9,6 +9,7 @@ use palpate_learn::Shipped;
 use palpate_serve::{Clients, Desk, DeskSetup, EmulatedHand, MOST_CLIENTS, listen, listen_to_input, schema};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{ErrorKind, Write as _};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -90,7 +91,12 @@ pub(super) fn run(arguments: &ServeArguments, store: Option<&Path>) -> Result<()
     warn_of_perfect_sensors(&model);
     let mut opened = open_store(store)?;
     let store = opened.path().to_owned();
-    let token = token(arguments.token.as_deref())?;
+    // Before the token, which serves nobody where the port is in use.
+    let (clients, address) = match arguments.stdio {
+        true => (listen_to_input()?, None),
+        false => bound(arguments.listen, "--listen N").map(|(clients, address)| (clients, Some(address)))?,
+    };
+    let (token, token_place) = token(arguments.token.as_deref())?;
     let stop = stop_flag()?;
     let emulated = match arguments.port {
         Some(_) => None,
@@ -98,18 +104,21 @@ pub(super) fn run(arguments: &ServeArguments, store: Option<&Path>) -> Result<()
     };
     drop(opened);
     let gripper: Listen = emulated.as_ref().map_or_else(|| Arc::new(listen_to_port) as Listen, EmulatedHand::listen);
-    let desk = DeskSetup { store: store.clone(), token, emulated };
+    let desk = DeskSetup { store: store.clone(), token, token_place, emulated };
     let worker = GripperWorker::start(GripperSetup {
         scene,
-        store,
+        store: store.clone(),
         model: Some(Arc::new(model)),
         grasps: arguments.grasps,
         listen: gripper,
         wake: Arc::new(|| ()),
     })?;
     connect(&worker, arguments.port.clone(), &stop)?;
-    let clients = if arguments.stdio { listen_to_input()? } else { listening(arguments.listen)? };
-    Desk::new(desk, clients, |wake| worker.tap(wake)).serve(|| {
+    let gripper = arguments.port.as_ref().map_or("the emulated gripper".to_owned(), |port| port.display().to_string());
+    if let Some(address) = address {
+        listens(address, &format!("gripper: {gripper}, store: {}", store.display()));
+    }
+    let vents = Desk::new(desk, clients, |wake| worker.tap(wake)).serve(|| {
         // They go to the clients.
         worker.rows().for_each(drop);
         for notice in worker.notices() {
@@ -120,6 +129,9 @@ pub(super) fn run(arguments: &ServeArguments, store: Option<&Path>) -> Result<()
         !stop.load(Ordering::Relaxed) && !worker.has_ended()
     });
     let failed = worker.has_ended();
+    if stop.load(Ordering::Relaxed) {
+        note(if vents { "stopped; the fingers were told to vent" } else { "stopped" });
+    }
     // Vents and ends a running trial.
     drop(worker);
     if failed { Err("the gripper's thread has stopped; the board vents within a second".into()) } else { Ok(()) }
@@ -131,18 +143,25 @@ pub(super) fn beside_window(
     token_file: Option<&Path>,
     store: &Path,
 ) -> Result<(DeskSetup, Clients), Failure> {
-    let desk = DeskSetup { store: store.to_owned(), token: token(token_file)?, emulated: None };
-    Ok((desk, listening(port)?))
+    let (clients, address) = bound(port, "--serve=N")?;
+    let (token, token_place) = token(token_file)?;
+    listens(address, &format!("gripper: that of the window, store: {}", store.display()));
+    Ok((DeskSetup { store: store.to_owned(), token, token_place, emulated: None }, clients))
 }
 
-/// Listens on a TCP port, and says so.
-fn listening(port: u16) -> Result<Clients, Failure> {
-    let (clients, address) = listen(port).map_err(|error| match error.kind() {
-        ErrorKind::AddrInUse => format!("port {port} is in use: choose another one"),
+/// Listens on a TCP port; `option` chooses another one.
+fn bound(port: u16, option: &str) -> Result<(Clients, SocketAddr), Failure> {
+    Ok(listen(port).map_err(|error| match error.kind() {
+        ErrorKind::AddrInUse => {
+            format!("port {port} is in use, by another server perhaps: choose another one with {option}")
+        }
         _ => format!("cannot listen on port {port}: {error}"),
-    })?;
-    note(&format!("listening on {address}, for {MOST_CLIENTS} clients at most"));
-    Ok(clients)
+    })?)
+}
+
+/// Says that clients are served, and with what.
+fn listens(address: SocketAddr, with: &str) {
+    note(&format!("listening on {address}, for {MOST_CLIENTS} clients at most; {with}"));
 }
 
 /// Connects, and waits for the port while another program has it.
@@ -169,15 +188,15 @@ fn connect(worker: &GripperWorker, port: Option<PathBuf>, stop: &AtomicBool) -> 
     Err("stopped".into())
 }
 
-/// The token of a file, which is made where there is none; without a file a new one, which is printed.
-fn token(file: Option<&Path>) -> Result<String, Failure> {
+/// The token of a file, which is made where there is none; without a file a new one, which is printed. And where it is found.
+fn token(file: Option<&Path>) -> Result<(String, String), Failure> {
     let new = || (0..2).map(|k: u32| format!("{:016x}", RandomState::new().hash_one(k))).collect::<String>();
     let Some(path) = file else {
         let token = new();
         note(&format!("token: {token}"));
-        return Ok(token);
+        return Ok((token, "that `palpate serve` printed at its start".to_owned()));
     };
-    let shown = path.display();
+    let (shown, place) = (path.display(), format!("in \"{}\"", path.display()));
     if path.exists() {
         let token = palpate_geometry::read_text(path, LARGEST_TOKEN)?.trim().to_owned();
         if token.chars().count() < SHORTEST_TOKEN {
@@ -186,7 +205,7 @@ fn token(file: Option<&Path>) -> Result<String, Failure> {
             )
             .into());
         }
-        return Ok(token);
+        return Ok((token, place));
     }
     let mut options = std::fs::OpenOptions::new();
     options.write(true).create_new(true);
@@ -195,5 +214,5 @@ fn token(file: Option<&Path>) -> Result<String, Failure> {
     let token = new();
     let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
     written.map_err(|error| format!("cannot write \"{shown}\": {error}"))?;
-    Ok(token)
+    Ok((token, place))
 }

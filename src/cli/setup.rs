@@ -187,11 +187,12 @@ pub(super) fn classes_of(named: &[String], objects: usize) -> Result<Vec<String>
     Ok(named.iter().map(|name| class_name(name)).collect::<Result<_, _>>()?)
 }
 
-/// Path of the named store, or of the default one. Folders are not created for a named one.
+/// Path of the named store, or of the default one. Folders are not created for a named one, but for one beside the default one.
 pub(super) fn store_path(path: Option<&Path>) -> Result<PathBuf, Failure> {
     let Some(path) = path else { return Ok(Store::default_path()) };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    match folder.filter(|folder| !folder.is_dir()) {
+    let is_usual = |folder: &Path| Store::default_path().parent() == Some(folder);
+    match folder.filter(|folder| !folder.is_dir() && !is_usual(folder)) {
         Some(folder) => {
             let (store, folder) = (path.display(), folder.display());
             Err(format!("no store \"{store}\": there is no folder \"{folder}\". Create it, or name another --store")

@@ -494,12 +494,8 @@ pub(super) struct OpenDrawable {
 impl OpenDrawable {
     /// Caption of its pictures: the trial, where it is from, and whether the fingers were reconstructed.
     pub(super) fn badge(&self) -> String {
-        let source = match self.trial.source {
-            TrialSource::Simulated => "SIMULATED",
-            TrialSource::Recorded => "REAL GRIPPER, FINGERS AS ARCS",
-            TrialSource::Imported => "IMPORTED, FINGERS AS ARCS",
-        };
-        format!("TRIAL {}, {source}", self.trial.id)
+        let arcs = if self.trial.source == TrialSource::Simulated { "" } else { ", FINGERS AS ARCS" };
+        format!("TRIAL {}, {}{arcs}", self.trial.id, self.trial.source_title().to_uppercase())
     }
 }
 

@@ -82,7 +82,7 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
     if arguments.out.is_none() {
         make_models_folder(&models_folder())?;
     }
-    let (simulating, fitting) = (Progress::of("grasping"), Progress::of("learning"));
+    let (simulating, fitting) = (Progress::of("grasping"), Progress::of_share("learning"));
     let progress = |stage| match stage {
         LessonStage::Simulating(done, of) => simulating.show(done, of),
         LessonStage::Fitting(share) => {

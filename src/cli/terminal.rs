@@ -150,7 +150,8 @@ impl Progress {
     /// Progress in the form of a template of `indicatif`.
     pub(super) fn new(template: &str) -> Self {
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        Self(ProgressBar::new(0).with_style(style))
+        // Without a length, which a bar takes for the end of the work, until the work tells one.
+        Self(ProgressBar::no_length().with_style(style))
     }
 
     /// Work whose share cannot be told: what it is, and how long it has taken.
@@ -168,10 +169,19 @@ impl Progress {
         progress
     }
 
+    /// The same for work that tells its share, in percent.
+    pub(super) fn of_share(what: &str) -> Self {
+        let progress = Self::new("{msg} {bar:40} {percent} % {eta} left");
+        progress.0.set_message(what.to_owned());
+        progress
+    }
+
     /// Shows how much is done.
     pub(super) fn show(&self, done: usize, of: usize) {
-        self.0.set_length(of as u64);
-        self.0.set_position(done as u64);
+        if of > 0 {
+            self.0.set_length(of as u64);
+            self.0.set_position(done as u64);
+        }
     }
 
     /// Shows which share is done.

@@ -93,11 +93,18 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
     }
     let mut settings = parse_settings(&arguments.settings)?;
     let search = if arguments.search { Some(searched(method, &data, arguments, &mut settings)?) } else { None };
-    let mut model = fitted(method, &data, arguments, settings)?;
+    // Before this, Ctrl+C ends the program at once.
+    let stop = stop_flag()?;
+    let mut model = fitted(method, &data, arguments, settings, &stop)?;
     if let Some(rows) = &search {
         model.card.metrics = serde_json::json!({ "search": rows });
     }
-    let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan)).transpose()?;
+    let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan, &stop)).transpose();
+    // What was told to stop while it ended is stopped, too.
+    if stop.load(Ordering::Relaxed) {
+        return Err(LearnError::Stopped.into());
+    }
+    let judged = judged?;
     if let Some((test, evaluation)) = &judged {
         model.card.metrics = evaluation.metrics(test);
     }
@@ -165,10 +172,11 @@ fn fitted(
     data: &Dataset,
     arguments: &TrainArguments,
     settings: serde_json::Map<String, serde_json::Value>,
+    stop: &AtomicBool,
 ) -> Result<Model, LearnError> {
-    let bar = Progress::of("training");
-    let (stop, progress) = (AtomicBool::new(false), |share| bar.share(share));
-    let usual = Fitting::new(arguments.data.seed, arguments.data.quick, &stop);
+    let bar = Progress::of_share("training");
+    let progress = |share| bar.share(share);
+    let usual = Fitting::new(arguments.data.seed, arguments.data.quick, stop);
     method.train(data, &Fitting { settings, progress: &progress, ..usual })
 }
 
@@ -178,9 +186,10 @@ fn judged(
     data: &Dataset,
     arguments: &TrainArguments,
     plan: &SplitPlan,
+    stop: &AtomicBool,
 ) -> Result<(String, Evaluation), Failure> {
     let splits = plan.splits(data, arguments.data.seed, 1)?;
-    let compared = arguments.data.compare(data, &splits, &[method], None)?;
+    let compared = arguments.data.compare(data, &splits, &[method], None, stop)?;
     let row = compared.rows.into_iter().next().ok_or("no test grasps left")?;
     let trials = row.evaluation.trials;
     Ok((format!("{}, {trials} trials tested: {}", plan.described(), data.about.lines().join("; ")), row.evaluation))

@@ -47,6 +47,9 @@ enum TrialsCommand {
     List {
         #[command(flatten)]
         filters: Filters,
+        /// List trials simulated for data sets and studies, too, which a list without filters leaves out.
+        #[arg(long)]
+        data_sets: bool,
         /// Include deleted trials.
         #[arg(long)]
         deleted: bool,
@@ -147,14 +150,18 @@ pub(super) fn run(arguments: &TrialsArguments, store: Option<&Path>) -> Result<(
         _ => store_to_change(store)?,
     };
     match &arguments.command {
-        TrialsCommand::List { filters, deleted, discarded, sort, reverse, limit, json } => {
+        TrialsCommand::List { filters, data_sets, deleted, discarded, sort, reverse, limit, json } => {
             let shown = match (deleted, discarded) {
                 (true, _) => Shown::All,
                 (_, true) => Shown::Discarded,
                 _ => Shown::Kept,
             };
             let order = TrialOrder { column: *sort, descending: *reverse };
-            list(&store, &TrialQuery { order, ..filters.query(shown) }, *limit, *json)?.print(*json)
+            let query = TrialQuery { order, ..filters.query(shown) };
+            // `matching` takes what a list with the same filters shows.
+            let filtered = TrialQuery { shown: Shown::Kept, ..query.clone() }.is_filtered();
+            let without_collected = !data_sets && !filtered;
+            list(&store, &TrialQuery { without_collected, ..query }, *limit, *json)?.print(*json)
         }
         TrialsCommand::Show { id, json } => show::show(&store, *id, *json),
         TrialsCommand::Labels(command) => labels::run(command, &mut store),
@@ -246,12 +253,23 @@ fn list(store: &Store, query: &TrialQuery, limit: Option<usize>, json: bool) -> 
     let found = library.find(store, query)?;
     let on_terminal = std::io::stdout().is_terminal() && !json;
     let rows = shown_rows(&found, limit, query.order.descending, on_terminal);
+    let hidden = match query.hides_collected() {
+        true => library.find(store, &TrialQuery { without_collected: false, ..query.clone() })?.len() - found.len(),
+        false => 0,
+    };
+    if hidden > 0 {
+        note(&format!("{hidden} trial(s) of data sets are not listed; --data-sets lists them"));
+    }
     if !json && !rows.is_empty() && rows.len() < found.len() {
         let all = if limit.is_none() { "; `palpate trials list | less` shows all" } else { "" };
         note(&format!("{} of {} trials{all}", rows.len(), found.len()));
     }
     let is_filtered = query.is_filtered() && library.counts().kept > 0;
-    let none = if is_filtered { "no trial matches" } else { NONE_YET };
+    let none = match (is_filtered, hidden) {
+        (true, _) => "no trial matches",
+        (_, 0) => NONE_YET,
+        _ => "no trials but those of data sets",
+    };
     Ok(ListReport { rows: rows.iter().map(|trial| trial.row.clone()).collect(), none })
 }
 
@@ -262,7 +280,7 @@ impl Report for ListReport {
         }
         let row = |row: &TrialRow| {
             let [id, samples, seed] = [row.id.to_string(), row.samples.to_string(), row.seed.to_string()];
-            [id, shown_title(&row.object), date(&row.created), row.source.to_string(), samples, seed, remark(row)]
+            [id, shown_title(&row.object), date(&row.created), row.gripper().to_owned(), samples, seed, remark(row)]
         };
         let header = ["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""];
         page.table(&header, self.rows.iter().map(row));

@@ -61,7 +61,13 @@ pub(crate) fn labelled_card(rows: &[&LabelledTrial], channels: &[String], left_o
     let trials = rows.len();
     let configs = "- config_name: signals\n  data_files: signals.csv\n- config_name: trials\n  data_files: trials.csv";
     let content = format!("{trials} grasps, {samples} readings");
-    let mut text = opening("", (configs, samples), "Labelled grasps of a soft gripper", &content);
+    let emulated = rows.iter().filter(|row| row.emulated).count();
+    let title = match emulated {
+        0 => "Labelled grasps of a soft gripper",
+        all if all == trials => "Labelled grasps of an emulated soft gripper",
+        _ => "Labelled grasps of a soft gripper, real and emulated",
+    };
+    let mut text = opening("", (configs, samples), title, &content);
     text += "| label | grasps |\n|---|---|\n";
     let mut line = |line: &str| {
         // Writing to a text cannot fail.
@@ -70,9 +76,16 @@ pub(crate) fn labelled_card(rows: &[&LabelledTrial], channels: &[String], left_o
     let labels = counts(rows.iter().map(|row| shown_name(row.object.as_deref().unwrap_or_default()).to_owned()));
     labels.iter().for_each(|(label, count)| line(&format!("| {label} | {count} |")));
     line("\n## How they were measured\n");
-    let days = counts(rows.iter().map(|row| row.created.chars().take(10).collect()));
-    let days: Vec<String> = days.iter().map(|(day, count)| format!("{day} ({count})")).collect();
-    line(&format!("- real gripper, on {} (UTC)", days.join(", ")));
+    for (gripper, is_emulated) in
+        [("real gripper", false), ("emulated gripper: simulated readings, no real ones", true)]
+    {
+        let of_it = rows.iter().filter(|row| row.emulated == is_emulated);
+        let days = counts(of_it.map(|row| row.created.chars().take(10).collect()));
+        let days: Vec<String> = days.iter().map(|(day, count)| format!("{day} ({count})")).collect();
+        if !days.is_empty() {
+            line(&format!("- {gripper}, on {} (UTC)", days.join(", ")));
+        }
+    }
     line(&format!("- channels: {}", channels.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")));
     line("- `raw/` has the counts of each reading, and the bytes as the board sent them\n\n## Limits\n");
     let count = |is: fn(&LabelledTrial) -> bool| rows.iter().filter(|row| is(row)).count();
@@ -132,7 +145,7 @@ fn origin_of(trial: &TrialContent) -> String {
                 scene.solver.accuracy
             )
         }
-        TrialSource::Recorded => format!("real gripper, its parts: {parts}"),
+        TrialSource::Recorded => format!("{}, its parts: {parts}", open.source_title()),
         TrialSource::Imported => format!("imported from another program, its channels: {parts}"),
     }
 }

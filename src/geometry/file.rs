@@ -50,7 +50,9 @@ pub fn text_of(bytes: &[u8]) -> String {
 pub fn other_content(bytes: &[u8]) -> Option<&'static str> {
     let head = &bytes[..bytes.len().min(200)];
     let text = String::from_utf8_lossy(head).trim_start_matches('\u{feff}').trim_start().to_ascii_lowercase();
-    if text.starts_with("version https://git-lfs") {
+    if bytes.is_empty() {
+        Some("the file is empty")
+    } else if text.starts_with("version https://git-lfs") {
         Some("it is a Git LFS pointer in place of the file; run `git lfs pull` where it comes from")
     } else if text.starts_with("<!doctype html") || text.starts_with("<html") {
         Some("it is a web page in place of the file; download the file itself (\"raw\")")
@@ -109,6 +111,7 @@ mod tests {
         assert_eq!(text_of(b"\xFF\xFEa\0\xE4\0"), "a\u{e4}");
         assert_eq!(text_of(b"a\xE4"), "a\u{e4}");
         assert!(other_content(b"ISO-10303-21;\nHEADER;").is_some_and(|text| text.contains("STEP")));
+        assert_eq!(other_content(b""), Some("the file is empty"));
         assert!(other_content(b"PK\x03\x04").is_some() && other_content(b"solid").is_none());
     }
 }

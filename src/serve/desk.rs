@@ -3,7 +3,7 @@
 use crate::clients::{ClientId, Clients, Heard};
 use crate::emulated::EmulatedHand;
 use crate::messages::{
-    Advice, Answer, Event, Fault, Message, Outgoing, Request, Subscription, TrialState, VerdictMessage,
+    Advice, Answer, Event, Fault, FlagMessage, Message, Outgoing, Request, Subscription, TrialState, VerdictMessage,
 };
 use crate::outbox::Outbox;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
@@ -13,7 +13,7 @@ use palpate_lab::workers::{
 };
 use palpate_sim::objects::class_of;
 use palpate_store::Store;
-use palpate_store::labels::{TrialEdit, class_name};
+use palpate_store::labels::{Flag, FlagRemark, TrialEdit, class_name};
 use palpate_tactile::trial::{Control, TrialId};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,6 +31,8 @@ pub struct DeskSetup {
     pub store: PathBuf,
     /// Needed by requests that move air.
     pub token: String,
+    /// Where people find the token, for the message to those who send none: `in "token.txt"`.
+    pub token_place: String,
     /// The emulated gripper, where there is no real one.
     pub emulated: Option<EmulatedHand>,
 }
@@ -127,7 +129,8 @@ impl Desk {
     }
 
     /// Serves until `go_on` says no, which is asked some fifty times a second; then the fingers vent if a client had moved air.
-    pub fn serve(mut self, mut go_on: impl FnMut() -> bool) {
+    /// True where they do.
+    pub fn serve(mut self, mut go_on: impl FnMut() -> bool) -> bool {
         while go_on() {
             match self.from.heard.recv_timeout(PATIENCE) {
                 Ok(Heard::Came(id, outbox)) => {
@@ -145,10 +148,11 @@ impl Desk {
             }
             self.look();
         }
-        let writer = self.from.only.take();
+        let (writer, vents) = (self.from.only.take(), self.air.is_some());
         drop(self);
         // A panic in the thread has printed itself.
         let _written = writer.map(std::thread::JoinHandle::join);
+        vents
     }
 
     /// A lost connection vents, and ends the trial that it began.
@@ -171,7 +175,7 @@ impl Desk {
         let Some(outbox) = self.clients.get(&client).map(|client| Arc::clone(&client.outbox)) else { return };
         let id = message.id.clone();
         match self.ask(client, message) {
-            Ok(Asked::Now(answer)) => outbox.answer(&Outgoing::to(id, Ok(answer))),
+            Ok(Asked::Now(answer)) => outbox.answer(&Outgoing::to(id, Ok(*answer))),
             Ok(Asked::Later(sent, goal)) => {
                 self.pending.push(Pending { client, outbox, id, sent, goal, notes: Vec::new() });
             }
@@ -204,7 +208,12 @@ impl Desk {
                 self.begin(client, TrialRequest { object, control: Control::Free, length_s: seconds, adds: false })
             }
             Request::Label { trial, object, unsure } => self.label(trial, object, unsure),
-            Request::Recognise {} => Ok(Asked::Now(Answer { verdict: self.verdict(), ..Answer::default() })),
+            Request::Recognise {} => Ok(Asked::now(Answer { verdict: self.verdict(), ..Answer::default() })),
+            // The guide would take its readings for those of a touch.
+            Request::Advise {} if self.touched_nothing() => {
+                let text = "the last grasp touched nothing, so that no move is known to help: put the object between the fingers";
+                Ok(Asked::now(Answer { notes: vec![text.to_owned()], ..Answer::default() }))
+            }
             Request::Advise {} => match self.last_grasp() {
                 Some(_) => Ok(Asked::Later(0, Goal::Advised)),
                 None => Err(Fault::from("there is no grasp to learn from yet".to_owned())),
@@ -212,7 +221,7 @@ impl Desk {
             Request::Place { object, by } => match &mut self.setup.emulated {
                 Some(hand) => {
                     hand.place(object.as_deref(), by.as_ref())?;
-                    Ok(Asked::Now(Answer::default()))
+                    Ok(Asked::now(Answer::default()))
                 }
                 None => {
                     Err(Fault::of("request", "only the emulated hand takes objects from a program: move the real one"))
@@ -220,7 +229,7 @@ impl Desk {
             },
             Request::Subscribe { to } => {
                 self.clients.entry(client).and_modify(|client| _ = client.topics.insert(to));
-                Ok(Asked::Now(Answer::default()))
+                Ok(Asked::now(Answer::default()))
             }
         }
     }
@@ -229,7 +238,7 @@ impl Desk {
         match token {
             Some(token) if is_same(token, &self.setup.token) => Ok(()),
             Some(_) => Err(Fault::of("token", "this is not the token of the running server")),
-            None => Err(Fault::of("token", "what moves air needs the token that `palpate serve` printed at its start")),
+            None => Err(Fault::of("token", format!("what moves air needs the token {}", self.setup.token_place))),
         }
     }
 
@@ -316,12 +325,12 @@ impl Desk {
         if let Some((id, trial)) = trial.and_then(|trial| Some((trial.id?, trial)))
             && self.running.replace(id) != Some(id)
         {
-            self.tell_trial(id, TrialState::Begun, trial.request.object);
+            self.tell_trial(id, TrialState::Begun, trial.request.object, &[]);
         }
         let ended = self.view.ended.clone();
         if let Some(ended) = ended.filter(|ended| before.ended.as_ref().is_none_or(|old| old.id != ended.id)) {
             let state = if ended.complete { TrialState::Ended } else { TrialState::CutShort };
-            self.tell_trial(ended.id, state, ended.request.object.clone());
+            self.tell_trial(ended.id, state, ended.request.object.clone(), &ended.flags);
             self.trial.take_if(|_| self.view.trial.is_none());
         }
         if self.view.kept_bar.is_none() && self.view.trial.is_none() && self.pending.is_empty() {
@@ -329,8 +338,9 @@ impl Desk {
         }
     }
 
-    fn tell_trial(&self, trial: TrialId, state: TrialState, object: Option<String>) {
-        let event = Outgoing::Event(Event::Trial { trial, state, object });
+    fn tell_trial(&self, trial: TrialId, state: TrialState, object: Option<String>, flags: &[FlagRemark]) {
+        let flags = flags.iter().map(FlagMessage::from).collect();
+        let event = Outgoing::Event(Event::Trial { trial, state, object, flags });
         self.listeners(Subscription::Trial).for_each(|outbox| outbox.answer(&event));
     }
 
@@ -440,7 +450,16 @@ impl Desk {
     fn ended(&self, ended: &EndedTrial, notes: Vec<String>) -> Answer {
         let verdict = self.verdict().filter(|_| ended.request.control == Control::Driven);
         let notes = ended.warnings.iter().cloned().chain(notes).collect();
-        Answer { trial: Some(ended.id), verdict, notes, ..Answer::default() }
+        let flags = ended.flags.iter().map(FlagMessage::from).collect();
+        Answer { trial: Some(ended.id), verdict, flags, notes, ..Answer::default() }
+    }
+
+    /// True where the last trial is a grasp that no pad felt.
+    fn touched_nothing(&self) -> bool {
+        self.view.ended.as_ref().is_some_and(|ended| {
+            let driven = ended.request.control == Control::Driven;
+            driven && ended.flags.iter().any(|found| found.flag == Flag::NoContact)
+        })
     }
 
     fn verdict(&self) -> Option<VerdictMessage> {
@@ -479,9 +498,15 @@ fn label_job(path: PathBuf, wake: Wake) -> Job<NewLabel, ()> {
 /// How a request goes on.
 enum Asked {
     /// It is done.
-    Now(Answer),
+    Now(Box<Answer>),
     /// The command with this number does it.
     Later(u64, Goal),
+}
+
+impl Asked {
+    fn now(answer: Answer) -> Self {
+        Self::Now(Box::new(answer))
+    }
 }
 
 /// The class that a field names.

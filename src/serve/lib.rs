@@ -32,6 +32,6 @@ pub use clients::{Clients, MOST_CLIENTS, listen, listen_to_input};
 pub use desk::{Desk, DeskSetup};
 pub use emulated::{EmulatedHand, EmulationError};
 pub use messages::{
-    Advice, Answer, Event, Fault, GripperPose, Message, Outgoing, Request, Subscription, TrialState, VerdictMessage,
-    schema,
+    Advice, Answer, Event, Fault, FlagMessage, GripperPose, Message, Outgoing, Request, Subscription, TrialState,
+    VerdictMessage, schema,
 };

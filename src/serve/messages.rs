@@ -1,6 +1,7 @@
 //! Messages, one JSON object a line: requests in, answers and events out.
 
 use palpate_lab::grasping::{GripperMove, IdentificationView};
+use palpate_store::labels::FlagRemark;
 use palpate_tactile::trial::TrialId;
 use schemars::{JsonSchema, schema_for};
 use serde::{Deserialize, Serialize};
@@ -222,9 +223,27 @@ pub struct Answer {
     /// Advice; absent where no move is known to help.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub advice: Option<Advice>,
+    /// Faults found in the trial that has ended; absent where there is none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub flags: Vec<FlagMessage>,
     /// Remarks, in sentences.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
+}
+
+/// Fault of a trial.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FlagMessage {
+    /// `no-contact`, `saturated`, `interrupted`, `cadence` or `sensor-fault`.
+    pub flag: String,
+    /// Reason with numbers.
+    pub text: String,
+}
+
+impl From<&FlagRemark> for FlagMessage {
+    fn from(found: &FlagRemark) -> Self {
+        Self { flag: found.flag.label().replace(' ', "-"), text: found.remark.clone() }
+    }
 }
 
 /// Advice on the next grasp.
@@ -301,6 +320,9 @@ pub enum Event {
         state: TrialState,
         /// Class of its object, where it was given.
         object: Option<String>,
+        /// Faults found when it ended; absent where there is none.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        flags: Vec<FlagMessage>,
     },
     /// Samples were dropped because they were not read.
     Lost {
@@ -336,7 +358,10 @@ pub fn schema() -> Value {
 pub(crate) fn parse(line: &[u8]) -> Result<Message, (Value, Fault)> {
     let read: Result<Map<String, Value>, _> = serde_json::from_slice(line);
     let mut fields = read.map_err(|e| {
-        (Value::Null, Fault::from(format!("the line is no JSON object: {e}. See palpate help control")))
+        // Where the line is JSON of another kind, the position says nothing.
+        let cause = if e.is_data() { String::new() } else { format!(" ({e})") };
+        let text = format!("the line is no JSON object {{..}}{cause}; `palpate help control` has examples");
+        (Value::Null, Fault::from(text))
     })?;
     let id = fields.remove("id").unwrap_or_default();
     let message = (|| {
@@ -373,7 +398,46 @@ fn fault_of(error: &serde_path_to_error::Error<serde_json::Error>) -> Fault {
     } else if missing && inner.as_deref().is_none_or(|inner| !inner.ends_with(named)) {
         inner = Some(inner.map_or_else(|| named.to_owned(), |inner| format!("{inner}.{named}")));
     }
-    Fault { field: inner, text }
+    Fault { field: inner, text: in_plain_words(text) }
+}
+
+/// What serde says of a field, in words of JSON: `write a number, not a text` for `invalid type: string "1", expected f64`.
+fn in_plain_words(text: String) -> String {
+    let quoted = |name: &str| name.replace('`', "\"");
+    if let Some((found, wanted)) = text.strip_prefix("invalid type: ").and_then(|rest| rest.rsplit_once(", expected "))
+    {
+        return format!("write {}, not {}", json_kind(wanted), json_kind(found));
+    }
+    for (own, plain) in [("unknown variant ", "there is no"), ("unknown field ", "there is no field")] {
+        if let Some((name, rest)) = text.strip_prefix(own).and_then(|rest| rest.split_once(", ")) {
+            let names =
+                rest.strip_prefix("expected ").map(|names| names.trim_start_matches("one of ").replace('`', ""));
+            return format!(
+                "{plain} {}{}",
+                quoted(name),
+                names.map_or(String::new(), |names| format!(": choose {names}"))
+            );
+        }
+    }
+    match text.strip_prefix("missing field ") {
+        Some(name) => format!("the field {} is missing", quoted(name)),
+        None => text,
+    }
+}
+
+/// A type of serde in words of JSON.
+fn json_kind(of_serde: &str) -> &str {
+    let kind = of_serde.trim_start_matches("a ").trim_start_matches("an ");
+    match kind.split(' ').next().unwrap_or_default() {
+        "f64" | "floating" => "a number",
+        "i64" | "integer" => "a whole number",
+        "bool" | "boolean" => "true or false",
+        "string" => "a text",
+        "struct" | "map" => "an object {..}",
+        "array" | "sequence" => "a list [..]",
+        "unit" | "null" => "null",
+        _ => of_serde,
+    }
 }
 
 /// Refuses numbers out of range.
@@ -447,7 +511,37 @@ mod tests {
             let (id, fault) = parse(line.as_bytes()).expect_err(line);
             assert_eq!(fault.field.as_deref(), field, "{line}: {fault:?}");
             assert!(field.is_none() || id == 7, "{line}: {id}");
+            for jargon in ["variant", "f64", "i64", "map", "expected", "invalid type", "`"] {
+                let text = fault.text.replace("`palpate help control`", "");
+                assert!(!text.contains(jargon) || field.is_none(), "{line}: {text}");
+            }
         }
+    }
+
+    #[test]
+    fn faults_say_in_words_of_json_what_to_write() {
+        for (line, wanted) in [
+            ("[1]", "the line is no JSON object {..}; "),
+            (r#"{"request":"wave"}"#, r#"there is no "wave": choose grasp, close, vent"#),
+            (r#"{"request":"pressure","bar":"1"}"#, "write a number, not a text"),
+            (r#"{"request":"pressure"}"#, r#"the field "bar" is missing"#),
+            (r#"{"request":"grasp","again":1}"#, "write true or false, not a whole number"),
+            (r#"{"request":"place","move":3}"#, "write an object {..}, not a whole number"),
+            (r#"{"request":"place","move":{"shift_mm":3}}"#, "write a list [..], not a whole number"),
+            (r#"{"request":"place","move":{"turn":1}}"#, r#"there is no field "turn": choose turn_deg"#),
+            (r#"{"request":"vent","now":true}"#, r#"there is no field "now""#),
+        ] {
+            let (_, fault) = parse(line.as_bytes()).expect_err(line);
+            assert!(fault.text.starts_with(wanted), "{line}: {}", fault.text);
+        }
+    }
+
+    #[test]
+    fn a_fault_of_a_trial_has_the_name_that_commands_take() {
+        let found = FlagRemark { flag: palpate_store::labels::Flag::NoContact, remark: "no pad".to_owned() };
+        let answer = Answer { flags: vec![FlagMessage::from(&found)], ..Answer::default() };
+        let wanted = r#"{"flags":[{"flag":"no-contact","text":"no pad"}]}"#;
+        assert_eq!(serde_json::to_string(&answer).expect("JSON"), wanted);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::checksum::is_intact;
 use super::label_repository::LabelRepository;
 use super::store_error::StoreError;
 use crate::labels::{FlagRemark, Guess, GuessTop, LabelledTrial, Sparkline, cadence_line, flaws};
+use palpate_tactile::board::Board;
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::trial::TrialSource;
 use rusqlite::Row;
@@ -18,6 +19,7 @@ struct ListedInfo {
     flags: Vec<FlagRemark>,
     sparkline: Sparkline,
     seconds: f64,
+    board: Board,
 }
 
 /// A row; of a damaged one what can be read.
@@ -51,6 +53,7 @@ fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         guess: guess.and_then(|guess| GuessTop::of(&guess, object.as_deref())),
         reviewed: row.get(8)?,
         samples,
+        emulated: shown.board.emulated,
         seconds: if shown.seconds > 0.0 { shown.seconds } else { by_rate },
         discarded: row.get(9)?,
         damaged: !row.get::<_, bool>(14)?,

@@ -27,6 +27,9 @@ pub struct TrialRow {
     /// Origin.
     #[serde(rename = "rig")]
     pub source: TrialSource,
+    /// Recorded from an emulated gripper.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub emulated: bool,
     /// In the store, or in the demo log.
     pub place: TrialPlace,
     /// Name of the object; empty while unlabelled.
@@ -79,6 +82,11 @@ pub struct TrialRow {
 const PULLED: &str = "pulled by hand";
 
 impl TrialRow {
+    /// Name of its gripper: that of its source, or `emulated`.
+    pub fn gripper(&self) -> &'static str {
+        if self.emulated { "emulated" } else { self.source.name() }
+    }
+
     /// Simulated for a data set, by a study or by `palpate collect`.
     pub fn is_collected(&self) -> bool {
         self.source == TrialSource::Simulated && self.collection.is_some()
@@ -116,7 +124,8 @@ const ROWS: &str =
     (rig <> 'serial' OR about IS NOT NULL AND checksum(uid, about) IS board_trials.checksum)
     AND trials.chunks = (SELECT count(*) FROM chunks INDEXED BY chunks_by_trial WHERE chunks.trial = trials.id)
         + (SELECT count(*) FROM board_chunks INDEXED BY board_chunks_by_trial
-            WHERE board_chunks.trial = trials.id)";
+            WHERE board_chunks.trial = trials.id),
+    coalesce(CASE WHEN json_valid(about) THEN about ->> '$.board.emulated' END, 0)";
 
 /// Reads rows; presets are looked up once per text.
 #[derive(Default)]
@@ -160,6 +169,7 @@ impl RowReader {
             local: row.get::<_, Option<String>>(17)?.unwrap_or_default(),
             state: row.get(2)?,
             source,
+            emulated: row.get(27)?,
             seed: row.get::<_, i64>(5)?.cast_unsigned(),
             collection: row.get(10)?,
             preset: if source == TrialSource::Simulated { self.preset(row.get_ref("scene")?.as_str()?) } else { None },

@@ -20,6 +20,9 @@ pub struct Board {
     pub divider_ohm: Vec<f64>,
     /// Version of its firmware, where reported.
     pub firmware: Option<String>,
+    /// It is the emulator of `palpate emulate` or `palpate serve`, by its handshake.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub emulated: bool,
     /// The sensors that its channels are wired to, by name.
     #[serde(skip_serializing_if = "is_paper")]
     pub sensors: SensorList,
@@ -39,6 +42,7 @@ impl Default for Board {
             rate_hz: None,
             divider_ohm: Vec::new(),
             firmware: None,
+            emulated: false,
             sensors: SensorList::default(),
         }
     }

@@ -122,6 +122,14 @@ fn wrong_names_and_files_are_refused_in_words() {
     let at = folder.path();
     std::fs::write(at.join("notes.txt"), "hello").unwrap();
     std::fs::write(at.join("cut.urdf"), "<robot name='x'><link name='a'><visual>").unwrap();
+    for name in ["empty.stl", "empty.obj", "empty.urdf"] {
+        std::fs::write(at.join(name), "").unwrap();
+        refused(at, &["grasp", name], &[name, "the file is empty"]);
+    }
+    std::fs::write(at.join("prose.obj"), "This is no mesh.\n").unwrap();
+    refused(at, &["grasp", "prose.obj"], &["no corners", "no faces"]);
+    std::fs::create_dir(at.join("folder")).unwrap();
+    refused(at, &["grasp", "folder"], &["is a folder", ".urdf, .obj or .stl"]);
     std::fs::write(at.join("typo.toml"), "[gripper.finger]\njonts = 12\n").unwrap();
     refused(at, &["grasp", "lemmon"], &["lemmon", "did you mean \"lemon\""]);
     refused(at, &["grasp", "gone.urdf"], &["cannot read", "gone.urdf"]);
@@ -335,6 +343,14 @@ fn a_data_set_survives_a_kill_and_is_joined_from_parts() {
         rows.into_iter().map(|row| (row.object, row.seed)).collect::<BTreeSet<_>>()
     };
     assert!(seeds("trials.sqlite") == seeds("joined.sqlite") && seeds("joined.sqlite").len() == 24);
+    // As in the window, a list leaves them out and says so; one with filters shows what `matching` takes.
+    let listed = run(at, &["trials", "list"]);
+    assert!(listed.out.contains("no trials but those of data sets"), "{listed:?}");
+    assert!(listed.err.contains("24 trial(s) of data sets are not listed; --data-sets lists them"), "{listed:?}");
+    for more in ["--data-sets", "--object=ball"] {
+        let listed = run(at, &["trials", "list", more]);
+        assert!(listed.err.is_empty() && listed.out.contains("Rubber ball"), "{listed:?}");
+    }
     refused(at, &["trials", "merge", "gone.sqlite"], &["gone.sqlite", "no such file"]);
     refused(at, &["collect", "--objects", "lemmon"], &["lemmon", "lemon"]);
     assert_eq!(run(at, &["collect", "--shard", "3/2"]).code, Some(2));
@@ -433,6 +449,37 @@ fn commands_that_read_create_nothing() {
         assert!(ran.code == Some(1) && ran.err.contains("there is no folder"), "{ran:?}");
     }
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 0, "something was created");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_training_and_study_fail_and_say_what_is_kept() {
+    let folder = folder();
+    let at = folder.path();
+    let collect = ["collect", "--objects", "ball,cube", "--trials", "30", "--accuracy", "draft"];
+    assert_eq!(run(at, &collect).code, Some(0));
+    let interrupted = |arguments: &[&str], begun: &dyn Fn() -> bool| {
+        let mut command = palpate(&at.join("trials.sqlite"));
+        command.args(arguments).current_dir(at).stderr(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        while !begun() {
+            assert_eq!(child.try_wait().unwrap(), None, "it ended before it began");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        // It is told right after this sign when to stop.
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        ran(&child.wait_with_output().unwrap())
+    };
+    let trained = interrupted(&["train", "ids-lstm"], &|| at.join("data").exists());
+    assert!(
+        trained.code == Some(1) && trained.err.contains("error: training stopped; no model was saved"),
+        "{trained:?}"
+    );
+    let count = || Store::open(&at.join("trials.sqlite")).unwrap().list(false).unwrap().len();
+    let study = interrupted(&["study", "layouts", "--quick", "--out", "s"], &|| count() > 70);
+    assert!(study.code == Some(1) && study.err.contains("error: stopped after a part of layouts"), "{study:?}");
+    assert!(study.err.contains("grasps simulated for it stay in ") && study.err.contains("trials.sqlite"), "{study:?}");
 }
 
 #[cfg(unix)]

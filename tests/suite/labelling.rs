@@ -9,6 +9,7 @@ use palpate_lab::datasets::{DatasetQuery, SensorView};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::{Accuracy, Scene};
 use palpate_store::Store;
+use palpate_tactile::board::Board;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
 use std::path::Path;
 
@@ -108,6 +109,13 @@ fn an_afternoon_of_labels_from_the_terminal() {
     said(&["trials", "tag", "1", "wet", "late"]);
     let list = said(&["trials", "list"]);
     assert!(list.contains("unsure, [wet, late], \"slipped at the end\""), "{list}");
+    // What the emulator has sent never passes for real data.
+    assert!(list.contains("  emulated  ") && !list.contains("serial"), "{list}");
+    assert!(said(&["trials", "show", "1"]).contains("(emulated gripper on "));
+    said(&["trials", "export", "--labelled", "--out", "set"]);
+    let card = std::fs::read_to_string(at.join("set/README.md")).unwrap();
+    assert!(card.contains("# Labelled grasps of an emulated soft gripper"), "{card}");
+    assert!(card.contains("- emulated gripper: ") && !card.contains("- real gripper"), "{card}");
     said(&["trials", "discard", "2"]);
     assert!(said(&["trials", "undo"]).contains("trial 2: discarded"));
     assert!(said(&["trials", "redo"]).contains("Redone: "));
@@ -142,6 +150,7 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let at = folder.path();
     let (parts, [scene, _]) = (parts(8, false), scenes());
     let (board, calibrations) = calibrated(&parts, 8);
+    let board = Board { emulated: true, ..board };
     let mut store = Store::open(&at.join("trials.sqlite")).unwrap();
     for (sensor, calibration) in &calibrations {
         store.calibrations().add(&calibration.record).unwrap();
@@ -159,6 +168,8 @@ fn what_is_labelled_is_learned_from_and_leaves_the_store_whole() {
     let data = read(&store);
     let ids: Vec<i64> = data.examples.iter().map(|example| example.id).collect();
     assert_eq!((ids, data.labels.classes.len()), (vec![kept, other], 2));
+    // Cards of models print it.
+    assert_eq!(data.about.query, "all trials, with grasps of an emulated gripper");
     // One without a label is recognised all the same.
     let model = model_of_pads(at);
     let said = json(at, &["recognise", &unknown.to_string(), "--model", &model, "--json"]);

@@ -7,7 +7,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::calibration::parts;
 use crate::cpu_renderer::CpuRenderer;
 use crate::gripper::{TRUE_TO_TIME, emulated};
-use crate::program::{json, misused, palpate, refused};
+use crate::program::{json, misused, palpate, ran, refused, run};
 use crate::serial::{HANG, interrupt, start};
 use egui::Key;
 use palpate_serve::DeskSetup;
@@ -32,6 +32,8 @@ struct Server {
     child: Child,
     address: String,
     store: PathBuf,
+    /// What it has printed since it listens, once it has ended.
+    said: Receiver<String>,
 }
 
 impl Server {
@@ -48,10 +50,15 @@ impl Server {
             line.clear();
             assert!(said.read_line(&mut line).unwrap() > 0, "it has ended");
         }
+        assert!(line.contains("gripper: ") && line.contains("store: "), "{line}");
+        let (address, (rest, said_later)) = (line.split([' ', ',']).nth(2).unwrap().to_owned(), channel());
         // What else it says must not fill the pipe.
-        std::thread::spawn(move || said.read_to_end(&mut Vec::new()));
-        let address = line.split([' ', ',']).nth(2).unwrap().to_owned();
-        Self { child, address, store }
+        std::thread::spawn(move || {
+            let mut text = String::new();
+            let _all = said.read_to_string(&mut text);
+            rest.send(text)
+        });
+        Self { child, address, store, said: said_later }
     }
 
     fn connect(&self) -> Client {
@@ -203,6 +210,39 @@ fn a_program_grasps_records_labels_and_turns_the_object_as_advised() {
     let store = Store::open_to_read(&server.store).unwrap();
     let labels: Vec<_> = store.list(false).unwrap().into_iter().map(|row| row.object).collect();
     assert_eq!(labels.iter().filter(|label| label.as_str() == "lemon").count(), 3, "{labels:?}");
+    // Nothing of it passes for data of a real gripper, and the close that it adapted by is none of the labelled grasps.
+    assert!(store.list(false).unwrap().iter().all(|row| row.gripper() == "emulated"));
+    let exported = run(folder.path(), &["trials", "export", "--labelled", "--out", "set"]);
+    assert!(exported.code == Some(0) && exported.out.contains("3 trial(s)"), "{exported:?}");
+    let card = std::fs::read_to_string(folder.path().join("set/README.md")).unwrap();
+    assert!(card.contains("emulated gripper") && !card.contains("real gripper,"), "{card}");
+    let shown = run(folder.path(), &["trials", "show", &trials[0].to_string()]).out;
+    assert!(shown.contains("(emulated gripper on emulated, without a serial port)"), "{shown}");
+}
+
+#[test]
+fn the_python_example_of_the_manual_runs_to_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let client = folder.path().join("palpate.py");
+    std::fs::write(&client, include_str!("../../assets/clients/palpate.py")).unwrap();
+    let python = |script: &Path| std::process::Command::new("python3").arg(script).current_dir(folder.path()).output();
+    let Ok(alone) = python(&client) else { return };
+    // Without a server it says so in a line.
+    let text = String::from_utf8_lossy(&alone.stderr).into_owned();
+    let refused = text.starts_with("error: no `palpate serve` on 127.0.0.1:4747") && text.lines().count() == 1;
+    assert!(refused || TcpStream::connect("127.0.0.1:4747").is_ok(), "{text}");
+    // Advice for the box leads where the fingers have no room.
+    let server = Server::start(folder.path(), &["--object", "box", "--speed", "20"]);
+    let manual = include_str!("../../assets/help/control.md");
+    let example = manual.split("```python\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let port = server.address.rsplit(':').next().unwrap();
+    let example = example.replace("Palpate(token_file", &format!("Palpate({port}, token_file"));
+    let script = folder.path().join("example.py");
+    std::fs::write(&script, &example).unwrap();
+    let ended = python(&script).unwrap();
+    assert!(ended.status.success(), "{}\n{example}", String::from_utf8_lossy(&ended.stderr));
+    let labelled = Store::open_to_read(&server.store).unwrap().labels().trials().unwrap();
+    assert!(labelled.iter().any(|trial| trial.unsure && trial.object.is_some()), "the last trial is labelled");
 }
 
 #[test]
@@ -217,8 +257,13 @@ fn pressure_is_set_recorded_and_given_up_with_the_connection() {
     }
     // Without the token no air moves.
     for request in [object!({ "request": "grasp" }), object!({ "request": "close" })] {
-        assert_eq!(client.fail(request)["field"], "token");
+        let fault = client.fail(request);
+        assert!(fault["field"] == "token" && fault["text"].as_str().unwrap().contains("token.txt\""), "{fault}");
     }
+    let port = server.address.rsplit(':').next().unwrap();
+    let second = run(folder.path(), &["serve", "--listen", port]);
+    assert!(second.err.contains("in use") && second.err.contains("--listen N"), "{second:?}");
+    assert!(second.code == Some(1) && !second.err.contains("token:"), "{second:?}");
     assert_eq!(client.fail(object!({ "request": "pressure", "bar": 0.3, "token": "x" }))["field"], "token");
     let tared = client.ask(object!({ "request": "tare" }));
     assert!(tared["notes"].to_string().contains("Tared"), "{tared}");
@@ -257,6 +302,16 @@ fn pressure_is_set_recorded_and_given_up_with_the_connection() {
     watcher.ask(object!({ "request": "vent" }));
     let vented = client.await_answer(id);
     assert!(vented["error"]["text"].as_str().is_some_and(|text| text.contains("Vent sent")), "{vented}");
+    watcher.event(|event| event["state"] == "cut-short");
+    // A grasp that touches nothing says so, and no move is advised after it.
+    let missed = client.ask(object!({ "request": "grasp", "object": "lemon", "token": TOKEN }));
+    let told = watcher.event(|event| event["state"] == "ended" && event["trial"] == missed["trial"]);
+    assert!(missed["flags"] == told["flags"] && told["flags"][0]["flag"] == "no-contact", "{missed}, {told}");
+    let advised = client.ask(object!({ "request": "advise" }));
+    assert!(advised["advice"].is_null() && advised["notes"].to_string().contains("touched nothing"), "{advised}");
+    // In the empty hand that is as it should be.
+    let empty = client.ask(object!({ "request": "grasp", "object": "empty", "token": TOKEN }));
+    assert!(empty["flags"].is_null(), "{empty}");
 }
 
 /// A line that is no request, nearly one, or one that moves air and has no token.
@@ -397,6 +452,19 @@ fn standard_input_is_served_until_it_ends() {
     assert!(child.wait().unwrap().success());
 }
 
+/// On other systems the folder cannot be chosen.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_first_server_of_a_computer_makes_its_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_palpate"));
+    command.args(["serve", "--stdio", "--object", "empty", "--speed", "20"]);
+    command.env("XDG_DATA_HOME", folder.path()).stdin(Stdio::null());
+    let served = ran(&command.output().unwrap());
+    assert_eq!(served.code, Some(0), "{served:?}");
+    assert!(folder.path().join("palpate/emulated.sqlite").is_file());
+}
+
 /// What a board has printed when Ctrl+C has ended the server that kept its fingers closed.
 fn printed_after_ctrl_c() -> String {
     let folder = tempfile::tempdir().unwrap();
@@ -414,6 +482,8 @@ fn printed_after_ctrl_c() -> String {
     client.until_bar(|bar| bar > 0.3);
     interrupt(&server.child);
     assert!(server.child.wait().unwrap().success());
+    let said = server.said.recv().unwrap();
+    assert!(said.ends_with("stopped; the fingers were told to vent\n"), "{said}");
     let began = Instant::now();
     let last_bar = || {
         let text = std::fs::read_to_string(&sent).unwrap_or_default();
@@ -440,7 +510,9 @@ fn beside_the_window_esc_vents_what_a_program_drives() {
     let mut bench = Bench::new(setup, CpuRenderer::default());
     let (clients, address) = palpate_serve::listen(0).unwrap();
     let store = bench.store_folder().join("trials.sqlite");
-    bench.tell(|app| app.serve(DeskSetup { store, token: TOKEN.to_owned(), emulated: None }, clients));
+    bench.tell(|app| {
+        app.serve(DeskSetup { store, token: TOKEN.to_owned(), token_place: String::new(), emulated: None }, clients);
+    });
     let mut client = Client::connect(&address.to_string());
     let early = client.fail(object!({ "request": "close", "token": TOKEN }));
     assert!(early["text"].as_str().unwrap().contains("no board is connected"), "{early}");

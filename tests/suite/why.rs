@@ -51,6 +51,8 @@ fn the_command_says_why_and_names_the_nearest_trials() {
     ] {
         assert!(text.contains(part), "no \"{part}\" in {text}");
     }
+    let mixed = run(at, &["recognise", "1", "2", "3", "4", "--together"]);
+    assert!(mixed.err.contains("of one object, but their labels are Lemon, Tomato"), "{mixed:?}");
     let alone = run(at, &["recognise", "1", "--why", "--nearest", "0"]).out;
     assert!(!alone.contains("Nearest") && alone.contains("How measured"), "{alone}");
     assert_eq!(run(at, &["recognise", "1", "--nearest", "2"]).code, Some(2), "--nearest needs --why");

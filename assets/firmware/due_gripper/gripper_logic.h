@@ -160,6 +160,9 @@ static void gripper_say_handshake(const GripperSetup *setup, const GripperPins *
     gripper_put(&out, " p_max=");
     gripper_put_bar(&out, setup->most_steps);
   }
+#ifdef GRIPPER_EMULATED
+  gripper_put(&out, " emulated=1");
+#endif
   gripper_sign(&out, " ck=");
   gripper_send(pins, &out);
 }

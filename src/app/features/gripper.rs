@@ -151,7 +151,7 @@ impl App {
         let desk = Desk::new(desk, clients, |wake| self.gripper.worker.tap(wake));
         let stop = Arc::<AtomicBool>::default();
         let stopped = Arc::clone(&stop);
-        let serving = move || desk.serve(|| !stopped.load(Ordering::Relaxed));
+        let serving = move || _ = desk.serve(|| !stopped.load(Ordering::Relaxed));
         match Builder::new().name("serve".to_owned()).spawn(serving) {
             Ok(thread) => self.gripper.served = Some(Served { stop, thread: Some(thread) }),
             Err(cause) => self.notices.show(Notice::Failed(format!("Other programs are not served: {cause}"))),

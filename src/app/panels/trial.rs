@@ -94,7 +94,7 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
         facts.push(("seed", header.seed.to_string()));
         facts.push(("engine", header.scene.solver.engine.name().to_owned()));
         facts.push(("accuracy", header.scene.solver.accuracy.to_string()));
-        facts.push(("peak pressure", format!("{:.2}{SPACE}bar", header.scene.programme.peak_bar)));
+        facts.push(("line pressure", format!("{:.2}{SPACE}bar", header.scene.programme.peak_bar)));
     }
     if let Some(own) = &trial.simulated {
         let on = own.plan.effects.iter().filter(|effect| effect.on);

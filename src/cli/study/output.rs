@@ -53,7 +53,7 @@ impl StudyOutput {
         let part = folder.part(key, self.shard);
         let outcome = run_experiment(experiment, &how, Some(&part), self.shard)?;
         drop(bar);
-        let Some(stored) = whole(key, &part, outcome) else { return Ok(None) };
+        let Some(stored) = whole(key, &part, outcome, "")? else { return Ok(None) };
         let (shown, figures) = (E::shown(&stored.result), E::figures(&stored.result));
         let title = study_title(key).unwrap_or(key);
         self.show(&folder, (key, title, quick), &stored, &shown, figures)?;
@@ -91,17 +91,24 @@ impl StudyOutput {
 /// Progress of a study.
 pub(super) const BAR: &str = "{msg} {bar:40} {pos}/{len} {eta} left";
 
-/// The result of a study; none of a part, or where it was stopped, which is said.
-pub(super) fn whole<R>(key: &str, part: &Path, outcome: StudyOutcome<R>) -> Option<StoredStudy<R>> {
+/// The result of a study; none of a part, which is said. Fails where it was stopped, with what is `kept` of it beside the part.
+pub(super) fn whole<R>(
+    key: &str,
+    part: &Path,
+    outcome: StudyOutcome<R>,
+    kept: &str,
+) -> Result<Option<StoredStudy<R>>, Failure> {
     match &outcome {
-        StudyOutcome::Stopped => note(&format!("stopped after a part of {key}; the same command continues here")),
+        StudyOutcome::Stopped => {
+            return Err(format!("stopped after a part of {key}; the same command continues here{kept}").into());
+        }
         StudyOutcome::Part(units) => note(&format!(
             "{units} units of {key} are in {}; `palpate study merge` joins the files of all parts",
             part.display()
         )),
         StudyOutcome::Whole(_) => {}
     }
-    outcome.whole()
+    Ok(outcome.whole())
 }
 
 /// A claim, the verdict, and the numbers around the line that decides.

@@ -9,6 +9,7 @@ use palpate_study::paper::{PAPER_STUDIES, STUDY_PRESET, StudyData, StudyPlan, pa
 use palpate_study::{Measuring, StudyCard, StudyProgress, StudySize, StudyStep};
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicUsize;
 
 /// Arguments of every study of the paper.
 #[derive(Clone, Debug, clap::Args)]
@@ -119,12 +120,25 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
     let (plan, output) = (arguments.plan(), &arguments.output);
     let folder = output.folder(arguments.quick);
     let (stop, bar) = (stop_flag()?, Progress::new(BAR));
+    let (collected, wanted) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let progress = |StudyProgress { step, done, of }: StudyProgress| {
-        bar.0.set_message(if step == StudyStep::Collecting { "collecting" } else { "measuring" });
         bar.show(done, of);
+        bar.0.set_message(if step == StudyStep::Collecting { "collecting grasps" } else { "measuring cells" });
+        if step == StudyStep::Collecting {
+            collected.store(done, Ordering::Relaxed);
+            wanted.store(of, Ordering::Relaxed);
+        }
     };
     let work = Measuring { threads: output.threads(), cancelled: &stop, progress: &progress };
-    let bench = StudyData::new(open_store(store)?, &plan, work);
+    let store = open_store(store)?;
+    let path = store.path().to_owned();
+    let kept = || match [&collected, &wanted].map(|count| count.load(Ordering::Relaxed)) {
+        [0, _] => String::new(),
+        [done, of] => {
+            format!(". {done} of {of} grasps simulated for it stay in {}; the next run uses them", path.display())
+        }
+    };
+    let bench = StudyData::new(store, &plan, work);
     let mut reports = BTreeMap::new();
     for study in studies {
         let StudyCard { key, title, .. } = study.card();
@@ -132,12 +146,7 @@ pub(super) fn run(command: &PaperCommand, store: Option<&Path>) -> Result<(), Fa
         let part = folder.part(key, output.shard);
         let outcome = study.run(&bench, Some(&part), output.shard);
         bar.0.finish_and_clear();
-        let Some(stored) = whole(key, &part, outcome?) else {
-            if stop.load(Ordering::Relaxed) {
-                return Ok(());
-            }
-            continue;
-        };
+        let Some(stored) = whole(key, &part, outcome?, &kept())? else { continue };
         let title = format!("{title} ({})", study.card().origin());
         let (shown, figures) = (&stored.result, study.figures(&stored.result));
         output.show(&folder, (key, &title, arguments.quick), &stored, shown, figures)?;

@@ -126,7 +126,8 @@ impl Report for BoardReport {
         let course = &self.about.course;
         self.warnings.iter().for_each(|warning| page.warn(warning));
         let object = shown_title(&self.object);
-        page.line(format!("trial {}: {object} (real gripper on {})", self.id, self.about.port));
+        let (gripper, port) = (if course.board.emulated { "emulated" } else { "real" }, &self.about.port);
+        page.line(format!("trial {}: {object} ({gripper} gripper on {port})", self.id));
         labels_text(&self.labels, page);
         let (samples, duration_s, version) = (self.samples, self.duration_s, &self.version);
         page.line(format!("{samples} samples over {duration_s:.2} s, recorded by Palpate {version}"));

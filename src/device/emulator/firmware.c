@@ -1,6 +1,8 @@
 /* The board's firmware for the emulator: gripper_logic.h as it goes onto the board, with its pins given by the emulator.
  * Its one user is firmware.rs. */
 
+/* It says so in its handshake: its trials must not pass for those of a real gripper. */
+#define GRIPPER_EMULATED
 #include "gripper_logic.h"
 
 #ifdef _MSC_VER

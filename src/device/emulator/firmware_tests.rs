@@ -91,7 +91,7 @@ fn samples_are_due_every_20_ms_and_do_not_drift_across_the_wrap_of_the_clock() {
     let lines = lines(&ran);
     assert_eq!(
         lines[0],
-        "# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700 ck=55195"
+        "# tactile-gripper fw=2 adc=12 vref=3.3 rate=50 ch=flexL,flexR,fsrL,fsrR rm=47000,47000,4700,4700 emulated=1 ck=57262"
     );
     assert_eq!(lines.len(), 1 + 165, "3.3 s hold 165 periods");
     for (k, line) in lines[1..].iter().enumerate() {
@@ -151,7 +151,7 @@ fn pressure_comes_in_steps_up_to_the_maximum_and_rubbish_is_refused() {
     let ran = run(&setup(20_000, 4, 20), 0, &happenings);
     let not_understood = "# refused reason=not-understood";
     let hello = lines(&ran)[0];
-    assert!(hello.contains(" p_max=1.00 ck="), "{hello}");
+    assert!(hello.contains(" p_max=1.00 emulated=1 ck="), "{hello}");
     let want = [
         hello,
         "# ok p=0.55",

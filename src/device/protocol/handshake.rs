@@ -56,6 +56,7 @@ fn board<'a>(words: impl Iterator<Item = &'a str>) -> Board {
                     board.reference_volt = volt;
                 }
             }
+            "emulated" => board.emulated = value == "1",
             "rate" => board.rate_hz = positive(value),
             "ch" => board.channels = value.split(',').filter(|n| !n.is_empty()).map(str::to_owned).collect(),
             "rm" => board.divider_ohm = value.split(',').map_while(positive).collect(),
@@ -90,7 +91,9 @@ mod tests {
             firmware: Some("1".to_owned()),
             ..Board::default()
         };
-        assert_eq!(handshake(text), Some(board));
+        assert_eq!(handshake(text), Some(board.clone()));
+        let emulated = Board { emulated: true, ..board };
+        assert_eq!(handshake(&format!("{text} emulated=1")), Some(emulated));
     }
 
     #[test]

@@ -70,6 +70,9 @@ pub(super) fn cleaned(bytes: &[u8]) -> Result<String, String> {
                 "line {number}: \"{line}\" is a curved surface or a line, and no face (f) is in the file; export it as a mesh"
             ),
         }),
+        _ if faces == 0 => {
+            Err("it has no corners (lines that begin with v) and no faces (f), so it is no OBJ file".to_owned())
+        }
         (index, number) if index > corners => {
             Err(format!("line {number}: the face names corner {index}, but the file has {corners}"))
         }

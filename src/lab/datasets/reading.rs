@@ -7,16 +7,12 @@ use super::query::{
 };
 use palpate_learn::{Dataset, Example, OTHER, Sequence};
 use palpate_sim::objects::{EMPTY, RandomShape, catalogue};
-use palpate_store::labels::{Classes, Flag, compared};
+use palpate_store::labels::{ADAPTING, Classes, Flag, compared};
 use palpate_store::{Library, Store, TrialPlace, TrialRow};
 use palpate_tactile::trial::{TrialId, TrialSource};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-
-/// Tag of the trial of the empty hand that a gripper was adapted by. Its sensors were calibrated to read it as the model does, so
-/// that it is no example to learn from; without the tag it is.
-pub const ADAPTING: &str = "adapting";
 
 /// Numbers of trials left out, by reason.
 type LeftOut = BTreeMap<String, usize>;

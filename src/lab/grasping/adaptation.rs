@@ -2,11 +2,10 @@
 //! for any gripper were trained on readings that are calibrated in this way.
 
 use super::run::grasp;
-use crate::datasets::ADAPTING;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
-use palpate_store::labels::TrialEdit;
+use palpate_store::labels::{ADAPTING, TrialEdit};
 use palpate_store::{Store, StoreError};
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Calibration, CalibrationFault, EmptyHand, KnownWeight, Readout, SensorKind};

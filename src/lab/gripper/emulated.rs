@@ -80,7 +80,7 @@ impl BoardStream for EmulatedStream {
             state: LinkState::Listening,
             port: PortInfo {
                 path: "emulated".into(),
-                title: "the emulated gripper".to_owned(),
+                title: "without a serial port".to_owned(),
                 usb: None,
                 kind: BoardKind::default(),
             },

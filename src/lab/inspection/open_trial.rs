@@ -184,6 +184,7 @@ impl OpenTrial {
     pub fn source_title(&self) -> &'static str {
         match self.source {
             TrialSource::Simulated => "simulated",
+            TrialSource::Recorded if self.board.as_ref().is_some_and(|board| board.emulated) => "emulated gripper",
             TrialSource::Recorded => "real gripper",
             TrialSource::Imported => "imported",
         }

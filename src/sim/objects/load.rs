@@ -100,6 +100,9 @@ fn blueprint(source: &str, content: &Content) -> Result<Blueprint, ObjectError> 
 }
 
 fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
+    if path.is_dir() {
+        return ObjectError(format!("\"{source}\" is a folder; name the .urdf, .obj or .stl file in it"));
+    }
     if path.exists() || !extension.is_empty() {
         let kind = if extension.is_empty() { "typeless".to_owned() } else { format!(".{extension}") };
         return ObjectError(format!("\"{source}\" is a {kind} file; Palpate reads objects from .urdf, .obj and .stl"));

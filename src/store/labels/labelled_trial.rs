@@ -5,6 +5,10 @@ use super::sparkline::Sparkline;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
 
+/// Tag of the trial of the empty hand that a gripper was adapted by. Its sensors were calibrated to read it as the model does, so
+/// that it is no example to learn from; without the tag it is.
+pub const ADAPTING: &str = "adapting";
+
 /// Prediction of a model for a trial, made when its label was given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guess {
@@ -74,6 +78,9 @@ pub struct LabelledTrial {
     pub guess: Option<GuessTop>,
     /// Reviewed since.
     pub reviewed: bool,
+    /// Recorded from an emulated gripper.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub emulated: bool,
     /// Number of readings.
     pub samples: u64,
     /// Duration (s).
@@ -87,15 +94,24 @@ pub struct LabelledTrial {
 }
 
 impl LabelledTrial {
-    /// True for a trial that counts: complete, labelled, and neither deleted nor damaged.
+    /// True for a trial that counts: complete, labelled, neither deleted nor damaged, and not the one that the gripper was adapted
+    /// by.
     pub fn counts(&self) -> bool {
-        self.complete && self.object.is_some() && !self.discarded && !self.damaged
+        let adapting = self.tags.iter().any(|tag| tag == ADAPTING);
+        self.complete && self.object.is_some() && !self.discarded && !self.damaged && !adapting
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_close_that_a_gripper_was_adapted_by_does_not_count() {
+        let empty = LabelledTrial { complete: true, object: Some("empty".to_owned()), ..LabelledTrial::default() };
+        assert!(empty.counts());
+        assert!(!LabelledTrial { tags: vec!["wet".to_owned(), ADAPTING.to_owned()], ..empty }.counts());
+    }
 
     #[test]
     fn the_top_of_a_guess_is_its_first_largest() {

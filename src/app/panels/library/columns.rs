@@ -76,6 +76,7 @@ pub(super) fn cell(view: &LibraryView, trial: &LibraryTrial, column: TrialColumn
         TrialColumn::Object => format!("{}{}", trial.title, if row.unsure { "?" } else { "" }),
         TrialColumn::Date => view.date(&row.local),
         TrialColumn::Source if row.place == TrialPlace::DemoLog => row.place.title().to_owned(),
+        TrialColumn::Source if row.emulated => row.gripper().to_owned(),
         TrialColumn::Source => source(row.source).to_owned(),
         TrialColumn::Preset => row.preset.unwrap_or_default().to_owned(),
         TrialColumn::Sensors => row.sensors.clone(),

@@ -11,6 +11,7 @@ use palpate_device::protocol::ConsoleLine;
 use palpate_device::serial::{LinkStatus, PortInfo};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
+use palpate_store::labels::FlagRemark;
 use palpate_tactile::Channel;
 use palpate_tactile::board::{Sensor, SensorList};
 use palpate_tactile::calibration::{Drift, SensorEstimate};
@@ -132,6 +133,8 @@ pub struct EndedTrial {
     pub discarded: bool,
     /// True where readings came until the end of the programme or the length.
     pub complete: bool,
+    /// Flags that are faults for its object.
+    pub flags: Vec<FlagRemark>,
     /// Warnings, in sentences.
     pub warnings: Vec<String>,
     /// Timing statistics of the board, in a line.

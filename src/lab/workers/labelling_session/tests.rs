@@ -40,7 +40,7 @@ fn running(id: TrialId) -> GripperView {
 fn ended(id: TrialId) -> GripperView {
     let request = request();
     let (warnings, cadence) = (Vec::new(), String::new());
-    let ended = EndedTrial { id, request, discarded: false, complete: true, warnings, cadence };
+    let ended = EndedTrial { id, request, discarded: false, complete: true, flags: Vec::new(), warnings, cadence };
     GripperView { ended: Some(Arc::new(ended)), ..GripperView::default() }
 }
 

@@ -10,7 +10,7 @@ use crate::workers::live_recognition::LiveRecognition;
 use palpate_device::serial::LinkState;
 use palpate_sim::gripper::Phase;
 use palpate_store::Stored;
-use palpate_store::labels::cadence_line;
+use palpate_store::labels::{cadence_line, flaws};
 use palpate_tactile::board::Reading;
 use palpate_tactile::trial::Control;
 use std::sync::Arc;
@@ -177,8 +177,8 @@ impl GripperSession {
                         self.publisher.notify(Notice::Stored(Stored::New(trial.id)));
                     }
                     let cadence = cadence_line(&trial.about.course.cadence);
-                    let warnings = trial.warnings;
-                    let ended = EndedTrial { id: trial.id, request, discarded, complete, warnings, cadence };
+                    let (flags, warnings) = (flaws(trial.about.flags, request.object.as_deref()), trial.warnings);
+                    let ended = EndedTrial { id: trial.id, request, discarded, complete, flags, warnings, cadence };
                     self.ended = Some(Arc::new(ended));
                     self.publish();
                 }
