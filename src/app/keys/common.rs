@@ -128,7 +128,7 @@ pub(in crate::app) static COMMANDS: &[Act] = &[
     command("Verify the last grasp at finer accuracy", |app| app.simulation.send(Command::ComputeAgain)),
     command("Use the shipped model for the real gripper", |app| app.use_model(None)),
     command("Use the shipped model in the simulation: forget all learned objects", |app| {
-        app.use_simulation_model(None)
+        app.use_simulation_model(None);
     }),
     command("Learn the object file in the hand", App::teach_object),
     command("Forget or rename the learned object in the hand", |app| {
