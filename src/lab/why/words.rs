@@ -168,8 +168,8 @@ mod tests {
         assert_eq!(
             why.sentences(),
             [
-                "For Lemon: left pad pressure in the hold (+38 points), left pad pressure in contact (+12).",
-                "Against Lemon: right curvature, distal in contact (−9 points)."
+                "For Lemon: left pad pressure in the hold (+38 percentage points), left pad pressure in contact (+12).",
+                "Against Lemon: right curvature, distal in contact (−9 percentage points)."
             ]
         );
         // No part alone changes the answer by a point.

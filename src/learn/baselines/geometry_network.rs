@@ -472,7 +472,7 @@ mod tests {
             model.card.labels.classes.iter().map(|class| class.name.clone()).collect()
         };
         assert_eq!((names(&renamed)[2].as_str(), &renamed.card.taught[..]), ("broad", &["broad".to_owned()][..]));
-        let more = renamed.taught(&data_of(&["broad", "thick"]), &quick(1)).expect("learns more");
+        let more = renamed.taught(&data_of(&["thick"]), &quick(1)).expect("learns more");
         assert_eq!(more.card.labels.classes.len(), 3);
         let least = renamed.without("broad").expect("forgets");
         let least = Model::from_bytes("least", &least.to_bytes().expect("writes")).expect("reads");

@@ -532,7 +532,7 @@ mod tests {
     #[test]
     fn files_that_are_no_urdf_are_refused_with_the_reason() {
         let message = |text: &str| blueprint(text).map(|_| ()).expect_err("refused").to_string();
-        assert!(message("").contains("no XML"));
+        assert!(message("").contains("the file is empty"));
         assert!(message("<sdf/>").contains("SDF"));
         assert!(message("<robot><link name='${x}'/></robot>").contains("xacro"));
         assert!(message("<robot><link></robot>").contains("well-formed"));
