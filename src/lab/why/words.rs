@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(sure.sentences()[1], "Nothing spoke against it by a percentage point or more.");
         // A whole phase does, although no channel in it does alone.
         let together = Attribution { by_phase: [0.0, 44.0].map(evidence).to_vec(), ..sure };
-        assert_eq!(together.sentences()[0], "For Lemon: all channels in the hold (+44 points).");
+        assert_eq!(together.sentences()[0], "For Lemon: all channels in the hold (+44 percentage points).");
     }
 
     #[test]
