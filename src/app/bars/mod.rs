@@ -37,9 +37,11 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
     let right = ui.data(|data| data.get_temp::<f32>(id)).unwrap_or(RIGHT);
     ui.horizontal_centered(|ui| {
         let room = vec2((ui.available_width() - right - ui.spacing().item_spacing.x).max(0.0), ui.available_height());
-        ui.allocate_ui_with_layout(room, Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_size(room);
-            ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
+        // What does not fit is cut off, and does not push the buttons away.
+        let (place, _) = ui.allocate_exact_size(room, egui::Sense::hover());
+        let builder = egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
+        ui.scope_builder(builder, |ui| {
+            ui.set_clip_rect(place.intersect(ui.clip_rect()));
             if ui.available_width() > 780.0 {
                 ui.label(RichText::new("Palpate").heading().strong());
             }
@@ -73,6 +75,9 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
         }
     });
 }
+
+/// Room for sources below which a trial has its number alone (points).
+const NARROW: f32 = 330.0;
 
 /// Width of the buttons at the right before they were drawn (points).
 const RIGHT: f32 = 140.0;
@@ -200,7 +205,10 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     sources.push((ViewSource::Simulation, simulated, "Show the simulated gripper".to_owned(), colours.text));
     if let Some(inspected) = app.inspect.inspected() {
         let trial = inspected.trial;
-        let text = format!("TRIAL {}, {}", trial.id, trial.source_title().to_uppercase());
+        let text = match ui.available_width() > NARROW {
+            true => format!("TRIAL {}, {}", trial.id, trial.source_title().to_uppercase()),
+            false => format!("TRIAL {}", trial.id),
+        };
         let about = format!("{}: show this stored trial", trial.title);
         sources.push((ViewSource::Trial, text, about, colours.text));
     }

@@ -58,6 +58,8 @@ pub struct InspectFeature {
     /// Number of the simulation's grasp at the last look.
     grasp: u64,
     moved_at: Option<f64>,
+    /// The newest trial is opened once the library is read.
+    opens_newest: bool,
 }
 
 impl InspectFeature {
@@ -82,7 +84,13 @@ impl InspectFeature {
             before: ViewSource::default(),
             grasp: 0,
             moved_at: None,
+            opens_newest: false,
         }
+    }
+
+    /// True once, where the newest trial is still to be opened.
+    pub(super) fn takes_newest(&mut self) -> bool {
+        std::mem::take(&mut self.opens_newest) && self.wanted.is_none()
     }
 
     /// True while a trial is being opened.
@@ -331,6 +339,7 @@ impl App {
         let newest = || self.library.view.as_ref()?.found.first().map(|trial| trial.row.id);
         let simulated = self.view.source == ViewSource::Simulation;
         let wanted = self.inspect.wanted.or_else(|| newest().filter(|_| simulated));
+        self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && simulated;
         match (mode, wanted) {
             (Mode::Inspect, Some(id)) => self.show_trial(id),
             (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => {

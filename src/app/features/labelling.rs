@@ -59,7 +59,7 @@ impl App {
         labelling.worker.notices().for_each(|notice| notices.show(notice));
         // The simulation shows the next object of the plan.
         if let Some(next) = next.filter(|name| *name != self.simulation.scene.object.source) {
-            self.open(&next);
+            self.grasp_object(&next);
             self.simulation.send(Command::Pause);
         }
         if before.as_ref().map(Arc::as_ptr) != self.labelling.labels.as_ref().map(Arc::as_ptr) {

@@ -1,6 +1,7 @@
 //! The trial library in the window: its query, the selection of trials, and edits of them.
 
 use super::App;
+use super::view::Mode;
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialQuery};
@@ -181,6 +182,10 @@ impl App {
             *seen = Arc::clone(&view.found);
         }
         worker.notices().for_each(|notice| notices.show(notice));
+        let newest = view.found.first().map(|trial| trial.row.id);
+        if let Some(newest) = newest.filter(|_| self.view.mode == Mode::Inspect && self.inspect.takes_newest()) {
+            self.show_trial(newest);
+        }
     }
 
     /// Moves the keyboard to the search field, and adds text typed ahead.

@@ -199,6 +199,10 @@ impl App {
         self.use_in_simulation(is_own.then_some(&trained.model));
         // It is not learned again by itself.
         self.recognition.taught = Some(source.clone());
+        // The answer was the other model's.
+        if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
+            self.simulation.send(Command::Play);
+        }
         let ClassChange::Renamed(new) = change else { return self.notices.info(format!("Forgot \"{title}\".")) };
         self.notices.info(format!("\"{title}\" is \"{}\" now.", capital(&object_title(new))));
         if self.simulation.scene.object.source == source {

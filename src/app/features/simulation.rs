@@ -211,13 +211,18 @@ impl App {
                 Err(error) => self.notices.failed("scene", error.to_string()),
             };
         }
+        self.grasp_object(source);
+        if self.view.source == ViewSource::Gripper {
+            self.notices.info("Set in the simulation; the real gripper is shown. Click SIMULATED to see it.");
+        }
+    }
+
+    /// Grasps this object in the simulation.
+    pub(super) fn grasp_object(&mut self, source: &str) {
         let mut scene = self.simulation.scene_with(source);
         // A file that the model has learned keeps the name that it had then.
         scene.object.name = self.learned_as(&scene.object.source).map(str::to_owned);
         self.set_scene(scene);
-        if self.view.source == ViewSource::Gripper {
-            self.notices.info("Set in the simulation; the real gripper is shown. Click SIMULATED to see it.");
-        }
     }
 
     /// Grasps another built-in object, drawn at random.

@@ -6,6 +6,7 @@ use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, remark_ui, selectable_row, text_field, warning_ui, wrapped};
+use egui::text_edit::TextEditState;
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::units::{self, percent};
 use palpate_lab::workers::{
@@ -240,6 +241,13 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
     let hint = "find or name an object ( / )";
     if draft.focus_search && focus_field(ui, search_id()) {
         actions.push(|app| app.label(LabellingAction::SearchFocused));
+    }
+    // Ctrl+Z must not bring back what was typed for another trial.
+    if search.is_empty()
+        && let Some(mut state) = TextEditState::load(ui.ctx(), search_id())
+    {
+        state.clear_undoer();
+        state.store(ui.ctx(), search_id());
     }
     let field = text_field(&mut search, search_id()).hint_text(hint).char_limit(80);
     let response = ui.add(field);

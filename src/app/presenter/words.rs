@@ -63,7 +63,8 @@ fn felt(view: &IdentificationView) -> String {
         return String::new();
     }
     let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));
-    width.map_or_else(String::new, |width| format!("It feels about {:.0} mm wide.", mm(width.value)))
+    let range = width.map(|width| width.range.map(mm));
+    range.map_or_else(String::new, |[from, to]| format!("It feels {from:.0} to {to:.0} mm wide."))
 }
 
 /// What else it may be beside the class that is named, where that is worth a word.

@@ -58,7 +58,7 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
         let progress = |stage: LessonStage| {
             let (share, words) = match stage {
                 LessonStage::Simulating(done, of) => {
-                    (SIMULATING * done as f64 / of.max(1) as f64, format!("grasp {done} of {of}"))
+                    (SIMULATING * done as f64 / of.max(1) as f64, format!("{done} of {of}"))
                 }
                 LessonStage::Fitting(share) => (SIMULATING + (1.0 - SIMULATING) * share, "fitting".to_owned()),
             };

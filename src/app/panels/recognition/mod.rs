@@ -186,7 +186,9 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
         } else if let Some(learned) = learned {
             ui.horizontal_wrapped(|ui| {
                 let title = capital(&object_title(&learned.name));
-                ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(good)));
+                let is_doubtful = learned.lesson.as_ref().is_some_and(|(lesson, _)| lesson.warning().is_some());
+                let ink = if is_doubtful { theme::of(ui).colours().warning } else { good };
+                ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(ink)));
                 if let Some((lesson, seconds)) = &learned.lesson {
                     let (grasps, known) = (lesson.grasps, lesson.words());
                     ui.label(format!("from {grasps} simulated grasps in {seconds:.0}\u{a0}s: {known}."));

@@ -117,7 +117,8 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let (threshold, most) = (percent(view.rule.threshold), view.rule.most_grasps);
     let Some(now) = newest(view) else {
         let failed = "Grasp failed: no answer";
-        return if recognised.finished { failed } else { recognised.waiting }.to_owned();
+        // Early in a stored grasp nothing has failed yet.
+        return if recognised.finished && !view.listening { failed } else { recognised.waiting }.to_owned();
     };
     let p = now.top().1;
     let certain = p >= view.rule.threshold;
