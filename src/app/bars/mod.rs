@@ -40,26 +40,9 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
         // What does not fit is cut off, and does not push the buttons away.
         let (place, _) = ui.allocate_exact_size(room, egui::Sense::hover());
         let builder = egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center));
-        ui.scope_builder(builder, |ui| {
-            ui.set_clip_rect(place.intersect(ui.clip_rect()));
-            if ui.available_width() > 780.0 {
-                ui.label(RichText::new("Palpate").heading().strong());
-            }
-            modes_ui(ui, app, actions);
-            // Before what may be cut off.
-            gripper_ui(ui, app, actions);
-            sources_ui(ui, app, actions);
-            if app.view.source == ViewSource::Simulation {
-                simulated_ui(ui, app);
-            }
-            let room = ui.available_width();
-            if let Some(driver) = app.driver.as_deref().filter(|_| room > 240.0) {
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let quiet = RichText::new(driver).small().color(colour(app.view.theme.colours().quiet_text));
-                    ui.add(egui::Label::new(quiet).truncate()).on_hover_text(drawn_by(app, driver));
-                });
-            }
-        });
+        let inside = &mut ui.new_child(builder);
+        inside.set_clip_rect(place.intersect(ui.clip_rect()));
+        sources_and_modes_ui(inside, app, actions);
         let buttons = ui.scope(|ui| {
             activity_ui(ui, app, actions);
             if app.gripper_view().is_some_and(GripperView::is_connected) {
@@ -74,6 +57,27 @@ pub(super) fn top(ui: &mut Ui, app: &App, actions: &mut Actions) {
             ui.ctx().request_repaint();
         }
     });
+}
+
+/// Left part of the upper bar: modes, the real gripper, sources, the driver.
+fn sources_and_modes_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
+    if ui.available_width() > 780.0 {
+        ui.label(RichText::new("Palpate").heading().strong());
+    }
+    modes_ui(ui, app, actions);
+    // Before what may be cut off.
+    gripper_ui(ui, app, actions);
+    sources_ui(ui, app, actions);
+    if app.view.source == ViewSource::Simulation {
+        simulated_ui(ui, app);
+    }
+    let room = ui.available_width();
+    if let Some(driver) = app.driver.as_deref().filter(|_| room > 240.0) {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let quiet = RichText::new(driver).small().color(colour(app.view.theme.colours().quiet_text));
+            ui.add(egui::Label::new(quiet).truncate()).on_hover_text(drawn_by(app, driver));
+        });
+    }
 }
 
 /// Room for sources below which a trial has its number alone (points).
