@@ -150,7 +150,7 @@ impl Progress {
     /// Progress in the form of a template of `indicatif`.
     pub(super) fn new(template: &str) -> Self {
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        // Without a length, which a bar takes for the end of the work, until the work tells one.
+        // A bar of length 0 would be full.
         Self(ProgressBar::no_length().with_style(style))
     }
 
@@ -169,7 +169,7 @@ impl Progress {
         progress
     }
 
-    /// The same for work that tells its share, in percent.
+    /// The same in percent.
     pub(super) fn of_share(what: &str) -> Self {
         let progress = Self::new("{msg} {bar:40} {percent} % {eta} left");
         progress.0.set_message(what.to_owned());

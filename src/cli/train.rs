@@ -100,7 +100,7 @@ pub(super) fn run(arguments: &TrainArguments, store: Option<&Path>) -> Result<()
         model.card.metrics = serde_json::json!({ "search": rows });
     }
     let judged = arguments.split.as_ref().map(|plan| judged(method, &data, arguments, plan, &stop)).transpose();
-    // What was told to stop while it ended is stopped, too.
+    // A stop in its last moments counts, too.
     if stop.load(Ordering::Relaxed) {
         return Err(LearnError::Stopped.into());
     }

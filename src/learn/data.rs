@@ -178,6 +178,9 @@ pub struct DataCard {
     /// What grasps of different kinds were mixed without being asked for, and how to choose one kind.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mixed: Vec<String>,
+    /// True where grasps of an emulated gripper are among the recorded ones.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub emulated: bool,
     /// Version of the physics; `None` unless all simulated grasps have the same one, and where it is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub physics: Option<u32>,
@@ -211,6 +214,7 @@ impl DataCard {
         let mut parts = Vec::new();
         parts.extend(self.preset.as_ref().map(|preset| format!("preset {preset}")));
         parts.push(if self.is_recorded() { "recorded grasps".to_owned() } else { format!("object {}", self.object) });
+        parts.extend(self.emulated.then(|| "some of an emulated gripper".to_owned()));
         parts.extend(self.sensors.as_ref().map(|sensors| match self.draws {
             Some(draws) => format!("{draws} times {sensors} sensors"),
             None => format!("{sensors} sensors"),

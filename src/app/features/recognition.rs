@@ -39,8 +39,6 @@ pub(in crate::app) struct RecognitionFeature {
 pub(in crate::app) struct Learned {
     /// Its class.
     pub(in crate::app) name: String,
-    /// File that the object is from.
-    source: String,
     /// How well it is known, and the time that the lesson took (s); none where that was before.
     pub(in crate::app) lesson: Option<(Lesson, f64)>,
 }
@@ -77,6 +75,11 @@ impl RecognitionFeature {
     /// Model of the real gripper.
     pub(in crate::app) fn gripper_model(&self) -> Option<&Model> {
         self.models.of(Shipped::AnyGripper).map(Arc::as_ref)
+    }
+
+    /// Models of the simulation, for free and for fixed objects.
+    fn simulated(&self) -> impl Iterator<Item = &Arc<Model>> {
+        [false, true].into_iter().filter_map(|fixed| self.models.of(Shipped::simulated(fixed)))
     }
 
     /// Classes that the model of the simulation has learned, with their files.
@@ -153,18 +156,14 @@ impl App {
         let Some(name) = self.learned_as(source).map(str::to_owned) else {
             return self.notices.info("No learned object is in the hand.");
         };
-        self.recognition.learned = Some(Learned { name, source: source.to_owned(), lesson: None });
+        self.recognition.learned = Some(Learned { name, lesson: None });
         self.show_panel("recognition");
     }
 
     /// Changes the model of the simulation in the object of the last lesson.
     fn change_class(&mut self, change: ClassChange) {
         let Some(Learned { name, .. }) = &self.recognition.learned else { return };
-        let kind = Shipped::simulated(self.simulation.scene.holds_object());
-        let models =
-            [kind, Shipped::simulated(kind == Shipped::simulated(false))].map(|kind| self.recognition.models.of(kind));
-        let knows = |model: &&Arc<Model>| model.card.taught.contains(name);
-        let Some(model) = models.into_iter().flatten().find(knows) else { return };
+        let Some(model) = self.recognition.simulated().find(|model| model.card.taught.contains(name)) else { return };
         let request = TeachRequest { model: Arc::clone(model), name: name.clone(), object: None, change };
         self.tools.teaching.start(request);
     }
@@ -177,8 +176,7 @@ impl App {
     /// Gives the object of the last lesson another name.
     pub(in crate::app) fn rename_learned(&mut self, name: &str) {
         let Some(learned) = &self.recognition.learned else { return };
-        let models = [false, true].map(|fixed| self.recognition.models.of(Shipped::simulated(fixed)));
-        let is_taken = |name: &str| models.iter().flatten().any(|model| model.card.labels.class(name).is_some());
+        let is_taken = |name: &str| self.recognition.simulated().any(|model| model.card.labels.class(name).is_some());
         let name = match class_name(name) {
             Ok(name) if name == learned.name => return,
             Ok(name) if !is_taken(&name) => name,
@@ -189,12 +187,16 @@ impl App {
         self.change_class(ClassChange::Renamed(name));
     }
 
-    /// Takes in a model in which the object of the last lesson has another name, or is forgotten.
-    fn take_changed(&mut self, trained: &TrainedModel, change: &ClassChange) {
-        let Some(Learned { name, source, .. }) = self.recognition.learned.take() else { return };
-        let title = capital(&object_title(&name));
-        // Without a learned object it is the shipped model again.
-        let is_own = !trained.model.card.taught.is_empty();
+    /// Takes in a model in which a learned object has another name, or is forgotten.
+    fn take_changed(&mut self, trained: &TrainedModel, TeachRequest { model, name, change, .. }: &TeachRequest) {
+        self.recognition.learned = None;
+        let source = model.card.taught_from.get(name).map_or_else(String::new, |(_, file)| file.clone());
+        let title = capital(&object_title(name));
+        // A shipped model without a learned object is the shipped one again.
+        let card = &trained.model.card;
+        let shipped = [false, true].map(|fixed| self.recognition.shipped.of(Shipped::simulated(fixed)));
+        let was_shipped = shipped.iter().flatten().any(|own| own.card.data.collections == card.data.collections);
+        let is_own = !card.taught.is_empty() || !was_shipped;
         self.view.simulation_model = is_own.then(|| trained.path.clone());
         self.use_in_simulation(is_own.then_some(&trained.model));
         // It is not learned again by itself.
@@ -298,15 +300,14 @@ impl App {
             Ok(lesson) if simulated.iter().any(is_current) => {
                 let FinishedLesson { trained, lesson } = &*lesson;
                 if let ClassChange::Renamed(_) | ClassChange::Forgotten = command.change {
-                    return self.take_changed(trained, &command.change);
+                    return self.take_changed(trained, &command);
                 }
                 self.view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
                 self.notices.info(format!("Learned \"{}\".", capital(&object_title(&command.name))));
                 let seconds = self.recognition.asked.elapsed().as_secs_f64();
-                self.recognition.learned = command.object.as_ref().map(|object| Learned {
+                self.recognition.learned = command.object.as_ref().map(|_| Learned {
                     name: command.name.clone(),
-                    source: object.source.clone(),
                     lesson: lesson.clone().map(|lesson| (lesson, seconds)),
                 });
                 // What was decided without the new class is tried again.

@@ -91,7 +91,7 @@ impl StudyOutput {
 /// Progress of a study.
 pub(super) const BAR: &str = "{msg} {bar:40} {pos}/{len} {eta} left";
 
-/// The result of a study; none of a part, which is said. Fails where it was stopped, with what is `kept` of it beside the part.
+/// The result of a whole study; of a part none, and a note. Fails where it was stopped; the error ends with what is `kept`.
 pub(super) fn whole<R>(
     key: &str,
     part: &Path,

@@ -44,9 +44,8 @@ pub(super) fn card(
     note(presets.iter().map(named).collect(), query.preset.is_some(), "pose presets", "--preset");
     note(fixed.iter().map(support).collect(), false, "kinds of support", "--collection");
     note(physics.iter().map(version).collect(), query.physics.is_some(), "versions of the physics", "--physics");
-    let recorded: Vec<bool> =
-        rows.iter().filter(|row| row.source == TrialSource::Recorded).map(|row| row.emulated).collect();
-    let kinds: BTreeSet<&str> = recorded.iter().map(|emulated| if *emulated { "emulated" } else { "real" }).collect();
+    let recorded = rows.iter().filter(|row| row.source == TrialSource::Recorded);
+    let kinds: BTreeSet<&str> = recorded.map(|row| if row.emulated { "emulated" } else { "real" }).collect();
     note(kinds.iter().map(|kind| (*kind).to_owned()).collect(), false, "kinds of gripper", "--store");
     let calibrated = calibrations.iter().map(ids).collect();
     note(calibrated, !query.calibrations.is_empty(), "sets of calibrations", "--calibration");
@@ -76,13 +75,8 @@ pub(super) fn card(
         cut: (view.cut != Cut::default()).then(|| view.cut.to_string()),
         left_out: left_out_for.values().sum(),
         left_out_for,
-        query: match kinds.contains("emulated") {
-            true => {
-                let asked = if asked.is_empty() { "all trials" } else { asked };
-                format!("{asked}, with grasps of an emulated gripper")
-            }
-            false => asked.to_owned(),
-        },
+        query: asked.to_owned(),
+        emulated: kinds.contains("emulated"),
         mixed,
         physics: physics.first().copied().flatten().filter(|_| physics.len() == 1),
         calibrations: calibrations.into_iter().flatten().copied().collect::<BTreeSet<i64>>().into_iter().collect(),

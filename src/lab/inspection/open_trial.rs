@@ -120,9 +120,8 @@ pub struct Instant<'a> {
 impl OpenTrial {
     /// The pads of a simulated grasp do not touch the object at the end of its hold.
     pub fn nothing_held(&self) -> bool {
-        let stage = self.stage.as_ref().filter(|_| self.simulated.is_some() && self.header.object != EMPTY);
-        let end = self.frames.iter().rev().find(|frame| frame.phase == Phase::Hold);
-        stage.zip(end).is_some_and(|(stage, frame)| stage.force_on_object(frame).is_none())
+        let end = self.frames.iter().rfind(|frame| frame.phase == Phase::Hold && frame.world_from_object.is_some());
+        self.stage.as_ref().zip(end).is_some_and(|(stage, frame)| stage.force_on_object(frame).is_none())
     }
 
     /// Opens a trial of any source. The recogniser answers as it did live, from the samples alone.

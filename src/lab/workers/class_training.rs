@@ -30,7 +30,7 @@ pub struct TeachRequest {
     pub change: ClassChange,
 }
 
-/// What is to become of an object that a model learns, or has learned.
+/// Change of a class of a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ClassChange {
     /// It is learned from simulated grasps.
