@@ -344,7 +344,11 @@ impl<'a> DisplayedData<'a> {
                 off: gripper.recognition_off.as_deref(),
                 truth: None,
                 nothing_held: false,
-                waiting: if gripper.trial.is_some() { "Fingers closing" } else { "Press R to start a grasp" },
+                waiting: match &gripper.trial {
+                    Some(_) => "Fingers closing",
+                    None if !gripper.remarks.is_empty() => "Sensors not calibrated: first Adapt (panel Gripper)",
+                    None => "Press R to start a grasp",
+                },
                 again: "press R to grasp again",
                 finished: false,
             }),

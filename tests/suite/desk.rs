@@ -298,6 +298,22 @@ fn a_board_that_leaves_gives_back_where_grasps_are_recorded() {
 }
 
 #[test]
+fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_moves() {
+    let listen = emulated(&parts(1, false), None, TRUE_TO_TIME, 30);
+    let setup = BenchSetup { listen, size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let mut desk = Bench::new(setup, CpuRenderer::default());
+    desk.tell(|app| app.set_mode(Mode::Label));
+    desk.press_with(Modifiers::COMMAND, Key::G);
+    for text in ["EMULATED GRIPPER 50 Hz", "not calibrated: raw counts"] {
+        desk.until_shown(true, text);
+    }
+    desk.press(Key::R);
+    desk.until_shown(true, "Recording: the emulated hand moves by itself");
+    desk.press(Key::Escape);
+    desk.until_told("The emulated hand stays open until it is driven");
+}
+
+#[test]
 fn adapting_shows_the_empty_hand_and_asks_for_one() {
     let mut desk = desk_at(emulated(&parts(1, false), None, TRUE_TO_TIME, 30));
     desk.press_with(Modifiers::COMMAND, Key::G);

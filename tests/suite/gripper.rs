@@ -306,7 +306,11 @@ fn what_is_held_is_recognised_from_calibrated_sensors_grasp_by_grasp() {
     desk.connect();
     desk.trial(Control::Driven, true);
     let view = desk.until(|view| view.recognition_off.is_some());
-    assert!(view.recognition_off.as_deref().unwrap().contains("it needs curvature_left"), "{:?}", view.recognition_off);
+    assert!(
+        view.recognition_off.as_deref().unwrap().contains("the sensors are not calibrated"),
+        "{:?}",
+        view.recognition_off
+    );
     desk.command(GripperCommand::Disconnect);
     desk.until(|view| !view.is_connected());
     store_calibrations(&desk.store, &parts);

@@ -190,10 +190,11 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     if let Some(link) = link {
         let cadence = &link.cadence;
         let listening = link.state == LinkState::Listening;
+        let gripper = if link.board.emulated { "EMULATED GRIPPER" } else { "REAL GRIPPER" };
         let text = match (listening, cadence.troubled) {
-            (true, true) => format!("REAL GRIPPER {:.0} Hz: many unreadable lines", cadence.rate_hz),
-            (true, false) => format!("REAL GRIPPER {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
-            (false, _) => "REAL GRIPPER: no readings".to_owned(),
+            (true, true) => format!("{gripper} {:.0} Hz: many unreadable lines", cadence.rate_hz),
+            (true, false) => format!("{gripper} {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
+            (false, _) => format!("{gripper}: no readings"),
         };
         let remarks = [link.line_remarks(), link.wiring_remarks()].concat();
         let about = format!("{}: {}", link.port.path.display(), link.state.sentence());

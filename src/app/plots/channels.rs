@@ -2,22 +2,34 @@
 
 use super::PlotCurve;
 use crate::app::shown::DisplayedData;
+use crate::app::traces::GraspTrace;
 use palpate_geometry::palette::Trace;
 use palpate_lab::grasping::band_half_width;
 use palpate_tactile::board::Board;
 use palpate_tactile::{Channel, Quantity, unit_of_channel};
 
 /// Curves of all channels of a quantity (of a pressure also the contact pressure), their values multiplied by `factor`, and
-/// their unit; or the raw counts of their sensors, where those are chosen.
+/// their unit; or the raw counts of their sensors, where those are chosen or are all that was read.
 pub(in crate::app) fn channel_curves<'a>(
     data: &DisplayedData<'_>,
     quantity: Quantity,
     (factor, unit): (f64, &'a str),
 ) -> (Vec<PlotCurve>, &'a str) {
-    match data.board().filter(|_| data.view.raw) {
-        Some(board) => (raw_curves(data, board, quantity), "counts"),
-        None => (physical_curves(data, quantity, factor), unit),
+    let physical = physical_curves(data, quantity, factor);
+    let nothing = || data.traces.current().is_some_and(|trace| is_empty(trace, &physical));
+    match data.board().filter(|_| data.view.raw || nothing()) {
+        Some(board) => (raw_curves(data, board, quantity), COUNTS),
+        None => (physical, unit),
     }
+}
+
+/// Unit of raw readings.
+pub(super) const COUNTS: &str = "counts";
+
+/// No curve has a number in a trace that is more than a beginning.
+pub(super) fn is_empty(trace: &GraspTrace, curves: &[PlotCurve]) -> bool {
+    let number = |k: usize| curves.iter().any(|curve| (curve.values)(trace, k).is_some_and(f64::is_finite));
+    trace.t.len() > 5 && !(0..trace.t.len()).any(number)
 }
 
 /// Curves of the counts of the sensors that measure a quantity.

@@ -3,17 +3,18 @@
 use crate::app::actions::Actions;
 use crate::app::features::view::{Derivation, ViewSource};
 use crate::app::shown::DisplayedData;
+use crate::app::widgets::adapt_button;
 use egui::Ui;
 use palpate_lab::inspection::FigureOptions;
 use palpate_sim::objects::object_title;
 
-/// Choice of derived curves, and the times of cursor and marks.
+/// Choice of derived curves, and the times of cursor and marks; `uncalibrated` where raw counts stand in for values.
 pub(super) fn ui(
     ui: &mut Ui,
     data: &DisplayedData<'_>,
     actions: &mut Actions,
     (id, plotted): (&str, &[&str]),
-    derived: Derivation,
+    (derived, uncalibrated): (Derivation, bool),
 ) {
     ui.horizontal(|ui| {
         let combo = egui::ComboBox::from_id_salt((id, "derived")).width(96.0);
@@ -26,7 +27,14 @@ pub(super) fn ui(
             }
         });
         shown.response.on_hover_text("Values, sum or difference of both fingers, or change over time");
-        if data.board().is_some() && id != "counts" && id != "line pressure" {
+        if uncalibrated {
+            let text = egui::RichText::new("not calibrated: raw counts").small().color(ui.visuals().warn_fg_color);
+            let about = "Adapt (closes the empty hand once), or calibrate with reference weights and angles";
+            ui.label(text).on_hover_text(about);
+            if data.source == ViewSource::Gripper {
+                adapt_button(ui, data.gripper, data.view.control, actions);
+            }
+        } else if data.board().is_some() && id != "counts" && id != "line pressure" {
             let mut raw = data.view.raw;
             if ui.checkbox(&mut raw, egui::RichText::new("raw counts").small()).changed() {
                 actions.push(move |app| app.view.raw = raw);
@@ -48,7 +56,7 @@ pub(super) fn ui(
             let hint = "Export this plot as SVG or PNG, with the trials compared and a caption (Ctrl+E: all plots)";
             if ui.small_button("Export").on_hover_text(hint).clicked() {
                 let channel = if id == "line pressure" { "line" } else { id };
-                let raw = id == "counts" || data.view.raw;
+                let raw = id == "counts" || data.view.raw || uncalibrated;
                 let channels = if raw { Vec::new() } else { vec![channel.to_owned()] };
                 let options = FigureOptions { channels, raw, ..FigureOptions::default() };
                 actions.push(|app| app.export_figure(options));

@@ -11,7 +11,7 @@ pub(super) const WIDTH: f32 = 144.0;
 /// Length of the piece of a curve's line before its name (points).
 const SAMPLE: f32 = 14.0;
 /// Distance between two lines (points).
-const LINE: f32 = 14.0;
+pub(super) const LINE: f32 = 14.0;
 
 /// Name of a curve, and its values.
 pub(super) struct CurveLabel<'a> {

@@ -10,6 +10,7 @@ mod layers;
 mod mouse;
 
 pub(super) use axes::{static_plot, value_marks};
+use channels::COUNTS;
 pub(super) use channels::{channel_curves, colour_of, shows};
 
 use crate::app::actions::Actions;
@@ -18,7 +19,6 @@ use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
-use crate::app::widgets::adapt_button;
 use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;
@@ -69,10 +69,12 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let [from, to] = data.view.time_window.filter(fits).unwrap_or(span);
     let theme = data.view.theme;
     let derived = data.view.derived.get(plot.id).copied().unwrap_or_default();
-    if ui.available_height() > ROOM_FOR_HEADER && ui.available_width() > ROOM_FOR_LABELS {
+    let uncalibrated = plot.unit == COUNTS && plot.id != COUNTS && !data.view.raw;
+    let has_header = ui.available_height() > ROOM_FOR_HEADER && ui.available_width() > ROOM_FOR_LABELS;
+    if has_header {
         let channels = plot.curves.iter().filter_map(|curve| Some(curve.channel.as_ref()?.0.as_str()));
         let plotted: Vec<&str> = channels.collect();
-        header::ui(ui, data, actions, (plot.id, &plotted), derived);
+        header::ui(ui, data, actions, (plot.id, &plotted), (derived, uncalibrated));
     }
     let unit = derived.unit(plot.unit);
     let least = if derived == Derivation::Values { plot.least } else { [0.0, 0.0] };
@@ -140,7 +142,12 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let shade = veil(theme.colours().error, 0.55);
     gaps.iter().for_each(|gap| layers::hatch(ui, &response.transform, *gap, shade));
     if labelled {
-        let frame = *response.transform.frame();
+        let mut frame = *response.transform.frame();
+        if uncalibrated && !has_header {
+            let (font, corner) = (egui::FontId::proportional(11.0), frame.right_bottom() + egui::vec2(6.0, 0.0));
+            ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, "not calibrated", font, ui.visuals().warn_fg_color);
+            frame.max.y -= labels::LINE;
+        }
         labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(data, &plot, &response.transform));
     }
     if let Some(why) = nothing {
@@ -148,18 +155,10 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         let ink = colour(theme.colours().quiet_text);
         let galley =
             ui.painter().layout(why.to_owned(), egui::FontId::proportional(13.0), ink, (rect.width() - 60.0).max(60.0));
-        let adapts = why == NOT_CALIBRATED && data.source == ViewSource::Gripper;
-        let above = if adapts { 18.0 } else { 0.0 };
-        let corner = rect.center() - 0.5 * galley.size() - egui::vec2(0.0, above);
-        let below = corner.y + galley.size().y + 8.0;
+        let corner = rect.center() - 0.5 * galley.size();
         let ground = egui::Rect::from_min_size(corner, galley.size()).expand(6.0);
         ui.painter().rect_filled(ground, 3.0, ui.visuals().panel_fill);
         ui.painter().galley(corner, galley, ink);
-        if adapts {
-            let place = egui::Rect::from_center_size(egui::pos2(rect.center().x, below + 13.0), egui::vec2(80.0, 26.0));
-            let mut own = ui.new_child(egui::UiBuilder::new().id_salt((plot.id, "adapt")).max_rect(place));
-            adapt_button(&mut own, data.gripper, data.view.control, actions);
-        }
     }
     response
         .response
@@ -204,9 +203,6 @@ fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &P
     own.chain(others).collect()
 }
 
-const NOT_CALIBRATED: &str =
-    "Sensors not calibrated. Adapt (closes the empty hand once) or calibrate with reference weights and angles.";
-
 /// Text where a connected gripper gives no curve to draw.
 fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'static str> {
     let real = match data.source {
@@ -218,12 +214,10 @@ fn nothing_read(data: &DisplayedData<'_>, plot: &TimePlot<'_>) -> Option<&'stati
     if plot.curves.is_empty() {
         return Some("The gripper has no such sensors; those that it has may be in the panel Other channels.");
     }
-    let number = |k: usize| plot.curves.iter().any(|c| (c.values)(trace, k).is_some_and(f64::is_finite));
-    let nothing = trace.t.len() > 5 && !(0..trace.t.len()).any(number);
-    nothing.then_some(if plot.id == "line pressure" {
+    channels::is_empty(trace, &plot.curves).then_some(if plot.id == "line pressure" {
         "The board does not report line pressure."
     } else {
-        NOT_CALIBRATED
+        "The board sends no numbers of these sensors."
     })
 }
 
@@ -233,9 +227,13 @@ const TIMES: f32 = 20.0;
 /// Least share of the height that names have.
 const LEAST_SHARE: f32 = 0.165;
 
+/// Least range of raw counts, so that noise does not fill a plot.
+const LEAST_COUNTS: f64 = 100.0;
+
 /// Range of the curves within the time shown, with a margin, and at least the plot's least range; in a plot so high (points).
 fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 2], height: f32) -> [f64; 2] {
-    let [mut low, mut high] = plot.least;
+    // Counts have no natural zero.
+    let [mut low, mut high] = if plot.unit == COUNTS { [f64::INFINITY, f64::NEG_INFINITY] } else { plot.least };
     let compared = data.comparison.traces.iter().map(|compared| &compared.trace);
     for trace in data.traces.earlier().chain(data.traces.current()).chain(compared) {
         for (k, _) in trace.t.iter().enumerate().filter(|(_, t)| (from..=to).contains(*t)) {
@@ -244,6 +242,9 @@ fn value_range(data: &DisplayedData<'_>, plot: &TimePlot<'_>, [from, to]: [f64; 
                 high = high.max(value);
             }
         }
+    }
+    if plot.unit == COUNTS && high - low < LEAST_COUNTS {
+        [low, high] = [0.5 * (low + high - LEAST_COUNTS), 0.5 * (low + high + LEAST_COUNTS)];
     }
     if low >= high {
         [low, high] = if low.is_finite() { [low - 0.5, high + 0.5] } else { [0.0, 1.0] };

@@ -22,7 +22,7 @@ pub(super) struct Filters {
     unlabelled: bool,
     #[command(flatten)]
     origin: OriginFilters,
-    /// With this flag: no-contact, saturated, interrupted, cadence, sensor-fault or duplicate.
+    /// With this flag: no-contact, late-start, saturated, interrupted, cadence, sensor-fault or duplicate.
     #[arg(long, value_name = "FLAG")]
     flag: Option<Flag>,
     /// Place: store or demo-log.

@@ -4,6 +4,7 @@
 //! | flag | raised when |
 //! |---|---|
 //! | no contact | no pad was loaded while the hand closed and held |
+//! | late start | the line had pressure, or a pad was loaded, before the grasp was seen to begin |
 //! | saturated | a channel was at an end of its range for more than 2 % of that time |
 //! | interrupted | the connection broke, readings are missing for over 0.1 s, or a sensor is missing in most readings |
 //! | cadence | readings were lost, the rate is off by more than 2 %, or the jitter is above half a period |
@@ -58,8 +59,10 @@ pub struct Observed<'a> {
 
 /// Faults of a trial, as flags.
 pub fn flags_of(trial: &Observed<'_>) -> Vec<FlagRemark> {
+    let late_start = trial.late_start();
     let raised = [
-        (Flag::NoContact, trial.no_contact()),
+        (Flag::NoContact, trial.no_contact().filter(|_| late_start.is_none())),
+        (Flag::LateStart, late_start),
         (Flag::Saturated, trial.saturated()),
         (Flag::Interrupted, trial.interrupted()),
         (Flag::Cadence, trial.bad_cadence()),
@@ -107,6 +110,34 @@ impl Observed<'_> {
         Some(format!("{} (needs {})", each.join(", "), least.join(" and ")))
     }
 
+    /// Remark for a trial that began while the hand was closed; its sensors have no rest to be zeroed at.
+    fn late_start(&self) -> Option<String> {
+        const ADVICE: &str = "when the recording began: begin with open fingers";
+        let (rest, pressed) = self.split();
+        let before = rest.last().or(pressed.first())?;
+        if let Some(bar) = before.line_bar {
+            let told = || format!("the line was at {bar:.2} bar {ADVICE}");
+            return (bar >= PRESSURE_STEP_BAR).then(told);
+        }
+        let pads = self.board.sensors.of_kind(SensorKind::Pad);
+        let loaded = |pad: Sensor| {
+            let column = self.board.channel_of(pad)?;
+            let counts = |reading: &Reading| reading.counts.get(column).copied().flatten().map(f64::from);
+            let (first, _) = middle_and_deviation(rest.iter().filter_map(counts).collect())?;
+            let later = self.readings[rest.len()..].iter().map(counts);
+            let open = -lasting_peak(later.map(|count| count.map(|count| -count)))?;
+            let is_loaded = first - open > self.least_counts(pad);
+            is_loaded.then(|| format!("{} was loaded ({first:.0} counts, later {open:.0}) {ADVICE}", pad.label()))
+        };
+        pads.into_iter().find_map(loaded)
+    }
+
+    /// Counts of an uncalibrated pad at the smallest force that counts as contact.
+    fn least_counts(&self, pad: Sensor) -> f64 {
+        let nominal = PadPart::NOMINAL_SIEMENS * BENT_FORCE.powf(PadPart::NOMINAL_EXPONENT);
+        Input::on(self.board, pad).counts(1.0 / nominal)
+    }
+
     /// Rise of a pad: in newtons if it is calibrated, otherwise in counts.
     fn rise(&self, pad: Sensor, rest: &[Reading], pressed: &[Reading]) -> Option<PadRise> {
         let column = self.board.channel_of(pad)?;
@@ -120,9 +151,8 @@ impl Observed<'_> {
         let counts = |reading: &Reading| reading.counts.get(column).copied().flatten().map(f64::from);
         let (middle, deviation) = middle_and_deviation(rest.iter().filter_map(counts).collect())?;
         let peak = lasting_peak(pressed.iter().map(counts))?;
-        let nominal = PadPart::NOMINAL_SIEMENS * BENT_FORCE.powf(PadPart::NOMINAL_EXPONENT);
-        let least = Input::on(self.board, pad).counts(1.0 / nominal);
-        Some(PadRise { pad, rise: peak - middle, least: (DEVIATIONS * deviation).max(least), unit: "counts" })
+        let least = (DEVIATIONS * deviation).max(self.least_counts(pad));
+        Some(PadRise { pad, rise: peak - middle, least, unit: "counts" })
     }
 
     fn saturated(&self) -> Option<String> {
@@ -310,6 +340,25 @@ mod tests {
             assert_eq!(flaws(found.clone(), Some("lemon")), found);
             assert_eq!(flaws(found, Some(EMPTY)), []);
         }
+    }
+
+    #[test]
+    fn a_hand_that_was_closed_before_is_not_blamed_for_missing() {
+        // Pressed from the beginning until the release.
+        let mut closed = readings(0.0);
+        closed[..125].iter_mut().for_each(|reading| reading.counts[3] = Some(1500.0));
+        let of = |readings: &[Reading]| flags(readings, &[], &[], &good());
+        let found = of(&closed);
+        assert_eq!(found.iter().map(|found| found.flag).collect::<Vec<_>>(), [Flag::LateStart]);
+        assert!(found[0].remark.starts_with("right pad was loaded (1500 counts, later 2)"), "{found:?}");
+        // The line pressure says it where it is read.
+        closed.iter_mut().for_each(|reading| reading.line_bar = Some(if reading.t_s < 2.5 { 0.8 } else { 0.0 }));
+        assert!(of(&closed)[0].remark.starts_with("the line was at 0.80 bar"), "{:?}", of(&closed));
+        // A grasp from rest is none, with or without line pressure.
+        let mut open = readings(1500.0);
+        assert_eq!(of(&open), []);
+        open.iter_mut().for_each(|r| r.line_bar = Some(if (0.5..2.5).contains(&r.t_s) { 1.0 } else { 0.0 }));
+        assert_eq!(of(&open), []);
     }
 
     #[test]

@@ -369,6 +369,26 @@ impl Segmenter {
     }
 }
 
+/// Phases of the first grasp in readings that holds its beginning, as measured: closing, the last hold before the release,
+/// and release. Empty where no grasp begins.
+pub fn measured_phases(board: &Board, readings: &[Reading]) -> Vec<PhaseMark> {
+    let mut segmenter = Segmenter::new(board);
+    let mut marks: Vec<PhaseMark> = Vec::new();
+    for event in readings.iter().flat_map(|reading| segmenter.push(reading)) {
+        match event {
+            SegmentEvent::Began { .. } => {}
+            SegmentEvent::Ended { .. } => break,
+            // Fingers may pause while they close.
+            SegmentEvent::Phase(mark) if mark.phase == Phase::Close && !marks.is_empty() => {}
+            SegmentEvent::Phase(mark) => {
+                marks.retain(|earlier| earlier.phase != mark.phase);
+                marks.push(PhaseMark { line_bar: None, ..mark });
+            }
+        }
+    }
+    marks
+}
+
 impl Gathering {
     fn tick(&self) -> Tick {
         let mean = |(sum, n): (f64, u32)| (n > 0).then(|| sum / f64::from(n));

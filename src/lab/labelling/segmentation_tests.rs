@@ -88,6 +88,36 @@ fn grasps_are_found_at_any_rate_by_the_strips_alone() {
 }
 
 #[test]
+fn the_phases_of_the_first_whole_grasp_are_measured() {
+    let board = Board::default();
+    let times = |readings: &[Reading]| -> Vec<(Phase, f64)> {
+        let marks = measured_phases(&board, readings);
+        // No pressure was commanded.
+        assert!(marks.iter().all(|mark| mark.line_bar.is_none()));
+        marks.iter().map(|mark| (mark.phase, mark.from_s)).collect()
+    };
+    let near = |found: &[(Phase, f64)], want: [f64; 3]| {
+        let phases: Vec<Phase> = found.iter().map(|(phase, _)| *phase).collect();
+        assert_eq!(phases, [Phase::Close, Phase::Hold, Phase::Release]);
+        assert!(found.iter().zip(want).all(|((_, t), want)| (t - want).abs() < 0.35), "{found:?}");
+    };
+    let mut readings = stream(50.0, 12.0, &[2.0, 7.0], 600.0);
+    near(&times(&readings), [2.0, 4.0, 5.0]);
+    assert_eq!(times(&stream(50.0, 12.0, &[], 600.0)), []);
+    // The line pressure decides where it is read: two steps with a pause, a hold, and a release.
+    let bar = |t: f64| match t {
+        t if !(2.5..6.0).contains(&t) => 0.0,
+        t if t < 3.5 => 0.4,
+        _ => 0.8,
+    };
+    readings.iter_mut().for_each(|reading| reading.line_bar = Some(bar(reading.t_s)));
+    near(&times(&readings), [2.5, 3.5, 6.0]);
+    // A grasp whose beginning is missing is not taken for one.
+    let later: Vec<Reading> = readings.iter().filter(|reading| reading.t_s > 3.0).cloned().collect();
+    assert_eq!(times(&later), []);
+}
+
+#[test]
 fn a_beginning_is_told_in_time_for_its_pre_roll() {
     let mut segmenter = Segmenter::new(&Board::default());
     for reading in stream(50.0, 10.0, &[3.0], 300.0) {

@@ -65,6 +65,7 @@ impl BoardTrialRecording {
             seconds: plan.total_s(),
             status: gripper.stream().status(),
             began_s,
+            prompted: request.control == Control::ByHand,
         });
         let mut recording = Self {
             request,

@@ -1,7 +1,7 @@
 //! Writer of a trial of the real gripper: pending data, and statistics for its header.
 
 use crate::grasping::PressureFault;
-use crate::labelling::{Observed, decimated, flags_of, sparkline};
+use crate::labelling::{Observed, decimated, flags_of, measured_phases, sparkline};
 use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::LinkStatus;
 use palpate_sim::scene::Scene;
@@ -31,6 +31,8 @@ pub struct BoardTrialPlan {
     pub status: LinkStatus,
     /// First reading (s, on the clock of the readings).
     pub began_s: f64,
+    /// Its phases are what a person was told to do: those measured replace them, where there are any.
+    pub prompted: bool,
 }
 
 /// A recorded trial of the real gripper.
@@ -49,6 +51,7 @@ pub struct RecordedTrial {
 pub(super) struct BoardWriter {
     id: TrialId,
     about: BoardInfo,
+    prompted: bool,
     chunk: BoardChunk,
     samples: u64,
     /// Number of these that are written.
@@ -81,6 +84,7 @@ impl BoardWriter {
         Ok(Self {
             id: store.begin_board(&TrialHeader::new(&plan.object, plan.scene.clone()), &about)?,
             about,
+            prompted: plan.prompted,
             chunk: BoardChunk::default(),
             samples: 0,
             written: 0,
@@ -186,13 +190,19 @@ impl BoardWriter {
         self.chunk.gaps.push(gap);
     }
 
-    /// Flags and sparkline of the stored trial. Without calibrations the flags are derived from raw counts.
+    /// Phases, flags and sparkline of the stored trial. Without calibrations the flags are derived from raw counts.
     fn judge(&mut self, store: &Store) -> Result<(), StoreError> {
         let Some(trial) = store.board_log(self.id)? else { return Ok(()) };
         let serving = store.calibrations().serving(Some(self.id), &[]).unwrap_or_else(|error| {
             tracing::warn!("trial {} is flagged without calibrations: {error}", self.id);
             Serving::default()
         });
+        if self.prompted {
+            let measured = measured_phases(&self.about.course.board, &trial.readings);
+            if !measured.is_empty() {
+                self.about.course.phases = measured;
+            }
+        }
         let readings = decimated(&trial.readings);
         self.about.flags = flags_of(&Observed {
             board: &self.about.course.board,

@@ -42,7 +42,14 @@ fn replayed(path: &Path) -> Result<SerialLink, PortError> {
 
 fn plan(link: &SerialLink, object: &str) -> BoardTrialPlan {
     let scene = Scene::default();
-    BoardTrialPlan { object: object.to_owned(), scene, seconds: Some(8.0), status: link.status(), began_s: 0.0 }
+    BoardTrialPlan {
+        object: object.to_owned(),
+        scene,
+        seconds: Some(8.0),
+        status: link.status(),
+        began_s: 0.0,
+        prompted: false,
+    }
 }
 
 /// Records a capture as fast as it can be played.

@@ -79,20 +79,20 @@ impl LiveRecognition {
     }
 
     /// Begins a grasp whose rows have these channels in these columns. Returns once per scene the
-    /// reason why nothing is recognised; `place` names the scene or gripper in it.
+    /// reason why nothing is recognised: the channels that the model misses, or `cause` in their place where it is known.
     pub(super) fn begin_grasp(
         &mut self,
         columns: impl IntoIterator<Item = (usize, String)>,
-        place: &str,
+        cause: Option<&str>,
     ) -> Option<String> {
         let begun = self.identification.begin_grasp(columns);
         self.compared = false;
         self.refresh();
-        let Err(cause) = begun else {
+        let Err(missing) = begun else {
             self.off = None;
             return None;
         };
-        let text = format!("no recognition {place}: {cause}");
+        let text = format!("no recognition: {}", cause.map_or_else(|| missing.to_string(), str::to_owned));
         self.off = Some(Arc::from(text.as_str()));
         (!std::mem::replace(&mut self.warned, true)).then_some(text)
     }

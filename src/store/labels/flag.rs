@@ -12,6 +12,8 @@ use std::str::FromStr;
 pub enum Flag {
     /// No sensor was touched.
     NoContact,
+    /// The fingers were closed already when the recording began.
+    LateStart,
     /// A sensor saturated.
     Saturated,
     /// Readings are missing.
@@ -26,13 +28,21 @@ pub enum Flag {
 
 impl Flag {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::NoContact, Self::Saturated, Self::Interrupted, Self::Cadence, Self::SensorFault, Self::Duplicate];
+    pub const ALL: [Self; 7] = [
+        Self::NoContact,
+        Self::LateStart,
+        Self::Saturated,
+        Self::Interrupted,
+        Self::Cadence,
+        Self::SensorFault,
+        Self::Duplicate,
+    ];
 
     /// Name on screen.
     pub fn label(self) -> &'static str {
         match self {
             Self::NoContact => "no contact",
+            Self::LateStart => "late start",
             Self::Saturated => "saturated",
             Self::Interrupted => "interrupted",
             Self::Cadence => "cadence",

@@ -113,6 +113,8 @@ pub struct TrialView {
     pub automatic: bool,
     /// A close of the empty hand, to adapt to.
     pub adapting: bool,
+    /// The gripper is emulated: nobody raises its pressure by hand.
+    pub emulated: bool,
 }
 
 impl TrialView {

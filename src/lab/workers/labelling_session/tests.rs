@@ -33,6 +33,7 @@ fn running(id: TrialId) -> GripperView {
         samples: 0,
         automatic: false,
         adapting: false,
+        emulated: false,
     };
     GripperView { trial: Some(trial), ..GripperView::default() }
 }

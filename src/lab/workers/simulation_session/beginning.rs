@@ -110,7 +110,7 @@ impl Session {
             }
         }
         if let Some(warning) = self.recognition.as_mut().and_then(|recognition| {
-            recognition.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), "in this scene")
+            recognition.begin_grasp(reader.channels().iter().map(Channel::name).enumerate(), None)
         }) {
             self.publisher.notify(Notice::Warning(warning));
         }

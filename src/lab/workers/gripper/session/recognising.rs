@@ -36,11 +36,12 @@ impl GripperSession {
         if self.adapting {
             return;
         }
-        let place = "on the gripper, whose sensors are not calibrated (Adapt in the Gripper panel does it)";
         let calibrated = connection.readout.channels();
+        let all = self.channels.iter().all(|channel| calibrated.contains(channel));
+        let cause = (!all).then_some("the sensors are not calibrated (Adapt in the Gripper panel does it)");
         let columns = self.channels.iter().enumerate().filter(|(_, channel)| calibrated.contains(channel));
         let columns = columns.map(|(place, channel)| (place, channel.name()));
-        if let Some(warning) = recognition.begin_grasp(columns, place) {
+        if let Some(warning) = recognition.begin_grasp(columns, cause) {
             self.publisher.notify(Notice::Warning(warning));
         }
     }

@@ -59,6 +59,9 @@ impl GripperSession {
             Ok(()) if connection.board.firmware.is_none() => self.publisher.notify(Notice::Warning(
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
+            Ok(()) if connection.board.emulated => self.publisher.notify(Notice::Warning(
+                "Vent sent. The emulated hand stays open until it is driven: actuation \"board\" (M).".to_owned(),
+            )),
             Ok(()) => self.publisher.notify(Notice::Warning("Vent sent.".to_owned())),
         }
         if let (Some(_), Some(recorder)) = (&self.recording, &self.recorder) {
@@ -244,6 +247,7 @@ impl GripperSession {
             samples: recording.samples,
             automatic: recording.automatic,
             adapting: self.adapting,
+            emulated: self.connection.as_ref().is_some_and(|connection| connection.board.emulated),
         }
     }
 }
