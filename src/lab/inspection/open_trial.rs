@@ -3,6 +3,7 @@
 use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, onset, phases_of_frames};
 use crate::datasets::{SensorView, noise_seed};
 use crate::grasping::{Identification, IdentificationView, Row, prepare};
+use crate::labelling::measured_phases;
 use crate::picture::{Stage, evenly_bent};
 use crate::recording::{OpenTrialError, Replay};
 use palpate_geometry::Pose;
@@ -13,7 +14,7 @@ use palpate_sim::objects::{EMPTY, object_title};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, Gap, SensorKind};
 use palpate_tactile::trial::{
-    CorrectedPhases, GraspOrigin, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource,
+    BoardCourse, CorrectedPhases, GraspOrigin, SimulatedData, Trial, TrialData, TrialHeader, TrialId, TrialSource,
 };
 use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, Signals, unit_of_channel};
 use std::sync::Arc;
@@ -132,10 +133,11 @@ impl OpenTrial {
         let (marks, began_s, gaps) = match &trial.data {
             TrialData::Simulated(_) => Default::default(),
             TrialData::Recorded(log) => {
-                let course = &log.course;
-                open.board = Some(course.board.clone());
-                let marks = course.phases.iter().map(|mark| (mark.from_s - course.began_s, mark.phase));
-                (PhaseTimes::of_samples(marks), course.began_s, log.gaps.clone())
+                let BoardCourse { board, phases, began_s, .. } = &log.course;
+                open.board = Some(board.clone());
+                let measured = if phases.is_empty() { measured_phases(board, &log.readings) } else { Vec::new() };
+                let marks = phases.iter().chain(&measured).map(|mark| (mark.from_s - began_s, mark.phase));
+                (PhaseTimes::of_samples(marks), *began_s, log.gaps.clone())
             }
             TrialData::Imported(_) => Default::default(),
         };
