@@ -223,8 +223,10 @@ impl<'a> DisplayedData<'a> {
         if !measured.is_empty() {
             return measured;
         }
-        let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
-        hold.into_iter().collect()
+        // As far as there are samples.
+        let newest_s = self.traces.current().map_or(f64::NEG_INFINITY, |trace| trace.span()[1]);
+        let hold = self.hold().map(|[from_s, to_s]| [from_s, to_s.min(newest_s)]).filter(|[from_s, to_s]| from_s < to_s);
+        hold.map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s }).into_iter().collect()
     }
 
     /// True where a stored trial or the past of a live gripper is shown.

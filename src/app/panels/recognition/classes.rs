@@ -40,7 +40,7 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     let width_of = |class| fitted(ui, title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
     let letters = (LETTERS * (names / longest).min(1.0)).max(LEAST_LETTERS).min(line);
-    let numbers = if columns > 1 { 24.0 } else { 46.0 };
+    let numbers = if columns > 1 { 34.0 } else { 46.0 };
     let places: Vec<Columns> = (0..columns)
         .map(|column| {
             let left = all.left() + (width + GUTTER) * column as f32;
@@ -114,9 +114,7 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     }
     // An empty bar says "0 %" already.
     if p >= 0.01 {
-        // Where there is no room for decimals, nothing is surer than 99 %.
-        let shown = if rect.right() - to < 30.0 { p.min(0.99) } else { p };
-        let number = fitted(ui, percent(shown), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
+        let number = fitted(ui, percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
         put(ui, number, rect, Align2::RIGHT_CENTER);
     }
 }
