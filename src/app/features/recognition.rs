@@ -5,9 +5,7 @@ use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
 use palpate_geometry::units::capital;
 use palpate_lab::grasping::RecognisedGrasp;
-use palpate_lab::workers::{
-    ClassChange, Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel,
-};
+use palpate_lab::workers::{ClassChange, Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Lesson, Model, Models, Shipped};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::class_name;

@@ -95,7 +95,8 @@ fn rivals(lesson: &Lesson) -> String {
     let mut all: Vec<(&String, usize)> = lesson.taken_for.iter().map(|(class, count)| (class, *count)).collect();
     all.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let others: usize = all.iter().skip(MOST_NAMED).map(|(_, count)| count).sum();
-    let named = all.iter().take(MOST_NAMED).map(|(class, count)| format!("{} ({count})", capital(&object_title(class))));
+    let named =
+        all.iter().take(MOST_NAMED).map(|(class, count)| format!("{} ({count})", capital(&object_title(class))));
     let mut named: Vec<String> = named.collect();
     named.extend((others > 0).then(|| format!("further ones ({others})")));
     match named.as_slice() {
@@ -338,8 +339,10 @@ mod tests {
 
     #[test]
     fn at_most_three_rivals_are_named_with_their_counts() {
-        let taken_for = [("cube", 1), ("case", 5), ("box", 2), ("ball", 1)].map(|(name, count)| (name.to_owned(), count));
-        let lesson = Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
+        let taken_for =
+            [("cube", 1), ("case", 5), ("box", 2), ("ball", 1)].map(|(name, count)| (name.to_owned(), count));
+        let lesson =
+            Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
         let rivals = "Case (5), Box (2), Ball (1) and further ones (1)";
         assert_eq!(lesson_result(&lesson), format!("3 of 12 new grasps recognised, others taken for {rivals}"));
         assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));

@@ -56,9 +56,7 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             run.progress(share, format!("Learning {name}: {words}"));
         };
         let store = Store::open(&store)?;
-        let save = |model| -> Result<_, JobError> {
-            Ok(Some(TrainedModel::save(model, &models, "taught", &store)?))
-        };
+        let save = |model| -> Result<_, JobError> { Ok(Some(TrainedModel::save(model, &models, "taught", &store)?)) };
         match &request.change {
             ClassChange::Renamed(new) => return save(request.model.renamed(&request.name, new)),
             ClassChange::Forgotten => return save(request.model.without(&request.name)?),

@@ -12,8 +12,9 @@ const UNDERLINE: f32 = 4.0;
 /// Room for the name of a property, which narrow panels leave out (points).
 const NAME: f32 = 36.0;
 const NARROW: f32 = 250.0;
-/// Size of letters (points).
+/// Size of letters, and the least with which numbers are shown (points).
 const LETTERS: f32 = 11.0;
+const SMALL: f32 = 9.5;
 
 /// Size and shape of an answer: those of the classes, so that they never contradict it.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
@@ -80,10 +81,12 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), part.measures.properties), Sense::hover());
     let named = named_ui(ui, part, name, rect);
     let width = (rect.width() - named) / answers.len().max(1) as f32;
-    // All have numbers, or none has.
+    // All have numbers, or none has; letters are a little smaller for it.
     let needed =
         |answer: &String| fitted(ui, format!("{answer} 99.9 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
-    let numbered = answers.iter().map(needed).fold(0.0, f32::max) <= width - 10.0;
+    let letters = LETTERS * ((width - 10.0) / answers.iter().map(needed).fold(1.0, f32::max)).min(1.0);
+    let numbered = letters >= SMALL;
+    let letters = if numbered { letters } else { LETTERS };
     // Below one half nothing is said.
     let best = pmf.map(Pmf::top).filter(|(_, p)| *p > 0.5).map(|(best, _)| best);
     for (k, answer) in answers.iter().enumerate() {
@@ -95,7 +98,7 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
             .on_hover_text(format!("{name}: {spoken}"))
             .widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, &spoken));
         let share = eased(ui, ui.scope_id().with((name, k, "share")), p);
-        segment_ui(ui, part, place, &Segment { answer, p, share, numbered, leads: best == Some(k) });
+        segment_ui(ui, part, place, &Segment { answer, p, share, numbered, letters, leads: best == Some(k) });
     }
 }
 
@@ -106,6 +109,7 @@ struct Segment<'a> {
     share: f32,
     /// There is room for a number.
     numbered: bool,
+    letters: f32,
     leads: bool,
 }
 
@@ -118,11 +122,11 @@ fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: &Segment<'_>) 
     ui.painter().rect_filled(filled, 1.5, colour(fill));
     let ink = colour(if segment.leads { colours.text } else { colours.quiet_text });
     let inside = place.shrink2(vec2(3.0, 0.0)).with_max_y(line.top());
-    let word = fitted(ui, segment.answer.to_owned(), LETTERS, inside.width(), ink);
+    let word = fitted(ui, segment.answer.to_owned(), segment.letters, inside.width(), ink);
     match segment.p.filter(|_| segment.numbered) {
         Some(p) => {
             put(ui, word, inside, Align2::LEFT_CENTER);
-            put(ui, fitted(ui, percent(p), LETTERS, inside.width(), ink), inside, Align2::RIGHT_CENTER);
+            put(ui, fitted(ui, percent(p), segment.letters, inside.width(), ink), inside, Align2::RIGHT_CENTER);
         }
         None => put(ui, word, inside, Align2::CENTER_CENTER),
     }
