@@ -30,6 +30,8 @@ pub(super) struct DisplayedData<'a> {
     pub(super) scene: &'a Scene,
     /// A trial is being opened.
     pub(super) opening: bool,
+    /// The last hold of the simulated object, from its end until the next contact.
+    pub(super) last_hold: Option<&'a HeldMoment>,
     /// Trial of the simulation's last grasp, where it was recorded.
     pub(super) last_trial: Option<TrialId>,
     /// Phases of the grasp, as far as they are known.
@@ -127,6 +129,14 @@ pub(super) struct Moment<'a> {
 /// Bit in the numbers of stored trials, which those of grasps do not have.
 const STORED: u64 = 1 << 63;
 
+/// A moment at which an object was held.
+pub(super) struct HeldMoment {
+    pub(super) stage: Arc<Stage>,
+    pub(super) frame: Arc<Frame>,
+    /// Class of the object.
+    pub(super) object: String,
+}
+
 /// Length of a live stream in the plots (s).
 const ROLLING_S: f64 = 10.0;
 /// Least length of a trial in the plots (s).
@@ -195,6 +205,11 @@ impl<'a> DisplayedData<'a> {
         Some(firmest.map_or(end, |(t, _)| t))
     }
 
+    /// The last hold, while the newest frame of the simulation is shown and touches nothing.
+    pub(super) fn last_hold(&self) -> Option<&'a HeldMoment> {
+        self.last_hold.filter(|_| self.source == ViewSource::Simulation && self.past_s().is_none())
+    }
+
     /// Answer of the recogniser in the past of a live gripper, where it is shown and has one.
     fn past_answer(&self) -> Option<&'a Arc<IdentificationView>> {
         self.playback.cursor_s?;
@@ -223,8 +238,11 @@ impl<'a> DisplayedData<'a> {
         if !measured.is_empty() {
             return measured;
         }
-        let hold = self.hold().map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s });
-        hold.into_iter().collect()
+        // As far as there are samples.
+        let newest_s = self.traces.current().map_or(f64::NEG_INFINITY, |trace| trace.span()[1]);
+        let hold =
+            self.hold().map(|[from_s, to_s]| [from_s, to_s.min(newest_s)]).filter(|[from_s, to_s]| from_s < to_s);
+        hold.map(|[from_s, to_s]| PhaseSpan { phase: TouchPhase::Hold, from_s, to_s }).into_iter().collect()
     }
 
     /// True where a stored trial or the past of a live gripper is shown.

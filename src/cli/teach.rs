@@ -5,8 +5,8 @@ use super::prelude::*;
 use super::recognise::load_model;
 use super::setup::classes_of;
 use palpate_lab::datasets::{make_models_folder, models_folder, save_model};
-use palpate_lab::grasping::{LESSON_GRASPS, Lesson, LessonError, LessonStage, Lessons};
-use palpate_learn::{LearnError, Shipped};
+use palpate_lab::grasping::{LESSON_GRASPS, LessonError, LessonStage, Lessons, lesson_result, lesson_warning};
+use palpate_learn::{LearnError, Lesson, Shipped};
 use palpate_sim::objects::anchored;
 use palpate_sim::scene::ObjectSetup;
 use std::time::Instant;
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &TeachArguments, store: Option<&Path>) -> Result<()
         taught => taught?,
     };
     for lesson in &taught.lessons {
-        if let Some(warning) = lesson.warning() {
+        if let Some(warning) = lesson_warning(lesson) {
             warn(&format!("\"{}\": {warning}", lesson.name));
         }
     }
@@ -131,7 +131,7 @@ impl Report for TeachReport<'_> {
     fn text(&self, page: &mut Page) {
         page.fact("taught", self.taught.join(", "));
         for lesson in &self.lessons {
-            page.fact("test", format!("{}: {}", lesson.name, lesson.words()));
+            page.fact("test", format!("{}: {}", lesson.name, lesson_result(lesson)));
         }
         page.fact("classes", format!("{}: {}", self.classes.len(), self.classes.join(", ")));
         page.fact("cost", format!("{:.1} s, {:.1} s CPU", self.seconds, self.cpu_s));

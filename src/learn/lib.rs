@@ -108,7 +108,7 @@ pub use leaks::{LEAK_REST_S, LeakCheck, LeakSource};
 pub use learned::LearnedGrasps;
 pub use methods::{METHODS, Method, MethodKind, method};
 pub use mirror::mirror;
-pub use model::{Model, ModelCard, REMOVED_METHODS};
+pub use model::{Lesson, Model, ModelCard, REMOVED_METHODS};
 pub use model_file::Models;
 pub use pmf::Pmf;
 pub use recogniser::{LiveRecogniser, Properties, Pupil, Recogniser, Verdict};

@@ -149,6 +149,7 @@ impl Method {
             signature_grasps: None,
             taught: Vec::new(),
             taught_from: BTreeMap::new(),
+            lessons: Vec::new(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
         let model = Model { card, recogniser: Arc::from(recogniser), signatures: None };
@@ -232,6 +233,7 @@ impl Model {
         let mut card = self.card.clone();
         card.taught.retain(|own| own != name);
         card.taught_from.remove(name);
+        card.lessons.retain(|lesson| lesson.name != name);
         card.labels.classes.remove(class);
         card.settings = recogniser.settings();
         card.parameters = recogniser.parameters();
@@ -246,6 +248,14 @@ impl Model {
         names.filter(|own| *own == name).for_each(|own| new.clone_into(own));
         if let Some(from) = card.taught_from.remove(name) {
             card.taught_from.insert(new.to_owned(), from);
+        }
+        for lesson in &mut card.lessons {
+            if lesson.name == name {
+                new.clone_into(&mut lesson.name);
+            }
+            if let Some(count) = lesson.taken_for.remove(name) {
+                lesson.taken_for.insert(new.to_owned(), count);
+            }
         }
         model
     }

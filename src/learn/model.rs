@@ -36,6 +36,9 @@ pub struct ModelCard {
     /// Hash of the files of each of these that was simulated, and where they lay.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub taught_from: BTreeMap<String, (u64, String)>,
+    /// How well each of these was learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lessons: Vec<Lesson>,
     /// Settings chosen or found while fitting.
     pub settings: serde_json::Value,
     /// Fingerprint of the method that made it, [`crate::Method::fingerprint`]; absent in files of older versions.
@@ -70,7 +73,29 @@ pub struct ModelCard {
     pub version: String,
 }
 
+/// Test of a class right after it was learned from simulated grasps.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lesson {
+    /// Class.
+    pub name: String,
+    /// Grasps that it was learned from.
+    pub grasps: usize,
+    /// Those of them in which the object left the hand, or was never touched.
+    pub lost: usize,
+    /// Further grasps, in poses of a scene by default.
+    pub tested: usize,
+    /// Those of them that are recognised, each on its own.
+    pub recognised: usize,
+    /// Classes that the others are taken for, each with the number of them.
+    pub taken_for: BTreeMap<String, usize>,
+}
+
 impl ModelCard {
+    /// How well a class was learned; none of one that was not tested.
+    pub fn lesson(&self, name: &str) -> Option<&Lesson> {
+        self.lessons.iter().find(|lesson| lesson.name == name)
+    }
+
     /// Reads the method's own settings from the card.
     pub(crate) fn settings_as<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
         serde_json::from_value(self.settings.clone())

@@ -20,13 +20,17 @@ fn desk() -> Bench {
 }
 
 fn desk_at(listen: Listen) -> Bench {
+    desk_of([1400.0, 1000.0], listen)
+}
+
+fn desk_of(size: [f32; 2], listen: Listen) -> Bench {
     let fill = |store: &mut Store| {
         for (sensor, calibration) in calibrated(&parts(1, false), 1).1 {
             store.calibrations().add(&calibration.record).unwrap();
             store.calibrations().mount(sensor, &calibration.record.part).unwrap();
         }
     };
-    let setup = BenchSetup { fill, listen, size: [1400.0, 1000.0], ..BenchSetup::default() };
+    let setup = BenchSetup { fill, listen, size, ..BenchSetup::default() };
     let mut bench = Bench::new(setup, CpuRenderer::default());
     bench.tell(|app| app.set_mode(Mode::Label));
     bench.until_shown(true, "0 of 800 trials");
@@ -92,6 +96,20 @@ impl Bench {
 
 /// Looks after which something that was waited for will not come any more.
 const MOST_LOOKS: u32 = 3000;
+
+#[test]
+fn all_that_is_asked_of_a_trial_is_in_sight_in_a_window_of_usual_size() {
+    let mut desk = desk_of([1280.0, 800.0], board(&parts(1, false)));
+    desk.press_with(Modifiers::COMMAND, Key::G);
+    desk.until_shown(true, "Stop and vent");
+    desk.press(Key::M);
+    desk.record();
+    let below = desk.harness.get_by_label("Calibration").rect().top();
+    for name in ["Note", "Tags"] {
+        let field = desk.harness.query_all_by_label(name).map(|node| node.rect().bottom()).fold(0.0, f32::max);
+        assert!(field > 0.0 && field < below, "{name} ends at {field}, the panel at {below}");
+    }
+}
 
 #[test]
 fn an_afternoon_by_keys_alone() {

@@ -323,3 +323,30 @@ fn stored_trials_are_compared_in_both_themes() {
         compare(name, &bench.picture(), &by);
     }
 }
+
+#[test]
+fn a_plain_picture_has_one_force_for_each_finger_and_its_inset_hides_no_arrow() {
+    // The picture of presenter mode in a window of 960 x 600 points, with its larger letters.
+    let size = Vec2::new(462.0, 458.0);
+    for object in ["lemon", "tomato", "cube", "smallbutton"] {
+        let (stage, frames) = grasped(&Scene::default(), object, 2.9);
+        let frame = frames.last().unwrap();
+        let view = PictureView { plain: true, inset: 0.38, size, ..PictureView::default() };
+        let camera = stage.camera(StandardView::Home, frame, &view);
+        let list = stage.draw(frame, &PictureView { camera, ..view });
+        assert_eq!(list.arrows.len(), 2, "{object}");
+        let says = |wanted: &str| {
+            list.overlay.shapes.iter().any(|shape| matches!(shape, Shape2::Text { text, .. } if text == wanted))
+        };
+        for (letter, force) in ["L", "R"].into_iter().zip(stage.finger_forces(frame)) {
+            let number = palpate_geometry::units::shown(force.expect("touches"), "N");
+            assert!(says(&format!("{letter}  {number}")), "{object}: {letter} {number}");
+        }
+        let inset = list.inset.as_ref().expect("has room");
+        for arrow in &list.arrows {
+            let tip = camera.project(arrow.to, size).expect("in sight");
+            let is_covered = (tip - inset.corner - 0.5 * inset.size).abs().cmplt(0.5 * inset.size).all();
+            assert!(!is_covered, "{object}: the inset covers the tip at {tip}");
+        }
+    }
+}

@@ -152,6 +152,41 @@ fn letters_are_a_36th_of_the_window_and_never_overlap() {
     }
 }
 
+#[test]
+fn forces_are_told_in_newtons_and_those_of_the_hold_stay_until_the_next_contact() {
+    let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
+    bench.harness.key_press(Key::F11);
+    bench.harness.run_steps(2);
+    bench.tell(|app| app.simulation.send(Command::Pause));
+    let tells = |bench: &Bench, text: &str| bench.harness.query_all_by_label_contains(text).next().is_some();
+    bench.advance_to(2.6);
+    bench.harness.run_steps(2);
+    assert!(tells(&bench, "\u{a0}N (right)") && !tells(&bench, "Last hold"));
+    let mut t = 2.6;
+    while !bench.workbench().snapshot().unwrap().frame.taxels.is_empty() {
+        t += 0.1;
+        bench.advance_to(t);
+    }
+    bench.harness.run_steps(2);
+    assert!(tells(&bench, "Last hold: L ") && !tells(&bench, "Pressing with "));
+    // It is the hold of this object only.
+    bench.tell(|app| app.next_object());
+    bench.until(|s| s.truth() != "lemon");
+    bench.harness.run_steps(2);
+    assert!(!tells(&bench, "Last hold"));
+}
+
+#[test]
+fn plots_name_the_hold_once_there_are_samples_of_it() {
+    let mut bench = Bench::new(BenchSetup::default(), CpuRenderer::default());
+    let named = |bench: &Bench| texts(bench).iter().any(|(_, _, text)| text.trim() == "hold");
+    bench.harness.run_steps(2);
+    assert!(!named(&bench));
+    bench.advance_to(2.9);
+    bench.harness.run_steps(2);
+    assert!(named(&bench));
+}
+
 /// A grasp in the demo log.
 fn fill(store: &mut Store) {
     let trial = palpate_lab::grasping::grasp(&Scene::default(), None, 1);

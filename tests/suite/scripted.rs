@@ -34,6 +34,7 @@ pub(crate) fn model() -> Arc<Model> {
         signature_grasps: None,
         taught: Vec::new(),
         taught_from: BTreeMap::new(),
+        lessons: Vec::new(),
         version: String::new(),
     };
     Arc::new(Model { card, recogniser: Arc::new(Script), signatures: None })

@@ -95,6 +95,7 @@ impl App {
             playback: self.inspect.playback(self.view.source),
             traces: self.traces(),
             scene: &self.simulation.scene,
+            last_hold: self.simulation.last_hold(),
             last_trial: self.simulation.last_trial.map(|(id, _)| id),
             phases: &self.inspect.phases,
             comparison: ComparedTrials {

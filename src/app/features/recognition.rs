@@ -4,11 +4,9 @@ use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
 use palpate_geometry::units::capital;
-use palpate_lab::grasping::{Lesson, RecognisedGrasp};
-use palpate_lab::workers::{
-    ClassChange, Command, EndedJob, Explainer, FinishedLesson, GripperCommand, TeachRequest, TrainedModel,
-};
-use palpate_learn::{Model, Models, Shipped};
+use palpate_lab::grasping::RecognisedGrasp;
+use palpate_lab::workers::{ClassChange, Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
+use palpate_learn::{Lesson, Model, Models, Shipped};
 use palpate_sim::objects::object_title;
 use palpate_store::labels::class_name;
 use std::collections::VecDeque;
@@ -35,12 +33,14 @@ pub(in crate::app) struct RecognitionFeature {
     advised: Option<Arc<RecognisedGrasp>>,
 }
 
-/// An object that the model has just learned.
+/// An object that the model has learned.
 pub(in crate::app) struct Learned {
     /// Its class.
     pub(in crate::app) name: String,
-    /// How well it is known, and the time that the lesson took (s); none where that was before.
-    pub(in crate::app) lesson: Option<(Lesson, f64)>,
+    /// How well it is known; none where that was not tested.
+    pub(in crate::app) lesson: Option<Lesson>,
+    /// Time that the lesson took (s); none where that was before.
+    pub(in crate::app) seconds: Option<f64>,
 }
 
 impl RecognitionFeature {
@@ -156,7 +156,8 @@ impl App {
         let Some(name) = self.learned_as(source).map(str::to_owned) else {
             return self.notices.info("No learned object is in the hand.");
         };
-        self.recognition.learned = Some(Learned { name, lesson: None });
+        let lesson = self.lesson(&name).cloned();
+        self.recognition.learned = Some(Learned { name, lesson, seconds: None });
         self.show_panel("recognition");
     }
 
@@ -225,6 +226,11 @@ impl App {
         learned.find(|(_, file)| *file == source).map(|(class, _)| class)
     }
 
+    /// How well the model in use knows a class that it has learned.
+    pub(in crate::app) fn lesson(&self, class: &str) -> Option<&Lesson> {
+        self.recognition.simulated().find_map(|model| model.card.lesson(class))
+    }
+
     /// Cancels the lesson.
     pub(in crate::app) fn stop_teaching(&mut self) {
         self.tools.teaching.stop();
@@ -291,16 +297,15 @@ impl App {
     }
 
     /// Takes in a lesson that has ended.
-    fn take_lesson(&mut self, EndedJob { command, outcome, .. }: EndedJob<TeachRequest, FinishedLesson>) {
+    fn take_lesson(&mut self, EndedJob { command, outcome, .. }: EndedJob<TeachRequest, TrainedModel>) {
         let models = &self.recognition.models;
         let is_current = |kind: &Shipped| models.of(*kind).is_some_and(|model| Arc::ptr_eq(model, &command.model));
         let simulated = [false, true].map(Shipped::simulated);
         match outcome {
-            Ok(lesson) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&lesson.trained),
-            Ok(lesson) if simulated.iter().any(is_current) => {
-                let FinishedLesson { trained, lesson } = &*lesson;
+            Ok(trained) if is_current(&Shipped::AnyGripper) => self.use_file_for_gripper(&trained),
+            Ok(trained) if simulated.iter().any(is_current) => {
                 if let ClassChange::Renamed(_) | ClassChange::Forgotten = command.change {
-                    return self.take_changed(trained, &command);
+                    return self.take_changed(&trained, &command);
                 }
                 self.view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
@@ -308,7 +313,8 @@ impl App {
                 let seconds = self.recognition.asked.elapsed().as_secs_f64();
                 self.recognition.learned = command.object.as_ref().map(|_| Learned {
                     name: command.name.clone(),
-                    lesson: lesson.clone().map(|lesson| (lesson, seconds)),
+                    lesson: trained.model.card.lesson(&command.name).cloned(),
+                    seconds: Some(seconds),
                 });
                 // What was decided without the new class is tried again.
                 if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
@@ -316,8 +322,7 @@ impl App {
                 }
             }
             // Another model is in use by now.
-            Ok(lesson) => {
-                let trained = &lesson.trained;
+            Ok(trained) => {
                 self.notices.info(format!("Taught {}, saved as {}.", command.name, trained.path.display()));
             }
             Err(cause) => self.notices.warning(format!("The model did not learn {}: {cause}", command.name)),

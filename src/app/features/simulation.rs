@@ -2,10 +2,12 @@
 
 use super::App;
 use super::view::{ViewSource, ViewState};
+use crate::app::shown::HeldMoment;
 use crate::app::traces::TraceHistory;
 use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::workers::{Command, GhostGrasp, Job, MeasuredAccuracy, Notice, Refusal, SimWorker, Snapshot};
-use palpate_sim::gripper::Auto;
+use palpate_sim::frame::Frame;
+use palpate_sim::gripper::{Auto, Phase};
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
@@ -35,6 +37,8 @@ pub struct SimulationFeature {
     /// Scene as set by the user.
     pub(in crate::app) scene: Scene,
     pub(in crate::app) traces: TraceHistory,
+    /// The newest moment at which an object was held.
+    pub(in crate::app) held: Option<HeldMoment>,
     /// Number of the grasp from which on this scene is grasped.
     scene_since: u64,
     /// Object last seen in the hand: a built-in name or a file.
@@ -67,6 +71,7 @@ impl SimulationFeature {
             stored_accuracy: stored_accuracy().map(|stored| stored.result),
             scene,
             traces: TraceHistory::default(),
+            held: None,
             scene_since: 0,
             seen: None,
             shuffled: ShuffledObjects::new(DECK_SEED),
@@ -75,6 +80,12 @@ impl SimulationFeature {
             last_trial: None,
             ended: false,
         }
+    }
+
+    /// The last hold of the object, from its end until the next contact.
+    pub(in crate::app) fn last_hold(&self) -> Option<&HeldMoment> {
+        let snapshot = self.snapshot.as_ref()?;
+        self.held.as_ref().filter(|held| held.object == snapshot.truth() && snapshot.frame.taxels.is_empty())
     }
 
     /// Sends a command to the simulation.
@@ -112,6 +123,17 @@ impl SimulationFeature {
     /// Measures cost and influence of the scene's effects.
     pub(in crate::app) fn measure_effects(&self) {
         self.effects.start(self.scene.clone());
+    }
+
+    /// Keeps the newest moment of the grasp at which an object is held.
+    fn note_hold(&mut self, snapshot: &Snapshot) {
+        let Some(trace) = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp) else { return };
+        let holds = |frame: &&Arc<Frame>| frame.phase == Phase::Hold && snapshot.stage.force_on_object(frame).is_some();
+        let newest = trace.frames.iter().rev().flatten().take_while(|frame| frame.phase != Phase::Close).find(holds);
+        if let Some(frame) = newest {
+            let (stage, object) = (Arc::clone(&snapshot.stage), snapshot.truth().to_owned());
+            self.held = Some(HeldMoment { stage, frame: Arc::clone(frame), object });
+        }
     }
 
     /// Shows the scene that stays, unless the user has set another one since; returns why the other was refused.
@@ -158,6 +180,7 @@ impl App {
         simulation.snapshot = simulation.worker.snapshot();
         if let Some(snapshot) = simulation.snapshot.clone() {
             simulation.traces.forget_before(snapshot.scene_since);
+            simulation.note_hold(&snapshot);
             if std::mem::replace(&mut simulation.scene_since, snapshot.scene_since) != snapshot.scene_since {
                 notices.done("scene");
             }

@@ -3,9 +3,9 @@
 use super::App;
 use palpate_lab::grasping::{ObjectMove, RecognisedGrasp};
 use palpate_lab::workers::{
-    DiagnosticsReport, Examine, ExamineRequest, FinishedLesson, FinishedTraining, Job, JobFailure, TeachRequest,
-    TrainRequest, TrainedModel, TrainingData, Wake, advice_job, class_training_job, doctor_job, load_model_job,
-    training_data_job, training_job,
+    DiagnosticsReport, Examine, ExamineRequest, FinishedTraining, Job, JobFailure, TeachRequest, TrainRequest,
+    TrainedModel, TrainingData, Wake, advice_job, class_training_job, doctor_job, load_model_job, training_data_job,
+    training_job,
 };
 use palpate_store::TrialRow;
 use palpate_study::jobs::{FitTrials, FittedFinger, fit_job, recorded_trials_job};
@@ -42,7 +42,7 @@ pub struct GripperTools {
     pub training: Job<TrainRequest, FinishedTraining>,
     pub load: Job<PathBuf, TrainedModel>,
     /// Teaching of new objects.
-    pub teaching: Job<TeachRequest, FinishedLesson>,
+    pub teaching: Job<TeachRequest, TrainedModel>,
     /// Advice on the next grasp of the real gripper.
     pub advice: Job<Arc<RecognisedGrasp>, ObjectMove>,
     /// Number of the training whose model is used once it has ended.

@@ -15,6 +15,8 @@ use palpate_lab::workers::{
 use palpate_sim::objects::{catalogue, object_title};
 use palpate_store::labels::{LabelledTrial, NextTrial, TrialEdit};
 
+/// Height of the panel below which objects to choose stand in two columns (points).
+const LOW: f32 = 440.0;
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
 
@@ -208,13 +210,20 @@ fn question_ui(
     if chosen.is_none() {
         ui.weak("Which one? Choose with the arrow keys or the mouse.");
     }
-    for (place, name) in names.iter().take(NUMBERED_OBJECTS).enumerate() {
-        let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
-        if object_row(ui, pictures, place, name, Some(place) == chosen, !known).clicked() {
-            actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
-            actions.push(|app| app.label(LabellingAction::GiveLabel));
+    let shown = names.len().min(NUMBERED_OBJECTS);
+    // In a low panel, tags and note stay in sight below.
+    let columns = if ui.clip_rect().height() < LOW { 2 } else { 1 };
+    ui.columns(columns, |columns| {
+        let rows = shown.div_ceil(columns.len()).max(1);
+        for (place, name) in names.iter().take(shown).enumerate() {
+            let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
+            let row = object_row(&mut columns[place / rows], pictures, place, name, Some(place) == chosen, !known);
+            if row.clicked() {
+                actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
+                actions.push(|app| app.label(LabellingAction::GiveLabel));
+            }
         }
-    }
+    });
     if names.len() > NUMBERED_OBJECTS {
         ui.weak(format!("and {} more: type to find them (/)", names.len() - NUMBERED_OBJECTS));
     }

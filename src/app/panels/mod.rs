@@ -52,7 +52,8 @@ const fn panel(name: &'static str, title: &'static str, ui: fn(&mut Ui, &App, &m
 pub const ALL: [PanelKind; 35] = [
     panel("objects", "Objects", |ui, app, actions| {
         let chosen = &app.simulation.scene.object.source;
-        objects::ui(ui, (chosen, &app.view), |path: &str| app.learned_as(path), &app.thumbnails, actions);
+        let learned_as = |path: &str| app.learned_as(path).map(|class| (class, app.lesson(class)));
+        objects::ui(ui, (chosen, &app.view), learned_as, &app.thumbnails, actions);
     }),
     panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
     panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),

@@ -7,6 +7,7 @@ use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{capital, selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
+use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, catalogue, object_title};
 
 /// Side of a thumbnail (points).
@@ -15,7 +16,7 @@ const THUMBNAIL: f32 = 40.0;
 pub(super) fn ui<'a>(
     ui: &mut Ui,
     (chosen, view): (&str, &ViewState),
-    learned_as: impl Fn(&str) -> Option<&'a str>,
+    learned_as: impl Fn(&str) -> Option<(&'a str, Option<&'a Lesson>)>,
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -35,8 +36,14 @@ pub(super) fn ui<'a>(
         for path in &view.recent {
             let texture = pictures.get(path);
             let class = learned_as(path);
-            let title = class.map_or_else(|| view.title_of(path), |class| capital(&object_title(class)));
-            let learned = if class.is_some() { "learned, " } else { "" };
+            let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital(&object_title(class)));
+            let learned = match class {
+                Some((_, Some(Lesson { recognised, tested, .. }))) => {
+                    format!("learned, {recognised} of {tested} recognised, ")
+                }
+                Some((_, None)) => "learned, ".to_owned(),
+                None => String::new(),
+            };
             let clicked = row(ui, chosen == path, texture, &title, &format!("{learned}{path}"));
             follow(chosen == path, &clicked);
             let source = path.clone();

@@ -7,7 +7,7 @@ use crate::app::export::ExportRequest;
 use crate::app::features::App;
 use crate::app::features::view::{PathLayer, ViewSource};
 use crate::app::icons::{self, Icon};
-use crate::app::shown::{DisplayedData, Moment};
+use crate::app::shown::{DisplayedData, HeldMoment, Moment};
 use crate::app::shown_grasp::ShownGrasp;
 use crate::app::small_pads::{BUTTONS, small_pads};
 use crate::app::theme::{colour, veil};
@@ -158,8 +158,7 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         theme: own.data.view.theme,
         size,
         forces: own.data.view.forces,
-        // Presenter mode is for people who read no units.
-        numbers: !own.data.view.presents,
+        plain: own.data.view.presents,
         layout: own.data.view.sensors.sensor_layout().ok(),
         circles: own.data.view.circles && !own.data.view.presents,
         inset,
@@ -184,7 +183,10 @@ struct Drawn {
 fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> Drawn {
     let Moment { stage, frame, .. } = moment;
     let shown = ShownGrasp::of(&own.data);
-    let full_scale = shown.as_ref().map_or(PAD_FULL_SCALE, |shown| shown.full_scale);
+    let last_hold = own.data.last_hold();
+    // In presenter mode colours are the same for all objects.
+    let own_scale = shown.as_ref().filter(|_| !own.data.view.presents).map_or(PAD_FULL_SCALE, |shown| shown.full_scale);
+    let full_scale = last_hold.map_or(own_scale, |held| own_scale.max(held.stage.full_scale_of([&*held.frame])));
     let course = shown.filter(|shown| !shown.frames.is_empty() && frame.world_from_object.is_some());
     let grasp_path = course.and_then(|shown| path_colour(own.data.view.path, &shown).map(|colour| (shown, colour)));
     let path = grasp_path.as_ref().map(|(_, colour)| *colour);
@@ -199,6 +201,9 @@ fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) 
         ViewSource::Gripper => stage.draw_real(real.unwrap_or_default(), &view),
         ViewSource::Simulation | ViewSource::Trial => stage.draw(frame, &view),
     };
+    if let Some(held) = last_hold {
+        stage.add_hold(&mut list, frame, &view, (&held.stage, &held.frame));
+    }
     if let Some(ghost) = ghost {
         list.ghosts = stage.ghosts(ghost, own.data.view.theme);
     }
@@ -323,8 +328,20 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
         (texts.join(". "), Some(ghost_colour(theme)))
     } else {
         let begins = own.data.view.recent.is_empty() && own.data.source == ViewSource::Simulation;
-        (held.or_else(|| begins.then(|| INVITATION.to_owned())).unwrap_or_default(), None)
+        let last = own.data.last_hold().and_then(last_hold_words);
+        (held.or(last).or_else(|| begins.then(|| INVITATION.to_owned())).unwrap_or_default(), None)
     }
+}
+
+/// Force of each finger in the last hold.
+pub(in crate::app) fn last_hold_words(held: &HeldMoment) -> Option<String> {
+    let forces = Side::BOTH.into_iter().zip(held.stage.finger_forces(&held.frame));
+    let of_side = |(side, force): (Side, Option<f64>)| {
+        let letter = side.name().get(..1)?.to_uppercase();
+        Some(format!("{letter} {}", units::shown(force?, "N")))
+    };
+    let words: Vec<String> = forces.filter_map(of_side).collect();
+    (!words.is_empty()).then(|| format!("Last hold: {}", words.join(", ")))
 }
 
 /// Paints annotations over the picture, with letters of a size relative to the usual one.

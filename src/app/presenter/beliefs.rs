@@ -2,7 +2,7 @@
 //! sees the evidence add up.
 
 use super::{Page, put};
-use crate::app::panels::recognition::words::{Headline, percent, title};
+use crate::app::panels::recognition::words::{Headline, percent, running, title};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 use palpate_lab::grasping::IdentificationView;
@@ -77,7 +77,7 @@ impl Page<'_> {
         let runs = number == over && view.listening;
         let pmf: Option<&Pmf> = match view.beliefs.get(number) {
             Some(belief) => Some(belief),
-            None => view.verdict.as_ref().filter(|_| runs).map(|verdict| &verdict.pmf),
+            None => running(view).filter(|_| runs),
         };
         let needed = pmf.is_some() || runs || view.decision.is_none();
         let bar = bar_of(row, unit);

@@ -10,6 +10,7 @@ use crate::app::panels::view3d::{self, View3d};
 use crate::app::theme::{colour, veil};
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{Align2, Color32, FontId, Galley, Pos2, Rect, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
+use palpate_geometry::units;
 use palpate_lab::grasping::{IdentificationView, Presentation};
 use palpate_sim::objects::object_title;
 use std::sync::Arc;
@@ -81,7 +82,7 @@ impl Page<'_> {
 
     /// At most so many rows; numbers keep their units.
     fn paragraph(&self, ui: &Ui, (text, rows): (&str, usize), letters: f32, width: f32) -> Arc<Galley> {
-        let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm");
+        let text = text.replace(" %", "\u{a0}%").replace(" mm", "\u{a0}mm").replace(" N", "\u{a0}N");
         let ink = colour(self.app.view.theme.colours().text);
         let mut job = LayoutJob::simple(text, FontId::proportional(letters), ink, width.max(1.0));
         job.wrap.max_rows = rows;
@@ -99,11 +100,20 @@ impl Page<'_> {
         let Some(snapshot) = self.app.snapshot() else { return };
         let hard = Presentation::is_hard(&snapshot.scene.pose);
         let hard = hard.then(|| words::hard_pose(&snapshot.scene.gripper.mount));
-        let encoding = (!snapshot.frame.taxels.is_empty()).then(|| words::ENCODING.to_owned());
+        let shown = self.app.shown();
+        let hold = shown.last_hold().and_then(view3d::last_hold_words);
+        let touches = shown.moment().filter(|moment| !moment.frame.taxels.is_empty());
+        if let Some(moment) = touches {
+            let forces = moment.stage.finger_forces(moment.frame).map(|force| force.unwrap_or(0.0));
+            let [left, right] = forces.map(|force| units::shown(force, "N"));
+            self.speak(ui, "forces", picture, &format!("Pressing with {left} (left) and {right} (right)"));
+        }
+        let encoding = touches.is_some().then(|| words::ENCODING.to_owned());
         let colours = self.app.view.theme.colours();
         let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
-        for text in message.map(str::to_owned).into_iter().chain(hard).chain(encoding) {
-            let rows = self.paragraph(ui, (&text, 3), self.unit, place.width());
+        let texts = message.map(str::to_owned).into_iter().chain(hard).chain(encoding).map(|text| (text, 1.0));
+        for (text, letters) in texts.chain(hold.map(|text| (text, 1.25))) {
+            let rows = self.paragraph(ui, (&text, 3), letters * self.unit, place.width());
             let ground = Align2::LEFT_TOP.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
             self.speak(ui, &text, ground, &text);
             ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));

@@ -10,7 +10,7 @@ use palpate_sim::gripper::{Mount, Phase};
 use palpate_sim::objects::EMPTY;
 
 /// What the picture shows.
-pub(super) const ENCODING: &str = "Colour: how hard each spot presses. Arrows: the force.";
+pub(super) const ENCODING: &str = "Colour: pressure on each spot. Arrows: force of each finger. 1 N: weight of 100 g.";
 
 /// What happens now.
 pub(super) fn story(snapshot: &Snapshot) -> &'static str {

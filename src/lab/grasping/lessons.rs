@@ -6,7 +6,7 @@ use super::known_geometry::seeds_of;
 use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
 use palpate_geometry::units::capital;
 use palpate_learn::{
-    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Model, ModelCard, OTHER, Sequence,
+    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Lesson, Model, ModelCard, OTHER, Sequence,
 };
 use palpate_sim::frame::GraspFailure;
 use palpate_sim::objects::{ObjectError, ObjectModel, catalogue, object_title};
@@ -74,54 +74,54 @@ pub struct Taught {
     pub lessons: Vec<Lesson>,
 }
 
-/// How an object was learned from simulated grasps.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Lesson {
-    /// Class.
-    pub name: String,
-    /// Grasps that it was learned from.
-    pub grasps: usize,
-    /// Those of them in which the object left the hand, or was never touched.
-    pub lost: usize,
-    /// Further grasps, in poses of a scene by default.
-    pub tested: usize,
-    /// Those of them that are recognised, each on its own.
-    pub recognised: usize,
-    /// Class that most of the others are taken for.
-    pub taken_for: Option<String>,
+/// Tests a class that a model has learned by grasps that it has not learned from.
+fn test(lesson: &mut Lesson, model: &Model, grasps: &[Example]) {
+    let (labels, prior) = (&model.card.labels, model.card.prior());
+    lesson.tested = grasps.len();
+    for own in grasps {
+        let class = model.recogniser.recognise(&own.grasp, prior.as_ref()).pmf.top().0;
+        match &labels.classes[class].name {
+            name if *name == lesson.name => lesson.recognised += 1,
+            other => *lesson.taken_for.entry(other.clone()).or_default() += 1,
+        }
+    }
 }
 
-impl Lesson {
-    fn test(&mut self, model: &Model, grasps: &[Example]) {
-        let (labels, prior) = (&model.card.labels, model.card.prior());
-        let answers: Vec<usize> =
-            grasps.iter().map(|own| model.recogniser.recognise(&own.grasp, prior.as_ref()).pmf.top().0).collect();
-        let own = labels.class(&self.name);
-        self.tested = answers.len();
-        self.recognised = answers.iter().filter(|class| Some(**class) == own).count();
-        let times = |class: usize| answers.iter().filter(|answer| **answer == class).count();
-        let others = (0..labels.classes.len()).filter(|class| Some(*class) != own && times(*class) > 0);
-        self.taken_for = others.max_by_key(|class| times(*class)).map(|class| labels.classes[class].name.clone());
-    }
+/// Most classes that are named as mistaken for a new one.
+const MOST_NAMED: usize = 3;
 
-    /// How well it is recognised, in words.
-    pub fn words(&self) -> String {
-        let others =
-            self.taken_for.as_ref().map(|class| format!(", others mostly as {}", capital(&object_title(class))));
-        let Self { tested, recognised, .. } = self;
-        format!("{recognised} of {tested} new grasps recognised{}", others.unwrap_or_default())
+/// Classes that grasps of a new object are taken for, the most frequent first: `Cube (6), Case (2) and Box (1)`.
+fn rivals(lesson: &Lesson) -> String {
+    let mut all: Vec<(&String, usize)> = lesson.taken_for.iter().map(|(class, count)| (class, *count)).collect();
+    all.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let others: usize = all.iter().skip(MOST_NAMED).map(|(_, count)| count).sum();
+    let named =
+        all.iter().take(MOST_NAMED).map(|(class, count)| format!("{} ({count})", capital(&object_title(class))));
+    let mut named: Vec<String> = named.collect();
+    named.extend((others > 0).then(|| format!("further ones ({others})")));
+    match named.as_slice() {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
+}
 
-    /// A warning where the hand was empty in many of the grasps, or its grasps are like those of another object.
-    pub fn warning(&self) -> Option<String> {
-        let Self { grasps, lost, .. } = self;
-        if 4 * lost >= *grasps && *lost > 0 {
-            let words = "was not held: it slid away or was never touched. Fix it in place to learn its shape";
-            return Some(format!("in {lost} of {grasps} grasps the object {words}"));
-        }
-        let class = self.taken_for.as_ref().filter(|_| 2 * self.recognised < self.tested)?;
-        Some(format!("its grasps are hard to tell from those of {}", capital(&object_title(class))))
+/// How well a new object is recognised, in words.
+pub fn lesson_result(lesson: &Lesson) -> String {
+    let Lesson { tested, recognised, taken_for, .. } = lesson;
+    let others = if taken_for.is_empty() { String::new() } else { format!(", others taken for {}", rivals(lesson)) };
+    format!("{recognised} of {tested} new grasps recognised{others}")
+}
+
+/// A warning where the hand was empty in many of the grasps, or they are like those of other objects.
+pub fn lesson_warning(lesson: &Lesson) -> Option<String> {
+    let Lesson { grasps, lost, tested, recognised, taken_for, .. } = lesson;
+    if 4 * lost >= *grasps && *lost > 0 {
+        let words = "was not held: it slid away or was never touched. Fix it in place to learn its shape";
+        return Some(format!("in {lost} of {grasps} grasps the object {words}"));
     }
+    let is_doubtful = 2 * recognised < *tested && !taken_for.is_empty();
+    is_doubtful.then(|| format!("its grasps are hard to tell from those of {}", rivals(lesson)))
 }
 
 /// Reason why a model learned nothing.
@@ -237,7 +237,9 @@ impl Lessons<'_> {
         fitting.check()?;
         let mut taught = model.taught(&lessons, &fitting)?;
         taught.card.taught_from = taught_from;
-        learned.iter_mut().zip(&tests).for_each(|(lesson, test)| lesson.test(&taught, test));
+        learned.iter_mut().zip(&tests).for_each(|(lesson, grasps)| test(lesson, &taught, grasps));
+        taught.card.lessons.retain(|before| !learned.iter().any(|lesson| lesson.name == before.name));
+        taught.card.lessons.extend(learned.iter().cloned());
         Ok(Taught { model: taught, lessons: learned })
     }
 
@@ -328,4 +330,25 @@ pub(super) fn view_of(card: &ModelCard) -> SensorView {
     let view = SensorView::of_model(card);
     let sensors = if card.data.sensors.is_none() { SensorModel::Drawn } else { view.sensors };
     SensorView { draws: DRAWS, sensors, ..view }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn at_most_three_rivals_are_named_with_their_counts() {
+        let taken_for =
+            [("cube", 1), ("case", 5), ("box", 2), ("ball", 1)].map(|(name, count)| (name.to_owned(), count));
+        let lesson =
+            Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
+        let rivals = "Case (5), Box (2), Ball (1) and further ones (1)";
+        assert_eq!(lesson_result(&lesson), format!("3 of 12 new grasps recognised, others taken for {rivals}"));
+        assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));
+        let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };
+        assert_eq!((lesson_result(&known).as_str(), lesson_warning(&known)), ("12 of 12 new grasps recognised", None));
+        let lost = Lesson { lost: 40, ..lesson };
+        assert!(lesson_warning(&lost).is_some_and(|words| words.starts_with("in 40 of 160 grasps")));
+    }
 }

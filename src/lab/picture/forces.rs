@@ -61,19 +61,36 @@ pub(super) fn arrows(
     frame: &Frame,
     view: &PictureView,
 ) -> Vec<Arrow> {
-    let height = f64::from(view.camera.height_at_target());
+    let (height, span) = (f64::from(view.camera.height_at_target()), span(view));
     let mut arrows = Vec::new();
     for forces in on_fingers(gripper, world_from_gripper, frame) {
         let mut arrow = |vector: DVec3, colour: Rgb| {
-            let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, height));
+            let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, span));
             arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
         };
         arrow(forces.normal, forces.normal_colour());
-        if let Some(friction) = forces.friction {
+        if let Some(friction) = forces.friction.filter(|_| !view.plain) {
             arrow(friction, friction_colour(view.theme));
         }
     }
     arrows
+}
+
+/// Force of each finger across its pad (N); none below the smallest that is drawn.
+pub(super) fn of_fingers(gripper: &GripperModel, frame: &Frame) -> [Option<f64>; 2] {
+    let all = on_fingers(gripper, &Pose::IDENTITY, frame);
+    Side::BOTH.map(|side| Some(all.iter().find(|forces| forces.side == side)?.normal.length()))
+}
+
+/// Places along the arrows across the pads, each as long as it gets: what keeps clear of them stands still as they grow.
+pub(super) fn reach(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, view: &PictureView) -> Vec<Vec3> {
+    const PLACES: u8 = 12;
+    let longest = |forces: &Forces| span(view) * LONGEST * forces.normal.normalize();
+    let along = |forces: Forces| {
+        let to = longest(&forces);
+        (0..=PLACES).map(move |k| (forces.from + to * f64::from(k) / f64::from(PLACES)).as_vec3())
+    };
+    on_fingers(gripper, world_from_gripper, frame).into_iter().flat_map(along).collect()
 }
 
 /// Force of the arrow in the key (N), and the height of its tip and of the middle of the key above the scale bar (points).
@@ -111,15 +128,15 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>) {
 /// Their numbers, beyond the tips or near by: a plate for each finger.
 pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) {
     let view = annotator.view;
-    let height = f64::from(view.camera.height_at_target());
+    let span = span(view);
     let all = on_fingers(gripper, world_from_gripper, frame);
     let ends = |forces: &Forces, force: DVec3| {
-        let [from, to] = [forces.from.as_vec3(), tip(forces.from, force, height)];
+        let [from, to] = [forces.from.as_vec3(), tip(forces.from, force, span)];
         view.camera.project(from, view.size).zip(view.camera.project(to, view.size))
     };
     for forces in &all {
-        for (from, to) in std::iter::once(forces.normal).chain(forces.friction).filter_map(|force| ends(forces, force))
-        {
+        let friction = forces.friction.filter(|_| !view.plain);
+        for (from, to) in std::iter::once(forces.normal).chain(friction).filter_map(|force| ends(forces, force)) {
             annotator.keep_clear(from, to);
         }
     }
@@ -134,11 +151,12 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
             Side::Left => "L",
             Side::Right => "R",
         };
-        let text = |name: &str, force: DVec3| format!("{letter}  {name} {}", units::shown(force.length(), "N"));
-        let mut texts = vec![(text("normal", forces.normal), view.theme.colours().text)];
+        let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
+        let name = if view.plain { "" } else { "normal " };
+        let mut texts = vec![(text(name, forces.normal), view.theme.colours().text)];
         // A low picture has room for one line.
-        let friction = forces.friction.filter(|_| view.size.y >= LOW);
-        texts.extend(friction.map(|force| (text("friction", force), friction_colour(view.theme))));
+        let friction = forces.friction.filter(|_| view.size.y >= LOW && !view.plain);
+        texts.extend(friction.map(|force| (text("friction ", force), friction_colour(view.theme))));
         // The letters of this font are half as wide as high.
         let width = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).fold(0.0, f32::max);
         let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * texts.len() as f32 + 2.0);
@@ -196,10 +214,17 @@ pub(super) fn shear(gripper: &GripperModel, world_from_gripper: &Pose, frame: &F
     loads.iter().filter(|(_, size, ..)| *size >= FAINTEST_SHEAR).map(arrow).collect()
 }
 
+/// Height of the picture at the camera's target that lengths of arrows are shares of (m): less in a plain view, where the
+/// inset is large.
+fn span(view: &PictureView) -> f64 {
+    let share = if view.plain { 0.65 } else { 1.0 };
+    share * f64::from(view.camera.height_at_target())
+}
+
 /// Point of the arrow of a force.
-fn tip(from: DVec3, force: DVec3, height: f64) -> Vec3 {
+fn tip(from: DVec3, force: DVec3, span: f64) -> Vec3 {
     let size = force.length();
-    let length = height * (PER_NEWTON * size).clamp(SHORTEST, LONGEST);
+    let length = span * (PER_NEWTON * size).clamp(SHORTEST, LONGEST);
     (from + force / size * length).as_vec3()
 }
 

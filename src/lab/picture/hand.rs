@@ -2,6 +2,7 @@
 //! turns so far that a pad faces it, and no farther.
 
 use super::annotations::{MARGIN, Plate, SCALE_BAR, legend_room, shows_legends};
+use super::forces::reach;
 use super::reconstructed::evenly_bent;
 use super::{PictureView, Stage};
 use glam::{DVec3, Vec2, Vec3};
@@ -122,8 +123,8 @@ impl Stage {
         camera.containing(&self.hand_points(frame), &room, view.size.x / view.size.y)
     }
 
-    /// Where the inset of a view covers neither the hand nor other annotations: below the legend, or else in the lower corner;
-    /// none where both are taken.
+    /// Where the inset of a view covers neither the hand, nor its arrows where there is room, nor other annotations: below the
+    /// legend, or else in the lower corner; none where both are taken.
     pub(super) fn inset_place(&self, frame: &Frame, view: &PictureView) -> Option<Plate> {
         let size = inset_size(view)?;
         let right = view.size.x - MARGIN;
@@ -133,8 +134,12 @@ impl Stage {
         let lower = SMALLER.into_iter().map(|share| Plate::between(low - share * size, low));
         let points = self.hand_points(frame);
         let hand: Vec<Vec2> = points.iter().filter_map(|point| view.camera.project(*point, view.size)).collect();
-        let is_free = |plate: &Plate| !hand.iter().any(|place| plate.covers(*place));
-        std::iter::once(usual).chain(lower).find(is_free)
+        let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
+        let arrows = if view.forces { reach(&self.gripper, &world_from_gripper, frame, view) } else { Vec::new() };
+        let arrows: Vec<Vec2> = arrows.into_iter().filter_map(|point| view.camera.project(point, view.size)).collect();
+        let covered = |plate: &Plate, points: &[Vec2]| points.iter().filter(|place| plate.covers(**place)).count();
+        let beside = std::iter::once(usual).chain(lower).filter(|plate| covered(plate, &hand) == 0);
+        beside.min_by_key(|plate| covered(plate, &arrows))
     }
 }
 

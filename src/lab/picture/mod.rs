@@ -48,8 +48,8 @@ pub struct PictureView {
     pub size: Vec2,
     /// Draw force arrows.
     pub forces: bool,
-    /// Write forces and curvatures beside arrows and circles.
-    pub numbers: bool,
+    /// For people who have never seen such a picture: one force for each finger, and no other numbers or arrows.
+    pub plain: bool,
     /// Draw the axis gizmo, scale bar and legend.
     pub annotations: bool,
     /// Pressure that has the brightest colour (Pa).
@@ -73,7 +73,7 @@ impl Default for PictureView {
             theme: Theme::Dark,
             size: Vec2::new(960.0, 600.0),
             forces: true,
-            numbers: true,
+            plain: false,
             annotations: true,
             full_scale: PAD_FULL_SCALE,
             badge: None,
@@ -155,7 +155,7 @@ impl Stage {
         let inset = self.touch_inset(frame, view);
         let hand = self.held_points(frame).into_iter().filter_map(|point| view.camera.project(point, view.size));
         let mut annotator = Annotator::new(view, inset.as_ref(), hand.collect());
-        if view.forces && view.numbers {
+        if view.forces && !view.plain {
             forces::add_key(&mut annotator);
         }
         let palm = self.world_from_gripper.position.as_vec3();
@@ -163,10 +163,10 @@ impl Stage {
         let layout = view.layout.as_ref().filter(|_| view.circles && view.annotations);
         let circled = |layout| circles::add(&mut annotator, layout, &self.gripper, &world_from_gripper, frame);
         let numbers = layout.map(circled).unwrap_or_default();
-        if view.forces && view.annotations && view.numbers {
+        if view.forces && view.annotations {
             forces::label(&mut annotator, &self.gripper, &world_from_gripper, frame);
         }
-        numbers.iter().filter(|_| view.numbers).for_each(|own| circles::number(&mut annotator, own));
+        numbers.iter().filter(|_| !view.plain).for_each(|own| circles::number(&mut annotator, own));
         let mut fingers = self.fingers(frame, view.full_scale);
         if let Some(layout) = &view.layout {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
@@ -273,6 +273,11 @@ impl Stage {
     pub fn force_on_object(&self, frame: &Frame) -> Option<f32> {
         let object = frame.world_from_object.as_ref()?.position.as_vec3();
         self.touch(frame)?.force_on(object, self.object_radius)
+    }
+
+    /// Force of each finger across its pad (N), as its arrow shows it, left and right; none where it is not touched.
+    pub fn finger_forces(&self, frame: &Frame) -> [Option<f64>; 2] {
+        forces::of_fingers(&self.gripper, frame)
     }
 
     fn touch(&self, frame: &Frame) -> Option<touch::Touch> {

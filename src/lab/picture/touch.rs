@@ -1,5 +1,6 @@
 //! The touch from nearby: through the finger in front, which turns translucent where it hides its loaded pad.
 
+use super::annotations::Plate;
 use super::{PictureView, Stage};
 use glam::{DVec3, Vec3};
 use palpate_geometry::Pose;
@@ -95,7 +96,17 @@ impl Stage {
 
     /// The touch as a picture within a picture; none where nothing is touched.
     pub(super) fn touch_inset(&self, frame: &Frame, view: &PictureView) -> Option<Inset> {
-        let place = self.inset_place(frame, view)?;
+        self.inset(frame, view, self.inset_place(frame, view)?, None)
+    }
+
+    /// Adds the touch of an earlier hold, by this hand or in another pose, to a picture of a frame in which nothing is touched.
+    pub fn add_hold(&self, list: &mut DrawList, frame: &Frame, view: &PictureView, (stage, held): (&Self, &Frame)) {
+        let place = self.inset_place(frame, view);
+        let inset = place.and_then(|place| stage.inset(held, view, place, Some("last hold")));
+        list.inset = inset.map(Box::new);
+    }
+
+    fn inset(&self, frame: &Frame, view: &PictureView, place: Plate, title: Option<&str>) -> Option<Inset> {
         let (corner, size) = (place.middle - place.half, 2.0 * place.half);
         let inner = PictureView {
             camera: self.touch_camera(frame)?,
@@ -108,9 +119,12 @@ impl Stage {
         };
         let mut list = self.draw_touch(frame, &inner);
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
-        list.arrows = super::forces::shear(&self.gripper, &world_from_gripper, frame, view.theme);
+        if !view.plain {
+            list.arrows = super::forces::shear(&self.gripper, &world_from_gripper, frame, view.theme);
+        }
         let near = self.near_side(&inner.camera);
-        super::annotations::frame_inset(&mut list.overlay, &inner, &format!("{} pad", near.name()));
+        let title = title.map_or_else(|| format!("{} pad", near.name()), str::to_owned);
+        super::annotations::frame_inset(&mut list.overlay, &inner, &title);
         Some(Inset { list, corner, size })
     }
 }

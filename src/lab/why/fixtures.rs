@@ -81,6 +81,7 @@ pub(crate) fn linear(weights: [f64; 3]) -> (Arc<Model>, Arc<AtomicUsize>) {
         signature_grasps: None,
         taught: Vec::new(),
         taught_from: BTreeMap::new(),
+        lessons: Vec::new(),
         version: String::new(),
     };
     let calls = Arc::new(AtomicUsize::new(0));

@@ -4,7 +4,7 @@
 use super::job::{Job, JobError, Newer};
 use super::messages::Wake;
 use super::training::TrainedModel;
-use crate::grasping::{LESSON_GRASPS, Lesson, LessonStage, Lessons};
+use crate::grasping::{LESSON_GRASPS, LessonStage, Lessons};
 use palpate_geometry::units::capital;
 use palpate_learn::Model;
 use palpate_sim::objects::object_title;
@@ -42,17 +42,8 @@ pub enum ClassChange {
     Forgotten,
 }
 
-/// A model that has learned an object.
-#[derive(Clone, Debug)]
-pub struct FinishedLesson {
-    /// The model, saved.
-    pub trained: TrainedModel,
-    /// How well it knows the object; none where it learned from recorded grasps.
-    pub lesson: Option<Lesson>,
-}
-
 /// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
-pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, FinishedLesson> {
+pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, TrainedModel> {
     Job::new("teach", Newer::Waits, wake, move |request: &TeachRequest, run| {
         let name = capital(&object_title(&request.name));
         let progress = |stage: LessonStage| {
@@ -65,10 +56,7 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             run.progress(share, format!("Learning {name}: {words}"));
         };
         let store = Store::open(&store)?;
-        let save = |model| -> Result<_, JobError> {
-            let trained = TrainedModel::save(model, &models, "taught", &store)?;
-            Ok(Some(FinishedLesson { trained, lesson: None }))
-        };
+        let save = |model| -> Result<_, JobError> { Ok(Some(TrainedModel::save(model, &models, "taught", &store)?)) };
         match &request.change {
             ClassChange::Renamed(new) => return save(request.model.renamed(&request.name, new)),
             ClassChange::Forgotten => return save(request.model.without(&request.name)?),
@@ -87,7 +75,6 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             stop: run.stop(),
         };
         let taught = lessons.teach(&request.model, Some(&store))?;
-        let trained = TrainedModel::save(taught.model, &models, "taught", &store)?;
-        Ok(run.unless_stopped(FinishedLesson { trained, lesson: taught.lessons.into_iter().next() }))
+        Ok(run.unless_stopped(TrainedModel::save(taught.model, &models, "taught", &store)?))
     })
 }

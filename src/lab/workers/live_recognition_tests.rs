@@ -65,6 +65,7 @@ impl Parrot {
             signature_grasps: None,
             taught: Vec::new(),
             taught_from: BTreeMap::new(),
+            lessons: Vec::new(),
             version: String::new(),
         };
         (Model { card, recogniser: Arc::new(parrot), signatures: None }, rows)

@@ -63,7 +63,7 @@ mod why;
 mod worker;
 
 pub use advice::advice_job;
-pub use class_training::{ClassChange, FinishedLesson, TeachRequest, class_training_job};
+pub use class_training::{ClassChange, TeachRequest, class_training_job};
 pub use doctor::{DiagnosticsReport, Examine, ExamineRequest, doctor_job, examine_port};
 pub use gripper::{
     CalibrationCommand, CalibrationPlan, CalibrationSession, CalibrationSetup, CalibrationView, CrosstalkCommand,

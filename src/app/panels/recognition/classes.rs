@@ -14,7 +14,7 @@ const LETTERS: f32 = 12.5;
 /// Distance within which the line of the threshold can be dragged (points).
 const GRIP: f32 = 6.0;
 /// Distance between two columns (points).
-const GUTTER: f32 = 10.0;
+const GUTTER: f32 = 6.0;
 
 /// Columns of a line (points).
 #[derive(Clone, Copy)]
@@ -36,11 +36,11 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     let size = vec2(ui.available_width(), line * rows as f32);
     let (all, _) = ui.allocate_exact_size(size, Sense::hover());
     let width = (all.width() - GUTTER * (columns as f32 - 1.0)) / columns as f32;
-    let names = (if columns > 1 { 0.56 } else { 0.40 } * width).min(104.0);
+    let names = (if columns > 1 { 0.54 } else { 0.40 } * width).min(104.0);
     let width_of = |class| fitted(ui, title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
     let letters = (LETTERS * (names / longest).min(1.0)).max(LEAST_LETTERS).min(line);
-    let numbers = if columns > 1 { 24.0 } else { 46.0 };
+    let numbers = if columns > 1 { 31.0 } else { 46.0 };
     let places: Vec<Columns> = (0..columns)
         .map(|column| {
             let left = all.left() + (width + GUTTER) * column as f32;
@@ -114,9 +114,7 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     }
     // An empty bar says "0 %" already.
     if p >= 0.01 {
-        // Where there is no room for decimals, nothing is surer than 99 %.
-        let shown = if rect.right() - to < 30.0 { p.min(0.99) } else { p };
-        let number = fitted(ui, percent(shown), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
+        let number = fitted(ui, percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
         put(ui, number, rect, Align2::RIGHT_CENTER);
     }
 }

@@ -22,7 +22,7 @@ use egui::{
     WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::ThemeColours;
-use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp};
+use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp, lesson_result, lesson_warning};
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::object_title;
@@ -184,14 +184,15 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
                 ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(progress.words));
             });
         } else if let Some(learned) = learned {
+            let warning = learned.lesson.as_ref().and_then(lesson_warning);
             ui.horizontal_wrapped(|ui| {
                 let title = capital(&object_title(&learned.name));
-                let is_doubtful = learned.lesson.as_ref().is_some_and(|(lesson, _)| lesson.warning().is_some());
-                let ink = if is_doubtful { theme::of(ui).colours().warning } else { good };
+                let ink = if warning.is_some() { theme::of(ui).colours().warning } else { good };
                 ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(ink)));
-                if let Some((lesson, seconds)) = &learned.lesson {
-                    let (grasps, known) = (lesson.grasps, lesson.words());
-                    ui.label(format!("from {grasps} simulated grasps in {seconds:.0}\u{a0}s: {known}."));
+                if let Some(lesson) = &learned.lesson {
+                    let time = learned.seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.0}\u{a0}s"));
+                    let (grasps, known) = (lesson.grasps, lesson_result(lesson));
+                    ui.label(format!("from {grasps} simulated grasps{time}: {known}."));
                 }
                 let id = egui::Id::unique("name of what was learned");
                 if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {
@@ -205,7 +206,7 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
                 }
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
-            if let Some(warning) = learned.lesson.as_ref().and_then(|(lesson, _)| lesson.warning()) {
+            if let Some(warning) = warning {
                 ui.colored_label(colour(theme::of(ui).colours().warning), format!("{}.", capital(&warning)));
             }
         }

@@ -1,6 +1,6 @@
 //! Grasps so far, side by side: answer and confidence after each, and the running one.
 
-use super::words::{has_touched, percent, ranked, title};
+use super::words::{percent, ranked, running, title};
 use super::{Part, eased, fitted, put};
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Rect, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
@@ -31,9 +31,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     for number in first..last {
         let grasp = match view.beliefs.get(number) {
             Some(belief) => Grasp::Over(belief),
-            None if number == over && view.listening => {
-                Grasp::Running(view.verdict.as_ref().filter(|_| has_touched(view)).map(|v| &v.pmf))
-            }
+            None if number == over && view.listening => Grasp::Running(running(view)),
             None if view.decision.is_some() => Grasp::NotNeeded,
             None => Grasp::ToCome,
         };

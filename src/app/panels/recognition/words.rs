@@ -91,6 +91,12 @@ pub(in crate::app) fn newest(view: &IdentificationView) -> Option<&Pmf> {
     running.map(|verdict| &verdict.pmf).or(view.beliefs.last())
 }
 
+/// Answer of the running grasp, once it is one: before, the headline says that it senses.
+pub(in crate::app) fn running(view: &IdentificationView) -> Option<&Pmf> {
+    let touched = view.verdict.as_ref().filter(|_| has_touched(view) && Headline::of(view) != Headline::Sensing);
+    touched.map(|verdict| &verdict.pmf)
+}
+
 /// Most classes that are named as left.
 const NAMED: usize = 3;
 
@@ -154,11 +160,6 @@ pub(in crate::app) fn title(labels: &Labels, class: usize) -> String {
         OTHER => "Other".to_owned(),
         name => capital(&object_title(name)),
     })
-}
-
-/// Percentage without decimals.
-pub(super) fn whole_percent(p: f64) -> String {
-    percent(p.min(0.99))
 }
 
 /// The two most likely classes: `lemon 61 %, tomato 30 %`.
