@@ -3,7 +3,7 @@
 use palpate_exchange::{Exported, TrialExport, export_labelled, sound_ones, write_trials};
 use palpate_geometry::drawing::{DrawList, Figure};
 use palpate_geometry::palette::Theme;
-use palpate_lab::inspection::OpenOptions;
+use palpate_lab::inspection::{OpenOptions, trial_numbers};
 use palpate_lab::workers::{Job, JobError, Newer, Wake};
 use palpate_render::{DriverChoice, Gpu, Picture, Renderer, figure_picture, figure_svg};
 use palpate_store::{FileKind, Store, write_whole};
@@ -36,7 +36,12 @@ const LONGEST_NAME: usize = 60;
 impl ExportRequest {
     /// Name of its file, without ending: what it shows, in lower case.
     pub(super) fn name(&self) -> String {
-        let Self::Figure(figure, ..) = self else { return "palpate".to_owned() };
+        let figure = match self {
+            Self::Figure(figure, ..) => figure,
+            Self::Trials { ids, .. } if ids.len() == 1 => return format!("trial_{}", ids[0]),
+            Self::Trials { ids, .. } => return format!("{}_trials", ids.len()),
+            Self::View3d(..) | Self::Labelled(_) => return "palpate".to_owned(),
+        };
         let plot = match figure.plots.as_slice() {
             [one] => one.y.title.split(" (").next().unwrap_or_default(),
             _ => "",
@@ -82,14 +87,23 @@ impl ExportRequest {
 
 fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError> {
     // A name without ending is that of a folder.
-    let path = if path.extension().is_none() { unused(path) } else { path.to_owned() };
-    let (sound, _unsound) = sound_ones(export.store, export.ids)?;
-    let written = sound.len() - write_trials(&TrialExport { ids: &sound, ..*export }, &path)?.left_out.len();
-    let unsound = match export.ids.len() - written {
-        0 => String::new(),
-        count => format!("; {count} unsound or damaged left out"),
+    let folder = path.extension().is_none();
+    let path = if folder { unused(path) } else { path.to_owned() };
+    let (mut written, mut missing) = sound_ones(export.store, export.ids)?;
+    let left_out = write_trials(&TrialExport { ids: &written, ..*export }, &path)?.left_out;
+    missing.extend(left_out.into_iter().map(|(id, _)| id));
+    written.retain(|id| !missing.contains(id));
+    let what = match export.taxels {
+        _ if folder => "as CSV",
+        true => "with taxels",
+        false => "without taxels",
     };
-    Ok(format!("{written} of {} trials exported into {}{unsound}", export.ids.len(), path.display()))
+    let written = if written.is_empty() { "no trial".to_owned() } else { trial_numbers(written) };
+    let missing = match missing.is_empty() {
+        true => String::new(),
+        false => format!("; left out as unsound or damaged: {}", trial_numbers(missing)),
+    };
+    Ok(format!("Exported {written} {what}: {}{missing}", path.display()))
 }
 
 fn write_labelled(store: &Store, path: &Path) -> Result<String, JobError> {
@@ -131,7 +145,8 @@ mod tests {
         let options = OpenOptions::default();
         let request = ExportRequest::Trials { store, ids: vec![1, 2, 4], options, taxels: false };
         let said = request.write(&out, &AtomicBool::new(false)).expect("writes");
-        assert!(said.starts_with("3 of 3 trials exported into") && said.ends_with("export-2"), "{said}");
+        assert!(said.starts_with("Exported trials 1, 2, 4 as CSV: ") && said.ends_with("export-2"), "{said}");
+        assert_eq!(request.name(), "3_trials");
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export-2").join(name).is_file(), "{name}");
         }

@@ -55,6 +55,8 @@ pub struct Pinned {
 pub struct ComparedTrace {
     /// Name: `Tomato, trial 12`, or `Tomato, mean of 5`.
     pub name: String,
+    /// The same in a table: `12`, or `Tomato`.
+    pub short: String,
     /// Number of its colour.
     pub colour: usize,
     /// Values in the columns of the trace shown, on its time.

@@ -2,8 +2,9 @@
 
 use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
+use crate::presenter::texts;
 use crate::scripted;
-use egui::{Key, Modifiers};
+use egui::{Key, Modifiers, Rect};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::{Mode, Seek, ViewSource};
 use palpate_lab::datasets::SensorView;
@@ -224,6 +225,43 @@ fn compared_trials_have_a_line_each_or_a_mean() {
     bench.tell(|app| app.open_trial(99));
     bench.until_told("Trial 99 cannot be opened");
     assert_eq!(bench.workbench().inspected().map(|own| own.trial.id), Some(1));
+}
+
+#[test]
+fn values_of_compared_trials_stand_in_a_table() {
+    let mut bench = inspecting(1);
+    for id in [2, 3] {
+        bench.tell(|app| app.pin(id));
+    }
+    bench.until_shown(true, "Lemon, trial 3, simulated");
+    bench.harness.run_steps(3);
+    // Texts of the line at this height, from the left.
+    let line = |bench: &Bench, head: Rect, below: usize| -> Vec<String> {
+        let y = head.center().y + 14.0 * below as f32;
+        let mut found = texts(bench);
+        found.retain(|(place, ..)| (place.center().y - y).abs() < 4.0 && place.left() > head.left() - 1.0);
+        found.retain(|(place, ..)| place.left() < head.left() + 120.0);
+        found.sort_by(|a, b| a.0.left().total_cmp(&b.0.left()));
+        found.into_iter().map(|(.., text)| text).collect()
+    };
+    let heads: Vec<Rect> = texts(&bench).into_iter().filter(|(.., t)| t == "trial").map(|(place, ..)| place).collect();
+    assert!(heads.len() >= 2, "a table beside each plot");
+    for head in heads {
+        assert_eq!(line(&bench, head, 0)[1..], ["left", "right"]);
+        for id in 1..=3_usize {
+            let row = line(&bench, head, id);
+            assert!(row.len() == 3 && row[0] == id.to_string(), "{row:?}");
+            assert!(row[1..].iter().all(|value| value.parse::<f64>().is_ok()), "{row:?}");
+        }
+    }
+    // Between two marks there is a line for each curve.
+    bench.key(Modifiers::SHIFT, Key::A);
+    bench.key(Modifiers::NONE, Key::Home);
+    bench.key(Modifiers::SHIFT, Key::B);
+    bench.look();
+    let said = texts(&bench);
+    assert!(!said.iter().any(|(.., text)| text == "trial"));
+    assert!(said.iter().filter(|(.., text)| text.contains("Δ")).count() >= 12);
 }
 
 #[test]

@@ -7,8 +7,9 @@ use crate::program::{json, refused, run};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::{ALL_PANELS, Mode};
+use palpate::app::{ALL_PANELS, Mode, Reach};
 use palpate_lab::grasping::grasp;
+use palpate_lab::workers::Command;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::TrialEdit;
@@ -269,6 +270,88 @@ fn keys_walk_through_the_library_and_open_trials() {
     press(&mut bench, Modifiers::COMMAND, Key::Z);
     bench.until_told("Undone: trial 2: discarded");
     until_rows(&mut bench, &["2"]);
+}
+
+/// A lemon, below forty trials of a board, below a tomato.
+fn fill_high(store: &mut Store) {
+    let simulated = |store: &mut Store, name: &str| {
+        let mut scene = Scene::default();
+        name.clone_into(&mut scene.object.source);
+        store.insert(&grasp(&scene, scene.load_object().unwrap().as_ref(), 0)).unwrap();
+    };
+    simulated(store, "lemon");
+    for _ in 0..40 {
+        let id = store.begin_board(&TrialHeader::new("cube", Scene::default()), &BoardInfo::default()).unwrap();
+        store.finish_board(id, &BoardInfo::default(), &[]).unwrap();
+    }
+    simulated(store, "tomato");
+}
+
+#[test]
+fn the_trial_shown_is_marked_in_sight_and_exported() {
+    let setup = BenchSetup { size: [1400.0, 900.0], fill: fill_high, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    // The newest opens by itself, is marked and selected.
+    bench.tell(|app| app.set_mode(Mode::Inspect));
+    bench.until_shown(true, "Trial 42, Tomato, shown");
+    bench.until_shown(true, "1 selected");
+    // One far below comes into sight; rows out of sight are not drawn.
+    assert!(bench.harness.query_by_label_contains("Trial 1, Lemon").is_none());
+    bench.tell(|app| app.open_trial(1));
+    bench.until_shown(true, "Trial 1, Lemon, shown");
+    bench.until_shown(false, "Trial 42, Tomato");
+    // Also after a search that did not find it.
+    let search = |text: &str| TrialQuery { search: text.to_owned(), ..TrialQuery::default() };
+    bench.tell(|app| app.library.find(search("tomato")));
+    bench.until_shown(true, "Trial 42, Tomato");
+    bench.until_shown(false, "1 selected");
+    bench.tell(|app| app.library.find(search("")));
+    bench.until_shown(true, "Trial 1, Lemon, shown");
+    bench.until_shown(true, "1 selected");
+    // It is exported, until the keys select another one; its mark stays.
+    for (key, file) in [(None, "trial_1.mcap"), (Some(Key::ArrowUp), "trial_2.mcap")] {
+        key.into_iter().for_each(|key| bench.harness.key_press(key));
+        bench.harness.run_steps(3);
+        bench.harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::E);
+        bench.harness.run_steps(3);
+        let field = bench.harness.get_by_role_and_label(Role::TextInput, "Path").value();
+        assert!(field.as_ref().is_some_and(|path| path.ends_with(file)), "{field:?}");
+        bench.harness.key_press(Key::Escape);
+        bench.harness.run_steps(3);
+        assert!(bench.harness.query_by_label("Trial 1, Lemon, shown").is_some());
+    }
+    // The menu and the message name it.
+    let mut bench = library([900.0, 600.0]);
+    bench.tell(|app| app.open_trial(1));
+    bench.until_shown(true, "Trial 1, Lemon, shown");
+    let export = |bench: &mut Bench| {
+        bench.harness.get_by_label("Export").click();
+        bench.harness.run_steps(4);
+    };
+    export(&mut bench);
+    assert!(bench.harness.query_by_label("Export trial 1").is_some());
+    bench.harness.get_by_label("CSV into a folder beside the store").click();
+    bench.until_told("Exported trial 1 as CSV: ");
+    assert!(bench.store_folder().join("export").join("trial_1_lemon.csv").is_file());
+    bench.tell(|app| app.library.select(2, Reach::Alone));
+    bench.harness.run_steps(3);
+    export(&mut bench);
+    assert!(bench.harness.query_by_label("Export trial 2").is_some());
+    assert!(bench.harness.query_by_label("Trial 1, which is shown, is not selected.").is_some());
+}
+
+#[test]
+fn a_grasp_that_is_stored_already_names_its_trial_which_opens() {
+    let setup = BenchSetup { size: [1400.0, 900.0], fill: crate::inspect::three_trials, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(|app| app.simulation.send(Command::SetGrasps(1)));
+    bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
+    bench.tell(|app| app.simulation.send(Command::SetRecording(Some(TrialPlace::DemoLog))));
+    bench.tell(|app| app.simulation.send(Command::Play));
+    bench.until_told("Not stored again: trial 1 is the same grasp");
+    bench.tell(|app| app.set_mode(Mode::Inspect));
+    bench.until_shown(true, "TRIAL 1, SIMULATED");
+    bench.until_shown(true, "Trial 1, Lemon, shown");
 }
 
 #[test]

@@ -208,9 +208,13 @@ impl App {
         }
     }
 
-    /// Exports the trials selected in the library into one file, with the force on every taxel where this is wanted.
+    /// Exports the trials selected in the library, or else the one shown, into one file, with the force on every taxel where
+    /// this is wanted.
     pub(in crate::app) fn export_trials(&mut self, taxels: bool) {
-        let ids = self.library.selection.ids();
+        let mut ids = self.library.selection.ids();
+        if ids.is_empty() {
+            ids.extend(self.library.selection.shown);
+        }
         if ids.is_empty() {
             return self.notices.warning("Select trials in the library first.");
         }

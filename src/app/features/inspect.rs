@@ -93,6 +93,11 @@ impl InspectFeature {
         std::mem::take(&mut self.opens_newest) && self.wanted.is_none()
     }
 
+    /// Trial that is open or being opened.
+    pub(super) fn wanted(&self) -> Option<TrialId> {
+        self.wanted
+    }
+
     /// True while a trial is being opened.
     pub(in crate::app) fn is_opening(&self) -> bool {
         self.wanted.is_some() && self.open.as_ref().map(|open| open.id) != self.wanted
@@ -238,8 +243,8 @@ impl InspectFeature {
                 channels: key.names.iter().map(column).collect(),
                 ..GraspTrace::default()
             };
-            let name = format!("{}, trial {}", trial.title, trial.id);
-            ComparedTrace { name, colour: pinned.colour, trace, spread: Vec::new() }
+            let (name, short) = (format!("{}, trial {}", trial.title, trial.id), trial.id.to_string());
+            ComparedTrace { name, short, colour: pinned.colour, trace, spread: Vec::new() }
         };
         self.pinned.iter().filter(|pinned| Some(pinned.trial.id) != key.shown).map(compared).collect()
     }
@@ -265,7 +270,8 @@ impl InspectFeature {
             };
             let spread = key.names.iter().map(|n| column(n).map_or_else(empty, |c| c.spread.clone())).collect();
             let source = if real { "real" } else { "simulated" };
-            Some(ComparedTrace { name: format!("{title}, {source}, mean of {}", trials.len()), colour, trace, spread })
+            let (name, short) = (format!("{title}, {source}, mean of {}", trials.len()), title.to_owned());
+            Some(ComparedTrace { name, short, colour, trace, spread })
         };
         classes.into_iter().filter_map(compared).collect()
     }
@@ -336,9 +342,8 @@ impl App {
     /// Shows the open trial in Inspect mode, or the newest of the library unless a real gripper is connected; in the others
     /// the live gripper.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        let newest = || self.library.view.as_ref()?.found.first().map(|trial| trial.row.id);
         let simulated = self.view.source == ViewSource::Simulation;
-        let wanted = self.inspect.wanted.or_else(|| newest().filter(|_| simulated));
+        let wanted = self.inspect.wanted.or_else(|| self.newest_trial().filter(|_| simulated));
         self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && simulated;
         match (mode, wanted) {
             (Mode::Inspect, Some(id)) => self.show_trial(id),

@@ -32,6 +32,8 @@ pub struct LibrarySelection {
     pub cursor: Option<TrialId>,
     /// The selected trials in the order of the list, as of the last look.
     pub trials: Vec<Arc<LibraryTrial>>,
+    /// Trial that is open; it is selected where nothing else is.
+    pub shown: Option<TrialId>,
     /// Trial from which a range reaches.
     anchor: Option<TrialId>,
 }
@@ -45,6 +47,7 @@ impl Default for LibrarySelection {
             selected: BTreeSet::new(),
             cursor: None,
             trials: Vec::new(),
+            shown: None,
             anchor: None,
         }
     }
@@ -88,13 +91,26 @@ impl LibrarySelection {
         }
     }
 
+    /// Selects a trial that was opened, unless it is one of those selected.
+    fn show(&mut self, found: &[Arc<LibraryTrial>], shown: Option<TrialId>) {
+        self.shown = shown;
+        if let Some(id) = shown.filter(|id| !self.selected.contains(id)) {
+            self.select(found, id, Reach::Alone);
+        }
+        self.look(found);
+    }
+
     /// Looks at the selected trials again, and forgets those that are not found any more.
     fn look(&mut self, found: &[Arc<LibraryTrial>]) {
+        let is_found = |id: &TrialId| found.iter().any(|trial| trial.row.id == *id);
+        if let Some(id) = self.shown.filter(|id| !self.selected.iter().any(is_found) && is_found(id)) {
+            self.select(found, id, Reach::Alone);
+        }
         let selected = |trial: &&Arc<LibraryTrial>| self.selected.contains(&trial.row.id);
         self.trials =
             if self.selected.is_empty() { Vec::new() } else { found.iter().filter(selected).cloned().collect() };
         self.selected = self.trials.iter().map(|trial| trial.row.id).collect();
-        self.cursor = self.cursor.filter(|id| found.iter().any(|trial| trial.row.id == *id));
+        self.cursor = self.cursor.filter(is_found);
     }
 }
 
@@ -174,6 +190,7 @@ impl LibraryFeature {
 impl App {
     /// Shows outcomes, and forgets trials that are gone.
     pub(super) fn poll_library(&mut self) {
+        let shown = self.inspect.wanted();
         let Self { library: LibraryFeature { worker, view, selection, seen, .. }, notices, .. } = self;
         *view = worker.view();
         let Some(view) = view else { return };
@@ -181,11 +198,23 @@ impl App {
             selection.look(&view.found);
             *seen = Arc::clone(&view.found);
         }
+        if selection.shown != shown {
+            selection.show(seen, shown);
+        }
         worker.notices().for_each(|notice| notices.show(notice));
-        let newest = view.found.first().map(|trial| trial.row.id);
+        let newest = self.newest_trial();
         if let Some(newest) = newest.filter(|_| self.view.mode == Mode::Inspect && self.inspect.takes_newest()) {
             self.show_trial(newest);
         }
+    }
+
+    /// Trial that holds the last grasp of the simulation, although it may have been stored long ago; without one, the first
+    /// of the list.
+    pub(super) fn newest_trial(&self) -> Option<TrialId> {
+        let found = &self.library.view.as_ref()?.found;
+        let last = self.simulation.last_trial.map(|(id, _)| id);
+        let last = last.filter(|id| found.iter().any(|trial| trial.row.id == *id));
+        last.or_else(|| found.first().map(|trial| trial.row.id))
     }
 
     /// Moves the keyboard to the search field, and adds text typed ahead.
@@ -260,5 +289,28 @@ mod tests {
         assert_eq!((selected(&selection), selection.cursor), (vec![], None));
         selection.step(&found, 1, false);
         assert_eq!(selected(&selection), [6], "without a cursor at the top");
+    }
+
+    #[test]
+    fn the_trial_shown_is_selected_where_nothing_else_is() {
+        let found = found();
+        let mut selection = LibrarySelection::default();
+        selection.show(&found, Some(3));
+        assert_eq!((selected(&selection), selection.cursor), (vec![3], Some(3)));
+        // What is selected beside it stays so; also where the shown one is one of them.
+        selection.step(&found, 1, true);
+        selection.show(&found, Some(2));
+        assert_eq!(selected(&selection), [2, 3]);
+        selection.select(&found, 5, Reach::Alone);
+        selection.look(&found);
+        assert_eq!(selected(&selection), [5]);
+        // Found again after a search that found neither.
+        selection.look(&[]);
+        assert_eq!((selected(&selection), selection.cursor), (vec![], None));
+        selection.look(&found);
+        assert_eq!((selected(&selection), selection.cursor), (vec![2], Some(2)));
+        selection.show(&found, None);
+        selection.look(&found);
+        assert_eq!(selected(&selection), [2]);
     }
 }

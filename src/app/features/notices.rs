@@ -99,7 +99,9 @@ impl Notices {
             Notice::Failed(text) => self.error(text),
             Notice::SceneRefused(refusal) => self.error(refusal.cause),
             Notice::Stored(Stored::New(id)) => self.info(format!("Trial {id} stored.")),
-            Notice::Stored(Stored::Known(id)) => self.info(format!("Not stored again: trial {id} is the same grasp.")),
+            Notice::Stored(Stored::Known(id)) => {
+                self.info(format!("Not stored again: trial {id} is the same grasp (Inspect, Ctrl+2)."));
+            }
             Notice::Stored(Stored::Kept(id)) => {
                 self.info(format!("Trial {id} of the demo log is the same grasp: kept in the store."));
             }

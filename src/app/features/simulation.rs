@@ -49,6 +49,8 @@ pub struct SimulationFeature {
     refused: Option<Scene>,
     /// Trial that holds the last grasp, and where it was when the grasp ended.
     pub(super) last_trial: Option<(TrialId, TrialPlace)>,
+    /// Scene, by its first grasp, of which it was told that the demo log has its grasp already.
+    told_known: Option<u64>,
     ended: bool,
 }
 
@@ -78,6 +80,7 @@ impl SimulationFeature {
             changes: SceneChanges::default(),
             refused: None,
             last_trial: None,
+            told_known: None,
             ended: false,
         }
     }
@@ -168,7 +171,13 @@ impl App {
             match notice {
                 Notice::SceneRefused(refusal) => notices.failed("scene", simulation.take_refusal(*refusal)),
                 // The bar offers to keep it.
-                Notice::Logged(id, place) => simulation.last_trial = Some((id, place)),
+                Notice::Logged(stored, place) => {
+                    simulation.last_trial = Some((stored.id(), place));
+                    let since = Some(simulation.scene_since);
+                    if !stored.is_new() && std::mem::replace(&mut simulation.told_known, since) != since {
+                        notices.show(Notice::Stored(stored));
+                    }
+                }
                 Notice::Stored(stored) => {
                     simulation.last_trial = Some((stored.id(), TrialPlace::Store));
                     notices.show(notice);

@@ -296,17 +296,33 @@ const INVITATION: &str = "Drop an object of yours here (URDF, OBJ or STL): it is
 /// Least width of the picture in which that is one line, below the object (points).
 const INVITED: f32 = 700.0;
 
+/// Times closer than this are one (s).
+const SOON: f64 = 1e-6;
+
+/// What is said about an object that is shown in the hand or beside it, at a time (s) in or before the hold: one that is lost
+/// by the end of the hold is shown before.
+fn held_words(in_hand: bool, t: f64, [from, to]: [f64; 2]) -> &'static str {
+    match in_hand {
+        false => "Nothing is held",
+        true if t < from - SOON => "Not held: shown as it was pressed most",
+        true if t < to - SOON => "Not held to the end: shown as it was pressed most",
+        true => "As it was held",
+    }
+}
+
 /// What is said about a picture, and the colour of the ghost in it.
 fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
     let theme = own.data.view.theme;
     let held = own.data.held_s().map(|t| {
         let in_hand = own.data.moment().is_none_or(|now| now.stage.force_on_object(now.frame).is_some());
-        let words = if in_hand { "As it was held" } else { "Nothing is held" };
+        let words = held_words(in_hand, t, own.data.hold().unwrap_or([t, t]));
         format!("{words}, at {t:.1}{}s", units::SPACE)
     });
     if let Some(inspected) = own.data.shown_trial() {
-        // The time bar tells the time.
-        return (inspected.trial.remarks.join(" "), None);
+        let lost = held.filter(|_| inspected.trial.nothing_held()).map(|held| held + ".");
+        // Otherwise the time bar tells the time.
+        let said: Vec<String> = lost.into_iter().chain(inspected.trial.remarks.iter().cloned()).collect();
+        return (said.join(" "), None);
     }
     if own.data.source == ViewSource::Gripper {
         let text = match (own.silent_s, key.real) {
@@ -516,5 +532,14 @@ mod tests {
         let moment = |grasp| Moment { grasp, stage: &stage, frame: &held };
         assert_eq!(ghost_frame(Some(&ghost), moment(7)).map(|frame| frame.t), Some(held.t));
         assert_eq!(ghost_frame(Some(&ghost), moment(8)), None);
+    }
+
+    #[test]
+    fn an_object_that_was_lost_was_not_held() {
+        let hold = [2.0, 3.0];
+        assert_eq!(held_words(true, 3.0, hold), "As it was held");
+        assert_eq!(held_words(false, 3.0, hold), "Nothing is held");
+        assert_eq!(held_words(true, 0.0, hold), "Not held: shown as it was pressed most");
+        assert_eq!(held_words(true, 2.5, hold), "Not held to the end: shown as it was pressed most");
     }
 }

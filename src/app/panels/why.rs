@@ -197,18 +197,20 @@ impl Rows {
             };
             put_sized(ui, (span.phase.name(), HEADERS), cell, align, self.quiet);
         }
-        for (channel, evidence) in why.channels.iter().zip(&why.by_both) {
+        for ((channel, evidence), unloaded) in why.channels.iter().zip(&why.by_both).zip(&why.unloaded) {
             let name = channel_words(channel);
             let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
             put(ui, &name, rect.with_max_x(rect.left() + names_width(rect.width())), Align2::LEFT_CENTER, self.ink);
-            for ((span, own), cell) in why.phases.iter().zip(evidence).zip(cells(rect)) {
-                self.cell_ui(ui, (&name, span.phase), own, cell);
+            for (((span, own), unloaded), cell) in why.phases.iter().zip(evidence).zip(unloaded).zip(cells(rect)) {
+                self.cell_ui(ui, (&name, span.phase, *unloaded), own, cell);
             }
         }
     }
 
-    fn cell_ui(&self, ui: &Ui, (channel, phase): (&str, TouchPhase), evidence: &Evidence, cell: Rect) {
-        let name = format!("{channel}, {}", phase.name());
+    fn cell_ui(&self, ui: &Ui, part: (&str, TouchPhase, bool), evidence: &Evidence, cell: Rect) {
+        let (channel, phase, unloaded) = part;
+        let touches = if unloaded { ", which touches nothing" } else { "" };
+        let name = format!("{channel}{touches}, {}", phase.name());
         let text = format!("{name}: {}", spoken(evidence.points));
         let response = ui.interact(cell, ui.scope_id().with(("cell", channel, phase)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Label, true, &text));

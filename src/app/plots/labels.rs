@@ -1,7 +1,8 @@
-//! Names of the curves at the right of a plot with their values at the cursor, in the order of their heights. They take the
-//! place of a legend, which would cover curves.
+//! Names of the curves at the right of a plot with their values at the cursor, in the order of their heights; of compared
+//! trials in a table, with the numbers of the trials. They take the place of a legend, which would cover curves.
 
 use crate::app::theme::colour;
+use crate::app::widgets::put_line;
 use egui::{Align2, Color32, FontId, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::number;
@@ -31,17 +32,89 @@ pub(super) struct CurveLabel<'a> {
 
 impl CurveLabel<'_> {
     fn text(&self) -> String {
+        format!("{} {}", self.name, self.values())
+    }
+
+    fn values(&self) -> String {
         let value = self.value.map_or("–".to_owned(), |value| number(value, self.unit));
         match self.difference {
             Some(difference) => {
                 let sign = if difference > 0.0 { "+" } else { "" };
-                format!("{} {value}  Δ {sign}{}", self.name, number(difference, self.unit))
+                format!("{value}  Δ {sign}{}", number(difference, self.unit))
             }
-            None => format!("{} {value}", self.name),
+            None => value,
         }
     }
 }
 
+/// Draws a piece of a curve's line, which tells curves of one colour apart; its end.
+fn draw_line(painter: &egui::Painter, from: Pos2, ink: Color32, dashed: bool) -> Pos2 {
+    let line = [from, from + vec2(SAMPLE, 0.0)];
+    let stroke = Stroke::new(1.8, ink);
+    if dashed {
+        painter.extend(Shape::dashed_line(&line, stroke, 5.0, 4.0));
+    } else {
+        painter.line_segment(line, stroke);
+    }
+    line[1]
+}
+
+/// Most curves that have a column of their own beside the names of trials.
+const COLUMNS: usize = 2;
+/// Widest names of trials in a table (points).
+const TRIALS: f32 = 52.0;
+/// Room between columns (points).
+const GAP: f32 = 6.0;
+
+/// Draws the values of trials as a table beside a plot whose frame this is: a row for each trial and a column for each curve,
+/// or, where these have no room, a row for each curve of each trial. The labels are those of the first trial's curves, then
+/// of the second's, and so on.
+pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[String], &[CurveLabel<'_>])) {
+    let curves = (labels.len() / trials.len().max(1)).max(1);
+    let wide = curves <= COLUMNS && labels.iter().all(|label| label.difference.is_none());
+    let (in_row, head) = if wide { (curves, 1) } else { (1, 0) };
+    let (rows, room) = (labels.len() / in_row, (frame.height() / LINE).floor().max(2.0) as usize);
+    let shown = if head + rows > room { room - head - 1 } else { rows };
+    let width_of = |name: &str| {
+        ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(LETTERS), Color32::WHITE).size().x
+    };
+    let first = if wide { width_of(HEAD) } else { 0.0 };
+    let names = trials.iter().map(|name| width_of(name)).fold(first, f32::max).min(TRIALS) + GAP;
+    let left = frame.right() + 6.0 + SAMPLE + 5.0;
+    let column = (frame.right() + WIDTH - left - names) / in_row as f32;
+    let cell = |row: usize, from: f32, width: f32| {
+        Rect::from_min_size(pos2(left + from, frame.top() + LINE * row as f32), vec2(width, LINE))
+    };
+    let put = |cell: Rect, text: &str, ink| put_line(ui, cell, Align2::LEFT_CENTER, text, LETTERS, ink);
+    let quiet = colour(quiet);
+    if wide {
+        put(cell(0, 0.0, names), HEAD, quiet);
+        for (k, label) in labels.iter().take(in_row).enumerate() {
+            let place = cell(0, names + column * k as f32, column);
+            put(place, &label.name, quiet);
+            draw_line(ui.painter(), place.left_bottom(), quiet, label.dashed);
+        }
+    }
+    for (k, own) in labels.chunks(in_row).take(shown).enumerate() {
+        let (row, ink) = (head + k, own[0].ink);
+        let line = cell(row, -SAMPLE - 5.0, SAMPLE).left_center();
+        draw_line(ui.painter(), line, ink, own[0].dashed && !wide);
+        put(cell(row, 0.0, names - GAP), trials.get(k * in_row / curves).map_or("", String::as_str), ink);
+        for (k, label) in own.iter().enumerate() {
+            // Beside differences there is no room for the name: its line is dashed or not.
+            let text = if wide || label.difference.is_some() { label.values() } else { label.text() };
+            put(cell(row, names + column * k as f32, column), &text, ink);
+        }
+    }
+    if shown < rows {
+        put(cell(head + shown, 0.0, WIDTH), &format!("and {} more", rows - shown), quiet);
+    }
+}
+
+/// Head of the column of trials.
+const HEAD: &str = "trial";
+/// Letters of the table (points).
+const LETTERS: f32 = 11.5;
 /// Draws the labels beside a plot whose frame this is; those that do not fit are left out, the last first.
 pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<'_>>) {
     let room = ((frame.height() / LINE).floor().max(1.0)) as usize;
@@ -53,15 +126,7 @@ pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<
     let clip = Rect::from_min_max(pos2(frame.right(), frame.top()), pos2(frame.right() + WIDTH, frame.bottom()));
     let painter = ui.painter_at(clip);
     for (label, y) in labels.iter().zip(places) {
-        // A piece of its line tells curves of one colour apart.
-        let line = [pos2(frame.right() + 6.0, y), pos2(frame.right() + 6.0 + SAMPLE, y)];
-        let stroke = Stroke::new(1.8, label.ink);
-        if label.dashed {
-            painter.extend(Shape::dashed_line(&line, stroke, 5.0, 4.0));
-        } else {
-            painter.line_segment(line, stroke);
-        }
-        let place: Pos2 = line[1] + vec2(5.0, 0.0);
+        let place = draw_line(&painter, pos2(frame.right() + 6.0, y), label.ink, label.dashed) + vec2(5.0, 0.0);
         painter.text(place, Align2::LEFT_CENTER, label.text(), FontId::proportional(11.5), label.ink);
     }
     if hidden > 0 {

@@ -148,7 +148,13 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
             ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, "not calibrated", font, ui.visuals().warn_fg_color);
             frame.max.y -= labels::LINE;
         }
-        labels::draw(ui, frame, theme.colours().quiet_text, curve_labels(data, &plot, &response.transform));
+        let quiet = theme.colours().quiet_text;
+        let labels = curve_labels(data, &plot, &response.transform);
+        if data.comparison.traces.is_empty() {
+            labels::draw(ui, frame, quiet, labels);
+        } else {
+            labels::draw_table(ui, frame, quiet, (&names_of_trials(data), &labels));
+        }
     }
     if let Some(why) = nothing {
         let rect = response.response.rect;
@@ -201,6 +207,16 @@ fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &P
     let others =
         others.map(|(compared, curve)| label(&compared.trace, curve, colour(series_colour(compared.colour, theme))));
     own.chain(others).collect()
+}
+
+/// Names of the trial shown and of those compared, in the order of their curves.
+fn names_of_trials(data: &DisplayedData<'_>) -> Vec<String> {
+    let own = match data.shown_trial() {
+        Some(own) => own.trial.id.to_string(),
+        None => "live".to_owned(),
+    };
+    let own = data.traces.current().map(|_| own);
+    own.into_iter().chain(data.comparison.traces.iter().map(|compared| compared.short.clone())).collect()
 }
 
 /// Text where a connected gripper gives no curve to draw.

@@ -144,13 +144,15 @@ fn titles(trials: &[&OpenTrial]) -> String {
 
 /// Numbers of several trials: `trials 3 to 7`, `trials 3, 5, 9 …`.
 fn numbers(trials: &[&OpenTrial]) -> String {
-    numbers_of(trials.iter().map(|trial| trial.id).collect())
+    trial_numbers(trials.iter().map(|trial| trial.id).collect())
 }
 
-fn numbers_of(mut ids: Vec<TrialId>) -> String {
+/// Numbers of trials in words: `trial 3`, `trials 3 to 7`, `trials 3, 5, 9 …`.
+pub fn trial_numbers(mut ids: Vec<TrialId>) -> String {
     ids.sort_unstable();
     ids.dedup();
     match ids[..] {
+        [id] => format!("trial {id}"),
         [first, .., last] if ids.len() > 2 && ids.windows(2).all(|pair| pair[1] == pair[0] + 1) => {
             format!("trials {first} to {last}")
         }
@@ -429,8 +431,8 @@ mod tests {
 
     #[test]
     fn a_title_tells_which_trials_are_shown() {
-        let texts = [vec![25, 23, 24], vec![7, 3], vec![5, 5], (1..9).map(|k| 2 * k).collect()].map(numbers_of);
-        assert_eq!(texts, ["trials 23 to 25", "trials 3, 7", "trials 5", "trials 2, 4, 6, 8, 10, 12 …"]);
+        let texts = [vec![25, 23, 24], vec![7, 3], vec![5, 5], (1..9).map(|k| 2 * k).collect()].map(trial_numbers);
+        assert_eq!(texts, ["trials 23 to 25", "trials 3, 7", "trial 5", "trials 2, 4, 6, 8, 10, 12 …"]);
     }
 
     #[test]

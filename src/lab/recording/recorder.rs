@@ -26,7 +26,7 @@ pub enum RecorderNotice {
     /// A simulated grasp was sent to the store.
     Stored(Stored),
     /// A simulated grasp was sent to the demo log: the trial that now holds it, and where that trial is.
-    Logged(TrialId, TrialPlace),
+    Logged(Stored, TrialPlace),
     /// A trial of the real gripper is complete in the store.
     Recorded(Box<RecordedTrial>),
     /// Something about the trial was not stored; the trial itself is safe.
@@ -200,9 +200,8 @@ impl Writer {
     }
 
     fn report(&mut self, stored: Stored) -> Result<(), StoreError> {
-        let id = stored.id();
         let notice = match self.place {
-            TrialPlace::DemoLog => RecorderNotice::Logged(id, self.with_store(|store| store.place(id))?),
+            TrialPlace::DemoLog => RecorderNotice::Logged(stored, self.with_store(|store| store.place(stored.id()))?),
             TrialPlace::Store => RecorderNotice::Stored(stored),
         };
         (self.notify)(notice);

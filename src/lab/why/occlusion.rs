@@ -13,7 +13,7 @@
 //! Cost: 1 + C + P + C P answers of the model, with C channels and P phases; 28 for six channels and three phases.
 
 use super::bands::two_likeliest;
-use super::phases::{phase_at, phases_of};
+use super::phases::{phase_at, phases_of, unloaded};
 use crate::grasping::RecognisedGrasp;
 use crate::inspection::PhaseSpan;
 use palpate_learn::{Belief, Labels, Pmf, Sequence, Signatures};
@@ -69,6 +69,8 @@ pub struct Attribution {
     pub by_phase: Vec<Evidence>,
     /// Evidence of each channel in each phase, `[channels][phases]`.
     pub by_both: Vec<Vec<Evidence>>,
+    /// Where a channel is that of a pad without load: what spoke is that it touches nothing, `[channels][phases]`.
+    pub unloaded: Vec<Vec<bool>>,
     /// Course of the belief over the grasps of this object.
     pub grasps: Vec<BeliefMove>,
     /// Answers of the model that it took.
@@ -117,10 +119,11 @@ pub fn explain(of: &RecognisedGrasp, stop: &AtomicBool) -> Result<Attribution, W
     let by_phase = (0..phases.len()).map(|p| without(None, Some(p))).collect::<Result<_, _>>()?;
     let mut in_phases = |c| (0..phases.len()).map(|p| without(Some(c), Some(p))).collect::<Result<_, _>>();
     let by_both = (0..channels.len()).map(&mut in_phases).collect::<Result<_, _>>()?;
+    let unloaded = unloaded(&of.grasp, signatures, &phases);
     let labels = &of.model.card.labels;
     let [first, second] = two.map(|class| share(labels, &answer, class));
     let (channels, grasps, calls) = (channels.to_vec(), moves(&of.belief, two), model.calls);
-    Ok(Attribution { first, second, channels, phases, by_channel, by_phase, by_both, grasps, calls })
+    Ok(Attribution { first, second, channels, phases, by_channel, by_phase, by_both, unloaded, grasps, calls })
 }
 
 /// A model whose answers are counted.

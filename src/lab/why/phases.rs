@@ -40,18 +40,34 @@ pub(super) fn phase_at(spans: &[PhaseSpan], t_s: f64) -> Option<usize> {
 
 /// First time at which a pad feels something (s).
 fn contact_s(grasp: &Sequence, signatures: &Signatures) -> Option<f64> {
-    let channels = signatures.channels().iter().enumerate();
-    let pads = channels.filter(|(_, name)| {
-        Quantity::of_name(name).is_some_and(|(quantity, _)| quantity.is_pressure() || quantity == Quantity::Force)
-    });
     let t_s: Vec<f64> = grasp.t_s.iter().map(|t| f64::from(*t)).collect();
-    let onsets = pads.filter_map(|(channel, _)| {
-        let classes = (0..signatures.grasps().len()).filter_map(|class| signatures.of_class(class, channel));
-        let most = classes.flat_map(|(mean, _)| mean.iter().copied()).fold(0.0, f32::max);
+    let onsets = (0..signatures.channels().len()).filter_map(|channel| {
+        let least = least_load(signatures, channel)?;
         let loads: Vec<f32> = grasp.rows().map(|(_, row)| row[channel]).collect();
-        onset(&t_s, &loads, f64::NEG_INFINITY, f64::from(CONTACT_SHARE * most))
+        onset(&t_s, &loads, f64::NEG_INFINITY, f64::from(least))
     });
     onsets.reduce(f64::min)
+}
+
+/// Least reading of a pad that is contact, in the channel's unit; none for channels that are no pad's.
+fn least_load(signatures: &Signatures, channel: usize) -> Option<f32> {
+    let (quantity, _) = Quantity::of_name(&signatures.channels()[channel])?;
+    let classes = (0..signatures.grasps().len()).filter_map(|class| signatures.of_class(class, channel));
+    let most = classes.flat_map(|(mean, _)| mean.iter().copied()).fold(0.0, f32::max);
+    (quantity.is_pressure() || quantity == Quantity::Force).then_some(CONTACT_SHARE * most)
+}
+
+/// True for each channel and phase in which a pad carries no load, `[channels][phases]`.
+pub(super) fn unloaded(grasp: &Sequence, signatures: &Signatures, phases: &[PhaseSpan]) -> Vec<Vec<bool>> {
+    let of_channel = |channel: usize| {
+        let least = least_load(signatures, channel);
+        let is_unloaded = |phase: usize| {
+            let mut rows = grasp.rows().filter(|(t, _)| phase_at(phases, f64::from(*t)) == Some(phase));
+            least.is_some_and(|least| rows.all(|(_, row)| row[channel] <= least))
+        };
+        (0..phases.len()).map(is_unloaded).collect()
+    };
+    (0..signatures.channels().len()).map(of_channel).collect()
 }
 
 /// Time from which on all channels stay close to their last values (s); none for a grasp that changes to its end.
@@ -114,5 +130,8 @@ mod tests {
             assert!((found[place].from_s..=found[place].to_s).contains(&f64::from(*t)), "{t}");
         }
         assert!(phases_of(&Sequence::default(), &signatures, None).is_empty());
+        // The pad is silent until contact; a bend is never a load.
+        let spans = phases_of(&grasp(4.0), &signatures, None);
+        assert_eq!(unloaded(&grasp(4.0), &signatures, &spans), [[false; 3], [true, false, false]]);
     }
 }

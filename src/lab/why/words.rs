@@ -35,12 +35,10 @@ impl Attribution {
     /// Strongest reasons for and against the first class, strongest first: channels in a phase or, where none of these
     /// counts alone, whole channels or whole phases.
     pub fn reasons(&self) -> [Vec<Reason>; 2] {
-        let channel = |c: usize| channel_words(&self.channels[c]);
-        let phase = |span: &PhaseSpan| phase_words(span);
-        let both = self.by_both.iter().enumerate().flat_map(|(c, row)| {
-            let cells = row.iter().zip(&self.phases);
-            cells.map(move |(evidence, span)| (format!("{} {}", channel(c), phase(span)), *evidence))
-        });
+        let both =
+            self.by_both.iter().enumerate().flat_map(|(c, row)| {
+                row.iter().enumerate().map(move |(p, evidence)| (self.part_words(c, p), *evidence))
+            });
         let channels = self.by_channel.iter().enumerate();
         let channels =
             channels.map(|(c, evidence)| (format!("{} throughout", channel_words(&self.channels[c])), *evidence));
@@ -51,6 +49,19 @@ impl Attribution {
             let of_level = |parts: &Vec<(String, Evidence)>| strongest(parts, sign);
             levels.iter().map(of_level).find(|found| !found.is_empty()).unwrap_or_default()
         })
+    }
+
+    /// A channel in a phase: `left pad pressure in the hold`; where the pad touches nothing then, its silence is what spoke:
+    /// `no left pad pressure yet while pre-shaping`.
+    fn part_words(&self, channel: usize, phase: usize) -> String {
+        let (name, span) = (channel_words(&self.channels[channel]), &self.phases[phase]);
+        let still_closing = span.phase < TouchPhase::Hold;
+        match (self.unloaded[channel][phase], name.split_once(", ")) {
+            (false, _) => format!("{name} {}", phase_words(span)),
+            (true, Some((pad, place))) if still_closing => format!("no {pad} ({place}) yet {}", phase_words(span)),
+            (true, None) if still_closing => format!("no {name} yet {}", phase_words(span)),
+            (true, _) => format!("no {name} {}", phase_words(span)),
+        }
     }
 
     /// The strongest reason for the first class, or that there is no single one.
@@ -156,6 +167,7 @@ mod tests {
             by_channel: [0.4, 0.2].map(evidence).to_vec(),
             by_phase: [0.0, 0.3].map(evidence).to_vec(),
             by_both: by_both.map(row).to_vec(),
+            unloaded: vec![vec![false; 2]; 2],
             grasps: Vec::new(),
             calls: 9,
         }
@@ -172,6 +184,14 @@ mod tests {
                 "Against Lemon: right curvature, distal in contact (−9 percentage points)."
             ]
         );
+        // A pad without load speaks by its silence.
+        let silent = |unloaded: [bool; 2]| {
+            let cells = vec![unloaded.to_vec(), vec![false; 2]];
+            Attribution { unloaded: cells, ..found([[96.0, 0.0], [0.0, 0.0]]) }.because()
+        };
+        assert_eq!(silent([true, false]), "no left pad pressure yet in contact");
+        let let_go = Attribution { unloaded: vec![vec![false, true]; 2], ..found([[0.0, 12.0], [0.0; 2]]) };
+        assert_eq!(let_go.because(), "no left pad pressure in the hold");
         // No part alone changes the answer by a point.
         let sure = found([[0.1; 2]; 2]);
         assert_eq!(

@@ -10,7 +10,6 @@ use palpate_sim::objects::{EMPTY, ObjectClass};
 use palpate_sim::scene::{Accuracy, EngineKind, Scene};
 use palpate_store::{Stored, TrialPlace};
 use palpate_tactile::Channel;
-use palpate_tactile::trial::TrialId;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -73,7 +72,7 @@ pub enum Notice {
     /// A trial is in the store.
     Stored(Stored),
     /// A grasp was sent to the demo log: the trial that now holds it, and where that trial is.
-    Logged(TrialId, TrialPlace),
+    Logged(Stored, TrialPlace),
 }
 
 /// A scene that could not be set up.

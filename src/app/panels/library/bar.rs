@@ -2,6 +2,7 @@
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
+use crate::app::features::library::LibrarySelection;
 use crate::app::widgets::{text_field, wrapped};
 use egui::containers::menu::{MenuButton, MenuConfig, SubMenuButton, is_in_menu};
 use egui::{Button, Id, Key, PopupCloseBehavior, RichText, ScrollArea, Ui};
@@ -21,11 +22,12 @@ const OFFERS: f32 = 150.0;
 
 pub(super) fn ui(
     ui: &mut Ui,
-    trials: &[Arc<LibraryTrial>],
+    picked: &LibrarySelection,
     labels: Option<&LabelView>,
     view: &LibraryView,
     actions: &mut Actions,
 ) {
+    let trials = picked.trials.as_slice();
     let gone = trials.iter().all(|trial| trial.row.deleted.is_some());
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
@@ -42,9 +44,9 @@ pub(super) fn ui(
             actions.push(|app| app.library.edit(TrialEdit::Keep));
         }
         if ui.available_width() < WHOLE {
-            menu(ui, "Edit", |ui| edits_ui(ui, trials, labels, view, actions));
+            menu(ui, "Edit", |ui| edits_ui(ui, picked, labels, view, actions));
         } else {
-            edits_ui(ui, trials, labels, view, actions);
+            edits_ui(ui, picked, labels, view, actions);
         }
     });
 }
@@ -52,27 +54,39 @@ pub(super) fn ui(
 /// Everything that changes or exports the selection.
 fn edits_ui(
     ui: &mut Ui,
-    trials: &[Arc<LibraryTrial>],
+    picked: &LibrarySelection,
     labels: Option<&LabelView>,
     view: &LibraryView,
     actions: &mut Actions,
 ) {
+    let trials = picked.trials.as_slice();
     menu(ui, "Label", |ui| label_ui(ui, labels, trials, actions));
     menu(ui, "Tag", |ui| tag_ui(ui, view, trials, actions));
     menu(ui, "Note", |ui| note_ui(ui, trials, actions));
     menu(ui, "Export", |ui| {
+        ui.strong(match trials {
+            [one] => format!("Export trial {}", one.row.id),
+            _ => format!("Export {} selected trials", trials.len()),
+        });
+        let others = picked.shown.filter(|id| !picked.selected.contains(id));
+        others.into_iter().for_each(|id| _ = ui.weak(format!("Trial {id}, which is shown, is not selected.")));
         let id = Id::unique("exported taxels");
         let mut taxels = ui.data(|data| data.get_temp(id)).unwrap_or(false);
         if ui.button("CSV into a folder beside the store").clicked() {
             actions.push(App::export_tables);
             ui.close();
         }
-        if ui.button("MCAP or NPZ file …").on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy").clicked() {
+        if ui
+            .button("MCAP or NPZ file …")
+            .on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy (Ctrl+Shift+E)")
+            .clicked()
+        {
             actions.push(move |app| app.export_trials(taxels));
             ui.close();
         }
-        let hint = "The file also holds the force on every taxel of simulated trials, normal and shear";
-        if ui.checkbox(&mut taxels, "Taxels").on_hover_text(hint).changed() {
+        let hint = "The file also holds the force on every taxel of simulated trials, normal and shear. CSV lists the \
+             loaded taxels anyway, in .contacts.csv";
+        if ui.checkbox(&mut taxels, "With taxels (MCAP, NPZ)").on_hover_text(hint).changed() {
             ui.data_mut(|data| data.insert_temp(id, taxels));
         }
     });

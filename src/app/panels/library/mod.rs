@@ -32,7 +32,7 @@ pub(super) fn ui(
         let frame = Frame::new().fill(fill).corner_radius(4).inner_margin(Margin::same(6));
         Panel::bottom("selected trials")
             .frame(frame)
-            .show(ui, |ui| bar::ui(ui, &library.selection.trials, labels, view, actions));
+            .show(ui, |ui| bar::ui(ui, &library.selection, labels, view, actions));
     }
     search_ui(ui, &library.selection, view, actions);
     filters::ui(ui, &library.selection.query, view, actions);

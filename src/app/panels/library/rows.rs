@@ -40,7 +40,11 @@ pub(super) fn ui(
     ui.spacing_mut().item_spacing.y = 0.0;
     let seen = ui.scope_id().with("rows");
     let mut list = ScrollArea::vertical().auto_shrink(false);
-    if let Some(offset) = scroll_offset(ui, seen, picked.cursor, view, height) {
+    let before = ui.data(|data| data.get_temp::<Seen>(seen)).unwrap_or_default();
+    let mut now = Seen { rows: 0..0, cursor: picked.cursor, shown: picked.shown, query: view.query.clone() };
+    // One that is not in the list yet is new when it comes.
+    now.shown = now.shown.filter(|id| view.found.iter().any(|trial| trial.row.id == *id));
+    if let Some(offset) = scroll_offset(ui, &before, &now, view, height) {
         list = list.vertical_scroll_offset(offset);
     }
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
@@ -50,7 +54,16 @@ pub(super) fn ui(
         rows
     });
     draw_seen(ui, seen, view, &shown.inner, actions);
-    ui.data_mut(|data| data.insert_temp(seen, (shown.inner.start, shown.inner.end, picked.cursor)));
+    ui.data_mut(|data| data.insert_temp(seen, Seen { rows: shown.inner, ..now }));
+}
+
+/// What the last picture of the list has shown.
+#[derive(Clone, Default)]
+struct Seen {
+    rows: Range<usize>,
+    cursor: Option<TrialId>,
+    shown: Option<TrialId>,
+    query: TrialQuery,
 }
 
 /// Asks for the sparklines of rows in sight, once for each set of rows.
@@ -66,17 +79,17 @@ fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, a
     }
 }
 
-/// Offset that brings a newly selected trial into sight.
-fn scroll_offset(ui: &Ui, seen: egui::Id, cursor: Option<TrialId>, view: &LibraryView, height: f32) -> Option<f32> {
-    let (first, end, before) = ui.data(|data| data.get_temp::<(usize, usize, Option<TrialId>)>(seen))?;
-    let cursor = cursor.filter(|_| cursor != before)?;
-    let place = view.found.iter().position(|trial| trial.row.id == cursor)?;
-    if (first + 1..end.saturating_sub(1)).contains(&place) {
+/// Offset that brings a newly selected trial into sight, or else one that is newly shown, also in another list.
+fn scroll_offset(ui: &Ui, before: &Seen, now: &Seen, view: &LibraryView, height: f32) -> Option<f32> {
+    let cursor = now.cursor.filter(|_| now.cursor != before.cursor);
+    let wanted = cursor.or(now.shown.filter(|_| (now.shown, &now.query) != (before.shown, &before.query)))?;
+    let place = view.found.iter().position(|trial| trial.row.id == wanted)?;
+    if (before.rows.start + 1..before.rows.end.saturating_sub(1)).contains(&place) {
         return None;
     }
     let room = ui.available_height();
     let at = place as f32 * height;
-    Some(if place <= first { at } else { (at + height - room).max(0.0) })
+    Some(if place <= before.rows.start { at } else { (at + height - room).max(0.0) })
 }
 
 /// Titles of columns; a click sorts.
@@ -139,7 +152,8 @@ fn row_ui(
     let id = trial.row.id;
     let selected = picked.selected.contains(&id);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
-    let name = format!("Trial {id}, {}", trial.title);
+    let shown = picked.shown == Some(id);
+    let name = format!("Trial {id}, {}{}", trial.title, if shown { ", shown" } else { "" });
     response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, selected, &name));
     if selected || response.hovered() || response.has_focus() {
         let share = if selected { 0.30 } else { 0.10 };
@@ -149,13 +163,16 @@ fn row_ui(
             colour(colours.background.mix(colours.accent, share)),
         );
     }
-    if picked.cursor == Some(id) {
-        let edge = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(2.5, height - 6.0));
+    if shown {
+        let edge = Rect::from_min_size(rect.min + vec2(0.0, 1.0), vec2(4.0, height - 2.0));
         ui.painter().rect_filled(edge, 1.0, colour(colours.accent));
+    } else if picked.cursor == Some(id) {
+        let edge = Rect::from_min_size(rect.min + vec2(0.0, 3.0), vec2(2.5, height - 6.0));
+        ui.painter().rect_filled(edge, 1.0, colour(colours.quiet_text));
     }
     match table {
         Some(columns) => table_row(ui, pictures, view, trial, &placed(columns, rect)),
-        None => list_row(ui, pictures, view, trial, rect),
+        None => list_row(ui, pictures, view, (trial, shown), rect),
     }
     answer(ui, &response, trial, selected, actions);
     response.on_hover_ui(|ui| hint_ui(ui, view, trial));
@@ -252,7 +269,7 @@ fn table_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &Library
 }
 
 /// Two lines: title and date, then the rest in small print.
-fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &LibraryTrial, rect: Rect) {
+fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): (&LibraryTrial, bool), rect: Rect) {
     let colours = theme::of(ui).colours();
     let inside = rect.shrink2(vec2(6.0, 4.0));
     let side = inside.height();
@@ -281,11 +298,11 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &LibraryT
     let lower = Rect::from_min_max(pos2(words.left(), words.center().y), words.max);
     let quality = cell(view, trial, TrialColumn::Quality);
     let plain = trial.row.deleted.is_none() && trial.quality() == TrialQuality::Sound;
-    let left = if plain {
-        lower.left()
-    } else {
-        text(ui, lower, Align2::LEFT_CENTER, &quality, 11.5, ink_of(TrialColumn::Quality)) + GAP
-    };
+    let mut left = lower.left();
+    let first = [("shown", colour(colours.accent), shown), (&quality, ink_of(TrialColumn::Quality), !plain)];
+    for (word, ink, _) in first.into_iter().filter(|(.., said)| *said) {
+        left = text(ui, lower.with_min_x(left), Align2::LEFT_CENTER, word, 11.5, ink) + GAP;
+    }
     let preset = trial.row.preset.map(|name| format!("preset {name}")).unwrap_or_default();
     let tags: String = trial.row.tags.iter().map(|tag| format!("#{tag} ")).collect();
     let number = format!("no {}", trial.row.id);

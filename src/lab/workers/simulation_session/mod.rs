@@ -84,7 +84,7 @@ impl Session {
         let recorder = Recorder::start(setup.store, move |notice| {
             notifier.notify(match notice {
                 RecorderNotice::Stored(stored) => Notice::Stored(stored),
-                RecorderNotice::Logged(id, place) => Notice::Logged(id, place),
+                RecorderNotice::Logged(stored, place) => Notice::Logged(stored, place),
                 RecorderNotice::Warning(text) => Notice::Warning(text),
                 RecorderNotice::Failed(text) => Notice::Failed(text),
                 // Only the real gripper's trials say so.
