@@ -204,12 +204,17 @@ impl Camera {
 
     /// Projects a point of the world into a picture of `size` points, from its top left; `None` behind the eye.
     pub fn project(&self, point: Vec3, size: Vec2) -> Option<Vec2> {
-        let clip = self.clip_from_world(size.x / size.y) * point.extend(1.0);
-        if clip.w <= 0.0 {
-            return None;
+        self.projector(size)(point)
+    }
+
+    /// [`Camera::project`] for many points.
+    pub fn projector(&self, size: Vec2) -> impl Fn(Vec3) -> Option<Vec2> + use<> {
+        let clip_from_world = self.clip_from_world(size.x / size.y);
+        move |point| {
+            let clip = clip_from_world * point.extend(1.0);
+            let ndc = clip.truncate() / clip.w;
+            (clip.w > 0.0).then(|| Vec2::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size)
         }
-        let ndc = clip.truncate() / clip.w;
-        Some(Vec2::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * size)
     }
 }
 

@@ -45,6 +45,7 @@ pub(super) fn add(
     let Ok(sensors) = Sensors::new(layout, gripper, SignalDefinition::Parts) else { return Vec::new() };
     let mut numbers = Vec::new();
     let view = annotator.view;
+    let on_picture = view.camera.projector(view.size);
     let values = sensors.read(frame);
     let strips = sensors.channels().iter().zip(values).filter(|(channel, _)| channel.quantity == Quantity::Curvature);
     for (channel, value) in strips {
@@ -55,7 +56,7 @@ pub(super) fn add(
         let colour = trace.colour(view.theme);
         let points: Vec<Option<Vec2>> = arc(gripper, frame, side, stretch, curvature)
             .into_iter()
-            .map(|point| view.camera.project(world_from_gripper.point(point).as_vec3(), view.size))
+            .map(|point| on_picture(world_from_gripper.point(point).as_vec3()))
             .collect();
         for (k, pair) in points.windows(2).enumerate() {
             let dashed = side == Side::Right && k % 3 == 2;

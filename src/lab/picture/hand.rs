@@ -132,14 +132,13 @@ impl Stage {
         let usual = Plate::between(Vec2::new(right - size.x, top), Vec2::new(right, top + size.y));
         let low = Vec2::new(right, view.size.y - SCALE_BAR);
         let lower = SMALLER.into_iter().map(|share| Plate::between(low - share * size, low));
-        let points = self.hand_points(frame);
-        let hand: Vec<Vec2> = points.iter().filter_map(|point| view.camera.project(*point, view.size)).collect();
+        let on_picture = view.camera.projector(view.size);
+        let hand: Vec<Vec2> = self.hand_points(frame).into_iter().filter_map(&on_picture).collect();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let arrows = if view.forces { reach(&self.gripper, &world_from_gripper, frame, view) } else { Vec::new() };
-        let arrows: Vec<Vec2> = arrows.into_iter().filter_map(|point| view.camera.project(point, view.size)).collect();
-        let covered = |plate: &Plate, points: &[Vec2]| points.iter().filter(|place| plate.covers(**place)).count();
-        let beside = std::iter::once(usual).chain(lower).filter(|plate| covered(plate, &hand) == 0);
-        beside.min_by_key(|plate| covered(plate, &arrows))
+        let arrows: Vec<Vec2> = arrows.into_iter().filter_map(&on_picture).collect();
+        let beside = std::iter::once(usual).chain(lower).filter(|plate| !hand.iter().any(|place| plate.covers(*place)));
+        beside.min_by_key(|plate| arrows.iter().filter(|place| plate.covers(**place)).count())
     }
 }
 

@@ -153,8 +153,10 @@ impl Stage {
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
         let inset = self.touch_inset(frame, view);
-        let hand = self.held_points(frame).into_iter().filter_map(|point| view.camera.project(point, view.size));
-        let mut annotator = Annotator::new(view, inset.as_ref(), hand.collect());
+        // Only labels have to keep clear of the hand.
+        let hand = if view.annotations { self.held_points(frame) } else { Vec::new() };
+        let hand = hand.into_iter().filter_map(view.camera.projector(view.size)).collect();
+        let mut annotator = Annotator::new(view, inset.as_ref(), hand);
         if view.forces && !view.plain {
             forces::add_key(&mut annotator);
         }
