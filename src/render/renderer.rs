@@ -19,6 +19,8 @@ pub struct Renderer {
     passes: Vec<Box<dyn Pass>>,
     /// The picture, and its inset.
     sized: [Option<SizeTargets>; 2],
+    /// The earlier moment that the inset shows, its size and detail.
+    past: Option<(u64, [u32; 2], Detail)>,
 }
 
 /// Textures and bindings for one picture size.
@@ -57,7 +59,7 @@ impl Renderer {
         let ambient = Ambient::new(device, &frame);
         let setup = PassSetup { device, queue, frame: &frame };
         let passes = passes::ALL.iter().map(|make| make(&setup)).collect();
-        Self { frame, shadows, ambient, passes, sized: [None, None] }
+        Self { frame, shadows, ambient, passes, sized: [None, None], past: None }
     }
 
     /// Records the drawing of a list into a picture of `size` pixels, at `pixels_per_point`.
@@ -73,10 +75,13 @@ impl Renderer {
         let most = device.limits().max_texture_dimension_2d;
         let size = size.map(|s| s.clamp(SMALLEST, most));
         let prepare = Prepare { device, queue, list, pixels_per_point };
-        if let Some(inset) = &list.inset {
+        let whole_inset = list.inset.as_ref().map(|inset| whole(inset.size, pixels_per_point).map(|s| s.min(most)));
+        let past =
+            list.inset.as_ref().zip(whole_inset).and_then(|(own, size)| Some((own.past?, size, own.list.detail)));
+        let is_drawn = std::mem::replace(&mut self.past, past) == past && past.is_some();
+        if let Some((inset, inner)) = list.inset.as_ref().zip(whole_inset).filter(|_| !is_drawn) {
             // The inset gets its own submission, because the passes can hold only one draw list at a time.
             let mut first = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let inner = whole(inset.size, pixels_per_point).map(|s| s.min(most));
             self.draw(&mut first, &Prepare { list: &inset.list, ..prepare }, inner, INSET);
             queue.submit([first.finish()]);
         }
@@ -93,9 +98,9 @@ impl Renderer {
             pass.prepare(prepare);
         }
         let which = usize::from(list.detail == Detail::Fast);
-        // Picture and inset use the same shadow map. It is drawn with the inset's list, which comes first, so a list
-        // that has an inset skips it.
-        if list.inset.is_none() {
+        // Picture and inset of one moment use the same shadow map. It is drawn with the inset's list, which comes first, so a
+        // list that has an inset skips it.
+        if list.inset.as_ref().is_none_or(|inset| inset.past.is_some()) {
             self.draw_shadow(encoder, &self.shadows[which]);
         }
         if self.sized[target].as_ref().map(|sized| sized.targets.size) != Some(size) {

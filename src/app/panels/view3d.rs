@@ -66,8 +66,8 @@ pub(super) fn ui(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
         message(ui, rect, own, "The 3-D view needs a graphics driver. Everything else works without.");
         return;
     }
-    steer(ui, &response, own, moment, actions);
     let picture = paint(ui, rect, own, moment, 1.0);
+    steer(ui, &response, picture.camera, actions);
     small_pads(ui, rect, &own.data, &picture);
     buttons(ui, rect, own, actions);
     if let Some(loading) = own.data.snapshot.and_then(|snapshot| snapshot.status.loading.as_ref()) {
@@ -103,11 +103,10 @@ fn message(ui: &Ui, rect: Rect, own: &View3d<'_>, text: &str) {
 }
 
 /// Moves the camera or pulls at the object by the mouse.
-fn steer(ui: &Ui, response: &egui::Response, own: &View3d<'_>, moment: Moment<'_>, actions: &mut Actions) {
+fn steer(ui: &Ui, response: &egui::Response, camera: Camera, actions: &mut Actions) {
     let height = response.rect.height().max(1.0);
     let moved = response.drag_delta() / height;
     let drag = Vec2::new(moved.x, moved.y);
-    let camera = picture_view(own, moment, Vec2::new(response.rect.width(), height)).camera;
     let (ctrl, shift) = ui.input(|i| (i.modifiers.command, i.modifiers.shift));
     // Releasing the button or Ctrl releases the object.
     let pulling = response.dragged_by(PointerButton::Primary) && ctrl;
@@ -211,6 +210,7 @@ fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) 
         let path = stage.path(&path_mesh(ctx, stage, shown, *colour), frame);
         if let Some(inset) = &mut list.inset {
             inset.list.solids.extend(path.clone());
+            inset.past = inset.past.map(|past| past ^ frame.t.to_bits());
         }
         list.solids.extend(path);
         Stage::unveil(&mut list, own.data.view.theme);

@@ -46,7 +46,7 @@ pub struct DrawList {
     pub inset: Option<Box<Inset>>,
 }
 
-/// Picture within a picture: the same shadows from another side.
+/// Picture within a picture: the same moment from another side, or an earlier one.
 #[derive(Clone, Debug)]
 pub struct Inset {
     /// What is in it; its overlay begins at its own corner.
@@ -55,6 +55,8 @@ pub struct Inset {
     pub corner: Vec2,
     /// Width and height (points).
     pub size: Vec2,
+    /// Number of the earlier moment that it shows: its shadows are others, and it is drawn again only for another number.
+    pub past: Option<u64>,
 }
 
 /// How finely the light of a picture is computed.

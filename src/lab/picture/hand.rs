@@ -39,7 +39,13 @@ pub(super) fn outline(mesh: &SurfaceMesh) -> Vec<Vec3> {
     };
     let points = || mesh.vertices.iter().map(|vertex| Vec3::from(vertex.position));
     let farthest = |along: Vec3| points().max_by(|a, b| a.dot(along).total_cmp(&b.dot(along)));
-    (0..DIRECTIONS).filter_map(|k| farthest(direction(k))).collect()
+    let mut found: Vec<Vec3> = Vec::new();
+    for point in (0..DIRECTIONS).filter_map(|k| farthest(direction(k))) {
+        if !found.contains(&point) {
+            found.push(point);
+        }
+    }
+    found
 }
 
 /// Outlines of the rigid parts of a picture, each in its own frame.

@@ -7,6 +7,7 @@ use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Camera, DrawList, FingerFrame, Inset, SoftFinger, StandardView, Veil};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{GripperModel, Side};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Force on both pads from which the touch is shown (N).
 const FAINTEST: f32 = 0.01;
@@ -96,27 +97,24 @@ impl Stage {
 
     /// The touch as a picture within a picture; none where nothing is touched.
     pub(super) fn touch_inset(&self, frame: &Frame, view: &PictureView) -> Option<Inset> {
-        self.inset(frame, view, self.inset_place(frame, view)?, None)
+        let camera = self.touch_camera(frame)?;
+        Some(self.inset(frame, view, (self.inset_place(frame, view)?, camera), None))
     }
 
     /// Adds the touch of an earlier hold, by this hand or in another pose, to a picture of a frame in which nothing is touched.
     pub fn add_hold(&self, list: &mut DrawList, frame: &Frame, view: &PictureView, (stage, held): (&Self, &Frame)) {
-        let place = self.inset_place(frame, view);
-        let inset = place.and_then(|place| stage.inset(held, view, place, Some("last hold")));
-        list.inset = inset.map(Box::new);
+        let place = self.inset_place(frame, view).zip(stage.touch_camera(held));
+        let mut number = DefaultHasher::new();
+        format!("{} {:?} {view:?}", held.t, held.world_from_object).hash(&mut number);
+        let past = Some(number.finish());
+        list.inset = place.map(|place| Box::new(Inset { past, ..stage.inset(held, view, place, Some("last hold")) }));
     }
 
-    fn inset(&self, frame: &Frame, view: &PictureView, place: Plate, title: Option<&str>) -> Option<Inset> {
+    fn inset(&self, frame: &Frame, view: &PictureView, at: (Plate, Camera), title: Option<&str>) -> Inset {
+        let (place, camera) = at;
         let (corner, size) = (place.middle - place.half, 2.0 * place.half);
-        let inner = PictureView {
-            camera: self.touch_camera(frame)?,
-            size,
-            forces: false,
-            annotations: false,
-            path: None,
-            badge: None,
-            ..view.clone()
-        };
+        let inner =
+            PictureView { camera, size, forces: false, annotations: false, path: None, badge: None, ..view.clone() };
         let mut list = self.draw_touch(frame, &inner);
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         if !view.plain {
@@ -125,7 +123,7 @@ impl Stage {
         let near = self.near_side(&inner.camera);
         let title = title.map_or_else(|| format!("{} pad", near.name()), str::to_owned);
         super::annotations::frame_inset(&mut list.overlay, &inner, &title);
-        Some(Inset { list, corner, size })
+        Inset { list, corner, size, past: None }
     }
 }
 
