@@ -329,6 +329,8 @@ fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_
     desk.until_shown(true, "Recording: the emulated hand moves by itself");
     desk.press(Key::Escape);
     desk.until_told("The emulated hand stays open until it is driven");
+    desk.press(Key::R);
+    desk.until_shown(true, "The emulated hand waits: actuation board (M)");
 }
 
 #[test]

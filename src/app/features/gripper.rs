@@ -235,6 +235,7 @@ pub(in crate::app) fn control_title(control: Control) -> &'static str {
 pub(in crate::app) fn instruction(trial: &TrialView) -> &'static str {
     let by_hand = trial.request.control == Control::ByHand;
     match trial.stage {
+        _ if by_hand && trial.emulated && trial.taken_over => "The emulated hand waits: actuation board (M)",
         _ if by_hand && trial.emulated => "Recording: the emulated hand moves by itself",
         GraspStage::Lead if by_hand => "Get ready to close",
         GraspStage::Lead => "At rest",

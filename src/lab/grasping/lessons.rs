@@ -343,7 +343,7 @@ mod tests {
             [("cube", 1), ("case", 5), ("box", 2), ("ball", 1)].map(|(name, count)| (name.to_owned(), count));
         let lesson =
             Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
-        let rivals = "Case (5), Box (2), Ball (1) and further ones (1)";
+        let rivals = "Earphone case (5), Cardboard box (2), Rubber ball (1) and further ones (1)";
         assert_eq!(lesson_result(&lesson), format!("3 of 12 new grasps recognised, others taken for {rivals}"));
         assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));
         let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };

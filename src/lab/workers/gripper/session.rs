@@ -56,6 +56,8 @@ struct Connection {
     segmenter: Segmenter,
     /// Detects sensors that fail, and keeps what they felt.
     felt: FeltRows,
+    /// It was vented or driven since it was opened.
+    taken_over: bool,
 }
 
 /// State of the thread.
@@ -261,6 +263,7 @@ impl GripperSession {
             borrowed: false,
             segmenter: Segmenter::new(&Board { sensors: self.sensors, ..Board::default() }),
             felt: FeltRows::default(),
+            taken_over: false,
         });
         self.read_calibrations();
         self.begin_stretch(0.0);

@@ -34,6 +34,7 @@ fn running(id: TrialId) -> GripperView {
         automatic: false,
         adapting: false,
         emulated: false,
+        taken_over: false,
     };
     GripperView { trial: Some(trial), ..GripperView::default() }
 }

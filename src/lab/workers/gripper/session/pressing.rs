@@ -29,6 +29,7 @@ impl GripperSession {
             pressing.watch_board(now_s);
             self.pressing = Some(pressing);
         }
+        connection.taken_over = true;
         self.pressing.iter_mut().for_each(|pressing| pressing.aim(bar, now_s));
     }
 

@@ -53,6 +53,7 @@ impl GripperSession {
             return self.publisher.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
         self.pressing = None;
+        connection.taken_over = true;
         let sent = connection.gripper.vent();
         match sent {
             Err(error) => self.publisher.notify(Notice::Failed(format!("{error}: vent at the control box"))),
@@ -148,6 +149,7 @@ impl GripperSession {
             return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
+        connection.taken_over |= request.control == Control::Driven;
         // A driven trial vents before it closes.
         self.pressing.take_if(|_| request.control == Control::Driven);
         let recording = BoardTrialRecording::begin(
@@ -248,6 +250,7 @@ impl GripperSession {
             automatic: recording.automatic,
             adapting: self.adapting,
             emulated: self.connection.as_ref().is_some_and(|connection| connection.board.emulated),
+            taken_over: self.connection.as_ref().is_some_and(|connection| connection.taken_over),
         }
     }
 }
