@@ -49,7 +49,7 @@ pub struct SimulationFeature {
     refused: Option<Scene>,
     /// Trial that holds the last grasp, and where it was when the grasp ended.
     pub(super) last_trial: Option<(TrialId, TrialPlace)>,
-    /// Scene, by its first grasp, of which it was told that the demo log has its grasp already.
+    /// Scene, by its first grasp, for which a message has said that its grasp is stored already.
     told_known: Option<u64>,
     ended: bool,
 }

@@ -47,7 +47,7 @@ impl CurveLabel<'_> {
     }
 }
 
-/// Draws a piece of a curve's line, which tells curves of one colour apart; its end.
+/// Draws a piece of a curve's line, solid or dashed, before its name; returns its end.
 fn draw_line(painter: &egui::Painter, from: Pos2, ink: Color32, dashed: bool) -> Pos2 {
     let line = [from, from + vec2(SAMPLE, 0.0)];
     let stroke = Stroke::new(1.8, ink);

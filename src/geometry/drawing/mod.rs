@@ -55,7 +55,7 @@ pub struct Inset {
     pub corner: Vec2,
     /// Width and height (points).
     pub size: Vec2,
-    /// Number of the earlier moment that it shows: its shadows are others, and it is drawn again only for another number.
+    /// Number of the earlier moment that it shows. It has shadows of its own, and is drawn again only for another number.
     pub past: Option<u64>,
 }
 

@@ -389,7 +389,7 @@ impl OpenTrial {
         }
     }
 
-    /// Phases of a grasp of a board: as corrected, as marked, or else from the line pressure; contact from the pads.
+    /// Phases of a grasp of a board: as corrected, marked or measured, or else from the line pressure; contact from the pads.
     fn find_phases(&mut self, marked: PhaseTimes) {
         let line = PhaseTimes::of_line(&self.t_s, &self.line_bar);
         let closing = marked.closing.or(line.closing);

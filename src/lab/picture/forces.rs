@@ -82,7 +82,7 @@ pub(super) fn of_fingers(gripper: &GripperModel, frame: &Frame) -> [Option<f64>;
     Side::BOTH.map(|side| Some(all.iter().find(|forces| forces.side == side)?.normal.length()))
 }
 
-/// Places along the arrows across the pads, each as long as it gets: what keeps clear of them stands still as they grow.
+/// Points along the arrows across the pads at their greatest length: what keeps clear of them does not move as they grow.
 pub(super) fn reach(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, view: &PictureView) -> Vec<Vec3> {
     const PLACES: u8 = 12;
     let longest = |forces: &Forces| span(view) * LONGEST * forces.normal.normalize();
