@@ -16,7 +16,7 @@ use palpate_study::{Explanation, Measuring};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What a test starts from.
 pub(crate) struct BenchSetup {
@@ -67,8 +67,8 @@ fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explana
     Ok(explain_scene(scene, how)?.map(steady))
 }
 
-/// Wakes after which something that was waited for will not come any more.
-const MOST_WAKES: u32 = 20_000;
+/// Time after which what is waited for will not come any more: a test that hangs would take all of them along.
+const HANG: Duration = Duration::from_secs(300);
 
 /// The workbench and the harness that drives it.
 pub(crate) struct Bench {
@@ -129,6 +129,7 @@ impl Bench {
 
     /// Draws until the simulation is as wanted.
     pub(crate) fn until(&mut self, wanted: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+        let began = Instant::now();
         loop {
             self.harness.step();
             if let Some(snapshot) = self.workbench().snapshot().filter(|s| wanted(s)) {
@@ -136,7 +137,8 @@ impl Bench {
                 self.harness.step();
                 return snapshot;
             }
-            self.woken.recv_timeout(Duration::from_secs(600)).expect("the simulation is alive");
+            assert!(began.elapsed() < HANG, "the simulation is never as wanted: {:?}", self.workbench().messages());
+            self.woken.recv_timeout(HANG).expect("the simulation is alive");
         }
     }
 
@@ -151,7 +153,7 @@ impl Bench {
     /// Draws until the effects of the scene at hand have been measured.
     pub(crate) fn until_effects_are_measured(&mut self) {
         while self.harness.query_by_label_contains("of CPU time").is_none() {
-            self.woken.recv_timeout(Duration::from_secs(600)).expect("the measurement is alive");
+            self.woken.recv_timeout(HANG).expect("the measurement is alive");
             self.harness.step();
         }
     }
@@ -160,7 +162,8 @@ impl Bench {
     pub(crate) fn until_shown(&mut self, shown: bool, text: &str) {
         // What has just been clicked or told takes effect here.
         self.harness.step();
-        for _ in 0..MOST_WAKES {
+        let began = Instant::now();
+        while began.elapsed() < HANG {
             if self.harness.query_all_by_label_contains(text).next().is_some() == shown {
                 return;
             }
@@ -171,7 +174,8 @@ impl Bench {
 
     /// Draws until the user has been told something.
     pub(crate) fn until_told(&mut self, text: &str) {
-        for _ in 0..MOST_WAKES {
+        let began = Instant::now();
+        while began.elapsed() < HANG {
             if self.workbench().messages().iter().any(|message| message.contains(text)) {
                 return;
             }
@@ -188,7 +192,7 @@ impl Bench {
 
     /// Waits until something has happened, and draws.
     pub(crate) fn wait(&mut self) {
-        self.woken.recv_timeout(Duration::from_secs(600)).expect("something goes on");
+        self.woken.recv_timeout(HANG).expect("something goes on");
         self.harness.step();
     }
 

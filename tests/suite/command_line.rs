@@ -489,8 +489,9 @@ fn an_interrupted_collection_says_what_is_kept() {
     let store = folder.path().join("set.sqlite");
     let arguments = ["collect", "--objects", "ball", "--trials", "100000", "--accuracy", "draft", "--threads", "1"];
     let mut command = palpate(&store);
-    let child = command.args(arguments).stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut child = command.args(arguments).stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     while !Store::open(&store).is_ok_and(|store| store.list(false).is_ok_and(|rows| rows.len() > 2)) {
+        assert_eq!(child.try_wait().unwrap(), None, "it ended before it stored anything");
         std::thread::sleep(Duration::from_millis(50));
     }
     let id = child.id().to_string();

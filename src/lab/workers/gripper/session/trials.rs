@@ -142,8 +142,11 @@ impl GripperSession {
         };
         let state = connection.gripper.stream().status().state;
         if connection.latest.is_none() || matches!(state, LinkState::Lost { .. } | LinkState::Silent { .. }) {
-            let text = format!("nothing is recorded: {}", state.sentence());
-            return self.publisher.notify(Notice::Warning(text));
+            let cause = match state {
+                LinkState::Listening => "the board has sent no readings yet".to_owned(),
+                state => state.sentence(),
+            };
+            return self.publisher.notify(Notice::Warning(format!("nothing is recorded: {cause}")));
         }
         let Some(recorder) = &self.recorder else {
             return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
