@@ -75,7 +75,7 @@ fn letter(side: Side, facing: f64) -> TriMesh {
         let (from, to) = (point(*from), point(*to));
         let along = to - from;
         let half = DVec3::new(0.5 * (along.length() + STROKE), RELIEF, 0.5 * STROKE);
-        let mut bar = rounded_box(half, 0.8 * RELIEF);
+        let mut bar = Primitive::Cuboid { half }.tessellate();
         let turn = glam::DQuat::from_rotation_arc(DVec3::X, along.normalize());
         bar.transform(&Pose::new(0.5 * (from + to), turn));
         mesh.append(&bar);

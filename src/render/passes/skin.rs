@@ -8,7 +8,7 @@ use super::{Pass, PassSetup, Prepare};
 use crate::text::upload_texels;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
-use palpate_geometry::drawing::{FingerFrame, Section, SensorStrip, SoftFinger};
+use palpate_geometry::drawing::{Detail, FingerFrame, Section, SensorStrip, SoftFinger};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, SILICONE};
 use std::ops::Range;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferUsages, Device, Queue, RenderPass, RenderPipeline};
@@ -16,6 +16,8 @@ use wgpu::{Texture, VertexBufferLayout, VertexStepMode};
 
 /// As in shaders/skin.wgsl.
 const RINGS: usize = 128;
+/// Rings from each one that is drawn to the next, in full and in fast detail.
+const STRIDES: [usize; 2] = [1, 2];
 /// Rings that round off the tip.
 const TIP_RINGS: usize = 6;
 /// Length over which the tip is rounded (m).
@@ -73,22 +75,30 @@ struct SkinMesh {
     length: f32,
     vertices: Buffer,
     indices: Buffer,
+    /// For full and for fast detail.
+    parts: [SkinParts; 2],
+}
+
+/// Bellows and pad, whose indices follow each other.
+#[derive(Clone, Debug)]
+struct SkinParts {
     bellows: SkinPart,
     pad: SkinPart,
 }
 
-/// Some indices of a skin: first those between each ring and the next, from the palm on.
+/// Some indices of a skin: first those between each ring and one `stride` after it, from the palm on.
 #[derive(Clone, Debug, PartialEq)]
 struct SkinPart {
     indices: Range<u32>,
-    per_ring: u32,
+    per_stride: u32,
+    stride: u32,
 }
 
 impl SkinPart {
     /// Indices between two rings.
     fn between(&self, rings: &Range<u32>) -> Range<u32> {
-        let at = |ring: u32| (self.indices.start + ring * self.per_ring).min(self.indices.end);
-        at(rings.start)..at(rings.end)
+        let at = |strides: u32| (self.indices.start + strides * self.per_stride).min(self.indices.end);
+        at(rings.start / self.stride)..at(rings.end.div_ceil(self.stride))
     }
 }
 
@@ -111,6 +121,7 @@ struct SkinPass {
     mesh: Option<SkinMesh>,
     fingers: Vec<FingerOnDevice>,
     shown: usize,
+    detail: Detail,
 }
 
 /// Pipelines of both parts of a skin: bellows are seen from outside alone, a pad from both sides.
@@ -148,17 +159,19 @@ pub(super) fn make(setup: &PassSetup<'_>) -> Box<dyn Pass> {
     let topology = wgpu::PrimitiveTopology::TriangleList;
     let unlit = UnlitShape { label: "skin, unlit", shader: &shader, buffers: &buffers, groups: &[&layout], topology };
     let (shadow, distance) = (shadow_pipeline(setup, &unlit), distance_pipeline(setup, &unlit));
-    Box::new(SkinPass { opaque, veil, shadow, distance, layout, mesh: None, fingers: Vec::new(), shown: 0 })
+    let (fingers, detail) = (Vec::new(), Detail::Full);
+    Box::new(SkinPass { opaque, veil, shadow, distance, layout, mesh: None, fingers, shown: 0, detail })
 }
 
 impl SkinPass {
     /// Draws a part of each finger: some of its indices.
-    fn draw_part(&self, pass: &mut RenderPass<'_>, part: impl Fn(&FingerOnDevice, &SkinMesh) -> Range<u32>) {
+    fn draw_part(&self, pass: &mut RenderPass<'_>, part: impl Fn(&FingerOnDevice, &SkinParts) -> Range<u32>) {
         let Some(mesh) = &self.mesh else { return };
+        let parts = &mesh.parts[usize::from(self.detail == Detail::Fast)];
         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
         for finger in &self.fingers[..self.shown] {
-            let indices = part(finger, mesh);
+            let indices = part(finger, parts);
             if !indices.is_empty() {
                 pass.set_bind_group(1, &finger.group, &[]);
                 pass.draw_indexed(indices, 0, 0..1);
@@ -171,22 +184,21 @@ impl SkinPass {
         if self.mesh.as_ref().is_some_and(|m| m.section == finger.section && m.length == length) {
             return;
         }
-        let (vertices, indices, [bellows, pad]) = skin_mesh(&finger.section, length);
+        let (vertices, indices, parts) = skin_mesh(&finger.section, length);
         let (device, queue) = (prepare.device, prepare.queue);
         self.mesh = Some(SkinMesh {
             section: finger.section,
             length,
             vertices: fixed_buffer(device, queue, "skin", BufferUsages::VERTEX, bytemuck::cast_slice(&vertices)),
             indices: fixed_buffer(device, queue, "skin indices", BufferUsages::INDEX, bytemuck::cast_slice(&indices)),
-            bellows,
-            pad,
+            parts,
         });
     }
 }
 
 /// All indices of a skin: its parts follow each other.
-fn whole(_finger: &FingerOnDevice, mesh: &SkinMesh) -> Range<u32> {
-    mesh.bellows.indices.start..mesh.pad.indices.end
+fn whole(_finger: &FingerOnDevice, parts: &SkinParts) -> Range<u32> {
+    parts.bellows.indices.start..parts.pad.indices.end
 }
 
 /// Share of the length over which a veil begins and ends; as in the shader.
@@ -209,6 +221,7 @@ impl Pass for SkinPass {
     fn prepare(&mut self, prepare: &Prepare<'_>) {
         let fingers: Vec<&SoftFinger> = prepare.list.fingers.iter().filter(|f| f.frames.len() >= 2).collect();
         self.shown = fingers.len();
+        self.detail = prepare.list.detail;
         for (k, finger) in fingers.into_iter().enumerate() {
             self.update_mesh(prepare, finger);
             let size = [finger.taxels.columns.max(1), finger.taxels.rows.max(1)];
@@ -234,14 +247,14 @@ impl Pass for SkinPass {
 
     fn draw(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.opaque.bellows);
-        self.draw_part(pass, |_, mesh| mesh.bellows.indices.clone());
+        self.draw_part(pass, |_, parts| parts.bellows.indices.clone());
         pass.set_pipeline(&self.opaque.pad);
-        self.draw_part(pass, |_, mesh| mesh.pad.indices.clone());
+        self.draw_part(pass, |_, parts| parts.pad.indices.clone());
         // The pad lies behind the bellows that are looked through.
         pass.set_pipeline(&self.veil.pad);
-        self.draw_part(pass, |finger, mesh| mesh.pad.between(&finger.veiled));
+        self.draw_part(pass, |finger, parts| parts.pad.between(&finger.veiled));
         pass.set_pipeline(&self.veil.bellows);
-        self.draw_part(pass, |finger, mesh| mesh.bellows.between(&finger.veiled));
+        self.draw_part(pass, |finger, parts| parts.bellows.between(&finger.veiled));
     }
 }
 
@@ -397,8 +410,9 @@ fn section_points(section: &Section, k: usize, length: f32) -> Vec<(Vec2, f32)> 
     half.iter().copied().chain(mirrored).map(|(p, w)| (middle + (p - middle) * scale, w)).collect()
 }
 
-/// The skin in the coordinates of its rings, with a flat end: corners, indices, and which of these are bellows and pad.
-fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>, [SkinPart; 2]) {
+/// The skin in the coordinates of its rings, with a flat end: corners, indices, and which of these are bellows and pad in
+/// full and in fast detail.
+fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>, [SkinParts; 2]) {
     let rings: Vec<Vec<(Vec2, f32)>> = (0..RINGS).map(|k| section_points(section, k, length)).collect();
     let around = rings[0].len();
     let place = |k: usize, i: usize| {
@@ -423,20 +437,22 @@ fn skin_mesh(section: &Section, length: f32) -> (Vec<Vertex>, Vec<u32>, [SkinPar
     let at = |k: usize, i: usize| (k * around + i % around) as u32;
     let is_pad = |i: usize| rings[0][i % around].1 > 0.5 && rings[0][(i + 1) % around].1 > 0.5;
     let mut indices = Vec::new();
-    let mut add = |wanted: bool| {
+    let mut add = |wanted: bool, stride: usize| {
         let start = indices.len() as u32;
         let chosen: Vec<usize> = (0..around).filter(|i| is_pad(*i) == wanted).collect();
-        for k in 0..RINGS - 1 {
+        for k in (0..RINGS - 1).step_by(stride) {
+            let next = (k + stride).min(RINGS - 1);
             for i in chosen.iter().copied() {
-                indices.extend([at(k, i), at(k + 1, i + 1), at(k, i + 1), at(k, i), at(k + 1, i), at(k + 1, i + 1)]);
+                indices.extend([at(k, i), at(next, i + 1), at(k, i + 1), at(k, i), at(next, i), at(next, i + 1)]);
             }
         }
         if !wanted {
             close_tip(section, &rings[RINGS - 1], &mut vertices, &mut indices);
         }
-        SkinPart { indices: start..indices.len() as u32, per_ring: 6 * chosen.len() as u32 }
+        let indices = start..indices.len() as u32;
+        SkinPart { indices, per_stride: 6 * chosen.len() as u32, stride: stride as u32 }
     };
-    let parts = [add(false), add(true)];
+    let parts = STRIDES.map(|stride| SkinParts { bellows: add(false, stride), pad: add(true, stride) });
     (vertices, indices, parts)
 }
 
@@ -477,12 +493,15 @@ mod tests {
 
     #[test]
     fn the_skin_is_closed_round_and_faces_outward() {
-        let (vertices, indices, [bellows, pad]) = skin_mesh(&SECTION, 0.1);
-        assert_eq!(
-            (bellows.indices.start, bellows.indices.end, pad.indices.end),
-            (0, pad.indices.start, indices.len() as u32)
-        );
-        assert_eq!(pad.between(&(0..RINGS as u32 - 1)), pad.indices);
+        let (vertices, indices, parts) = skin_mesh(&SECTION, 0.1);
+        let mut end = 0;
+        for SkinParts { bellows, pad } in &parts {
+            assert_eq!((bellows.indices.start, bellows.indices.end), (end, pad.indices.start));
+            assert_eq!(pad.between(&(0..RINGS as u32 - 1)), pad.indices);
+            end = pad.indices.end;
+        }
+        assert_eq!(end as usize, indices.len());
+        assert!(parts[1].pad.indices.len() < parts[0].pad.indices.len() * 11 / 20, "fast detail has half the triangles");
         assert!(indices.iter().all(|i| (*i as usize) < vertices.len()));
         for v in &vertices {
             let n = Vec3::from(v.normal);
