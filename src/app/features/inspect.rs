@@ -246,7 +246,10 @@ impl InspectFeature {
             let (name, short) = (format!("{}, trial {}", trial.title, trial.id), trial.id.to_string());
             ComparedTrace { name, short, colour: pinned.colour, trace, spread: Vec::new() }
         };
-        self.pinned.iter().filter(|pinned| Some(pinned.trial.id) != key.shown).map(compared).collect()
+        // A trial without any of the channels shown has no curve.
+        let has_curves = |pinned: &&Pinned| key.names.iter().any(|name| pinned.trial.column(name).is_some());
+        let others = self.pinned.iter().filter(|pinned| Some(pinned.trial.id) != key.shown);
+        others.filter(has_curves).map(compared).collect()
     }
 
     fn means(&self, key: &ComparisonKey) -> Vec<ComparedTrace> {

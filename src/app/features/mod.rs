@@ -100,8 +100,8 @@ impl App {
             phases: &self.inspect.phases,
             comparison: ComparedTrials {
                 pinned: &self.inspect.pinned,
-                // Beside a grasp of the demo they are curves without a name.
-                traces: if self.view.mode == view::Mode::Demo { &[] } else { &self.inspect.compared },
+                // Beside a grasp of the demo or of the gripper they are curves without a name.
+                traces: if self.view.mode == view::Mode::Inspect { &self.inspect.compared } else { &[] },
                 alignment: self.inspect.alignment,
                 spread: self.inspect.spread,
             },

@@ -90,10 +90,12 @@ fn row_ui(
     let blind = labelling.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
-        (_, _, Some(found)) => (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning),
-        (_, Some(_), None) => {
+        (_, Some(_), _) => {
             let labels: Vec<&str> = trial.flags.iter().map(|flag| flag.flag.label()).collect();
             (labels.join(", "), colours.warning)
+        }
+        (_, None, Some(found)) => {
+            (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
         }
         (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
         (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),

@@ -110,7 +110,7 @@ fn rivals(lesson: &Lesson) -> String {
 pub fn lesson_result(lesson: &Lesson) -> String {
     let Lesson { tested, recognised, taken_for, .. } = lesson;
     let others = if taken_for.is_empty() { String::new() } else { format!(", others taken for {}", rivals(lesson)) };
-    format!("{recognised} of {tested} new grasps recognised{others}")
+    format!("the most likely answer in {recognised} of {tested} new grasps{others}")
 }
 
 /// A warning where the hand was empty in many of the grasps, or they are like those of other objects.
@@ -344,10 +344,11 @@ mod tests {
         let lesson =
             Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
         let rivals = "Earphone case (5), Cardboard box (2), Rubber ball (1) and further ones (1)";
-        assert_eq!(lesson_result(&lesson), format!("3 of 12 new grasps recognised, others taken for {rivals}"));
+        assert_eq!(lesson_result(&lesson), format!("the most likely answer in 3 of 12 new grasps, others taken for {rivals}"));
         assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));
         let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };
-        assert_eq!((lesson_result(&known).as_str(), lesson_warning(&known)), ("12 of 12 new grasps recognised", None));
+        let result = "the most likely answer in 12 of 12 new grasps";
+        assert_eq!((lesson_result(&known).as_str(), lesson_warning(&known)), (result, None));
         let lost = Lesson { lost: 40, ..lesson };
         assert!(lesson_warning(&lost).is_some_and(|words| words.starts_with("in 40 of 160 grasps")));
     }

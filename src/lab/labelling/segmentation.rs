@@ -389,6 +389,11 @@ pub fn measured_phases(board: &Board, readings: &[Reading]) -> Vec<PhaseMark> {
     marks
 }
 
+/// True where the line was read and never had pressure: nothing closed.
+pub fn is_unpressed(readings: &[Reading]) -> bool {
+    !readings.is_empty() && readings.iter().all(|reading| reading.line_bar.is_some_and(|bar| bar <= NO_BAR))
+}
+
 impl Gathering {
     fn tick(&self) -> Tick {
         let mean = |(sum, n): (f64, u32)| (n > 0).then(|| sum / f64::from(n));
