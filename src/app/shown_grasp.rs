@@ -132,14 +132,16 @@ impl<'a> ShownGrasp<'a> {
 
     /// Force on a pad as sensors read it at the time shown (N); NaN where they do not.
     fn read_force(&self, side: Side) -> f64 {
-        let read = |wanted: Quantity| {
-            let trace = self.trace?;
-            let (column, ..) = self.columns.iter().find(|(_, quantity, own)| *quantity == wanted && *own == side)?;
-            let value = f64::from(*trace.channels.get(*column)?.get(trace.sample_at(self.cursor_s)?)?);
-            Some(value).filter(|value| value.is_finite())
-        };
-        let from_pressure = || read(Quantity::Pressure).map(|pressure| pressure * PadPart::ACTIVE_AREA);
-        read(Quantity::Force).or_else(from_pressure).unwrap_or(f64::NAN)
+        let from_pressure = || self.read(Quantity::Pressure, side).map(|pressure| pressure * PadPart::ACTIVE_AREA);
+        self.read(Quantity::Force, side).or_else(from_pressure).unwrap_or(f64::NAN)
+    }
+
+    /// Value of a channel at the time shown.
+    pub(super) fn read(&self, wanted: Quantity, side: Side) -> Option<f64> {
+        let trace = self.trace?;
+        let (column, ..) = self.columns.iter().find(|(_, quantity, own)| *quantity == wanted && *own == side)?;
+        let value = f64::from(*trace.channels.get(*column)?.get(trace.sample_at(self.cursor_s)?)?);
+        Some(value).filter(|value| value.is_finite())
     }
 
     /// Time to show in heat maps over time (s).

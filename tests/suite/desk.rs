@@ -314,6 +314,11 @@ fn a_board_that_leaves_gives_back_where_grasps_are_recorded() {
     let grasps = |snapshot: &Snapshot| (snapshot.status.recording, snapshot.status.grasps);
     desk.tell(|app| app.connect(None));
     desk.until(|snapshot| grasps(snapshot) == (None, 1));
+    // While the simulation is looked at, it grasps and stores as without a gripper.
+    desk.tell(|app| app.view.source = ViewSource::Simulation);
+    desk.until(|snapshot| grasps(snapshot) == (Some(TrialPlace::DemoLog), 4));
+    desk.tell(|app| app.view.source = ViewSource::Gripper);
+    desk.until(|snapshot| grasps(snapshot) == (None, 1));
     for _ in 0..2 {
         desk.tell(|app| _ = app.gripper.send(GripperCommand::Disconnect));
         desk.until(|snapshot| grasps(snapshot) == (Some(TrialPlace::DemoLog), 4));
@@ -338,6 +343,17 @@ fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_
     desk.until_told("The emulated hand stays open until it is driven");
     desk.press(Key::R);
     desk.until_shown(true, "The emulated hand waits: actuation board (M)");
+}
+
+#[test]
+fn a_hand_that_did_not_close_has_no_phases_and_no_answer() {
+    let mut desk = desk();
+    desk.tell(|app| app.connect(None));
+    desk.until_shown(true, "Stop and vent");
+    desk.record();
+    desk.until_told("the hand did not close, so there is no answer");
+    let course = desk.store().board_log(1).unwrap().unwrap().course;
+    assert_eq!(course.phases, []);
 }
 
 #[test]

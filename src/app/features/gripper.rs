@@ -32,6 +32,8 @@ pub struct GripperFeature {
     pub(in crate::app) view: Option<Arc<GripperView>>,
     pub(in crate::app) traces: TraceHistory,
     connected: bool,
+    /// The simulation waits for the gripper: it is connected, and not the simulation is looked at.
+    followed: bool,
     /// When the last reading came.
     heard: Instant,
     /// Part of the trial at the last look.
@@ -67,6 +69,7 @@ impl GripperFeature {
             view: None,
             traces: TraceHistory::default(),
             connected: false,
+            followed: false,
             heard: Instant::now(),
             part: None,
             before_following: (Some(TrialPlace::DemoLog), GRASPS),
@@ -133,12 +136,19 @@ impl App {
                 self.notices.done("gripper");
             }
             self.view.source = if now.is_connected() { ViewSource::Gripper } else { ViewSource::Simulation };
+        }
+        let followed = match self.view.source {
+            ViewSource::Simulation => false,
+            ViewSource::Gripper => self.gripper.connected,
+            ViewSource::Trial => self.gripper.connected && self.gripper.followed,
+        };
+        if std::mem::replace(&mut self.gripper.followed, followed) != followed {
             self.hand_over();
         }
         self.show_empty(now.trial.as_ref().is_some_and(|trial| trial.adapting));
         let part = now.trial.as_ref().map(|trial| trial.stage);
         let begins = std::mem::replace(&mut self.gripper.part, part) != part;
-        if begins && part == Some(GraspStage::Phase(Phase::Close)) && self.view.ghost {
+        if begins && part == Some(GraspStage::Phase(Phase::Close)) && self.view.ghost && followed {
             // The simulated fingers close beside the real ones.
             for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {
                 self.simulation.send(command);
@@ -203,9 +213,9 @@ impl App {
         }
     }
 
-    /// While a gripper is connected, the simulation waits for it and stores nothing.
+    /// While a gripper is connected and shown, the simulation waits for it and stores nothing.
     fn hand_over(&mut self) {
-        let commands = if self.gripper.connected {
+        let commands = if self.gripper.followed {
             // Nothing is known yet where the window opens with a gripper.
             let now = self.snapshot().map(|snapshot| (snapshot.status.recording, snapshot.status.grasps));
             let known = now.filter(|(recording, _)| recording.is_some());

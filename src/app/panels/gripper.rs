@@ -46,11 +46,13 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     } else {
         remark_ui(ui, "No gripper connected. Everything works with the simulated one too.");
     }
+    let id = egui::Id::unique("port path");
+    let mut path = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let typed = Some(path.trim()).filter(|path| !path.is_empty()).map(PathBuf::from);
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(theme::of(ui)));
-        actions.on(&ui.add(connect).on_hover_text("Find the gripper's board and connect to it (Ctrl+G)"), |app| {
-            app.connect(None);
-        });
+        let hint = "Connect to the port or file below; without one, find the gripper's board (Ctrl+G)";
+        actions.on(&ui.add(connect).on_hover_text(hint), |app| app.connect(typed));
         actions.on(&ui.button("List ports"), |app| _ = app.gripper.send(GripperCommand::ListPorts));
     });
     let ports: &[PortInfo] = gripper.map_or(&[], |gripper| &gripper.ports);
@@ -62,8 +64,6 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
             actions.push(|app| app.connect(Some(path)));
         }
     }
-    let id = egui::Id::unique("port path");
-    let mut path = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     ui.horizontal(|ui| {
         let label = ui.label("Port or file");
         let field = text_field(&mut path, id.with("field")).hint_text("/dev/ttyACM0 or captured bytes");

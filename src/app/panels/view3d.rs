@@ -21,6 +21,7 @@ use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
+use palpate_tactile::Quantity;
 use std::sync::Arc;
 
 /// What the 3-D view reads.
@@ -325,10 +326,16 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
         return (said.join(" "), None);
     }
     if own.data.source == ViewSource::Gripper {
+        let is_emulated = own.data.board().is_some_and(|board| board.emulated);
+        let fingers = if is_emulated { "emulated fingers" } else { "real fingers" };
         let text = match (own.silent_s, key.real) {
             (_, None) => "The fingers are not drawn: their flex strips are not calibrated".to_owned(),
-            (Some(silent_s), _) => format!("No readings for {silent_s}\u{a0}s: real fingers as last read"),
-            (None, _) => "Real fingers, as their flex strips read".to_owned(),
+            (Some(silent_s), _) => format!("No readings for {silent_s}\u{a0}s: {fingers} as last read"),
+            (None, _) => {
+                let at =
+                    own.data.playback.cursor_s.map_or_else(String::new, |t| format!(", at {t:.1}{}s", units::SPACE));
+                format!("{}, as their flex strips read{at}", units::capital(fingers))
+            }
         };
         match key.ghost {
             Some(_) => (format!("{text}. Translucent: the simulation"), Some(ghost_colour(theme))),
@@ -416,9 +423,13 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
 /// Curvature of the real fingers (1/m), while they are shown.
 fn real_curvature(own: &View3d<'_>) -> Option<[Option<f64>; 2]> {
     let estimate = &own.data.gripper?.latest.as_ref()?.estimate;
+    let past = ShownGrasp::of(&own.data).filter(|_| own.data.looks_back());
     // In invisible steps, so that noise alone does not redraw the picture.
     let seen = |kappa: f64| (kappa / SEEN_PER_M).round() * SEEN_PER_M;
-    let curvature = Side::BOTH.map(|side| estimate.curvature(side).map(seen));
+    let curvature = Side::BOTH.map(|side| {
+        let now = || estimate.curvature(side);
+        past.as_ref().map_or_else(now, |past| past.read(Quantity::Curvature, side)).map(seen)
+    });
     (own.data.source == ViewSource::Gripper && curvature.iter().any(Option::is_some)).then_some(curvature)
 }
 

@@ -344,7 +344,10 @@ mod tests {
         let lesson =
             Lesson { grasps: 160, tested: 12, recognised: 3, taken_for: taken_for.into(), ..Lesson::default() };
         let rivals = "Earphone case (5), Cardboard box (2), Rubber ball (1) and further ones (1)";
-        assert_eq!(lesson_result(&lesson), format!("the most likely answer in 3 of 12 new grasps, others taken for {rivals}"));
+        assert_eq!(
+            lesson_result(&lesson),
+            format!("the most likely answer in 3 of 12 new grasps, others taken for {rivals}")
+        );
         assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));
         let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };
         let result = "the most likely answer in 12 of 12 new grasps";

@@ -23,6 +23,6 @@ mod sparkline;
 
 pub use disagreement::{Disagreement, disagreements};
 pub use flags::{Observed, flags_of};
-pub use segmentation::{PRE_ROLL_S, SegmentEvent, Segmenter, is_unpressed, measured_phases};
+pub use segmentation::{PRE_ROLL_S, SegmentEvent, Segmenter, measured_phases, shows_grasps};
 pub use sensor_watch::{SensorFault, SensorTrouble, SensorWatch};
 pub use sparkline::{decimated, sparkline, stored_sparkline};

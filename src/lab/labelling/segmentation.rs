@@ -389,9 +389,10 @@ pub fn measured_phases(board: &Board, readings: &[Reading]) -> Vec<PhaseMark> {
     marks
 }
 
-/// True where the line was read and never had pressure: nothing closed.
-pub fn is_unpressed(readings: &[Reading]) -> bool {
-    !readings.is_empty() && readings.iter().all(|reading| reading.line_bar.is_some_and(|bar| bar <= NO_BAR))
+/// True where line pressure or a flex strip is read, so that a grasp would be seen in the readings.
+pub fn shows_grasps(board: &Board, readings: &[Reading]) -> bool {
+    let has_strip = board.sensors.of_kind(SensorKind::Flex).into_iter().any(|strip| board.channel_of(strip).is_some());
+    !readings.is_empty() && (has_strip || readings.iter().any(|reading| reading.line_bar.is_some()))
 }
 
 impl Gathering {

@@ -1,7 +1,7 @@
 //! Writer of a trial of the real gripper: pending data, and statistics for its header.
 
 use crate::grasping::PressureFault;
-use crate::labelling::{Observed, decimated, flags_of, is_unpressed, measured_phases, sparkline};
+use crate::labelling::{Observed, decimated, flags_of, measured_phases, shows_grasps, sparkline};
 use palpate_device::protocol::BoardEvent;
 use palpate_device::serial::LinkStatus;
 use palpate_sim::scene::Scene;
@@ -200,7 +200,7 @@ impl BoardWriter {
         if self.prompted {
             let measured = measured_phases(&self.about.course.board, &trial.readings);
             // Phases that were asked for stay where nothing measures them.
-            if !measured.is_empty() || is_unpressed(&trial.readings) {
+            if !measured.is_empty() || shows_grasps(&self.about.course.board, &trial.readings) {
                 self.about.course.phases = measured;
             }
         }

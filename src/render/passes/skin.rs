@@ -501,7 +501,10 @@ mod tests {
             end = pad.indices.end;
         }
         assert_eq!(end as usize, indices.len());
-        assert!(parts[1].pad.indices.len() < parts[0].pad.indices.len() * 11 / 20, "fast detail has half the triangles");
+        assert!(
+            parts[1].pad.indices.len() < parts[0].pad.indices.len() * 11 / 20,
+            "fast detail has half the triangles"
+        );
         assert!(indices.iter().all(|i| (*i as usize) < vertices.len()));
         for v in &vertices {
             let n = Vec3::from(v.normal);

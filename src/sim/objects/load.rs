@@ -111,9 +111,11 @@ fn unknown(source: &str, path: &Path, extension: &str) -> ObjectError {
     let nearest = names()
         .map(|name| (strsim::jaro_winkler(&source.to_ascii_lowercase(), name), name))
         .filter(|(likeness, _)| *likeness > 0.7)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let hint = match nearest {
-        Some((_, name)) => format!("did you mean \"{name}\"?"),
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name);
+    let titled = Some(class_of(source)).filter(|name| *name != source);
+    let hint = match titled.or(nearest) {
+        Some(name) => format!("did you mean \"{name}\"?"),
         None => {
             format!("there are {}, {EMPTY}, or any .urdf, .obj or .stl file", names().collect::<Vec<_>>().join(", "))
         }

@@ -124,7 +124,8 @@ pub(super) fn ui(
         let measures = Measures::fitting(room);
         ui.spacing_mut().item_spacing.y = measures.gap;
         let top = ui.cursor().top();
-        lesson_ui(ui, tools, learned, actions);
+        let labels = recognised.view.map(|view| view.labels.as_ref());
+        lesson_ui(ui, tools, learned, labels, actions);
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
@@ -168,7 +169,13 @@ pub(super) fn ui(
 }
 
 /// A lesson that is running, with its progress, or the last one, with its result: the object is known from now on.
-fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actions: &mut Actions) {
+fn lesson_ui(
+    ui: &mut Ui,
+    tools: &GripperTools,
+    learned: Option<&Learned>,
+    labels: Option<&Labels>,
+    actions: &mut Actions,
+) {
     let (running, good) = (tools.teaching.running(), theme::of(ui).colours().good);
     if running.is_none() && learned.is_none() {
         return;
@@ -193,6 +200,9 @@ fn lesson_ui(ui: &mut Ui, tools: &GripperTools, learned: Option<&Learned>, actio
                     let time = learned.seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.0}\u{a0}s"));
                     let (grasps, known) = (lesson.grasps, lesson_result(lesson));
                     ui.label(format!("from {grasps} simulated grasps{time}: {known}."));
+                }
+                if labels.is_some_and(|labels| labels.classes.iter().all(|class| class.name != learned.name)) {
+                    ui.label("The model that answers here has not learned it.");
                 }
                 let id = egui::Id::unique("name of what was learned");
                 if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {

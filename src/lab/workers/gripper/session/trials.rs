@@ -53,6 +53,7 @@ impl GripperSession {
             return self.publisher.notify(Notice::Warning("no board is connected: vent at the control box".to_owned()));
         };
         self.pressing = None;
+        let driven = self.recording.as_ref().is_some_and(|recording| recording.is_driven());
         connection.taken_over = true;
         let sent = connection.gripper.vent();
         match sent {
@@ -60,7 +61,7 @@ impl GripperSession {
             Ok(()) if connection.board.firmware.is_none() => self.publisher.notify(Notice::Warning(
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
-            Ok(()) if connection.board.emulated => self.publisher.notify(Notice::Warning(
+            Ok(()) if connection.board.emulated && !driven => self.publisher.notify(Notice::Warning(
                 "Vent sent. The emulated hand stays open until it is driven: actuation \"board\" (M).".to_owned(),
             )),
             Ok(()) => self.publisher.notify(Notice::Warning("Vent sent.".to_owned())),
@@ -180,8 +181,17 @@ impl GripperSession {
                 RecorderNotice::Begun(id) => self.recording_id = Some(id),
                 RecorderNotice::Recorded(trial) => {
                     let Some((request, discarded, complete)) = self.ending.pop_front() else { continue };
+                    let adapted = self.adapting;
                     let discarded = self.adapt_to(trial.id, discarded);
-                    if !discarded {
+                    let by_hand = request.control == Control::ByHand && !adapted && !discarded;
+                    if by_hand && trial.about.course.phases.is_empty() {
+                        // An answer would be one to the noise of sensors at rest.
+                        self.start_over();
+                        let text = format!("trial {}: the hand did not close, so there is no answer", trial.id);
+                        self.publisher.notify(Notice::Warning(text));
+                    }
+                    // What was adapted says more than that a trial is stored.
+                    if !discarded && !adapted {
                         self.publisher.notify(Notice::Stored(Stored::New(trial.id)));
                     }
                     let cadence = cadence_line(&trial.about.course.cadence);
