@@ -351,9 +351,29 @@ fn a_hand_that_did_not_close_has_no_phases_and_no_answer() {
     desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
     desk.record();
-    desk.until_told("the hand did not close, so there is no answer");
+    desk.until_told("no close from open fingers was seen, so there is no answer");
     let course = desk.store().board_log(1).unwrap().unwrap().course;
     assert_eq!(course.phases, []);
+}
+
+#[test]
+fn the_answer_to_a_discarded_trial_goes_with_it() {
+    let mut desk = desk();
+    desk.tell(|app| app.connect(None));
+    desk.until_shown(true, "Stop and vent");
+    for key in [Key::M, Key::B] {
+        desk.press(key);
+    }
+    desk.record();
+    let answered = "press R to grasp again";
+    desk.tell(|app| app.set_mode(Mode::Demo));
+    desk.until_shown(true, answered);
+    desk.tell(|app| app.set_mode(Mode::Label));
+    desk.press(Key::D);
+    desk.until_labelled(&[(1, None, true)]);
+    desk.tell(|app| app.set_mode(Mode::Demo));
+    desk.until_shown(true, "Press R to start a grasp");
+    assert!(desk.harness.query_all_by_label_contains(answered).next().is_none());
 }
 
 #[test]

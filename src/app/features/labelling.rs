@@ -6,6 +6,7 @@ use palpate_lab::workers::{
     Command, GripperCommand, LabelCommand, LabelView, LabelWorker, LabellingAction, LabellingEffect, LabellingSession,
     SessionContext, TrialInSight,
 };
+use palpate_store::labels::TrialEdit;
 use palpate_tactile::trial::TrialId;
 use std::sync::Arc;
 
@@ -113,7 +114,14 @@ impl App {
     fn carry_out(&mut self, effects: Vec<LabellingEffect>) {
         for effect in effects {
             match effect {
-                LabellingEffect::Edit(command) => _ = self.labelling.worker.send(command),
+                LabellingEffect::Edit(command) => {
+                    let ended = self.gripper_view().and_then(|gripper| gripper.ended.as_ref()).map(|ended| ended.id);
+                    // Nor does the answer to it stand any longer.
+                    if matches!(&command, LabelCommand::Edit(id, TrialEdit::Discard) if Some(*id) == ended) {
+                        self.gripper.send(GripperCommand::AnotherObject);
+                    }
+                    self.labelling.worker.send(command);
+                }
                 LabellingEffect::BeginTrial(request) => {
                     let number = self.gripper.send(GripperCommand::Begin(request));
                     self.labelling.session.trial_requested(number);

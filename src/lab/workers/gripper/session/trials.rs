@@ -185,9 +185,10 @@ impl GripperSession {
                     let discarded = self.adapt_to(trial.id, discarded);
                     let by_hand = request.control == Control::ByHand && !adapted && !discarded;
                     if by_hand && trial.about.course.phases.is_empty() {
-                        // An answer would be one to the noise of sensors at rest.
+                        // The hand did not move, or was closed already.
                         self.start_over();
-                        let text = format!("trial {}: the hand did not close, so there is no answer", trial.id);
+                        let text =
+                            format!("trial {}: no close from open fingers was seen, so there is no answer", trial.id);
                         self.publisher.notify(Notice::Warning(text));
                     }
                     // What was adapted says more than that a trial is stored.
