@@ -2,8 +2,9 @@
 
 #![cfg(unix)]
 
+use crate::bench::HANG;
 use crate::program::{Ran, palpate, ran, refused, run};
-use crate::serial::{HANG, TOO_BUSY, finished, start};
+use crate::serial::{TOO_BUSY, finished, start};
 use palpate_store::Store;
 use palpate_tactile::board::Sensor;
 use palpate_tactile::calibration::{Curve, Readout};

@@ -67,8 +67,8 @@ fn explain_steadily(scene: &Scene, how: &Measuring<'_>) -> Result<Option<Explana
     Ok(explain_scene(scene, how)?.map(steady))
 }
 
-/// Time after which what is waited for will not come any more: a test that hangs would take all of them along.
-const HANG: Duration = Duration::from_secs(300);
+/// After this long something hangs, however busy the machine is.
+pub(crate) const HANG: Duration = Duration::from_secs(300);
 
 /// The workbench and the harness that drives it.
 pub(crate) struct Bench {
@@ -192,7 +192,7 @@ impl Bench {
 
     /// Waits until something has happened, and draws.
     pub(crate) fn wait(&mut self) {
-        self.woken.recv_timeout(HANG).expect("something goes on");
+        self.woken.recv_timeout(HANG).expect("the window is woken");
         self.harness.step();
     }
 

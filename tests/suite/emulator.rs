@@ -4,10 +4,11 @@
 
 #![cfg(unix)]
 
+use crate::bench::HANG;
 use crate::calibration::{capture, parts};
 use crate::gripper::scene;
 use crate::program::{palpate, ran, refused};
-use crate::serial::{HANG, TOO_BUSY, finished, interrupt, start};
+use crate::serial::{TOO_BUSY, finished, interrupt, start};
 use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, parse_faults};
 use palpate_device::protocol::BoardEvent;

@@ -5,6 +5,7 @@
 //! A second or two of it run with every test. `PALPATE_FUZZ_S=3600 cargo test --test suite fuzz` runs for an hour, from
 //! `PALPATE_FUZZ_SEED` on, and tells every find with its seed.
 
+use crate::bench::HANG;
 use palpate_lab::grasping::grasp;
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::{Scene, SceneKey};
@@ -16,9 +17,6 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-
-/// Longer than anything that is not a hang, however slow the machine.
-const HANG: Duration = Duration::from_secs(300);
 
 /// Steps times strands in one trial: what keeps a case below a second or so.
 const MOST_WORK: f64 = 2e6;

@@ -1,6 +1,7 @@
 //! The real gripper's side, over real pseudo-terminals: `palpate record` as a user would run it.
 #![cfg(unix)]
 
+use crate::bench::HANG;
 use crate::program::{Ran, palpate, ran, refused};
 use palpate_store::Store;
 use palpate_tactile::board::Reading;
@@ -12,9 +13,6 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-
-/// After this long something hangs, however busy the machine is.
-pub(crate) const HANG: Duration = Duration::from_secs(300);
 
 /// Held while a program is started, so that none inherits an end of a pseudo-terminal that is being made: it would never
 /// be seen to vanish.

@@ -3,12 +3,13 @@
 #![cfg(unix)]
 
 use crate::adapting::Emulator;
+use crate::bench::HANG;
 use crate::bench::{Bench, BenchSetup};
 use crate::calibration::parts;
 use crate::cpu_renderer::CpuRenderer;
 use crate::gripper::{TRUE_TO_TIME, emulated};
 use crate::program::{json, misused, palpate, ran, refused, run};
-use crate::serial::{HANG, interrupt, start};
+use crate::serial::{interrupt, start};
 use egui::Key;
 use palpate_serve::DeskSetup;
 use palpate_store::Store;

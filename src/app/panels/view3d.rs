@@ -423,7 +423,7 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
 /// Curvature of the real fingers (1/m), while they are shown.
 fn real_curvature(own: &View3d<'_>) -> Option<[Option<f64>; 2]> {
     let estimate = &own.data.gripper?.latest.as_ref()?.estimate;
-    let past = ShownGrasp::of(&own.data).filter(|_| own.data.looks_back());
+    let past = own.data.looks_back().then(|| ShownGrasp::of(&own.data)).flatten();
     // In invisible steps, so that noise alone does not redraw the picture.
     let seen = |kappa: f64| (kappa / SEEN_PER_M).round() * SEEN_PER_M;
     let curvature = Side::BOTH.map(|side| {
