@@ -207,7 +207,7 @@ impl<'a> DisplayedData<'a> {
         Some(firmest.map_or(end, |(t, _)| t))
     }
 
-    /// The last hold, while the newest frame of the simulation is shown and touches nothing.
+    /// The last hold, while the newest frame of the simulation is shown, and is no longer one.
     pub(super) fn last_hold(&self) -> Option<&'a HeldMoment> {
         self.last_hold.filter(|_| self.source == ViewSource::Simulation && self.past_s().is_none())
     }

@@ -17,6 +17,8 @@ use palpate_tactile::Quantity;
 use palpate_tactile::electronics::PadPart;
 use std::ops::Range;
 
+/// Least pressure that has the brightest colour while grasps run (Pa).
+const LEAST_RUNNING: f32 = 20e3;
 /// Most columns of a heat map over time.
 pub(super) const MAP_COLUMNS: usize = 600;
 
@@ -80,6 +82,10 @@ impl<'a> ShownGrasp<'a> {
         let span_s = data.time_span();
         let full_scale = match frames.as_slice() {
             [] => PAD_FULL_SCALE,
+            // A running grasp begins with the scale at which most end, so that colours keep their meaning.
+            frames if data.source == ViewSource::Simulation => {
+                full_scale_of(gripper, frames.iter().copied()).max(LEAST_RUNNING)
+            }
             frames => full_scale_of(gripper, frames.iter().copied()),
         };
         let rows = touched_rows(gripper, frames.iter().copied().chain(frame));

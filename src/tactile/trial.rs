@@ -56,6 +56,15 @@ impl TrialSource {
             Self::Imported => "import",
         }
     }
+
+    /// Name in sentences.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Simulated => "simulated",
+            Self::Recorded => "recorded",
+            Self::Imported => "imported",
+        }
+    }
 }
 
 impl std::fmt::Display for TrialSource {

@@ -109,7 +109,7 @@ fn all_that_is_asked_of_a_trial_is_in_sight_in_a_window_of_usual_size() {
     let mut desk = desk_of([1280.0, 800.0], board(&parts(1, false)));
     desk.press_with(Modifiers::COMMAND, Key::G);
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     desk.record();
     let below = desk.harness.get_by_label("Calibration").rect().top();
     for name in ["Note", "Tags"] {
@@ -123,7 +123,7 @@ fn an_afternoon_by_keys_alone() {
     let mut desk = desk();
     desk.press_with(Modifiers::COMMAND, Key::G);
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     assert_eq!(desk.workbench().view().control, Control::Driven);
     // What the plan has next is proposed: Enter takes it.
     let next = desk.next_object();
@@ -202,7 +202,7 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     let mut desk = desk();
     desk.press_with(Modifiers::COMMAND, Key::G);
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     let blind = desk.workbench().view().blind;
     // In the frame of the key that goes to the field, or in the frames after it: letters are no keys, which would throw
     // away, tare, or show the model's guess.
@@ -278,7 +278,7 @@ fn stop_works_while_something_is_typed() {
     let mut desk = desk();
     desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     desk.record();
     desk.press(Key::Slash);
     desk.type_text("r");
@@ -295,7 +295,7 @@ fn blind_hides_the_models_guess_until_the_label_is_given() {
     let mut desk = desk();
     desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     desk.record();
     desk.harness.get_by_label("Recognition").click();
     desk.harness.step();
@@ -340,9 +340,9 @@ fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_
     desk.press(Key::R);
     desk.until_shown(true, "Recording: the emulated hand moves by itself");
     desk.press(Key::Escape);
-    desk.until_told("The emulated hand stays open until it is driven");
+    desk.until_told("The emulated hand stays open until the next trial");
     desk.press(Key::R);
-    desk.until_shown(true, "The emulated hand waits: actuation board (M)");
+    desk.until_shown(true, "Closing");
 }
 
 #[test]
@@ -361,7 +361,7 @@ fn the_answer_to_a_discarded_trial_goes_with_it() {
     let mut desk = desk();
     desk.tell(|app| app.connect(None));
     desk.until_shown(true, "Stop and vent");
-    for key in [Key::M, Key::B] {
+    for key in [Key::A, Key::B] {
         desk.press(key);
     }
     desk.record();

@@ -127,7 +127,7 @@ fn in_the_window_a_grasp_of_it_is_recorded_recognised_and_explained() {
     desk.tell(|app| app.set_mode(Mode::Label));
     desk.press_with(Modifiers::COMMAND, Key::G);
     desk.until_shown(true, "Stop and vent");
-    desk.press(Key::M);
+    desk.press(Key::A);
     desk.record();
     desk.press(Key::Enter);
     desk.until_shown(true, "The model predicts Cardboard box");

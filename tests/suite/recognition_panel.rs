@@ -55,7 +55,7 @@ fn a_grasp_is_followed_until_it_is_sure() {
     assert!(says(&bench, "large 95 %") && says(&bench, "spherical 96 %"));
     assert!(says(&bench, "Tomato 24 %") && says(&bench, "Empty hand 0 %"));
     assert!(says(&bench, "Grasp 1, running: Lemon 61 %") && says(&bench, "Grasp 2: not yet"));
-    assert!(says(&bench, "Truth shown when it decides"));
+    assert!(says(&bench, "Truth: Lemon"));
     bench.tell(|app| app.simulation.send(Command::SetSpeed(64.0)));
     bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| beliefs(s) == 1 && s.identification.as_ref().is_some_and(|view| !view.listening));

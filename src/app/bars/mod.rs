@@ -99,8 +99,8 @@ fn activity_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         let Some((name, progress)) = running else { continue };
         let text = format!("{name} {:.0}{SPACE}%", 100.0 * progress.share);
         chip(ui, &text, app.view.theme.colours().accent).on_hover_text(&progress.words);
-        let button = ui.small_button("Stop");
-        button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Stop: {name}")));
+        // The word would be read as that of the button beside it, which vents the gripper.
+        let button = icons::button(ui, Icon::Cross, &format!("Stop: {name}"), &format!("Stop: {name}"));
         actions.on(&button, stop);
     }
 }
@@ -255,7 +255,7 @@ fn gripper_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     actions.on(&ui.add(button).on_hover_text(about), App::toggle_watch);
     let text = RichText::new(drive_text(app, gripper, narrow)).small().color(colour(colours.text));
     let about = "Who sets the pressure of the next trial: you by hand, or the board; untimed trials last until Q. \
-                 M in Label mode, or a click, changes it";
+                 A in Label mode, or a click, changes it";
     actions.on(&ui.button(text).on_hover_text(about), App::next_control);
 }
 

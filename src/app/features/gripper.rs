@@ -229,7 +229,7 @@ impl App {
     }
 }
 
-/// Actuations, in the order of the key M.
+/// Actuations, in the order of the key A.
 pub(in crate::app) const CONTROLS: [Control; 3] = [Control::ByHand, Control::Driven, Control::Free];
 
 /// Name of an actuation.
@@ -245,7 +245,6 @@ pub(in crate::app) fn control_title(control: Control) -> &'static str {
 pub(in crate::app) fn instruction(trial: &TrialView) -> &'static str {
     let by_hand = trial.request.control == Control::ByHand;
     match trial.stage {
-        _ if by_hand && trial.emulated && trial.taken_over => "The emulated hand waits: actuation board (M)",
         _ if by_hand && trial.emulated => "Recording: the emulated hand moves by itself",
         GraspStage::Lead if by_hand => "Get ready to close",
         GraspStage::Lead => "At rest",

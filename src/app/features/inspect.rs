@@ -35,7 +35,7 @@ pub struct InspectFeature {
     wanted: Option<TrialId>,
     open: Option<Arc<OpenTrial>>,
     pub(super) history: TraceHistory,
-    pub(super) pinned: Vec<Pinned>,
+    pub(in crate::app) pinned: Vec<Pinned>,
     /// Trials that are being opened to be compared.
     awaited: Vec<TrialId>,
     /// Rises with each change of the pinned trials.

@@ -19,7 +19,7 @@ pub(super) mod view;
 use crate::app::frame_rate::FrameRate;
 use crate::app::shown::{ComparedTrials, DisplayedData};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::traces::{GraspTrace, TraceHistory};
+use crate::app::traces::TraceHistory;
 use files::FileFeature;
 use gripper::GripperFeature;
 use inspect::InspectFeature;
@@ -147,7 +147,12 @@ impl App {
         let shown = self.shown();
         let (names, phases) = (shown.column_names(), shown.find_phases());
         let own = shown.shown_trial().map(|own| own.trial.id);
-        let span = shown.traces.current().map_or([0.0; 2], GraspTrace::span);
+        // Values beside the plots are those of a time that they show.
+        let plotted = shown.time_span();
+        let span = shown.traces.current().map_or([0.0; 2], |trace| {
+            let [from, to] = trace.span();
+            [from.max(plotted[0]), to]
+        });
         self.inspect.move_cursor(&self.ctx, self.view.source, span);
         self.inspect.compare(names, phases, own);
     }

@@ -36,7 +36,7 @@ const LINE: f32 = 18.0;
 const WITH_BUTTON: Duration = Duration::from_secs(30);
 
 /// Time for which the last message can still be read after it, in quiet letters.
-const QUIET: Duration = Duration::from_secs(60);
+const QUIET: Duration = Duration::from_secs(10);
 
 /// In messages of a store that is lost, which stay until they are dismissed: whatever is recorded goes nowhere.
 const STORE_LOST: &str = "while it was open";

@@ -85,10 +85,12 @@ impl SimulationFeature {
         }
     }
 
-    /// The last hold of the object, from its end until the next contact.
+    /// The last hold of the object, from its end until the next contact: forces of the release are no measure of it.
     pub(in crate::app) fn last_hold(&self) -> Option<&HeldMoment> {
         let snapshot = self.snapshot.as_ref()?;
-        self.held.as_ref().filter(|held| held.object == snapshot.truth() && snapshot.frame.taxels.is_empty())
+        let frame = &snapshot.frame;
+        let over = frame.phase == Phase::Release || frame.taxels.is_empty();
+        self.held.as_ref().filter(|held| over && held.object == snapshot.truth())
     }
 
     /// Sends a command to the simulation.

@@ -146,6 +146,7 @@ pub(in crate::app) static COMMANDS: &[Act] = &[
     command("Record simulated grasps into the demo log", |app| {
         app.simulation.send(Command::SetRecording(Some(TrialPlace::DemoLog)));
     }),
+    command("Show the load on every taxel (panel Pads)", |app| app.show_panel("pads")),
     command("Error band, on or off", |app| {
         let shown = app.snapshot().is_some_and(|snapshot| snapshot.status.error_band);
         app.simulation.send(Command::SetErrorBand(!shown));

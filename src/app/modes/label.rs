@@ -31,7 +31,7 @@ const KEYS: &[Act] = &[
     key(NONE, Key::B, "blind: hide the model's prediction until the label is given", |app| {
         app.label(LabellingAction::ToggleBlind);
     }),
-    key(NONE, Key::M, "actuation: manual, board or untimed", App::next_control),
+    key(NONE, Key::A, "actuation: manual, board or untimed", App::next_control),
     key(NONE, Key::W, "detect trials automatically", App::toggle_watch),
     key(COMMAND, Key::E, "export all labelled trials", App::export_labelled),
     key(COMMAND, Key::T, "train on all labelled trials", App::train_and_use),

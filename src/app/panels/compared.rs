@@ -102,11 +102,17 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 ui.monospace(number(own, unit));
                 for other in &pinned {
                     let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
-                    let text = mean.map_or("–".to_owned(), |mean| {
-                        let sign = if mean > own { "+" } else { "" };
-                        format!("{} ({sign}{})", number(mean, unit), number(mean - own, unit))
-                    });
-                    ui.monospace(text);
+                    let Some(mean) = mean else {
+                        ui.monospace("–");
+                        continue;
+                    };
+                    let sign = if mean > own { "+" } else { "" };
+                    let (mean, off) = (number(mean, unit), format!("{sign}{}", number(mean - own, unit)));
+                    // A panel has room for both of one trial.
+                    match pinned.len() {
+                        1 => ui.monospace(format!("{mean} ({off})")),
+                        _ => ui.monospace(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
+                    };
                 }
                 ui.end_row();
             }

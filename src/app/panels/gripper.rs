@@ -225,7 +225,7 @@ fn drift_badge(ui: &mut Ui, drift: &Drift) {
 
 /// Actuation, and automatic detection of trials.
 fn control_ui(ui: &mut Ui, mut control: Control, gripper: &GripperView, actions: &mut Actions) {
-    ui.label("Actuation  (M)");
+    ui.label("Actuation  (A)");
     for kind in CONTROLS {
         let about = match kind {
             Control::ByHand => "You set the pressure at the control box, as instructed",

@@ -31,6 +31,7 @@ mod why;
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
+use crate::app::features::view::ViewSource;
 use egui::Ui;
 use view3d::View3d;
 
@@ -51,7 +52,9 @@ const fn panel(name: &'static str, title: &'static str, ui: fn(&mut Ui, &App, &m
 /// All panels, and what each of them reads.
 pub const ALL: [PanelKind; 35] = [
     panel("objects", "Objects", |ui, app, actions| {
-        let chosen = &app.simulation.scene.object.source;
+        // Nobody knows what a real hand holds.
+        let simulated = app.view.source != ViewSource::Gripper;
+        let chosen = if simulated { app.simulation.scene.object.source.as_str() } else { "" };
         let learned_as = |path: &str| app.learned_as(path).map(|class| (class, app.lesson(class)));
         objects::ui(ui, (chosen, &app.view), learned_as, &app.thumbnails, actions);
     }),
@@ -78,7 +81,7 @@ pub const ALL: [PanelKind; 35] = [
     panel("plan", "Plan", |ui, app, actions| plan::ui(ui, app.labels(), actions)),
     panel("trials", "Trials", |ui, app, actions| trials::ui(ui, &app.labelling, actions)),
     panel("library", "Library", |ui, app, actions| {
-        library::ui(ui, &app.library, app.labels(), &app.thumbnails, actions);
+        library::ui(ui, (&app.library, &app.inspect.pinned), app.labels(), &app.thumbnails, actions);
     }),
     panel("journal", "Journal", |ui, app, actions| journal::ui(ui, app.labels(), actions)),
     panel("gripper", "Gripper", |ui, app, actions| {

@@ -6,7 +6,7 @@ use crate::app::features::App;
 use crate::app::features::tools::{DEFAULT_METHOD, GripperTools, TRAINING_SEED};
 use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
+use crate::app::widgets::{capital, failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units::SPACE;
@@ -15,6 +15,7 @@ use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::comparison::in_table_order;
 use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, Model, counted, method};
+use palpate_sim::objects::{object_title, titled};
 use std::path::{Path, PathBuf};
 
 pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, model: Option<&Model>, view: &ViewState, actions: &mut Actions) {
@@ -152,7 +153,11 @@ fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], act
     for class in classes.iter().filter(is_new) {
         let hint =
             format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
-        if ui.button(format!("Teach the model in use: {}", class.name)).on_hover_text(hint).clicked() {
+        if ui
+            .button(format!("Teach the model in use: {}", capital(&object_title(&class.name))))
+            .on_hover_text(hint)
+            .clicked()
+        {
             let name = class.name.clone();
             actions.push(|app| app.teach_recorded(name));
         }
@@ -168,17 +173,18 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass) {
         false => (format!("{}, needs {LEAST_TRIALS}", class.trials), colours.warning, colours.warning),
     };
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width().max(120.0), 18.0), Sense::hover());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{}: {number}", class.name)));
+    let title = capital(&object_title(&class.name));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{title}: {number}")));
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(13.0);
     let [names, numbers] = [0.36, 0.26].map(|share: f32| share * rect.width());
     let name = painter.with_clip_rect(rect.with_max_x(rect.left() + names - 4.0));
-    name.text(rect.left_center(), Align2::LEFT_CENTER, &class.name, font.clone(), colour(colours.text));
+    name.text(rect.left_center(), Align2::LEFT_CENTER, &title, font.clone(), colour(colours.text));
     painter.text(rect.right_center(), Align2::RIGHT_CENTER, &number, font, colour(ink));
     let room = rect.with_min_x(rect.left() + names).with_max_x(rect.right() - numbers).shrink2(vec2(0.0, 4.0));
     let filled = room.with_max_x(room.left() + share * room.width());
     painter.rect_filled(filled, 2.0, colour(bar));
-    response.on_hover_text(&class.name);
+    response.on_hover_text(titled(&class.name));
 }
 
 /// Room for the button beside a model, and for the scroll bar (points).

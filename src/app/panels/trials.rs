@@ -98,7 +98,10 @@ fn row_ui(
             (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
         }
         (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
-        (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
+        (_, None, None) => {
+            let tags: String = trial.tags.iter().map(|tag| format!("#{tag}, ")).collect();
+            (format!("{tags}{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text)
+        }
     };
     put_line(ui, words, Align2::LEFT_BOTTOM, &below, 11.0, colour(ink));
     let clicked = response.clicked();

@@ -296,7 +296,8 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
     for trial in report.trials.iter().filter(|own| own.distance >= SAME || Some(own.id) != last) {
         let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { object_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
-        let text = format!("Trial {}, {name}, {}, distance {:.2}{same}", trial.id, trial.source, trial.distance);
+        let source = trial.source.title();
+        let text = format!("Trial {}, {name}, {source}, distance {:.2}{same}", trial.id, trial.distance);
         let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &text));
         if response.hovered() || response.has_focus() {
@@ -308,13 +309,7 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
             egui::Image::new(texture).corner_radius(3.0).paint_at(ui, picture.shrink(1.0));
         }
         let words = rect.with_min_x(picture.right() + 6.0).with_max_x(rect.right() - NUMBER);
-        put(
-            ui,
-            &format!("{name}  {} {}{same}", trial.source, trial.id),
-            words,
-            Align2::LEFT_CENTER,
-            colour(colours.text),
-        );
+        put(ui, &format!("{name}  {source} {}{same}", trial.id), words, Align2::LEFT_CENTER, colour(colours.text));
         put(ui, &format!("{:.2}", trial.distance), rect, Align2::RIGHT_CENTER, colour(colours.text));
         if response.on_hover_text(format!("{text}; click to open it")).clicked() {
             let id = trial.id;

@@ -149,6 +149,12 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
             frame.max.y -= labels::LINE;
         }
         let quiet = theme.colours().quiet_text;
+        if data.traces.earlier().next().is_some() && frame.height() >= ROOM_FOR_EARLIER {
+            let (font, corner) = (egui::FontId::proportional(11.0), frame.right_bottom() + egui::vec2(6.0, 0.0));
+            let text = "faint: earlier grasps";
+            ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, text, font, veil(quiet, 0.8));
+            frame.max.y -= labels::LINE;
+        }
         let labels = curve_labels(data, &plot, &response.transform);
         if data.comparison.traces.is_empty() {
             labels::draw(ui, frame, quiet, labels);
@@ -180,6 +186,8 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
 /// Height from which on a plot has a line of choices above it, and width from which on it has names beside it (points).
 const ROOM_FOR_HEADER: f32 = 120.0;
 const ROOM_FOR_LABELS: f32 = 380.0;
+/// Height from which on faint curves are named (points).
+const ROOM_FOR_EARLIER: f32 = 84.0;
 
 /// Colour of a curve of the grasp shown: that of its sensor, or the text colour where trials are compared.
 fn own_ink(data: &DisplayedData<'_>, curve: &PlotCurve) -> Color32 {

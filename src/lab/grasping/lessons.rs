@@ -27,6 +27,8 @@ pub const LESSON_GRASPS: usize = 160;
 /// Simulated grasps of each built-in object that the model knows, in the poses of a scene by default: few of the grasps that
 /// it has kept are in these.
 const REHEARSED: usize = 8;
+/// One of so many simulated grasps of a new object is straight.
+const STRAIGHT: usize = 8;
 /// Simulated grasps of a new object by which it is tested.
 const TESTED: usize = 12;
 /// Fewest recorded grasps of an object that a model learns.
@@ -175,8 +177,11 @@ impl Lessons<'_> {
         for (class, (content, source)) in &taught_from {
             classes.take(class, *content, source, SEPARATE)?;
         }
-        // Half of the grasps are in poses of a scene by default, where any turn and any face are rare.
-        let usual = Scene { pose: PoseSpread { build: scene.pose.build, ..PoseSpread::default() }, ..scene.clone() };
+        // Half of the grasps are in poses of a scene by default, where any turn and any face are rare; some of these are as
+        // straight as a first grasp: flat faces that lie on the pads read like no others.
+        let [usual, straight] =
+            [PoseSpread::default(), PoseSpread { shift: [1e-3; 3], yaw_deg: 2.0, ..PoseSpread::default() }]
+                .map(|pose| Scene { pose: PoseSpread { build: scene.pose.build, ..pose }, ..scene.clone() });
         let rehearsed: Vec<&str> = catalogue().iter().map(|own| own.name.as_str()).filter(|name| known(name)).collect();
         let rehearsed = if self.objects.is_empty() { Vec::new() } else { rehearsed };
         let (done, of) =
@@ -192,7 +197,7 @@ impl Lessons<'_> {
         }
         for (number, setup) in self.objects.iter().enumerate() {
             let ObjectSetup { fixed, shift, .. } = scene.object;
-            let [scene, usual] = [&scene, &usual].map(|own| {
+            let [scene, usual, straight] = [&scene, &usual, &straight].map(|own| {
                 let object = ObjectSetup { fixed, shift, ..setup.clone() };
                 Scene { object, ..own.clone() }
             });
@@ -210,15 +215,18 @@ impl Lessons<'_> {
             }
             classes.take(&object.name, object.content, &setup.source, SEPARATE)?;
             taught_from.insert(object.name.clone(), (object.content, setup.source.clone()));
-            let half = self.grasps / 2;
-            let (mut examples, of_any) = self.simulated(&scene, &object, 0..self.grasps - half, &view, &tick)?;
-            let (others, of_usual) = self.simulated(&usual, &object, 0..half, &view, &tick)?;
-            examples.extend(others);
+            let (few, half) = (self.grasps / STRAIGHT, self.grasps / 2);
+            let (mut examples, mut lost) = (Vec::new(), 0);
+            for (scene, grasps) in [(&scene, self.grasps - half), (&usual, half - few), (&straight, few)] {
+                let (own, lost_here) = self.simulated(scene, &object, 0..grasps, &view, &tick)?;
+                examples.extend(own);
+                lost += lost_here;
+            }
             if examples.is_empty() {
                 let name = &object.name;
                 return Err(refused(format!("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")));
             }
-            let (name, grasps, lost) = (object.name.clone(), examples.len(), of_any + of_usual);
+            let (name, grasps) = (object.name.clone(), examples.len());
             learned.push(Lesson { name, grasps, lost, ..Lesson::default() });
             tests.push(self.simulated(&usual, &object, half..half + TESTED, &view, &tick)?.0);
             add(data_of(&object.name, examples, &scene, &view)?)?;

@@ -184,10 +184,9 @@ impl OpenTrial {
     /// Name of the source, in words.
     pub fn source_title(&self) -> &'static str {
         match self.source {
-            TrialSource::Simulated => "simulated",
             TrialSource::Recorded if self.board.as_ref().is_some_and(|board| board.emulated) => "emulated gripper",
             TrialSource::Recorded => "real gripper",
-            TrialSource::Imported => "imported",
+            source => source.title(),
         }
     }
 

@@ -14,7 +14,7 @@ pub(super) const SCALE_BAR: f32 = 46.0;
 /// Height of its text (points).
 const TEXT: f32 = 14.0;
 /// Least size of a picture with scale bar and legends (points).
-const LEAST_SIZE: Vec2 = Vec2::new(340.0, 200.0);
+const LEAST_SIZE: Vec2 = Vec2::new(340.0, 150.0);
 /// Width of a legend, and its height with its texts (points).
 const LEGEND_WIDTH: f32 = 132.0;
 const LEGEND_HEIGHT: f32 = 50.0;
@@ -69,7 +69,7 @@ const EDGE: f32 = 10.0;
 const HEAD: f32 = 48.0;
 const FOOT: f32 = 42.0;
 /// Distance of the places that are tried (points).
-const STEP: f32 = 9.0;
+const STEP: f32 = 6.0;
 
 impl<'a> Annotator<'a> {
     /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset; `hand` is what plates
@@ -100,8 +100,8 @@ impl<'a> Annotator<'a> {
         self.kept.extend((0..=pieces as u32).map(|k| from.lerp(to, k as f32 / pieces)));
     }
 
-    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that; beside the
-    /// hand, or over it where it must stand somewhere: `farthest` (points) is infinite. None where all within that is taken.
+    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that, sooner on its
+    /// side of the picture; beside the hand, or over it where it must stand somewhere: `farthest` (points) is infinite. None where all within that is taken.
     pub(super) fn place(&self, wanted: &[Vec2], half: Vec2, farthest: f32) -> Option<Plate> {
         let low = half + Vec2::new(EDGE, HEAD);
         let high = (self.view.size - half - Vec2::new(EDGE, FOOT)).max(low);
@@ -109,7 +109,9 @@ impl<'a> Annotator<'a> {
         let count = ((high - low) / STEP).floor().as_uvec2();
         let places = (0..=count.y).flat_map(|y| (0..=count.x).map(move |x| low + STEP * Vec2::new(x as f32, y as f32)));
         let mut near: Vec<Vec2> = places.filter(|place| place.distance(first) <= farthest).collect();
-        near.sort_by(|a, b| a.distance(first).total_cmp(&b.distance(first)));
+        let middle = 0.5 * self.view.size.x;
+        let crosses = |place: &Vec2| (place.x < middle) != (first.x < middle);
+        near.sort_by(|a, b| crosses(a).cmp(&crosses(b)).then(a.distance(first).total_cmp(&b.distance(first))));
         let places = || wanted.iter().map(|place| place.clamp(low, high)).chain(near.iter().copied());
         let mut free = places().map(|middle| Plate { middle, half }).filter(|plate| self.is_free(plate));
         let first_free = free.next()?;

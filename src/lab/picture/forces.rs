@@ -25,8 +25,9 @@ const FULL_SCALE: f64 = 0.5;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Least height of a picture with numbers, and with words beside them (points).
-const LEAST_HEIGHT: f32 = 220.0;
+/// Least height of a picture with numbers, with a word beside them, and with those of friction (points).
+const LEAST_HEIGHT: f32 = 150.0;
+const WITH_WORD: f32 = 220.0;
 const LOW: f32 = 320.0;
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
@@ -152,7 +153,7 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
             Side::Right => "R",
         };
         let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
-        let name = if view.plain { "" } else { "normal " };
+        let name = if view.plain || view.size.y < WITH_WORD { "" } else { "normal " };
         let mut texts = vec![(text(name, forces.normal), view.theme.colours().text)];
         // A low picture has room for one line.
         let friction = forces.friction.filter(|_| view.size.y >= LOW && !view.plain);

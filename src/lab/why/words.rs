@@ -32,36 +32,36 @@ impl Attribution {
         format!("{first}, then {second}.")
     }
 
-    /// Strongest reasons for and against the first class, strongest first: channels in a phase or, where none of these
-    /// counts alone, whole channels or whole phases.
+    /// Strongest reasons for and against the first class, strongest first: channels, each with the phase in which it speaks
+    /// most, or, where no channel counts alone, whole phases. A channel in one phase counts too much by itself: beside its
+    /// own other phases, an average is like no grasp.
     pub fn reasons(&self) -> [Vec<Reason>; 2] {
-        let both =
-            self.by_both.iter().enumerate().flat_map(|(c, row)| {
-                row.iter().enumerate().map(move |(p, evidence)| (self.part_words(c, p), *evidence))
-            });
         let channels = self.by_channel.iter().enumerate();
-        let channels =
-            channels.map(|(c, evidence)| (format!("{} throughout", channel_words(&self.channels[c])), *evidence));
+        let channels: Vec<(String, Evidence)> = channels.map(|(c, own)| (self.channel_part(c, own), *own)).collect();
         let phases = self.by_phase.iter().zip(&self.phases);
-        let phases = phases.map(|(evidence, span)| (format!("all channels {}", phase_words(span)), *evidence));
-        let levels: [Vec<(String, Evidence)>; 3] = [both.collect(), channels.collect(), phases.collect()];
+        let phases: Vec<(String, Evidence)> =
+            phases.map(|(own, span)| (format!("all channels {}", phase_words(span)), *own)).collect();
         [1.0, -1.0].map(|sign: f64| {
-            let of_level = |parts: &Vec<(String, Evidence)>| strongest(parts, sign);
-            levels.iter().map(of_level).find(|found| !found.is_empty()).unwrap_or_default()
+            let found = strongest(&channels, sign);
+            if found.is_empty() { strongest(&phases, sign) } else { found }
         })
     }
 
-    /// A channel in a phase: `left pad pressure in the hold`; where the pad touches nothing then, its silence is what spoke:
-    /// `no left pad pressure yet while pre-shaping`.
-    fn part_words(&self, channel: usize, phase: usize) -> String {
-        let (name, span) = (channel_words(&self.channels[channel]), &self.phases[phase]);
-        let still_closing = span.phase < TouchPhase::Hold;
-        match (self.unloaded[channel][phase], name.split_once(", ")) {
-            (false, _) => format!("{name} {}", phase_words(span)),
-            (true, Some((pad, place))) if still_closing => format!("no {pad} ({place}) yet {}", phase_words(span)),
-            (true, None) if still_closing => format!("no {name} yet {}", phase_words(span)),
-            (true, _) => format!("no {name} {}", phase_words(span)),
-        }
+    /// A channel, and the phase in which it speaks most to the same end: `left pad pressure, mostly in the hold`; where the
+    /// pad touches nothing then, its silence is what spoke: `no left pad pressure yet, mostly while pre-shaping`.
+    fn channel_part(&self, channel: usize, own: &Evidence) -> String {
+        let sign = own.points.signum();
+        let in_phases = self.by_both[channel].iter().map(|both| sign * both.points).enumerate();
+        let most = in_phases.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, points)| *points >= WORTH_NAMING);
+        let name = channel_words(&self.channels[channel]);
+        let Some((phase, _)) = most else { return name };
+        let span = &self.phases[phase];
+        let name = match self.unloaded[channel][phase] {
+            false => name,
+            true if span.phase < TouchPhase::Hold => format!("no {name} yet"),
+            true => format!("no {name}"),
+        };
+        format!("{name}, mostly {}", phase_words(span))
     }
 
     /// The strongest reason for the first class, or that there is no single one.
@@ -155,7 +155,8 @@ mod tests {
         Evidence { points, decibans: points }
     }
 
-    fn found(by_both: [[f64; 2]; 2]) -> Attribution {
+    /// What two channels say over the grasp, and in each phase.
+    fn found(by_channel: [f64; 2], by_both: [[f64; 2]; 2]) -> Attribution {
         let share = |class, name: &str, probability| ClassShare { class, name: name.to_owned(), probability };
         let span = |phase| PhaseSpan { phase, from_s: 0.0, to_s: 1.0 };
         let row = |cells: [f64; 2]| cells.map(evidence).to_vec();
@@ -164,7 +165,7 @@ mod tests {
             second: share(1, "tomato", 0.06),
             channels: ["pressure_left", "curvature_right_distal"].map(str::to_owned).to_vec(),
             phases: [TouchPhase::Contact, TouchPhase::Hold].map(span).to_vec(),
-            by_channel: [0.4, 0.2].map(evidence).to_vec(),
+            by_channel: by_channel.map(evidence).to_vec(),
             by_phase: [0.0, 0.3].map(evidence).to_vec(),
             by_both: by_both.map(row).to_vec(),
             unloaded: vec![vec![false; 2]; 2],
@@ -175,25 +176,29 @@ mod tests {
 
     #[test]
     fn the_sentences_name_the_strongest_parts() {
-        let why = found([[12.2, 38.0], [-9.0, 0.3]]);
+        let why = found([40.2, -9.0], [[12.2, 38.0], [-9.0, 0.3]]);
         assert_eq!(why.answer(), "Lemon 91 %, then Tomato 6 %.");
         assert_eq!(
             why.sentences(),
             [
-                "For Lemon: left pad pressure in the hold (+38 percentage points), left pad pressure in contact (+12).",
-                "Against Lemon: right curvature, distal in contact (−9 percentage points)."
+                "For Lemon: left pad pressure, mostly in the hold (+40 percentage points).",
+                "Against Lemon: right curvature, distal, mostly in contact (−9 percentage points)."
             ]
         );
         // A pad without load speaks by its silence.
         let silent = |unloaded: [bool; 2]| {
             let cells = vec![unloaded.to_vec(), vec![false; 2]];
-            Attribution { unloaded: cells, ..found([[96.0, 0.0], [0.0, 0.0]]) }.because()
+            Attribution { unloaded: cells, ..found([60.0, 0.0], [[96.0, 0.0], [0.0, 0.0]]) }.because()
         };
-        assert_eq!(silent([true, false]), "no left pad pressure yet in contact");
-        let let_go = Attribution { unloaded: vec![vec![false, true]; 2], ..found([[0.0, 12.0], [0.0; 2]]) };
-        assert_eq!(let_go.because(), "no left pad pressure in the hold");
-        // No part alone changes the answer by a point.
-        let sure = found([[0.1; 2]; 2]);
+        assert_eq!(silent([true, false]), "no left pad pressure yet, mostly in contact");
+        assert_eq!(silent([false, true]), "left pad pressure, mostly in contact");
+        let let_go =
+            Attribution { unloaded: vec![vec![false, true]; 2], ..found([12.0, 0.0], [[0.0, 12.0], [0.0; 2]]) };
+        assert_eq!(let_go.because(), "no left pad pressure, mostly in the hold");
+        // A channel that counts in no phase alone has none.
+        assert_eq!(found([12.0, 0.0], [[0.2; 2]; 2]).because(), "left pad pressure");
+        // Neither a channel nor a phase changes the answer by a point; a channel in one phase would, beside its others.
+        let sure = found([0.4, 0.2], [[90.0, 0.1], [0.1; 2]]);
         assert_eq!(
             sure.sentences()[0],
             "No single part decides: without any one of them Lemon still has 90 % or more."

@@ -2,7 +2,6 @@
 
 use palpate_lab::workers::LibraryView;
 use palpate_store::{LibraryTrial, TrialColumn, TrialPlace, TrialQuality};
-use palpate_tactile::trial::TrialSource;
 
 /// A column: what it holds, its width (points), and its rank: the lowest stay where there is little room.
 #[derive(Clone, Copy)]
@@ -77,22 +76,13 @@ pub(super) fn cell(view: &LibraryView, trial: &LibraryTrial, column: TrialColumn
         TrialColumn::Date => view.date(&row.local),
         TrialColumn::Source if row.place == TrialPlace::DemoLog => row.place.title().to_owned(),
         TrialColumn::Source if row.emulated => row.gripper().to_owned(),
-        TrialColumn::Source => source(row.source).to_owned(),
+        TrialColumn::Source => row.source.title().to_owned(),
         TrialColumn::Preset => row.preset.unwrap_or_default().to_owned(),
         TrialColumn::Sensors => row.sensors.clone(),
         TrialColumn::Quality => quality(trial),
         TrialColumn::Tags => row.tags.join(", "),
         TrialColumn::Note => row.note.clone(),
         TrialColumn::Samples => row.samples.to_string(),
-    }
-}
-
-/// Origin in a word.
-pub(super) fn source(source: TrialSource) -> &'static str {
-    match source {
-        TrialSource::Simulated => "simulated",
-        TrialSource::Recorded => "recorded",
-        TrialSource::Imported => "imported",
     }
 }
 

@@ -83,7 +83,7 @@ fn set_ui(ui: &mut Ui, query: &mut TrialQuery) {
     {
         query.object = None;
     }
-    query.source = query.source.filter(|source| chip(columns::source(*source).to_owned()).is_some());
+    query.source = query.source.filter(|source| chip(source.title().to_owned()).is_some());
     // That of the demo log has a chip of its own.
     let place = query.place.filter(|place| *place == TrialPlace::Store);
     if place.is_some_and(|place| chip(format!("in the {}", place.title())).is_none()) {
@@ -101,7 +101,7 @@ fn set_ui(ui: &mut Ui, query: &mut TrialQuery) {
 fn menu_ui(ui: &mut Ui, view: &LibraryView, query: &mut TrialQuery) {
     let counts = &view.counts;
     counted_ui(ui, "Object", &counts.objects, object_title, &mut query.object);
-    choice_ui(ui, "Source", TrialSource::ALL.map(|source| (columns::source(source), source)), &mut query.source);
+    choice_ui(ui, "Source", TrialSource::ALL.map(|source| (source.title(), source)), &mut query.source);
     choice_ui(ui, "Place", TrialPlace::ALL.map(|place| (place.title(), place)), &mut query.place);
     choice_ui(ui, "Quality", TrialQuality::ALL.map(|quality| (quality.name(), quality)), &mut query.quality);
     choice_ui(ui, "Flag", Flag::ALL.map(|flag| (flag.label(), flag)), &mut query.flag);

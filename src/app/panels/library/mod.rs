@@ -8,6 +8,7 @@ mod rows;
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::library::{LibraryFeature, LibrarySelection};
+use crate::app::shown::Pinned;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, text_field};
@@ -17,7 +18,7 @@ use palpate_store::TrialQuery;
 
 pub(super) fn ui(
     ui: &mut Ui,
-    library: &LibraryFeature,
+    (library, pinned): (&LibraryFeature, &[Pinned]),
     labels: Option<&LabelView>,
     pictures: &Thumbnails,
     actions: &mut Actions,
@@ -43,7 +44,7 @@ pub(super) fn ui(
     if view.found.is_empty() {
         return empty_ui(ui, query, view, actions);
     }
-    rows::ui(ui, library, pictures, view, actions);
+    rows::ui(ui, (library, pinned), pictures, view, actions);
 }
 
 /// Trials of data sets that are left out.

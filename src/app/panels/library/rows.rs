@@ -4,11 +4,12 @@ use super::columns::{self, Shows, cell, fitting, title};
 use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::library::{LibraryFeature, LibrarySelection, Reach};
+use crate::app::shown::Pinned;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{put_line as text, sparkline};
 use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
-use palpate_geometry::palette::ThemeColours;
+use palpate_geometry::palette::{ThemeColours, series_colour};
 use palpate_lab::workers::LibraryView;
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
@@ -25,7 +26,7 @@ const SCROLL_BAR: f32 = 10.0;
 
 pub(super) fn ui(
     ui: &mut Ui,
-    library: &LibraryFeature,
+    (library, pinned): (&LibraryFeature, &[Pinned]),
     pictures: &Thumbnails,
     view: &LibraryView,
     actions: &mut Actions,
@@ -49,7 +50,12 @@ pub(super) fn ui(
     }
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
         for trial in &view.found[rows.clone()] {
-            row_ui(ui, (picked, pictures), view, trial, (table.as_deref(), height), actions);
+            let rect = row_ui(ui, (picked, pictures), view, trial, (table.as_deref(), height), actions);
+            if let Some(compared) = pinned.iter().find(|own| own.trial.id == trial.row.id) {
+                // At the right end: the left one says which is shown.
+                let edge = rect.with_min_x(rect.right() - 4.0).shrink2(vec2(0.0, 2.0));
+                ui.painter().rect_filled(edge, 1.0, colour(series_colour(compared.colour, theme::of(ui))));
+            }
         }
         rows
     });
@@ -147,7 +153,7 @@ fn row_ui(
     trial: &LibraryTrial,
     (table, height): (Option<&[(Shows, f32)]>, f32),
     actions: &mut Actions,
-) {
+) -> Rect {
     let colours = theme::of(ui).colours();
     let id = trial.row.id;
     let selected = picked.selected.contains(&id);
@@ -176,6 +182,7 @@ fn row_ui(
     }
     answer(ui, &response, trial, selected, actions);
     response.on_hover_ui(|ui| hint_ui(ui, view, trial));
+    rect
 }
 
 /// Clicks on a row.

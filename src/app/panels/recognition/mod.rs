@@ -64,20 +64,20 @@ const ROOMY: Measures = Measures {
 /// Measures in a small window.
 const TIGHT: Measures = Measures {
     headline: 30.0,
-    reason: 44.0,
+    reason: 38.0,
     reason_letters: 11.5,
     truth: 24.0,
     properties: 22.0,
     class: 16.0,
-    strip: 42.0,
-    button: 30.0,
-    gap: 4.0,
+    strip: 40.0,
+    button: 28.0,
+    gap: 3.0,
 };
 
 /// Height of the line with the threshold (points).
 const THRESHOLD_LINE: f32 = 24.0;
 /// Least height of the line of a class in one column, and in two; with less room the panel scrolls (points).
-const ONE_COLUMN: f32 = 11.5;
+const ONE_COLUMN: f32 = 9.5;
 const LEAST_CLASS: f32 = 8.0;
 
 impl Measures {
@@ -97,7 +97,7 @@ impl Measures {
         let touch = if has_touch { touch::height(self) } else { 0.0 };
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - touch - 7.0 * self.gap;
-        let line = |columns: usize| (room / classes.div_ceil(columns).max(1) as f32).floor();
+        let line = |columns: usize| (2.0 * room / classes.div_ceil(columns).max(1) as f32).floor() / 2.0;
         if line(1) >= ONE_COLUMN { (1, line(1).min(self.class)) } else { (2, line(2).clamp(LEAST_CLASS, TIGHT.class)) }
     }
 }
@@ -120,8 +120,12 @@ pub(super) fn ui(
         return;
     }
     let room = ui.available_size();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let measures = Measures::fitting(room);
+    let measures = Measures::fitting(room);
+    // The buttons stay in sight below what scrolls.
+    let has_buttons = data.source != ViewSource::Trial;
+    let below = if has_buttons { measures.button + measures.gap } else { 0.0 };
+    let scrolled = ScrollArea::vertical().auto_shrink(false).max_height(room.y - below);
+    scrolled.show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = measures.gap;
         let top = ui.cursor().top();
         let labels = recognised.view.map(|view| view.labels.as_ref());
@@ -161,11 +165,13 @@ pub(super) fn ui(
             }
             None => off_ui(ui, recognised.off),
         }
+    });
+    if has_buttons {
         ui.horizontal(|ui| {
             more_ui(ui, data, measures, actions);
             next_ui(ui, data, measures, actions);
         });
-    });
+    }
 }
 
 /// A lesson that is running, with its progress, or the last one, with its result: the object is known from now on.
@@ -398,12 +404,8 @@ impl Part<'_, '_> {
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.good))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),
-            // A stored trial keeps no secret.
-            None if shown && self.data.source == ViewSource::Trial => (title.clone(), format!("Truth: {title}"), None),
-            None => {
-                let text = if shown { "shown when it decides" } else { "hidden" };
-                (text.to_owned(), format!("Truth {text}"), None)
-            }
+            None if shown => (title.clone(), format!("Truth: {title}"), None),
+            None => ("hidden".to_owned(), "Truth hidden".to_owned(), None),
         };
         let size = vec2(ui.available_width(), self.measures.truth);
         let (rect, _) = ui.allocate_exact_size(size, Sense::hover());

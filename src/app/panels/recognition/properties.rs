@@ -59,7 +59,8 @@ fn none_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, why: &str) {
     ui.painter().rect_filled(place, 3.0, colour(part.colours().raised));
     let inside = place.shrink2(vec2(4.0, 0.0));
     let ink = colour(part.colours().quiet_text);
-    put(ui, fitted(ui, why.to_owned(), LETTERS, inside.width(), ink), inside, Align2::LEFT_CENTER);
+    let text = if named > 0.0 { why.to_owned() } else { spoken };
+    put(ui, fitted(ui, text, LETTERS, inside.width(), ink), inside, Align2::LEFT_CENTER);
 }
 
 /// The name of a property before its answers; returns its room (points).

@@ -44,7 +44,10 @@ impl Headline {
             Some(StopReason::Unknown) => Self::Unknown,
             Some(StopReason::Sure) => Self::Decided(class, p),
             Some(StopReason::GraspLimit) => Self::Guess(class, p),
-            None if view.listening && view.beliefs.is_empty() && p < WORTH_NAMING => Self::Sensing,
+            // A first touch is like no known object yet.
+            None if view.listening && view.beliefs.is_empty() && (p < WORTH_NAMING || is_other(view, class)) => {
+                Self::Sensing
+            }
             None => Self::Leading(class, p),
         }
     }
@@ -78,6 +81,10 @@ impl Headline {
             Self::Waiting | Self::Sensing => colours.quiet_text,
         }
     }
+}
+
+fn is_other(view: &IdentificationView, class: usize) -> bool {
+    view.labels.other() == Some(class)
 }
 
 /// True once the running grasp has touched something, and where that cannot be told.
@@ -130,9 +137,8 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
     let certain = p >= view.rule.threshold;
     let again = recognised.again;
     let grasp = format!("Grasp {} of up to {most}", view.beliefs.len() + 1);
-    let is_other = view.labels.other() == Some(now.top().0);
     match view.decision {
-        Some(StopReason::Sure) if is_other => "None of the known objects".to_owned(),
+        Some(StopReason::Sure) if is_other(view, now.top().0) => "None of the known objects".to_owned(),
         Some(StopReason::Sure) if certain => format!("Certain: {} (needed {threshold})", percent(p)),
         Some(StopReason::Sure) => format!("Certain: {} reached the threshold of then", percent(p)),
         Some(StopReason::GraspLimit) => match view.beliefs.len() {

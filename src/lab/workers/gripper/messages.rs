@@ -115,8 +115,6 @@ pub struct TrialView {
     pub adapting: bool,
     /// The gripper is emulated: nobody raises its pressure by hand.
     pub emulated: bool,
-    /// It was vented or driven since it was opened: an emulated hand no longer moves by itself.
-    pub taken_over: bool,
 }
 
 impl TrialView {

@@ -34,7 +34,6 @@ fn running(id: TrialId) -> GripperView {
         automatic: false,
         adapting: false,
         emulated: false,
-        taken_over: false,
     };
     GripperView { trial: Some(trial), ..GripperView::default() }
 }

@@ -12,11 +12,9 @@ use palpate_tactile::trial::{Control, TrialId};
 impl GripperSession {
     /// Records a close of the empty hand.
     pub(super) fn adapt(&mut self, control: Control) {
-        let waits = self.connection.as_ref().is_some_and(|own| own.taken_over && own.board.emulated);
-        if waits && control != Control::Driven {
-            let text = "not adapted: the emulated hand waits until it is driven: actuation \"board\" (M)";
-            return self.publisher.notify(Notice::Warning(text.to_owned()));
-        }
+        // Nobody's hand closes an emulated one, which would go on holding objects by itself.
+        let emulated = self.connection.as_ref().is_some_and(|own| own.board.emulated);
+        let control = if emulated { Control::Driven } else { control };
         let begun = self.begun;
         self.begin(TrialRequest { object: Some(EMPTY.to_owned()), control, length_s: None, adds: false }, None);
         self.adapting = self.begun > begun;

@@ -62,7 +62,7 @@ impl GripperSession {
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
             Ok(()) if connection.board.emulated && !driven => self.publisher.notify(Notice::Warning(
-                "Vent sent. The emulated hand stays open until it is driven: actuation \"board\" (M).".to_owned(),
+                "Vent sent. The emulated hand stays open until the next trial, which drives it.".to_owned(),
             )),
             Ok(()) => self.publisher.notify(Notice::Warning("Vent sent.".to_owned())),
         }
@@ -132,7 +132,7 @@ impl GripperSession {
     // Trials.
 
     /// Begins a trial; ends a running one first.
-    pub(super) fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
+    pub(super) fn begin(&mut self, mut request: TrialRequest, from_s: Option<f64>) {
         self.end(false, None);
         if let Some(occupied) = self.occupied() {
             return self.publisher.notify(Notice::Warning(format!("trial not started: {occupied}")));
@@ -153,6 +153,10 @@ impl GripperSession {
             return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
+        if connection.taken_over && connection.board.emulated && request.control == Control::ByHand {
+            // It no longer moves by itself, and nobody has a valve to move it with.
+            request.control = Control::Driven;
+        }
         connection.taken_over |= request.control == Control::Driven;
         // A driven trial vents before it closes.
         self.pressing.take_if(|_| request.control == Control::Driven);
@@ -264,7 +268,6 @@ impl GripperSession {
             automatic: recording.automatic,
             adapting: self.adapting,
             emulated: self.connection.as_ref().is_some_and(|connection| connection.board.emulated),
-            taken_over: self.connection.as_ref().is_some_and(|connection| connection.taken_over),
         }
     }
 }
