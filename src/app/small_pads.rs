@@ -12,6 +12,8 @@ use palpate_lab::picture::{LoadUnit, PictureView, legend_room};
 /// Least and largest height of a pad, and its width as a share of its height (points).
 const HEIGHT: [f32; 2] = [44.0, 132.0];
 const WIDTH: f32 = 0.22;
+/// Room of the hand and of the axes, to the left of pads that stand left of the legends (points).
+const BESIDE_HAND: f32 = 260.0;
 /// Width that each pad has with its number (points).
 const EACH: f32 = 54.0;
 /// Height of the texts above and below a pad, and of the scale bar at the foot of the picture (points).
@@ -32,7 +34,7 @@ pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &P
     // Below the legends, or else to their left.
     let (right, top, room) = if below >= HEIGHT[0] {
         (rect.right() - 18.0, rect.top() + legends.y, below)
-    } else if rect.width() < BUTTONS && rect.width() > legends.x + 2.0 * EACH + 90.0 {
+    } else if rect.width() < BUTTONS && rect.width() > legends.x + 2.0 * EACH + BESIDE_HAND {
         (rect.right() - legends.x - 12.0, rect.top() + 14.0, beside)
     } else {
         return;

@@ -54,6 +54,8 @@ pub(super) fn apply(ctx: &egui::Context, theme: Theme) {
         style.spacing.slider_width = 120.0;
         // Contents end beside the scroll bar, not below it.
         style.spacing.scroll.floating_allocated_width = 8.0;
+        // Seen wherever there is more.
+        style.spacing.scroll.dormant_handle_opacity = 0.5;
         style.animation_time = 0.1;
     });
     for each in Theme::ALL {

@@ -16,6 +16,8 @@ pub struct GraspTrace {
     pub grasp: u64,
     /// Live stream outside of grasps: only its last seconds are kept.
     pub rolling: bool,
+    /// Its trial was discarded: it is not drawn behind later ones.
+    pub discarded: bool,
     /// Times (s).
     pub t: Vec<f64>,
     /// Line pressures (bar).
@@ -142,6 +144,13 @@ impl TraceHistory {
         self.grasps.retain(|trace| trace.grasp >= grasp);
     }
 
+    /// The trial of the last grasp is discarded.
+    pub(super) fn discard(&mut self) {
+        if let Some(last) = self.grasps.iter_mut().rfind(|trace| !trace.rolling) {
+            last.discarded = true;
+        }
+    }
+
     /// Forgets everything.
     pub(super) fn clear(&mut self) {
         self.grasps.clear();
@@ -166,7 +175,7 @@ impl TraceHistory {
     pub(super) fn earlier(&self) -> impl Iterator<Item = &GraspTrace> {
         let rolling = self.current().is_some_and(|current| current.rolling);
         let many = if rolling { 0 } else { self.place().unwrap_or(0) };
-        self.grasps.iter().take(many)
+        self.grasps.iter().take(many).filter(|trace| !trace.discarded)
     }
 }
 

@@ -183,7 +183,7 @@ pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: 
          that were calibrated by hand stay so",
     );
     let button = button.on_disabled_hover_text("Between trials, with the hand driven by the board or timed by hand");
-    actions.on(&button, |app| _ = app.gripper.send(GripperCommand::Adapt(app.view.control)));
+    actions.on(&button, |app| _ = app.gripper.send(GripperCommand::Adapt(app.control())));
 }
 
 /// The name of an effect or a check in words.

@@ -194,7 +194,7 @@ fn an_empty_hand_is_an_answer_like_others() {
 fn nothing_is_cut_off_or_covered_in_the_smallest_window() {
     let mut bench = bench(BenchSetup { size: [720.0, 480.0], ..BenchSetup::default() });
     run_out(&mut bench);
-    let whole = Rect::from_min_max(egui::pos2(500.0, 66.0), egui::pos2(720.0, 436.0));
+    let whole = Rect::from_min_max(egui::pos2(500.0, 66.0), egui::pos2(720.0, 404.0));
     let labels = [
         "Right: Lemon",
         "Show the truth",

@@ -197,7 +197,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         let setup = BenchSetup { size: [320.0, 760.0], fill: labelled, ..BenchSetup::default() };
         let mut bench: Bench = bench("training", theme, setup);
         bench.until_shown(true, "63 trials of 5 objects");
-        assert!(bench.harness.query_by_label("cube: 3, needs 5").is_some());
+        assert!(bench.harness.query_by_label("Puzzle cube: 3, needs 5").is_some());
         press(&mut bench, "Method");
         bench.harness.run_steps(3);
         bench.harness.get_by_label("KNN").click();
@@ -281,9 +281,9 @@ fn recorded_grasps_of_a_new_object_are_taught_to_the_model_for_real_grippers() {
     };
     let mut bench: Bench = bench("training", Theme::Dark, setup);
     bench.until_shown(true, "72 trials of 7 objects");
-    assert!(bench.harness.query_by_label_contains("Teach the model in use: pen").is_none());
-    press(&mut bench, "Teach the model in use: mug");
+    assert!(bench.harness.query_by_label_contains("Teach the model in use: Pen").is_none());
+    press(&mut bench, "Teach the model in use: Mug");
     bench.until_told("taught mug");
     bench.harness.step();
-    assert!(bench.harness.query_by_label_contains("Teach the model in use: mug").is_none());
+    assert!(bench.harness.query_by_label_contains("Teach the model in use: Mug").is_none());
 }

@@ -104,7 +104,7 @@ fn the_panel_shows_evidence_and_the_nearest_trials() {
     let mut bench = Bench::new(setup, CpuRenderer::default());
     assert!(bench.harness.query_by_label_contains("appears when a grasp ends: press play").is_some());
     run_out(&mut bench);
-    bench.until_shown(true, "Trial 1, Lemon, sim, distance 0.00, same readings");
+    bench.until_shown(true, "Trial 1, Lemon, simulated, distance 0.00, same readings");
     assert!(bench.harness.query_by_label("At the end of grasp 1.").is_some());
     compare("why_found", &bench.picture(), "the CPU renderer of the tests");
     // The model weighs the pads alone: curvature counts nothing, in no phase.
@@ -137,7 +137,7 @@ fn a_link_beside_the_answer_opens_the_panel() {
     run_out(&mut bench);
     bench.harness.run_steps(2);
     // The strongest reason stands beside it.
-    bench.until_shown(true, "left pad force in the hold");
+    bench.until_shown(true, "left pad force, mostly in the hold");
     // The time is that of the picture, which shows the hand as it was held.
     bench.until_shown(true, "3.00 / 4.00 s");
     bench.harness.get_by_label("Why?").click();

@@ -82,6 +82,8 @@ fn sources_and_modes_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
 
 /// Room for sources below which a trial has its number alone (points).
 const NARROW: f32 = 330.0;
+/// Room below which a gripper beside it has its rate alone (points).
+const CRAMPED: f32 = 480.0;
 
 /// Width of the buttons at the right before they were drawn (points).
 const RIGHT: f32 = 140.0;
@@ -187,12 +189,16 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     let colours = app.view.theme.colours();
     let link = app.gripper_view().and_then(|gripper| gripper.link.as_ref());
     let mut sources: Vec<(ViewSource, String, String, Rgb)> = Vec::new();
+    // A trial beside a gripper keeps its button to close it.
+    let cramped = link.is_some() && ui.available_width() < CRAMPED;
     if let Some(link) = link {
         let cadence = &link.cadence;
         let listening = link.state == LinkState::Listening;
-        let gripper = if link.board.emulated { "EMULATED GRIPPER" } else { "REAL GRIPPER" };
+        let kind = if link.board.emulated { "EMULATED" } else { "REAL" };
+        let gripper = if cramped { kind.to_owned() } else { format!("{kind} GRIPPER") };
         let text = match (listening, cadence.troubled) {
             (true, true) => format!("{gripper} {:.0} Hz: many unreadable lines", cadence.rate_hz),
+            (true, false) if cramped => format!("{gripper} {:.0} Hz", cadence.rate_hz),
             (true, false) => format!("{gripper} {:.0} Hz, {} lost", cadence.rate_hz, cadence.lost),
             (false, _) => format!("{gripper}: no readings"),
         };
@@ -210,7 +216,7 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     sources.push((ViewSource::Simulation, simulated, "Show the simulated gripper".to_owned(), colours.text));
     if let Some(inspected) = app.inspect.inspected() {
         let trial = inspected.trial;
-        let text = match ui.available_width() > NARROW {
+        let text = match !cramped && ui.available_width() > NARROW {
             true => format!("TRIAL {}, {}", trial.id, trial.source_title().to_uppercase()),
             false => format!("TRIAL {}", trial.id),
         };
@@ -262,7 +268,7 @@ fn gripper_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
 /// Actuation, and line pressure where it is known.
 fn drive_text(app: &App, gripper: &GripperView, narrow: bool) -> String {
     let running = gripper.trial.as_ref().map(|trial| trial.request.control);
-    let control = control_title(running.unwrap_or(app.view.control));
+    let control = control_title(running.unwrap_or(app.control()));
     if narrow {
         return control.to_owned();
     }

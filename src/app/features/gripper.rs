@@ -184,10 +184,18 @@ impl App {
         });
     }
 
+    /// Actuation of the next trial: the one chosen, or the board's where nobody can move the fingers by hand.
+    pub(in crate::app) fn control(&self) -> Control {
+        let driven_only = self.gripper_view().is_some_and(|gripper| gripper.driven_only);
+        if driven_only && self.view.control == Control::ByHand { Control::Driven } else { self.view.control }
+    }
+
     /// Changes to the next actuation.
     pub(in crate::app) fn next_control(&mut self) {
-        let now = CONTROLS.iter().position(|control| *control == self.view.control).unwrap_or(0);
+        let before = self.control();
+        let now = CONTROLS.iter().position(|control| *control == before).unwrap_or(0);
         self.view.control = CONTROLS[(now + 1) % CONTROLS.len()];
+        self.view.control = self.control();
         self.notices.info(format!("Actuation: {}.", control_title(self.view.control)));
     }
 

@@ -345,9 +345,10 @@ impl App {
     /// Shows the open trial in Inspect mode, or the newest of the library unless a real gripper is connected; in the others
     /// the live gripper.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        let simulated = self.view.source == ViewSource::Simulation;
-        let wanted = self.inspect.wanted.or_else(|| self.newest_trial().filter(|_| simulated));
-        self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && simulated;
+        // A grasp that is being recorded stays in sight.
+        let live = self.gripper_view().is_some_and(|gripper| gripper.trial.is_some());
+        let wanted = self.inspect.wanted.or_else(|| self.newest_trial().filter(|_| !live));
+        self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && !live;
         match (mode, wanted) {
             (Mode::Inspect, Some(id)) => self.show_trial(id),
             (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => {

@@ -100,13 +100,14 @@ impl App {
         // Read first: labels that come meanwhile show the outcome of no fewer commands.
         let settled = self.labelling.worker.is_settled();
         let (gripper, labels) = (self.gripper.worker.view(), self.labelling.worker.view());
+        let control = self.control();
         let now = SessionContext {
             gripper: gripper.as_deref(),
             labels: labels.as_deref(),
             settled,
             labelling: self.view.mode == Mode::Label,
             blind: self.view.blind,
-            control: self.view.control,
+            control,
         };
         act(&mut self.labelling.session, &now)
     }
@@ -119,6 +120,7 @@ impl App {
                     // Nor does the answer to it stand any longer.
                     if matches!(&command, LabelCommand::Edit(id, TrialEdit::Discard) if Some(*id) == ended) {
                         self.gripper.send(GripperCommand::AnotherObject);
+                        self.gripper.traces.discard();
                     }
                     self.labelling.worker.send(command);
                 }
@@ -126,7 +128,10 @@ impl App {
                     let number = self.gripper.send(GripperCommand::Begin(request));
                     self.labelling.session.trial_requested(number);
                 }
-                LabellingEffect::DiscardRunning => _ = self.gripper.send(GripperCommand::Discard),
+                LabellingEffect::DiscardRunning => {
+                    self.gripper.send(GripperCommand::Discard);
+                    self.gripper.traces.discard();
+                }
                 LabellingEffect::SetBlind(blind) => self.view.blind = blind,
                 LabellingEffect::Inform(text) => self.notices.info(text),
             }

@@ -1,7 +1,7 @@
 //! The trial library in the window: its query, the selection of trials, and edits of them.
 
 use super::App;
-use super::view::Mode;
+use super::view::{Mode, ViewSource};
 use palpate_lab::workers::{LibraryCommand, LibraryView, LibraryWorker};
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialQuery};
@@ -212,7 +212,8 @@ impl App {
     /// of the list.
     pub(super) fn newest_trial(&self) -> Option<TrialId> {
         let found = &self.library.view.as_ref()?.found;
-        let last = self.simulation.last_trial.map(|(id, _)| id);
+        let simulated = self.view.source == ViewSource::Simulation;
+        let last = self.simulation.last_trial.filter(|_| simulated).map(|(id, _)| id);
         let last = last.filter(|id| found.iter().any(|trial| trial.row.id == *id));
         last.or_else(|| found.first().map(|trial| trial.row.id))
     }

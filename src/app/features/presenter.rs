@@ -30,8 +30,8 @@ impl Score {
 /// State of presenter mode.
 #[derive(Default)]
 pub(in crate::app) struct PresenterFeature {
-    /// Poses, and where grasps were recorded, as they were before; none outside of presenter mode.
-    before: Option<(PoseSpread, Option<TrialPlace>)>,
+    /// Poses, where grasps were recorded, and what was shown, as they were before; none outside of presenter mode.
+    before: Option<(PoseSpread, Option<TrialPlace>, ViewSource)>,
     /// Presentations so far: each has another order of objects.
     presentations: u64,
     presentation: Presentation,
@@ -82,7 +82,7 @@ impl App {
         let mut scene = self.simulation.scene.clone();
         let presentations = self.presenter.presentations + 1;
         self.presenter = PresenterFeature {
-            before: Some((scene.pose.clone(), snapshot.status.recording)),
+            before: Some((scene.pose.clone(), snapshot.status.recording, self.view.source)),
             presentations,
             presentation: Presentation::new(presentations),
             judged: snapshot.grasp,
@@ -97,7 +97,8 @@ impl App {
     }
 
     fn end_presentation(&mut self) {
-        let Some((pose, recording)) = self.presenter.before.take() else { return };
+        let Some((pose, recording, source)) = self.presenter.before.take() else { return };
+        self.view.source = source;
         self.simulation.send(Command::SetFirstDrawn(false));
         self.simulation.send(Command::SetRecording(recording));
         self.set_scene(Scene { pose, ..self.simulation.scene.clone() });

@@ -137,7 +137,7 @@ pub(in crate::app) static COMMANDS: &[Act] = &[
     command("Detect trials automatically, or by key", App::toggle_watch),
     command("Next actuation: manual, board or untimed", App::next_control),
     command("Adapt to the real gripper by one close of the empty hand", |app| {
-        app.gripper.send(GripperCommand::Adapt(app.view.control));
+        app.gripper.send(GripperCommand::Adapt(app.control()));
     }),
     command("List serial ports", |app| _ = app.gripper.send(GripperCommand::ListPorts)),
     command("Record simulated grasps into the store", |app| {

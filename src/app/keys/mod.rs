@@ -1,5 +1,5 @@
-//! Keys: one table for behaviour and key sheet alike, that of the mode before that of all modes. Off while a text field
-//! has focus.
+//! Keys: one table for behaviour and key sheet alike, that of the mode before that of all modes. While a text field has focus,
+//! only those that open a mode.
 
 mod common;
 
@@ -38,7 +38,17 @@ fn acts(mode: Mode) -> impl Iterator<Item = &'static Act> {
 pub(super) fn pressed(app: &App, actions: &mut Actions) {
     let ctx = &app.ctx;
     let dialog = ctx.memory(|memory| memory.top_modal_layer().is_some());
-    if ctx.text_edit_focused() || app.view.palette_shown || dialog {
+    if app.view.palette_shown || dialog {
+        return stop(ctx, actions);
+    }
+    if ctx.text_edit_focused() {
+        for kind in &modes::ALL {
+            let shortcut =
+                kind.open.shortcut.filter(|shortcut| ctx.input_mut(|input| input.consume_shortcut(shortcut)));
+            if shortcut.is_some() {
+                actions.push(|app| kind.open.run(app));
+            }
+        }
         return stop(ctx, actions);
     }
     if egui::Popup::is_any_open(ctx) {

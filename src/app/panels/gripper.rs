@@ -44,7 +44,7 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         }
         remark_ui(ui, "The Doctor panel in Label mode examines port and board.");
     } else {
-        remark_ui(ui, "No gripper connected. Everything works with the simulated one too.");
+        remark_ui(ui, "No gripper connected. Demo and Inspect work with the simulated one.");
     }
     let id = egui::Id::unique("port path");
     let mut path = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
@@ -75,7 +75,8 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
     });
     ui.data_mut(|data| data.insert_temp(id, path));
     let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
-    wrapped(ui, RichText::new(format!("Sensors: {}", sensors.names())).small().weak());
+    let expected = format!("Expected columns of the board: {}", sensors.names());
+    wrapped(ui, RichText::new(expected).small().weak());
     let button = ui.button("Open gripper file");
     let about =
         "A TOML file that lists the sensors of another gripper; the store remembers them. It can also be dropped here";
@@ -232,7 +233,10 @@ fn control_ui(ui: &mut Ui, mut control: Control, gripper: &GripperView, actions:
             Control::Driven => "The board sets the pressure of the programme; needs our firmware",
             Control::Free => "Untimed: recording runs until Q, phases are unknown",
         };
-        if ui.radio_value(&mut control, kind, control_title(kind)).on_hover_text(about).changed() {
+        let can = kind != Control::ByHand || !gripper.driven_only;
+        let radio = ui.add_enabled_ui(can, |ui| ui.radio_value(&mut control, kind, control_title(kind))).inner;
+        let radio = radio.on_disabled_hover_text("Nobody has a valve of the emulated hand");
+        if radio.on_hover_text(about).changed() {
             actions.push(move |app| app.view.control = control);
         }
     }

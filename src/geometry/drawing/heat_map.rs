@@ -72,7 +72,7 @@ impl CellAxis {
         if unit.is_empty() {
             format!("{name} {middle:.0}")
         } else {
-            format!("{name} {}{SPACE}{unit}", three_digits(middle))
+            format!("{name} {}{SPACE}{unit}", true_minus(&three_digits(middle)))
         }
     }
 

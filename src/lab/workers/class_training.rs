@@ -48,11 +48,8 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
         let name = capital(&object_title(&request.name));
         let progress = |stage: LessonStage| {
             let (share, words) = match stage {
-                LessonStage::Simulating(done, of) => {
-                    let share = done as f64 / of.max(1) as f64;
-                    (SIMULATING * share, format!("grasps {:.0}\u{a0}%", 100.0 * share))
-                }
-                LessonStage::Fitting(share) => (SIMULATING + (1.0 - SIMULATING) * share, "fitting".to_owned()),
+                LessonStage::Simulating(done, of) => (SIMULATING * done as f64 / of.max(1) as f64, "grasping"),
+                LessonStage::Fitting(share) => (SIMULATING + (1.0 - SIMULATING) * share, "fitting"),
             };
             run.progress(share, format!("Learning {name}: {words}"));
         };

@@ -1,5 +1,6 @@
 //! Columns of the library: which fit, and the text of each.
 
+use crate::app::widgets::capital;
 use palpate_lab::workers::LibraryView;
 use palpate_store::{LibraryTrial, TrialColumn, TrialPlace, TrialQuality};
 
@@ -72,7 +73,7 @@ pub(super) fn cell(view: &LibraryView, trial: &LibraryTrial, column: TrialColumn
     let row = &trial.row;
     match column {
         TrialColumn::Id => row.id.to_string(),
-        TrialColumn::Object => format!("{}{}", trial.title, if row.unsure { "?" } else { "" }),
+        TrialColumn::Object => format!("{}{}", capital(&trial.title), if row.unsure { "?" } else { "" }),
         TrialColumn::Date => view.date(&row.local),
         TrialColumn::Source if row.place == TrialPlace::DemoLog => row.place.title().to_owned(),
         TrialColumn::Source if row.emulated => row.gripper().to_owned(),

@@ -7,7 +7,7 @@ use crate::app::features::library::{LibraryFeature, LibrarySelection, Reach};
 use crate::app::shown::Pinned;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{put_line as text, sparkline};
+use crate::app::widgets::{capital, put_line as text, sparkline};
 use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::{ThemeColours, series_colour};
 use palpate_lab::workers::LibraryView;
@@ -51,7 +51,8 @@ pub(super) fn ui(
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
         for trial in &view.found[rows.clone()] {
             let rect = row_ui(ui, (picked, pictures), view, trial, (table.as_deref(), height), actions);
-            if let Some(compared) = pinned.iter().find(|own| own.trial.id == trial.row.id) {
+            let id = trial.row.id;
+            if let Some(compared) = pinned.iter().find(|own| own.trial.id == id && picked.shown != Some(id)) {
                 // At the right end: the left one says which is shown.
                 let edge = rect.with_min_x(rect.right() - 4.0).shrink2(vec2(0.0, 2.0));
                 ui.painter().rect_filled(edge, 1.0, colour(series_colour(compared.colour, theme::of(ui))));
@@ -227,7 +228,7 @@ fn answer(ui: &Ui, response: &Response, trial: &LibraryTrial, selected: bool, ac
 
 /// Everything that is known, for a row whose texts may be cut.
 fn hint_ui(ui: &mut Ui, view: &LibraryView, trial: &LibraryTrial) {
-    ui.strong(format!("Trial {}: {}", trial.row.id, trial.title));
+    ui.strong(format!("Trial {}: {}", trial.row.id, capital(&trial.title)));
     let row = &trial.row;
     let samples = format!("{} samples", row.samples);
     ui.label([cell(view, trial, TrialColumn::Date), cell(view, trial, TrialColumn::Source), samples].join(", "));
@@ -246,7 +247,8 @@ fn hint_ui(ui: &mut Ui, view: &LibraryView, trial: &LibraryTrial) {
         ui.label(format!("{}: {}", found.flag.label(), found.remark));
     }
     if row.warnings > 0 {
-        ui.label(format!("{} warning(s); open it to read them", row.warnings));
+        let warnings = if row.warnings == 1 { "warning" } else { "warnings" };
+        ui.label(format!("{} {warnings}; open the trial to read", row.warnings));
     }
     if !row.sound {
         ui.label("unsound: data sets exclude it");

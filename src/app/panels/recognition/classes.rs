@@ -14,7 +14,7 @@ const LETTERS: f32 = 12.5;
 /// Distance within which the line of the threshold can be dragged (points).
 const GRIP: f32 = 6.0;
 /// Distance between two columns (points).
-const GUTTER: f32 = 6.0;
+const GUTTER: f32 = 16.0;
 
 /// Columns of a line (points).
 #[derive(Clone, Copy)]

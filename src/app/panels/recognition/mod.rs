@@ -11,7 +11,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::recognition::Learned;
 use crate::app::features::tools::GripperTools;
-use crate::app::features::view::ViewSource;
+use crate::app::features::view::{Mode, ViewSource};
 use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
@@ -22,6 +22,7 @@ use egui::{
     WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::ThemeColours;
+use palpate_geometry::units::SPACE;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp, lesson_result, lesson_warning};
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
@@ -63,11 +64,11 @@ const ROOMY: Measures = Measures {
 
 /// Measures in a small window.
 const TIGHT: Measures = Measures {
-    headline: 30.0,
+    headline: 28.0,
     reason: 38.0,
     reason_letters: 11.5,
-    truth: 24.0,
-    properties: 22.0,
+    truth: 20.0,
+    properties: 18.0,
     class: 16.0,
     strip: 40.0,
     button: 28.0,
@@ -76,9 +77,11 @@ const TIGHT: Measures = Measures {
 
 /// Height of the line with the threshold (points).
 const THRESHOLD_LINE: f32 = 24.0;
-/// Least height of the line of a class in one column, and in two; with less room the panel scrolls (points).
+/// Least height of the line of a class in one column, and in two; its height where there is less room and the panel scrolls
+/// (points).
 const ONE_COLUMN: f32 = 9.5;
 const LEAST_CLASS: f32 = 8.0;
+const SCROLLED_CLASS: f32 = 14.0;
 
 impl Measures {
     /// True in a small window.
@@ -98,7 +101,12 @@ impl Measures {
         let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
         let room = height - parts - properties - touch - 7.0 * self.gap;
         let line = |columns: usize| (2.0 * room / classes.div_ceil(columns).max(1) as f32).floor() / 2.0;
-        if line(1) >= ONE_COLUMN { (1, line(1).min(self.class)) } else { (2, line(2).clamp(LEAST_CLASS, TIGHT.class)) }
+        match [line(1), line(2)] {
+            [one, _] if one >= ONE_COLUMN => (1, one.min(self.class)),
+            [_, two] if two >= LEAST_CLASS => (2, two.min(TIGHT.class)),
+            // What scrolls can as well be read.
+            _ => (1, SCROLLED_CLASS),
+        }
     }
 }
 
@@ -122,7 +130,7 @@ pub(super) fn ui(
     let room = ui.available_size();
     let measures = Measures::fitting(room);
     // The buttons stay in sight below what scrolls.
-    let has_buttons = data.source != ViewSource::Trial;
+    let has_buttons = data.source != ViewSource::Trial && data.view.mode != Mode::Label;
     let below = if has_buttons { measures.button + measures.gap } else { 0.0 };
     let scrolled = ScrollArea::vertical().auto_shrink(false).max_height(room.y - below);
     scrolled.show(ui, |ui| {
@@ -194,7 +202,8 @@ fn lesson_ui(
             ui.horizontal(|ui| {
                 actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
                 let width = ui.available_width();
-                ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(progress.words));
+                let text = format!("{} {:.0}{SPACE}%", progress.words, 100.0 * progress.share);
+                ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(text));
             });
         } else if let Some(learned) = learned {
             let warning = learned.lesson.as_ref().and_then(lesson_warning);
@@ -396,11 +405,8 @@ impl Part<'_, '_> {
         let colours = self.colours();
         let shown = self.data.view.truth_shown;
         let right = self.recognised.is_right().filter(|_| shown);
-        let title = if right.is_some() && self.recognised.nothing_held {
-            format!("{title}, not held")
-        } else {
-            title.to_owned()
-        };
+        let title = capital(title);
+        let title = if right.is_some() && self.recognised.nothing_held { format!("{title}, not held") } else { title };
         let (text, spoken, sign) = match right {
             Some(true) => (title.clone(), format!("Right: {title}"), Some((Icon::Check, colours.good))),
             Some(false) => (title.clone(), format!("Wrong: {title}"), Some((Icon::Cross, colours.error))),

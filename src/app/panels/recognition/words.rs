@@ -15,7 +15,7 @@ const WORTH_NAMING: f64 = 0.4;
 pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
 
 /// Warning about an answer of a model that is learning the object in the hand.
-pub(super) const BEING_LEARNED: &str = "Being learned: the answer is one of the objects known so far.";
+pub(super) const BEING_LEARNED: &str = "Being learned: the model does not know this object yet.";
 
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,7 +151,7 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
             None if view.rule.threshold >= 1.0 => format!("{grasp}, without automatic stop"),
             None => format!("{grasp}, needed {threshold}"),
         },
-        None if recognised.finished => format!("Stopped below {threshold}: {}", leaders(&view.labels, now)),
+        None if recognised.finished => format!("Not certain (needed {threshold}): {}", leaders(&view.labels, now)),
         None if certain && view.beliefs.len() == 1 => {
             format!("{}, but unlike any known object: {again}", percent(p))
         }

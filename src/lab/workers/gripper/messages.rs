@@ -168,6 +168,9 @@ pub struct GripperView {
     pub remarks: Vec<String>,
     /// Line pressure that is kept outside of driven trials (bar).
     pub kept_bar: Option<f64>,
+    /// Only the board moves the fingers: an emulated hand that was vented or driven no longer moves by itself, and nobody has a
+    /// valve to move it with.
+    pub driven_only: bool,
     /// Running trial.
     pub trial: Option<TrialView>,
     /// Request of automatic trials; none while they are off.

@@ -418,6 +418,7 @@ impl GripperSession {
             drift: connection.map(|connection| connection.drift.clone()).unwrap_or_default(),
             remarks: connection.map(|connection| connection.remarks.clone()).unwrap_or_default(),
             kept_bar: self.pressing.as_ref().map(|pressing| pressing.plan().programme.peak_bar),
+            driven_only: connection.is_some_and(|connection| connection.taken_over && connection.board.emulated),
             trial,
             watching: self.watching.clone(),
             ended: self.ended.clone(),

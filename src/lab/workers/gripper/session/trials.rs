@@ -132,7 +132,7 @@ impl GripperSession {
     // Trials.
 
     /// Begins a trial; ends a running one first.
-    pub(super) fn begin(&mut self, mut request: TrialRequest, from_s: Option<f64>) {
+    pub(super) fn begin(&mut self, request: TrialRequest, from_s: Option<f64>) {
         self.end(false, None);
         if let Some(occupied) = self.occupied() {
             return self.publisher.notify(Notice::Warning(format!("trial not started: {occupied}")));
@@ -153,10 +153,6 @@ impl GripperSession {
             return self.publisher.notify(Notice::Failed("trials cannot be stored: restart Palpate".to_owned()));
         };
         let adds = request.adds;
-        if connection.taken_over && connection.board.emulated && request.control == Control::ByHand {
-            // It no longer moves by itself, and nobody has a valve to move it with.
-            request.control = Control::Driven;
-        }
         connection.taken_over |= request.control == Control::Driven;
         // A driven trial vents before it closes.
         self.pressing.take_if(|_| request.control == Control::Driven);
