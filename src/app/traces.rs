@@ -213,6 +213,19 @@ mod tests {
     }
 
     #[test]
+    fn a_discarded_grasp_is_no_curve_to_compare_with() {
+        let mut traces = TraceHistory::default();
+        traces.push(&row(1, false, 0.0, [0.0; 2]));
+        traces.push(&row(2, false, 0.0, [0.0; 2]));
+        // The stream after it, and its last rows, come later.
+        traces.discard();
+        traces.push(&row(2, false, 0.1, [0.0; 2]));
+        traces.push(&row(3, true, 0.0, [0.0; 2]));
+        traces.push(&row(4, false, 0.0, [0.0; 2]));
+        assert_eq!(traces.earlier().map(|t| t.grasp).collect::<Vec<u64>>(), [1]);
+    }
+
+    #[test]
     fn a_live_stream_is_bounded_and_has_gaps() {
         let mut traces = TraceHistory::default();
         let mut push = |t: f64, value: f32| {

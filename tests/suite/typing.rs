@@ -8,7 +8,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::Node;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use palpate::app::{ALL_PANELS, Mode, Reach};
+use palpate::app::{ALL_PANELS, Mode, Reach, ViewSource};
 use palpate_store::Store;
 
 const TOMATO: [(Key, &str); 6] =
@@ -104,4 +104,16 @@ fn a_word_typed_right_after_slash_goes_to_the_search_field() {
         bench.harness.key_press(Key::Escape);
         bench.harness.run_steps(2);
     }
+    // Presenter mode leaves the trial that was shown as it was.
+    for on in [true, false] {
+        bench.harness.key_press(Key::F11);
+        bench.harness.run_steps(3);
+        assert_eq!(bench.workbench().view().source == ViewSource::Trial, !on);
+    }
+    // A mode opens from within a text field, too.
+    strike(&mut bench, (Key::Slash, "/"));
+    bench.harness.run_steps(2);
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num1);
+    bench.harness.run_steps(2);
+    assert_eq!(bench.workbench().view().mode, Mode::Demo);
 }

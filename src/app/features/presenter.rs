@@ -3,7 +3,7 @@
 use super::App;
 use super::view::ViewSource;
 use palpate_lab::grasping::Presentation;
-use palpate_lab::workers::{Command, Snapshot};
+use palpate_lab::workers::{Command, GripperView, Snapshot};
 use palpate_sim::scene::{PoseSpread, Scene};
 use palpate_store::TrialPlace;
 use std::time::Duration;
@@ -98,7 +98,9 @@ impl App {
 
     fn end_presentation(&mut self) {
         let Some((pose, recording, source)) = self.presenter.before.take() else { return };
-        self.view.source = source;
+        // A gripper may have left meanwhile.
+        let is_there = source != ViewSource::Gripper || self.gripper_view().is_some_and(GripperView::is_connected);
+        self.view.source = if is_there { source } else { ViewSource::Simulation };
         self.simulation.send(Command::SetFirstDrawn(false));
         self.simulation.send(Command::SetRecording(recording));
         self.set_scene(Scene { pose, ..self.simulation.scene.clone() });

@@ -100,8 +100,9 @@ impl<'a> Annotator<'a> {
         self.kept.extend((0..=pieces as u32).map(|k| from.lerp(to, k as f32 / pieces)));
     }
 
-    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that, sooner on its
-    /// side of the picture; beside the hand, or over it where it must stand somewhere: `farthest` (points) is infinite. None where all within that is taken.
+    /// The free place for a plate of that half size: the first one wanted that is free, or else the nearest to that, sooner
+    /// on its side of the picture; beside the hand, or over it where it must stand somewhere: `farthest` (points) is infinite.
+    /// None where all within that is taken.
     pub(super) fn place(&self, wanted: &[Vec2], half: Vec2, farthest: f32) -> Option<Plate> {
         let low = half + Vec2::new(EDGE, HEAD);
         let high = (self.view.size - half - Vec2::new(EDGE, FOOT)).max(low);
