@@ -82,11 +82,11 @@ impl<'a> ShownGrasp<'a> {
         let span_s = data.time_span();
         let full_scale = match frames.as_slice() {
             [] => PAD_FULL_SCALE,
-            // A running grasp begins with the scale at which most end, so that colours keep their meaning.
-            frames if data.source == ViewSource::Simulation => {
-                full_scale_of(gripper, frames.iter().copied()).max(LEAST_RUNNING)
+            frames => {
+                // A running grasp begins with the scale at which most end, so that colours keep their meaning.
+                let least = if data.source == ViewSource::Simulation { LEAST_RUNNING } else { 0.0 };
+                full_scale_of(gripper, frames.iter().copied()).max(least)
             }
-            frames => full_scale_of(gripper, frames.iter().copied()),
         };
         let rows = touched_rows(gripper, frames.iter().copied().chain(frame));
         Some(Self {

@@ -12,8 +12,6 @@ use palpate_lab::picture::{LoadUnit, PictureView, legend_room};
 /// Least and largest height of a pad, and its width as a share of its height (points).
 const HEIGHT: [f32; 2] = [44.0, 132.0];
 const WIDTH: f32 = 0.22;
-/// Room of the hand and of the axes, to the left of pads that stand left of the legends (points).
-const BESIDE_HAND: f32 = 260.0;
 /// Width that each pad has with its number (points).
 const EACH: f32 = 54.0;
 /// Height of the texts above and below a pad, and of the scale bar at the foot of the picture (points).
@@ -29,16 +27,9 @@ pub(super) const BUTTONS: f32 = 490.0;
 pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &PictureView) {
     let Some(grasp) = ShownGrasp::of(data).filter(|grasp| !grasp.is_simulated()) else { return };
     let legends = legend_room(view);
-    let below = rect.height() - legends.y - SCALE_BAR - TEXTS;
-    let beside = rect.height() - 18.0 - SCALE_BAR - TEXTS;
-    // Below the legends, or else to their left.
-    let (right, top, room) = if below >= HEIGHT[0] {
-        (rect.right() - 18.0, rect.top() + legends.y, below)
-    } else if rect.width() < BUTTONS && rect.width() > legends.x + 2.0 * EACH + BESIDE_HAND {
-        (rect.right() - legends.x - 12.0, rect.top() + 14.0, beside)
-    } else {
-        return;
-    };
+    let room = rect.height() - legends.y - SCALE_BAR - TEXTS;
+    let (right, top) = (rect.right() - 18.0, rect.top() + legends.y);
+    // To the left of the legends they would cover the hand.
     if room < HEIGHT[0] || rect.width() < 2.0 * EACH + 90.0 {
         return;
     }

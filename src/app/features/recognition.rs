@@ -3,11 +3,10 @@
 use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
-use palpate_geometry::units::capital;
 use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::workers::{ClassChange, Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Lesson, Model, Models, Shipped};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 use palpate_store::labels::class_name;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -192,7 +191,7 @@ impl App {
     fn take_changed(&mut self, trained: &TrainedModel, TeachRequest { model, name, change, .. }: &TeachRequest) {
         self.recognition.learned = None;
         let source = model.card.taught_from.get(name).map_or_else(String::new, |(_, file)| file.clone());
-        let title = capital(&object_title(name));
+        let title = capital_title(name);
         // A shipped model without a learned object is the shipped one again.
         let card = &trained.model.card;
         let shipped = [false, true].map(|fixed| self.recognition.shipped.of(Shipped::simulated(fixed)));
@@ -207,7 +206,7 @@ impl App {
             self.simulation.send(Command::Play);
         }
         let ClassChange::Renamed(new) = change else { return self.notices.info(format!("Forgot \"{title}\".")) };
-        self.notices.info(format!("\"{title}\" is \"{}\" now.", capital(&object_title(new))));
+        self.notices.info(format!("\"{title}\" is \"{}\" now.", capital_title(new)));
         if self.simulation.scene.object.source == source {
             let mut scene = self.simulation.scene.clone();
             scene.object.name = Some(new.clone());
@@ -309,7 +308,7 @@ impl App {
                 }
                 self.view.simulation_model = Some(trained.path.clone());
                 self.use_in_simulation(Some(&trained.model));
-                self.notices.info(format!("Learned \"{}\".", capital(&object_title(&command.name))));
+                self.notices.info(format!("Learned \"{}\".", capital_title(&command.name)));
                 let seconds = self.recognition.asked.elapsed().as_secs_f64();
                 self.recognition.learned = command.object.as_ref().map(|_| Learned {
                     name: command.name.clone(),

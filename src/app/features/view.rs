@@ -5,11 +5,10 @@ use crate::app::theme;
 use egui_tiles::Tree;
 use palpate_geometry::drawing::{Camera, StandardView};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::capital;
 use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{BendUnit, LoadUnit};
 use palpate_lab::workers::{Command, LabelCommand, Snapshot};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 use palpate_tactile::trial::Control;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -256,7 +255,7 @@ impl ViewState {
     /// Title of the object in a file: that which it had when it was opened last.
     pub(in crate::app) fn title_of(&self, path: &str) -> String {
         let stem = || Path::new(path).file_stem().map_or(path.into(), |stem| stem.to_string_lossy());
-        self.titles.get(path).cloned().unwrap_or_else(|| capital(&object_title(&stem())))
+        self.titles.get(path).cloned().unwrap_or_else(|| capital_title(&stem()))
     }
 
     /// Uses a model for the real gripper, which is offered again after others.

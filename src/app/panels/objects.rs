@@ -5,10 +5,10 @@ use crate::app::features::App;
 use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, selectable_row, text_field};
+use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_learn::Lesson;
-use palpate_sim::objects::{EMPTY, catalogue, object_title};
+use palpate_sim::objects::{EMPTY, capital_title, catalogue};
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
@@ -36,7 +36,7 @@ pub(super) fn ui<'a>(
         for path in &view.recent {
             let texture = pictures.get(path);
             let class = learned_as(path);
-            let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital(&object_title(class)));
+            let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital_title(class));
             let learned = match class {
                 Some((_, Some(Lesson { recognised, tested, .. }))) => {
                     format!("learned, {recognised} of {tested} recognised, ")

@@ -6,7 +6,7 @@ use crate::app::features::App;
 use crate::app::features::tools::{DEFAULT_METHOD, GripperTools, TRAINING_SEED};
 use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{capital, failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
+use crate::app::widgets::{failure_ui, job_ui, just_opened, remark_ui, warning_ui, wrapped};
 use egui::{Align2, Button, ComboBox, FontId, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units::SPACE;
@@ -15,7 +15,7 @@ use palpate_lab::workers::{FinishedTraining, TrainRequest, TrainingData};
 use palpate_learn::comparison::in_table_order;
 use palpate_learn::metrics::Confusion;
 use palpate_learn::{Labels, Model, counted, method};
-use palpate_sim::objects::{object_title, titled};
+use palpate_sim::objects::{capital_title, titled};
 use std::path::{Path, PathBuf};
 
 pub(super) fn ui(ui: &mut Ui, tools: &GripperTools, model: Option<&Model>, view: &ViewState, actions: &mut Actions) {
@@ -153,11 +153,7 @@ fn classes_ui(ui: &mut Ui, model: Option<&Model>, classes: &[LabelledClass], act
     for class in classes.iter().filter(is_new) {
         let hint =
             format!("The model in use learns it from its {} recorded grasps, besides what it knows", class.trials);
-        if ui
-            .button(format!("Teach the model in use: {}", capital(&object_title(&class.name))))
-            .on_hover_text(hint)
-            .clicked()
-        {
+        if ui.button(format!("Teach the model in use: {}", capital_title(&class.name))).on_hover_text(hint).clicked() {
             let name = class.name.clone();
             actions.push(|app| app.teach_recorded(name));
         }
@@ -173,7 +169,7 @@ fn class_ui(ui: &mut Ui, theme: Theme, class: &LabelledClass) {
         false => (format!("{}, needs {LEAST_TRIALS}", class.trials), colours.warning, colours.warning),
     };
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width().max(120.0), 18.0), Sense::hover());
-    let title = capital(&object_title(&class.name));
+    let title = capital_title(&class.name);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, format!("{title}: {number}")));
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(13.0);

@@ -12,7 +12,7 @@ use palpate_geometry::units;
 use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
 use palpate_lab::workers::{ExplainRequest, Explainer};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::{capital_title, object_title};
 use palpate_tactile::trial::TrialId;
 
 /// Height of a row (points).
@@ -294,7 +294,7 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
     let colours = theme::of(ui).colours();
     // The grasp itself, as it was just stored, is none of its neighbours.
     for trial in report.trials.iter().filter(|own| own.distance >= SAME || Some(own.id) != last) {
-        let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { capital(&object_title(&trial.label)) };
+        let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { capital_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
         let source = trial.source.title();
         let text = format!("Trial {}, {name}, {source}, distance {:.2}{same}", trial.id, trial.distance);

@@ -4,12 +4,11 @@
 use super::agreement::{Recompute, grasp_soundly};
 use super::known_geometry::seeds_of;
 use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
-use palpate_geometry::units::capital;
 use palpate_learn::{
     Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Lesson, Model, ModelCard, OTHER, Sequence,
 };
 use palpate_sim::frame::GraspFailure;
-use palpate_sim::objects::{ObjectError, ObjectModel, catalogue, object_title};
+use palpate_sim::objects::{ObjectError, ObjectModel, capital_title, catalogue};
 use palpate_sim::poses::PoseSampler;
 use palpate_sim::scene::{ObjectSetup, PosePreset, PoseSpread, Scene};
 use palpate_store::Store;
@@ -97,8 +96,7 @@ fn rivals(lesson: &Lesson) -> String {
     let mut all: Vec<(&String, usize)> = lesson.taken_for.iter().map(|(class, count)| (class, *count)).collect();
     all.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let others: usize = all.iter().skip(MOST_NAMED).map(|(_, count)| count).sum();
-    let named =
-        all.iter().take(MOST_NAMED).map(|(class, count)| format!("{} ({count})", capital(&object_title(class))));
+    let named = all.iter().take(MOST_NAMED).map(|(class, count)| format!("{} ({count})", capital_title(class)));
     let mut named: Vec<String> = named.collect();
     named.extend((others > 0).then(|| format!("further ones ({others})")));
     match named.as_slice() {

@@ -5,9 +5,8 @@ use super::job::{Job, JobError, Newer};
 use super::messages::Wake;
 use super::training::TrainedModel;
 use crate::grasping::{LESSON_GRASPS, LessonStage, Lessons};
-use palpate_geometry::units::capital;
 use palpate_learn::Model;
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 use palpate_sim::scene::ObjectSetup;
 use palpate_store::Store;
 use std::path::PathBuf;
@@ -45,7 +44,7 @@ pub enum ClassChange {
 /// The job: recorded grasps come from the store at `store`, models go into the folder `models`.
 pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<TeachRequest, TrainedModel> {
     Job::new("teach", Newer::Waits, wake, move |request: &TeachRequest, run| {
-        let name = capital(&object_title(&request.name));
+        let name = capital_title(&request.name);
         let progress = |stage: LessonStage| {
             let (share, words) = match stage {
                 LessonStage::Simulating(done, of) => (SIMULATING * done as f64 / of.max(1) as f64, "grasping"),

@@ -1,8 +1,7 @@
 //! The held object: loaded model, and its description for display.
 
 use super::messages::ObjectCard;
-use palpate_geometry::units::capital;
-use palpate_sim::objects::{LoadOptions, ObjectModel, object_title};
+use palpate_sim::objects::{LoadOptions, ObjectModel, capital_title};
 use palpate_sim::scene::Scene;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -28,7 +27,7 @@ pub(super) fn card_of(model: &ObjectModel, scene: &Scene) -> ObjectCard {
     ObjectCard {
         content: model.content,
         name: model.name.clone(),
-        title: capital(&object_title(&model.name)),
+        title: capital_title(&model.name),
         class: model.class,
         mass: model.mass.mass,
         friction: scene.object.friction.value().unwrap_or(model.friction),

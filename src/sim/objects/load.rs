@@ -22,6 +22,11 @@ pub fn object_title(name: &str) -> String {
     built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
 }
 
+/// Title as lists and headings have it, with a capital: `Mug` for an object of a file `mug.obj`.
+pub fn capital_title(name: &str) -> String {
+    palpate_geometry::units::capital(&object_title(name))
+}
+
 /// Name of the class of the object with this name or title; the text itself where there is none.
 pub fn class_of(text: &str) -> &str {
     let text = text.trim();

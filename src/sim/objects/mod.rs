@@ -11,7 +11,7 @@ mod urdf;
 mod xml;
 
 pub use catalogue::{BuiltIn, catalogue, thumbnail};
-pub use load::{EMPTY, anchored, class_of, is_file, load, load_surface, object_title, titled};
+pub use load::{EMPTY, anchored, capital_title, class_of, is_file, load, load_surface, object_title, titled};
 pub use model::{ObjectClass, ObjectModel, Resting, RestingBall, ShapeClass, SizeClass};
 pub use options::{CollisionShape, LoadOptions};
 pub use random_shape::RandomShape;

@@ -26,7 +26,7 @@ use palpate_geometry::units::SPACE;
 use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp, lesson_result, lesson_warning};
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 use std::sync::Arc;
 use words::{BEING_LEARNED, FOREIGN, Headline, percent, reason};
 
@@ -208,7 +208,7 @@ fn lesson_ui(
         } else if let Some(learned) = learned {
             let warning = learned.lesson.as_ref().and_then(lesson_warning);
             ui.horizontal_wrapped(|ui| {
-                let title = capital(&object_title(&learned.name));
+                let title = capital_title(&learned.name);
                 let ink = if warning.is_some() { theme::of(ui).colours().warning } else { good };
                 ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(ink)));
                 if let Some(lesson) = &learned.lesson {

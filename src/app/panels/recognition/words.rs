@@ -6,7 +6,7 @@ use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_lab::grasping::IdentificationView;
 pub(in crate::app) use palpate_lab::why::percent;
 use palpate_learn::{Labels, OTHER, Pmf, StopReason};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 
 /// Least probability at which a running first grasp names its leader.
 const WORTH_NAMING: f64 = 0.4;
@@ -164,7 +164,7 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
 pub(in crate::app) fn title(labels: &Labels, class: usize) -> String {
     labels.classes.get(class).map_or_else(String::new, |class| match class.name.as_str() {
         OTHER => "Other".to_owned(),
-        name => capital(&object_title(name)),
+        name => capital_title(name),
     })
 }
 
