@@ -70,6 +70,7 @@ pub(super) fn show(
     };
     let mut widget = PlotWidget::new(id.to_owned())
         .height(height)
+        .width(ui.available_width() - LAST)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)
@@ -176,6 +177,8 @@ fn labels(ui: &Ui, theme: Theme, shown: &ShownPlot, plot: &Plot, labelled: impl 
 const NAMES: f32 = 0.45;
 const LETTER: f32 = 6.6;
 const LINE: f32 = 15.0;
+/// Room for the half of a number at the right end of the axis (points).
+const LAST: f32 = 16.0;
 
 /// A name in at most so many lines of so many letters, cut off with dots.
 fn wrapped_name(text: &str, most: usize, lines: usize) -> String {

@@ -104,6 +104,14 @@ impl<'a> ShownGrasp<'a> {
         })
     }
 
+    /// What is read at the time of the fingers in the picture: of a real gripper now, also while plots show the last trial.
+    pub(super) fn beside_fingers(data: &DisplayedData<'a>) -> Option<Self> {
+        let own = Self::of(data)?;
+        let now = data.traces.newest().filter(|_| data.source == ViewSource::Gripper && !data.looks_back());
+        let Some((trace, cursor_s)) = now.and_then(|trace| Some((trace, *trace.t.last()?))) else { return Some(own) };
+        Some(Self { trace: Some(trace), cursor_s, ..own })
+    }
+
     /// What to do where there is none.
     pub(super) fn missing(data: &DisplayedData<'_>) -> &'static str {
         match data.source {

@@ -25,7 +25,7 @@ pub(super) const BUTTONS: f32 = 490.0;
 
 /// Draws both pads where nothing else is; leaves them out where the view is too small.
 pub(super) fn small_pads(ui: &Ui, rect: Rect, data: &DisplayedData<'_>, view: &PictureView) {
-    let Some(grasp) = ShownGrasp::of(data).filter(|grasp| !grasp.is_simulated()) else { return };
+    let Some(grasp) = ShownGrasp::beside_fingers(data).filter(|grasp| !grasp.is_simulated()) else { return };
     let legends = legend_room(view);
     let room = rect.height() - legends.y - SCALE_BAR - TEXTS;
     let (right, top) = (rect.right() - 18.0, rect.top() + legends.y);

@@ -166,6 +166,11 @@ impl TraceHistory {
         self.place().and_then(|place| self.grasps.get(place))
     }
 
+    /// The grasp or stream that goes on.
+    pub(super) fn newest(&self) -> Option<&GraspTrace> {
+        self.grasps.back()
+    }
+
     fn place(&self) -> Option<usize> {
         let grasp = self.grasps.iter().rposition(|trace| !trace.rolling).filter(|_| self.held);
         grasp.or(self.grasps.len().checked_sub(1))
@@ -254,5 +259,7 @@ mod tests {
         assert_eq!(traces.current().map(|trace| trace.grasp), Some(3));
         traces.hold_grasp(true);
         assert_eq!(traces.current().map(|trace| trace.grasp), Some(2));
+        // What goes on is the stream.
+        assert_eq!(traces.newest().map(|trace| trace.grasp), Some(3));
     }
 }

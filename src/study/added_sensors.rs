@@ -26,7 +26,6 @@ pub(crate) const LISTED: PlainStudy<AddedSensorStudy> = PlainStudy {
         title: "Sensors beyond the paper's four",
         about: "the same simulated grasps read through the paper's four sensors and through those of other grippers: what the added ones are worth to recognition",
         paper: OWN_METHODS,
-        budget: "about 10 CPU minutes",
     },
     of_size: |size| Ok(study(None, size != StudySize::Full)),
 };

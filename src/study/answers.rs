@@ -30,7 +30,6 @@ pub(crate) const LISTED: PlainStudy<AnswerStudy> = PlainStudy {
         title: "Answers that keep their promise",
         about: "sets of classes and automatic stops calibrated for nine of ten rounds, tested on 1500 others: how often the true class is lost, how large sets are, how many stops are wrong",
         paper: OWN_METHODS,
-        budget: "about 100 CPU minutes",
     },
     of_size: |size| Ok(AnswerStudy::of_size(size)),
 };

@@ -62,7 +62,8 @@ pub use frame::{
     Agreement, Cell, ClaimNumber, Draw, Experiment, FigureLink, FigureMark, Finding, GeneratedSection, IntervalStrip,
     LinkedFigure, ListedStudy, Measuring, PERCENT, POINTS, ResultFile, ResultFileError, ShownStudy, StoredStudy,
     StudyCard, StudyCell, StudyColumn, StudyCommand, StudyError, StudyFolder, StudyOutcome, StudyProgress, StudyReport,
-    StudyRow, StudySize, StudyStep, StudyTable, TrialNumbers, markdown_table, merged_units, program, run_experiment,
+    StudyRow, StudySize, StudyStep, StudyTable, TrialNumbers, cpu_cost, markdown_table, merged_units, program,
+    run_experiment,
 };
 pub use generated::generated_sections;
 pub use network_cost::{

@@ -152,7 +152,7 @@ impl Bench {
 
     /// Draws until the effects of the scene at hand have been measured.
     pub(crate) fn until_effects_are_measured(&mut self) {
-        while self.harness.query_by_label_contains("of CPU time").is_none() {
+        while self.harness.query_by_label_contains("costs are shares of").is_none() {
             self.woken.recv_timeout(HANG).expect("the measurement is alive");
             self.harness.step();
         }

@@ -68,7 +68,7 @@ fn trials_travel_through_mcap_and_npz() {
     }
     // Without poses, the fingers are arcs of the curvature that was read, and it is said so.
     let drawn = run(&other, &["snapshot", "--trial", "1", "--at", "1.2", "--size", "320x200", "--out", "arcs.png"]);
-    assert!(drawn.code == Some(0) && drawn.err.contains("Fingers are arcs of the curvature"), "{drawn:?}");
+    assert!(drawn.code == Some(0) && drawn.err.contains("Fingers are arcs of the strips' curvature"), "{drawn:?}");
     // Twice is once.
     let again = run(&other, &["trials", "import", "../both.mcap"]);
     assert!(again.out.contains("0 trial(s) added"), "{again:?}");

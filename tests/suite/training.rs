@@ -206,7 +206,7 @@ fn the_window_trains_and_uses_what_it_trained() {
         bench.until_shown(true, "Macro F1");
         assert!(bench.harness.query_by_label_contains("evaluated on 12 others").is_some());
         let confused = |text: &str| bench.harness.query_by_label_contains(text).is_some();
-        assert!(confused("lemon predicted as tomato") || confused("tomato predicted as lemon"));
+        assert!(confused("Lemon predicted as Tomato") || confused("Tomato predicted as Lemon"));
         // Without the list of files, in whose names the time stands.
         let picture = bench.picture();
         let end = bench.harness.get_by_label("Models for the real gripper").rect().top() as u32 - 8;

@@ -137,7 +137,7 @@ fn a_link_beside_the_answer_opens_the_panel() {
     run_out(&mut bench);
     bench.harness.run_steps(2);
     // The strongest reason stands beside it.
-    bench.until_shown(true, "left pad force, mostly in the hold");
+    bench.until_shown(true, "left pad force");
     // The time is that of the picture, which shows the hand as it was held.
     bench.until_shown(true, "3.00 / 4.00 s");
     bench.harness.get_by_label("Why?").click();

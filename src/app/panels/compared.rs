@@ -19,19 +19,6 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         remark_ui(ui, "No trial is compared. Select trials in the library and press P.");
         return;
     }
-    ui.horizontal_wrapped(|ui| {
-        ui.label("Aligned at");
-        let choices = Alignment::ALL.map(|alignment| (alignment, alignment.name(), "Origin of time (M)"));
-        if let Some(alignment) = choice_ui(ui, Some(comparison.alignment), choices) {
-            actions.push(move |app| app.inspect.alignment = alignment);
-        }
-    });
-    let mut spread = comparison.spread;
-    let hint = "Draw the mean of each class, and its spread as a band, in place of each trial (S)";
-    if ui.checkbox(&mut spread, "Mean and spread of each class").on_hover_text(hint).changed() {
-        actions.push(move |app| app.inspect.spread = spread);
-    }
-    ui.separator();
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let own = data.shown_trial().map(|own| own.trial.id);
         let own = comparison.pinned.iter().find(|pinned| Some(pinned.trial.id) == own).map(|pinned| pinned.trial.id);
@@ -67,11 +54,29 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                 actions.on(&link.on_hover_text("Open this trial"), move |app| app.open_trial(id));
             });
         }
+        options_ui(ui, data, actions);
         hold_ui(ui, data);
         if comparison.pinned.len() > 1 && ui.button("Remove all").clicked() {
             actions.push(|app| app.inspect.unpin_all());
         }
     });
+}
+
+/// Origin of time, and whether trials or classes are drawn.
+fn options_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
+    let comparison = data.comparison;
+    ui.horizontal_wrapped(|ui| {
+        ui.label("Aligned at");
+        let choices = Alignment::ALL.map(|alignment| (alignment, alignment.name(), "Origin of time (M)"));
+        if let Some(alignment) = choice_ui(ui, Some(comparison.alignment), choices) {
+            actions.push(move |app| app.inspect.alignment = alignment);
+        }
+    });
+    let mut spread = comparison.spread;
+    let hint = "Draw the mean of each class, and its spread as a band, in place of each trial (S)";
+    if ui.checkbox(&mut spread, "Mean and spread of each class").on_hover_text(hint).changed() {
+        actions.push(move |app| app.inspect.spread = spread);
+    }
 }
 
 /// Most trials of the table of the hold.

@@ -38,7 +38,7 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
     }
     let explanation = last.as_ref().and_then(|ended| ended.outcome.as_deref().ok());
     let state = match fresh.map(|ended| &ended.outcome) {
-        Some(Ok(explanation)) => format!("a grasp takes {} ms of CPU time", three_digits(explanation.cpu_ms)),
+        Some(Ok(_)) => "costs are shares of a grasp's CPU time".to_owned(),
         Some(Err(cause)) => cause.to_string(),
         None => running
             .map(|running| running.progress.words)

@@ -52,13 +52,17 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
     let ObjectProgress { name, wanted, done, flagged } = object;
     ui.horizontal(|ui| {
         let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);
-        let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click());
         let flags = if *flagged > 0 { format!(", {flagged} flagged") } else { String::new() };
         let spoken = format!("{}: {done} of {wanted}{flags}", object_title(name));
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, &spoken));
-        response.on_hover_text(&spoken);
+        response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, next, &spoken));
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 3.0, colour(colours.raised));
+        let lit = if response.hovered() || response.has_focus() { 0.12 } else { 0.0 };
+        painter.rect_filled(rect, 3.0, colour(colours.raised.mix(colours.accent, lit)));
+        let chosen = name.clone();
+        actions.on(&response.on_hover_text(format!("{spoken}. Record it next")), move |app| {
+            app.edit_labels(LabelCommand::Next(chosen));
+        });
         let share = |count: u32| (f64::from(count) / f64::from((*wanted).max(1))).min(1.0) as f32;
         let part = |from: f32, to: f32| {
             let x = |share: f32| rect.left() + rect.width() * share;

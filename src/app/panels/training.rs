@@ -97,7 +97,8 @@ fn finished_ui(ui: &mut Ui, chosen: Option<&Path>, finished: &FinishedTraining, 
     }
     for class in &judged.too_few {
         let trials = if class.trials == 1 { "trial" } else { "trials" };
-        let text = format!("\"{}\" left out: {} usable {trials}, {LEAST_TRIALS} needed", class.name, class.trials);
+        let title = capital_title(&class.name);
+        let text = format!("\"{title}\" left out: {} usable {trials}, {LEAST_TRIALS} needed", class.trials);
         warning_ui(ui, text);
     }
     let data = &trained.model.card.data;
@@ -232,7 +233,7 @@ fn confusion_ui(ui: &mut Ui, theme: Theme, confusion: &Confusion, labels: &Label
     wrapped(ui, RichText::new("Rows: true class. Columns: predicted.").small().weak());
     let size = vec2(names + cell * count as f32, heading + cell * count as f32);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-    let name = |class: usize| labels.classes.get(class).map_or("", |class| class.name.as_str());
+    let name = |class: usize| labels.classes.get(class).map_or_else(String::new, |class| capital_title(&class.name));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Figure, true, confusions(confusion, labels)));
     let painter = ui.painter_at(rect);
     let corner = rect.min + vec2(names, heading);
@@ -284,11 +285,11 @@ fn readable(behind: Rgb, theme: Theme) -> Rgb {
 
 /// Confusions in words.
 fn confusions(confusion: &Confusion, labels: &Labels) -> String {
-    let classes = &labels.classes;
+    let classes: Vec<String> = labels.classes.iter().map(|class| capital_title(&class.name)).collect();
     let pairs = (0..classes.len()).flat_map(|row| (0..classes.len()).map(move |column| (row, column)));
     let wrong = pairs.filter(|(row, column)| row != column).filter_map(|(row, column)| {
         let count = confusion.count(row, Some(column));
-        (count > 0).then(|| format!("{} predicted as {}: {count}", classes[row].name, classes[column].name))
+        (count > 0).then(|| format!("{} predicted as {}: {count}", classes[row], classes[column]))
     });
     let wrong: Vec<String> = wrong.collect();
     if wrong.is_empty() { "No confusions".to_owned() } else { wrong.join("; ") }

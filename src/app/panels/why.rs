@@ -105,7 +105,7 @@ fn evidence_ui(ui: &mut Ui, why: &Attribution) {
     for (span, evidence) in why.phases.iter().zip(&why.by_phase) {
         rows.bar_ui(ui, span.phase.name(), evidence);
     }
-    heading(ui, "Channel by phase", &format!("Percent points of {title} that each channel brings in each phase"));
+    heading(ui, "Channel by phase", "The points of each channel, shared out over the phases");
     rows.table_ui(ui, why);
     if why.grasps.len() > 1 {
         heading(ui, "Grasps", &format!("Probability of {title} after each grasp"));
@@ -218,7 +218,7 @@ impl Rows {
         ui.painter().rect_filled(cell, 2.0, self.ground);
         ui.painter().rect_filled(cell, 2.0, veil(self.sign(evidence.points), 0.6 * share));
         put(ui, &points_words(evidence.points), cell, Align2::CENTER_CENTER, self.ink);
-        response.on_hover_text(hint_of(&name, evidence));
+        response.on_hover_text(format!("{text}, of those of the channel"));
     }
 }
 

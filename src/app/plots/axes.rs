@@ -5,15 +5,15 @@ use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{SPACE, mark as plain};
 
-/// Time at the axis of a plot so many points wide. Empty near the end of the axis, where it would be cut off, and where it
-/// would crowd its neighbours: then every fifth mark of its kind has a label.
-pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, width: f64) -> String {
-    let range = shown.end() - shown.start();
-    let text = format!("{}{SPACE}s", plain(mark.value));
-    let spacing = mark.step_size / range * width;
-    let crowded = spacing < LETTER * text.chars().count() as f64 + BETWEEN_LABELS;
-    let fifth = (mark.value / mark.step_size).round() % 5.0 == 0.0;
-    if (shown.end() - mark.value) / range < 0.02 || (crowded && !fifth) { String::new() } else { text }
+/// Time at the axis of a plot. Empty near the end of the axis, where it would be cut off.
+pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>) -> String {
+    let left = (shown.end() - mark.value) / (shown.end() - shown.start());
+    if left < 0.02 { String::new() } else { format!("{}{SPACE}s", plain(mark.value)) }
+}
+
+/// Marks of time at the axis of a plot so many points wide.
+pub(super) fn time_marks(low: f64, high: f64, width: f64) -> Vec<GridMark> {
+    round_marks(low, high, width / BETWEEN_TIMES)
 }
 
 /// Value at the axis of a plot so many points high. Empty where it would stand on the first time below.
@@ -24,9 +24,8 @@ pub(super) fn value_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, he
 
 /// Least height of a value above the axis of time (points).
 const LEAST_ABOVE: f64 = 2.5;
-/// Width of a letter of a label, and least distance between labels (points).
-const LETTER: f64 = 6.5;
-const BETWEEN_LABELS: f64 = 12.0;
+/// Least distance of times at their axis (points).
+const BETWEEN_TIMES: f64 = 56.0;
 
 /// Plot without interaction, its axes as wide as those of the others.
 pub(in crate::app) fn static_plot(
@@ -55,7 +54,12 @@ pub(in crate::app) fn static_plot(
 
 /// About four marks at round values.
 pub(in crate::app) fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
-    let rough = (high - low) / 4.0;
+    round_marks(low, high, 4.0)
+}
+
+/// At most so many marks and one, at round values.
+fn round_marks(low: f64, high: f64, most: f64) -> Vec<GridMark> {
+    let rough = (high - low) / most.max(1.0);
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
@@ -96,12 +100,15 @@ mod tests {
     #[test]
     fn times_at_the_axis_never_crowd() {
         let labels = |width: f64| -> Vec<String> {
-            let mark = |k: i32| GridMark { value: 0.1 * f64::from(k), step_size: if k % 10 == 0 { 1.0 } else { 0.1 } };
-            (0..=40).map(|k| seconds_at(mark(k), &(0.0..=4.0), width)).filter(|text| !text.is_empty()).collect()
+            let marks = time_marks(0.0, 4.0, width);
+            marks.into_iter().map(|mark| seconds_at(mark, &(0.0..=4.0))).filter(|text| !text.is_empty()).collect()
         };
         let seconds = |texts: &[&str]| texts.iter().map(|text| format!("{text}{SPACE}s")).collect::<Vec<_>>();
-        assert_eq!(labels(1200.0), seconds(&["0", "0.5", "1", "1.5", "2", "2.5", "3", "3.5"]));
-        // With room for all of them, all but the last, which would be cut off.
-        assert_eq!(labels(2400.0).len(), 40);
+        // All but the last, which would be cut off.
+        assert_eq!(labels(500.0), seconds(&["0", "0.5", "1", "1.5", "2", "2.5", "3", "3.5"]));
+        assert_eq!(labels(260.0), seconds(&["0", "1", "2", "3"]));
+        assert_eq!(labels(60.0), seconds(&["0"]));
+        // In a window that moves, one at least.
+        assert!((0..100).all(|k| !time_marks(f64::from(k), f64::from(k) + 8.0, 120.0).is_empty()));
     }
 }

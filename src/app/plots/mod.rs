@@ -84,7 +84,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
     let (plotted, plotted_height) = (f64::from(width - Y_AXIS), f64::from(ui.available_height() - TIMES));
     let seconds = AxisHints::new_x()
-        .formatter(move |mark: GridMark, shown| axes::seconds_at(mark, shown, plotted))
+        .formatter(|mark: GridMark, shown| axes::seconds_at(mark, shown))
         .label_spacing(egui::Rangef::new(24.0, 40.0));
     let widget = Plot::new(plot.id)
         .width(width)
@@ -101,6 +101,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .y_axis_label(units::symbol(&unit))
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
+        .x_grid_spacer(move |grid: GridInput| axes::time_marks(grid.bounds.0, grid.bounds.1, plotted))
         .y_grid_spacer(|grid: GridInput| axes::value_marks(grid.bounds.0, grid.bounds.1))
         .custom_x_axes(vec![seconds])
         .y_axis_formatter(move |mark: GridMark, shown| axes::value_at(mark, shown, plotted_height))

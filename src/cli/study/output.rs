@@ -8,7 +8,7 @@ use palpate_lab::grasping::Shard;
 use palpate_render::figure_svg;
 use palpate_study::{
     Cell, Experiment, Finding, LinkedFigure, Measuring, StoredStudy, StudyFolder, StudyOutcome, StudyProgress,
-    StudyReport, StudyTable, run_experiment, study_title,
+    StudyReport, StudyTable, cpu_cost, run_experiment, study_title,
 };
 use serde::de::DeserializeOwned;
 
@@ -84,7 +84,7 @@ impl StudyOutput {
             note("a quick study: do not quote its numbers");
         }
         let written = format!("Written to {}: {}", folder.path().display(), names.join(", "));
-        say(format!("\n{}. {written}\n", stored.cpu_time()))
+        say(format!("\n{}. {written}\n", cpu_cost(stored.cpu_hours)))
     }
 }
 

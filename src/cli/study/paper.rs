@@ -6,7 +6,7 @@ use super::output::{BAR, StudyOutput, whole};
 use clap::{ArgMatches, Args as _, Command, FromArgMatches, Subcommand};
 use palpate_lab::datasets::DatasetQuery;
 use palpate_study::paper::{PAPER_STUDIES, STUDY_PRESET, StudyData, StudyPlan, paper_study};
-use palpate_study::{Measuring, StudyCard, StudyProgress, StudySize, StudyStep};
+use palpate_study::{Measuring, StudyCard, StudyProgress, StudySize, StudyStep, cpu_cost};
 use palpate_tactile::model::SensorModel;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicUsize;
@@ -49,21 +49,21 @@ fn subcommands() -> Vec<Command> {
         PaperArguments::augment_args(Command::new(name)).about(about).after_help(format!("{GRASPS}\n\n{examples}"))
     };
     let studies = PAPER_STUDIES.iter().map(|study| {
-        let StudyCard { key, title, about, budget, .. } = study.card();
+        let card = study.card();
+        let (StudyCard { key, title, about, .. }, cost) = (card, card.cost());
         let examples = format!(
-            "Cost: {budget}, with --quick less than a minute. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study \
+            "Cost: {cost}, with --quick at most a minute. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study \
              {key} --quick\n  palpate study {key} --out studies/\n  palpate study {key} --preset A --sensors physical-like\n  \
              palpate study {key} --source serial --json\n\nSee also: palpate help studies"
         );
         of(key, format!("{title} ({}): {about}.", study.card().origin()), examples)
     });
-    let all = of(
-        ALL,
-        "Run all studies of the paper, one after the other.".to_owned(),
-        "Cost: about 9 CPU hours, with --quick a few minutes. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study all \
+    let total = cpu_cost(PAPER_STUDIES.iter().filter_map(|study| study.card().cpu_hours()).sum());
+    let examples = format!(
+        "Cost: about {total}, with --quick a few minutes. Ctrl+C stops; the same command resumes.\n\nExamples:\n  palpate study all \
          --quick\n  palpate study all --out studies/\n\nSee also: palpate help studies"
-            .to_owned(),
     );
+    let all = of(ALL, "Run all studies of the paper, one after the other.".to_owned(), examples);
     studies.chain([all]).collect()
 }
 

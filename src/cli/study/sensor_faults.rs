@@ -7,7 +7,7 @@ use palpate_study::sensor_fault_study;
 /// Arguments of `palpate study sensor-faults`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Cost: about 20 CPU minutes, with --quick less than one. Ctrl+C stops; the same command resumes.
+    after_help = "Cost: about 10 CPU minutes, with --quick less than one. Ctrl+C stops; the same command resumes.
 
 Examples:
   palpate study sensor-faults --quick

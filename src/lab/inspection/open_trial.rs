@@ -444,8 +444,7 @@ impl OpenTrial {
             if options.keep >= Keep::Scenery {
                 self.stage = Some(Arc::new(Stage::new(&self.header.scene, None, resting_pose(&self.header))));
             }
-            self.remarks
-                .push("Fingers are arcs of the curvature that the strips read; the object is not drawn.".to_owned());
+            self.remarks.push("Fingers are arcs of the strips' curvature; the object is not drawn.".to_owned());
         }
     }
 }

@@ -22,8 +22,9 @@ const LEGEND_HEIGHT: f32 = 50.0;
 const SCALE_BAR_SHARE: f32 = 0.16;
 /// Room of its text (points).
 const LEAST_BAR: f32 = 50.0;
-/// Height of the texts in an inset (points).
+/// Height of the texts in an inset, and of the lowest inset with a scale (points).
 const INSET_TEXT: f32 = 12.0;
+const INSET_WITH_SCALE: f32 = 76.0;
 /// Lengths that the scale bar may stand for (mm).
 pub const SCALE_STEPS: [f32; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
 
@@ -135,7 +136,7 @@ fn add(overlay: &mut Overlay, view: &PictureView) {
         add_gizmo(overlay, &view.camera, Vec2::new(MARGIN + 26.0, size.y - MARGIN - 26.0), view.theme);
     }
     if shows_legends(view) {
-        add_scale_bar(overlay, view, [MARGIN, TEXT]);
+        add_scale_bar(overlay, view, [MARGIN, TEXT], false);
         let full = f64::from(view.full_scale) * 1e-3;
         add_legend(overlay, view, MARGIN, "pad pressure, kPa", [0.0, full]);
         if let Some(PathColour::Time(span)) = view.path {
@@ -191,9 +192,9 @@ pub(super) fn frame_inset(overlay: &mut Overlay, view: &PictureView, title: &str
     let half = Vec2::new(0.25 * INSET_TEXT * title.chars().count() as f32 + 4.0, 0.5 * INSET_TEXT + 3.0);
     add_ground(overlay, view.theme, half + 4.0, half);
     overlay.text(half + 4.0, Align::Centre, INSET_TEXT, ink, title);
-    let bar = Vec2::new(0.5 * SCALE_BAR_SHARE * view.size.x + 14.0, 15.0);
-    add_ground(overlay, view.theme, view.size - bar - 3.0, bar);
-    add_scale_bar(overlay, view, [11.0, INSET_TEXT]);
+    if view.size.y >= INSET_WITH_SCALE {
+        add_scale_bar(overlay, view, [11.0, INSET_TEXT], true);
+    }
 }
 
 /// Translucent ground of a text about a place.
@@ -210,17 +211,24 @@ fn scale_bar(view: &PictureView) -> Option<(f32, f32)> {
     Some((mm, mm * points_per_mm))
 }
 
-/// A bar of a round length at the distance of the target, so far from the lower right corner, and the height of its text.
-fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [f32; 2]) {
+/// A bar of a round length at the distance of the target, so far from the lower right corner, with letters of that height, and
+/// a ground where it may stand on anything.
+fn add_scale_bar(overlay: &mut Overlay, view: &PictureView, [margin, letters]: [f32; 2], grounded: bool) {
     let Some((mm, length)) = scale_bar(view) else { return };
-    let right = view.size - margin;
-    let left = right - Vec2::new(length, 0.0);
+    let text = format!("{mm}{SPACE}mm");
+    // As wide as the wider of both.
+    let half = 0.5 * length.max(0.5 * letters * text.chars().count() as f32);
+    let middle = view.size - margin - Vec2::new(half, 0.0);
+    let [left, right] = [-0.5, 0.5].map(|share| middle + Vec2::new(share * length, 0.0));
+    if grounded {
+        add_ground(overlay, view.theme, middle - Vec2::new(0.0, 8.0), Vec2::new(half + 6.0, 14.0));
+    }
     let colour = ink(view.theme);
     overlay.line(left, right, 1.6, colour);
     for end in [left, right] {
         overlay.line(end - Vec2::new(0.0, 4.5), end + Vec2::new(0.0, 4.5), 1.6, colour);
     }
-    overlay.text((left + right) * 0.5 - Vec2::new(0.0, 12.0), Align::Centre, letters, colour, format!("{mm}{SPACE}mm"));
+    overlay.text(middle - Vec2::new(0.0, 12.0), Align::Centre, letters, colour, text);
 }
 
 /// Room of the legends in the top right corner of a picture (points): width from the right edge, height from the top.

@@ -25,10 +25,12 @@ const FULL_SCALE: f64 = 0.5;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Least height of a picture with numbers, with a word beside them, and with those of friction (points).
+/// Least height of a picture with numbers, and with a plate for each finger; least size with numbers of friction, and height
+/// with a key (points).
 const LEAST_HEIGHT: f32 = 150.0;
-const WITH_WORD: f32 = 220.0;
-const LOW: f32 = 320.0;
+const APART: f32 = 250.0;
+const WITH_FRICTION: Vec2 = Vec2::new(600.0, 250.0);
+const WITH_KEY: f32 = 320.0;
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
 fn friction_colour(theme: Theme) -> Rgb {
@@ -102,7 +104,7 @@ const KEY_MIDDLE: f32 = 17.0;
 /// An arrow of a known force above the scale bar, where there is room.
 pub(super) fn add_key(annotator: &mut Annotator<'_>) {
     let view = annotator.view;
-    if !shows_legends(view) || view.size.y < LOW {
+    if !shows_legends(view) || view.size.y < WITH_KEY {
         return;
     }
     let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
@@ -126,7 +128,7 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>) {
     );
 }
 
-/// Their numbers, beyond the tips or near by: a plate for each finger.
+/// Their numbers, beyond the tips or near by: a plate for each finger, or one for both in a low picture.
 pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) {
     let view = annotator.view;
     let span = span(view);
@@ -146,18 +148,22 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
     }
     let tips: Vec<f32> = all.iter().filter_map(|forces| Some(ends(forces, forces.normal)?.0.x)).collect();
     let middle = if tips.len() == 2 { 0.5 * (tips[0] + tips[1]) } else { 0.5 * view.size.x };
-    for forces in all {
-        let Some((from, to)) = ends(&forces, forces.normal) else { continue };
+    let lines = |forces: &Forces| -> Vec<(String, Rgb)> {
         let letter = match forces.side {
             Side::Left => "L",
             Side::Right => "R",
         };
         let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
-        let name = if view.plain || view.size.y < WITH_WORD { "" } else { "normal " };
-        let mut texts = vec![(text(name, forces.normal), view.theme.colours().text)];
-        // A low picture has room for one line.
-        let friction = forces.friction.filter(|_| view.size.y >= LOW && !view.plain);
-        texts.extend(friction.map(|force| (text("friction ", force), friction_colour(view.theme))));
+        let name = if view.plain || view.size.y < APART { "" } else { "normal " };
+        // A small picture has room for one line.
+        let friction = forces.friction.filter(|_| view.size.cmpge(WITH_FRICTION).all() && !view.plain);
+        let friction = friction.map(|force| (text("friction ", force), friction_colour(view.theme)));
+        std::iter::once((text(name, forces.normal), view.theme.colours().text)).chain(friction).collect()
+    };
+    for group in all.chunks(if view.size.y < APART { 2 } else { 1 }) {
+        let forces = &group[0];
+        let Some((from, to)) = ends(forces, forces.normal) else { continue };
+        let texts: Vec<(String, Rgb)> = group.iter().flat_map(lines).collect();
         // The letters of this font are half as wide as high.
         let width = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).fold(0.0, f32::max);
         let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * texts.len() as f32 + 2.0);
@@ -173,7 +179,9 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         let outward = (from.x - middle).signum();
         let outside = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0].map(|rows| aside(outward) + rows * over);
         let places = [&[beyond], &outside[..], &[aside(-outward), aside(-outward) + over]].concat();
-        let Some(plate) = annotator.place(&places, half, f32::INFINITY) else { continue };
+        // Over the hand sooner than nowhere, unless that is most of the picture.
+        let farthest = if shows_legends(view) { f32::INFINITY } else { view.size.length() };
+        let Some(plate) = annotator.place(&places, half, farthest) else { continue };
         annotator.add_plate(plate);
         let mut at = plate.middle - half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
         for (text, ink) in texts {

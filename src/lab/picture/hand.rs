@@ -17,7 +17,7 @@ const DIRECTIONS: u32 = 96;
 /// Share of the picture that is left free at each edge, and height of buttons or badge above (points), at most that share.
 const FREE: f32 = 0.06;
 const HEAD: f32 = 48.0;
-const MOST_HEAD: f32 = 0.22;
+const MOST_HEAD: f32 = 0.28;
 /// Yaw of the camera from beside the hand (rad): nearer to 0 no pad faces it, farther off one finger hides the other.
 const FACING: [f32; 2] = [0.5, 0.8];
 /// An object that is farther from the palm, in lengths of a finger, is not followed.
@@ -135,7 +135,8 @@ impl Stage {
         let size = inset_size(view)?;
         let right = view.size.x - MARGIN;
         let top = legend_room(view).y;
-        let usual = Plate::between(Vec2::new(right - size.x, top), Vec2::new(right, top + size.y));
+        let below_legend = size * ((view.size.y - SCALE_BAR - top) / size.y).clamp(SMALLER[SMALLER.len() - 1], 1.0);
+        let usual = Plate::between(Vec2::new(right - below_legend.x, top), Vec2::new(right, top + below_legend.y));
         let low = Vec2::new(right, view.size.y - SCALE_BAR);
         let lower = SMALLER.into_iter().map(|share| Plate::between(low - share * size, low));
         let on_picture = view.camera.projector(view.size);

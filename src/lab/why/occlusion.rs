@@ -10,6 +10,10 @@
 //!
 //! Parts overlap, so that their evidence does not add up: two channels that say the same each count little.
 //!
+//! A channel replaced in one phase alone, beside its own other phases, is like no grasp, and the answer loses far more than
+//! without the whole channel. These losses serve as proportions only: the evidence of a channel in a phase is the share that
+//! the phase has in that of the channel.
+//!
 //! Cost: 1 + C + P + C P answers of the model, with C channels and P phases; 28 for six channels and three phases.
 
 use super::bands::two_likeliest;
@@ -67,7 +71,7 @@ pub struct Attribution {
     pub by_channel: Vec<Evidence>,
     /// Evidence of all channels in each phase.
     pub by_phase: Vec<Evidence>,
-    /// Evidence of each channel in each phase, `[channels][phases]`.
+    /// Evidence of each channel shared out over the phases, `[channels][phases]`.
     pub by_both: Vec<Vec<Evidence>>,
     /// Where a channel is that of a pad without load: what spoke is that it touches nothing, `[channels][phases]`.
     pub unloaded: Vec<Vec<bool>>,
@@ -115,10 +119,13 @@ pub fn explain(of: &RecognisedGrasp, stop: &AtomicBool) -> Result<Attribution, W
         let occluded = model.answer(&occluded(&of.grasp, signatures, channel, &rows))?;
         Ok(evidence(&answer, &occluded, two))
     };
-    let by_channel = (0..channels.len()).map(|c| without(Some(c), None)).collect::<Result<_, _>>()?;
+    let by_channel = (0..channels.len()).map(|c| without(Some(c), None)).collect::<Result<Vec<_>, _>>()?;
     let by_phase = (0..phases.len()).map(|p| without(None, Some(p))).collect::<Result<_, _>>()?;
-    let mut in_phases = |c| (0..phases.len()).map(|p| without(Some(c), Some(p))).collect::<Result<_, _>>();
-    let by_both = (0..channels.len()).map(&mut in_phases).collect::<Result<_, _>>()?;
+    let mut in_phases = |c| {
+        let alone = (0..phases.len()).map(|p| without(Some(c), Some(p))).collect::<Result<Vec<_>, _>>()?;
+        Ok(shared_out(by_channel[c], &alone))
+    };
+    let by_both = (0..channels.len()).map(&mut in_phases).collect::<Result<_, WhyError>>()?;
     let unloaded = unloaded(&of.grasp, signatures, &phases);
     let labels = &of.model.card.labels;
     let [first, second] = two.map(|class| share(labels, &answer, class));
@@ -170,6 +177,15 @@ fn evidence(answer: &Pmf, without: &Pmf, [first, second]: [usize; 2]) -> Evidenc
         (logarithms[first] - logarithms[second]) * 10.0 / std::f64::consts::LN_10
     };
     Evidence { points, decibans: ratio(answer) - ratio(without) }
+}
+
+/// The evidence of a channel over the phases, in proportion to what they lose alone to the same end.
+fn shared_out(whole: Evidence, alone: &[Evidence]) -> Vec<Evidence> {
+    let weight = |own: &Evidence| (own.points * whole.points.signum()).max(0.0);
+    let all: f64 = alone.iter().map(weight).sum();
+    let share = |own: &Evidence| if all > 0.0 { weight(own) / all } else { 0.0 };
+    let shares = alone.iter().map(share);
+    shares.map(|share| Evidence { points: share * whole.points, decibans: share * whole.decibans }).collect()
 }
 
 /// How each grasp moved the belief in two classes.
@@ -224,6 +240,11 @@ mod tests {
             close(phase.decibans, 0.5 * (found.by_channel[0].decibans + found.by_channel[1].decibans));
             close(found.by_both[0][both].decibans, 0.5 * found.by_channel[0].decibans);
         }
+        // Phases of a channel add up to it, however much one does alone; one that speaks to the other end has no share.
+        let of = |points: f64| Evidence { points, decibans: 2.0 * points };
+        let shared = shared_out(of(2.0), &[of(90.0), of(-20.0), of(10.0)]);
+        assert_eq!(shared, [of(1.8), of(0.0), of(0.2)]);
+        assert_eq!(shared_out(of(2.0), &[of(0.0), of(-20.0)]), [of(0.0); 2]);
         // One answer as it is, three channels, two phases, and their pairs.
         assert_eq!((found.calls, calls.load(Ordering::Relaxed)), (1 + 3 + 2 + 6, 12));
     }

@@ -15,6 +15,9 @@ const WORTH_NAMING: f64 = 1.0;
 /// Most parts named for or against.
 const MOST_NAMED: usize = 3;
 
+/// Between a channel and the phase in which it speaks most.
+const MOSTLY: &str = ", mostly ";
+
 /// Part of a grasp and its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
@@ -33,8 +36,7 @@ impl Attribution {
     }
 
     /// Strongest reasons for and against the first class, strongest first: channels, each with the phase in which it speaks
-    /// most, or, where no channel counts alone, whole phases. A channel in one phase counts too much by itself: beside its
-    /// own other phases, an average is like no grasp.
+    /// most, or, where no channel counts alone, whole phases.
     pub fn reasons(&self) -> [Vec<Reason>; 2] {
         let channels = self.by_channel.iter().enumerate();
         let channels: Vec<(String, Evidence)> = channels.map(|(c, own)| (self.channel_part(c, own), *own)).collect();
@@ -47,27 +49,26 @@ impl Attribution {
         })
     }
 
-    /// A channel, and the phase in which it speaks most to the same end: `left pad pressure, mostly in the hold`; where the
+    /// A channel, and the phase that has more than half of it: `left pad pressure, mostly in the hold`; where the
     /// pad touches nothing then, its silence is what spoke: `no left pad pressure yet, mostly while pre-shaping`.
     fn channel_part(&self, channel: usize, own: &Evidence) -> String {
-        let sign = own.points.signum();
-        let in_phases = self.by_both[channel].iter().map(|both| sign * both.points).enumerate();
-        let most = in_phases.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, points)| *points >= WORTH_NAMING);
+        let most = self.by_both[channel].iter().position(|both| both.points / own.points > 0.5);
         let name = channel_words(&self.channels[channel]);
-        let Some((phase, _)) = most else { return name };
+        let Some(phase) = most else { return name };
         let span = &self.phases[phase];
         let name = match self.unloaded[channel][phase] {
             false => name,
             true if span.phase < TouchPhase::Hold => format!("no {name} yet"),
             true => format!("no {name}"),
         };
-        format!("{name}, mostly {}", phase_words(span))
+        format!("{name}{MOSTLY}{}", phase_words(span))
     }
 
-    /// The strongest reason for the first class, or that there is no single one.
+    /// The strongest reason for the first class in few words, without its phase, or that there is no single one.
     pub fn because(&self) -> String {
         let [spoke_for, _] = self.reasons();
-        spoke_for.into_iter().next().map_or_else(|| "no single part decides".to_owned(), |reason| reason.part)
+        let first = spoke_for.first().and_then(|reason| reason.part.split(MOSTLY).next());
+        first.unwrap_or("no single part decides").to_owned()
     }
 
     /// Reasons in sentences: what spoke for the first class, and what against it.
@@ -190,12 +191,13 @@ mod tests {
             let cells = vec![unloaded.to_vec(), vec![false; 2]];
             Attribution { unloaded: cells, ..found([60.0, 0.0], [[96.0, 0.0], [0.0, 0.0]]) }.because()
         };
-        assert_eq!(silent([true, false]), "no left pad pressure yet, mostly in contact");
-        assert_eq!(silent([false, true]), "left pad pressure, mostly in contact");
+        assert_eq!(silent([true, false]), "no left pad pressure yet");
+        assert_eq!(silent([false, true]), "left pad pressure");
         let let_go =
             Attribution { unloaded: vec![vec![false, true]; 2], ..found([12.0, 0.0], [[0.0, 12.0], [0.0; 2]]) };
-        assert_eq!(let_go.because(), "no left pad pressure, mostly in the hold");
-        // A channel that counts in no phase alone has none.
+        assert_eq!(let_go.because(), "no left pad pressure");
+        assert_eq!(let_go.reasons()[0][0].part, "no left pad pressure, mostly in the hold");
+        // Where no phase has more than half, none is named.
         assert_eq!(found([12.0, 0.0], [[0.2; 2]; 2]).because(), "left pad pressure");
         // Neither a channel nor a phase changes the answer by a point; a channel in one phase would, beside its others.
         let sure = found([0.4, 0.2], [[90.0, 0.1], [0.1; 2]]);

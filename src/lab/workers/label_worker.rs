@@ -29,6 +29,8 @@ pub enum LabelCommand {
     Want(String, u32),
     /// Remove an object from the plan; its trials stay.
     Unplan(String),
+    /// Record this object of the plan next, until a trial has it as its label.
+    Next(String),
 }
 
 /// Contents of the store, for display.
@@ -69,7 +71,7 @@ impl LabelWorker {
     /// Starts the thread on a store, which is opened when it is first needed.
     pub fn start(path: PathBuf, wake: Wake) -> std::io::Result<Self> {
         Self::spawn("label", "the label service", wake, move |inbox, publisher| {
-            let mut service = LabelService { store: OwnStore::new(path), seen: None };
+            let mut service = LabelService { store: OwnStore::new(path), seen: None, chosen: None };
             let mut patience = None;
             while let Ok(command) = inbox.next(patience) {
                 patience = Some(GLANCE);
@@ -95,6 +97,8 @@ struct LabelService {
     store: OwnStore,
     /// What the view shows, as [`palpate_store::LabelRepository::revision`] counts.
     seen: Option<LabelRevision>,
+    /// Object that was chosen as the next one; in the first view since, with its trials.
+    chosen: Option<(String, Option<u32>)>,
 }
 
 impl LabelService {
@@ -122,6 +126,10 @@ impl LabelService {
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "Nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
+            LabelCommand::Next(name) => {
+                self.chosen = Some((name.clone(), None));
+                Ok(None)
+            }
         };
         Ok(done?)
     }
@@ -133,7 +141,12 @@ impl LabelService {
         let progress = store.labels().plan()?.progress(&trials);
         trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
         let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
-        let next = progress.next(last);
+        let chosen = self.chosen.take().and_then(|(name, done)| {
+            let object = progress.objects.iter().find(|object| object.name == name)?;
+            (done.unwrap_or(object.done) == object.done).then_some(object)
+        });
+        self.chosen = chosen.map(|object| (object.name.clone(), Some(object.done)));
+        let next = chosen.map(|object| object.next()).or_else(|| progress.next(last));
         let journal = store.journal().entries(ENTRIES)?;
         self.seen = Some(seen);
         Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal })
@@ -154,7 +167,7 @@ mod tests {
     use super::super::job::watch::waker;
     use super::super::worker::watch::{shown, told};
     use super::*;
-    use palpate_sim::objects::object_title;
+    use palpate_sim::objects::{EMPTY, object_title};
     use palpate_sim::scene::Scene;
     use palpate_store::BoardInfo;
     use palpate_tactile::trial::TrialHeader;
@@ -204,6 +217,15 @@ mod tests {
         told_of(&labels, &woken, is_done("Undone: ", String::new()));
         labels.send(LabelCommand::Want("mug".to_owned(), 3));
         shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
+        // One that is chosen is the next until it is recorded.
+        labels.send(LabelCommand::Next("mug".to_owned()));
+        let is_next =
+            |view: &LabelView| view.next.as_ref().is_some_and(|next| next.object == "mug" && next.number == 1);
+        shown(&labels, &woken, is_next);
+        labels.send(LabelCommand::Edit(ids[1], TrialEdit::Label(EMPTY.to_owned())));
+        shown(&labels, &woken, |view| is_next(view) && view.unlabelled().is_none());
+        labels.send(LabelCommand::Edit(ids[1], TrialEdit::Label("mug".to_owned())));
+        shown(&labels, &woken, |view| !is_next(view) && view.next.as_ref().is_some_and(|next| next.object != "mug"));
         labels.send(LabelCommand::Want("mug".to_owned(), 0));
         told_of(&labels, &woken, |notice| matches!(notice, Notice::Failed(_)));
         labels.send(LabelCommand::Edit(99, TrialEdit::Label("mug".to_owned())));

@@ -144,6 +144,14 @@ pub struct NextTrial {
     pub cue: PoseCue,
 }
 
+impl ObjectProgress {
+    /// Its next trial.
+    pub fn next(&self) -> NextTrial {
+        let number = self.done + 1;
+        NextTrial { object: self.name.clone(), number, cue: PoseCue::drawn(&self.name, number) }
+    }
+}
+
 impl Progress {
     /// Trials done, each object counting up to its number wanted.
     pub fn done(&self) -> u32 {
@@ -169,12 +177,7 @@ impl Progress {
         let behind: Vec<&ObjectProgress> =
             among.iter().copied().filter(|object| !among.iter().any(|other| share_below(other, object))).collect();
         let draw = Stream::new(u64::from(self.done()), "label plan", "next").within(0.0, behind.len() as f64);
-        let object = behind.get(draw as usize).or(behind.last())?;
-        Some(NextTrial {
-            object: object.name.clone(),
-            number: object.done + 1,
-            cue: PoseCue::drawn(&object.name, object.done + 1),
-        })
+        behind.get(draw as usize).or(behind.last()).map(|object| object.next())
     }
 }
 

@@ -89,7 +89,6 @@ pub(crate) const LISTED: PlainStudy<AccuracyExperiment> = PlainStudy {
         title: "Cost and worth of accuracy",
         about: "CPU time and error of each setting of the simulation, and what it is worth for recognition",
         paper: OWN_PHYSICS,
-        budget: "about 9 CPU minutes",
     },
     of_size: |size| {
         let plan = match size {

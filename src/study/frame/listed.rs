@@ -4,7 +4,8 @@ use super::experiment::{Experiment, StudyError, run_experiment};
 use super::folder::StudyFolder;
 use super::report::{LinkedFigure, StudyReport};
 use super::result_file::{Measuring, ResultFileError};
-use super::stored_study::StoredStudy;
+use super::shipped::shipped_json;
+use super::stored_study::{StoredStudy, cpu_cost};
 use palpate_lab::grasping::Shard;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -49,11 +50,25 @@ pub struct StudyCard {
     pub about: &'static str,
     /// Figure or section of the paper.
     pub paper: &'static str,
-    /// CPU time of the full form, without collecting grasps.
-    pub budget: &'static str,
 }
 
 impl StudyCard {
+    /// CPU time of the full run that comes with the program (h); none where there is none.
+    pub fn cpu_hours(&self) -> Option<f64> {
+        /// What stands before the result.
+        #[derive(Deserialize)]
+        struct Head {
+            cpu_hours: f64,
+        }
+        let (head, _result) = shipped_json(self.key)?.split_once(",\"result\":")?;
+        serde_json::from_str(&format!("{head}}}")).ok().map(|head: Head| head.cpu_hours)
+    }
+
+    /// The same in words.
+    pub fn cost(&self) -> String {
+        self.cpu_hours().map_or_else(|| "not measured".to_owned(), |hours| format!("about {}", cpu_cost(hours)))
+    }
+
     /// True for a study that the paper has, or calls future work.
     pub fn is_of_the_paper(&self) -> bool {
         ![OWN_METHODS, OWN_PHYSICS].contains(&self.paper)

@@ -30,4 +30,4 @@ pub use result_file::{
     Measuring, ResultFile, ResultFileError, StudyProgress, StudyStep, TrialNumbers, merged_units, program,
 };
 pub(super) use stored_study::rounded;
-pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, markdown_table};
+pub use stored_study::{GeneratedSection, StoredStudy, StudyCommand, cpu_cost, markdown_table};

@@ -50,28 +50,28 @@ impl<R: Serialize + DeserializeOwned> StoredStudy<R> {
         })
     }
 
-    /// CPU time that the study took, in words.
-    pub fn cpu_time(&self) -> String {
-        let minutes = self.cpu_hours * 60.0;
-        if minutes < 2.0 {
-            format!("{:.0} CPU seconds", minutes * 60.0)
-        } else if minutes < 90.0 {
-            format!("{minutes:.0} CPU minutes")
-        } else {
-            format!("{:.1} CPU hours", self.cpu_hours)
-        }
-    }
-
     /// Origin of the result, as a line below a table or picture.
     pub fn origin(&self) -> String {
         let today = program();
         let older = if self.program == today { String::new() } else { format!(", not repeated with {today}") };
-        format!("`{}`, {}, version {}{older}", self.command, self.cpu_time(), self.program)
+        format!("`{}`, {}, version {}{older}", self.command, cpu_cost(self.cpu_hours), self.program)
     }
 
     /// The origin without Markdown, for pictures and terminals.
     pub fn plain_origin(&self) -> String {
         self.origin().replace('`', "")
+    }
+}
+
+/// CPU time in words (h).
+pub fn cpu_cost(hours: f64) -> String {
+    let minutes = hours * 60.0;
+    if minutes < 2.0 {
+        format!("{:.0} CPU seconds", minutes * 60.0)
+    } else if minutes < 90.0 {
+        format!("{minutes:.0} CPU minutes")
+    } else {
+        format!("{hours:.1} CPU hours")
     }
 }
 

@@ -9,7 +9,7 @@ use crate::frame::{
 use palpate_lab::workers::{Job, JobError, JobFailure, JobRun, Newer, Wake, spare_threads};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A run of a study.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,12 +92,22 @@ fn finish(store: &Path, request: &StudyRequest, draw: &DrawFigure, run: &JobRun<
     if request.anew {
         request.size.folder(store).forget_units(study.card().key)?;
     }
+    // Grasps are simulated between the parts, before the next one: done, all of them, and the largest share so far.
+    let parts = Mutex::new((0, 1, 0.0_f64));
     let progress = |StudyProgress { step, done, of }: StudyProgress| {
-        let words = match step {
-            StudyStep::Collecting => format!("simulating grasps, {done} of {of}"),
-            StudyStep::Measuring => format!("measuring, {done} of {of} parts"),
+        let mut parts = parts.lock().unwrap_or_else(PoisonError::into_inner);
+        let (words, within) = match step {
+            StudyStep::Measuring => {
+                (parts.0, parts.1) = (done, of.max(1));
+                (format!("measuring, {done} of {of} parts"), 0.0)
+            }
+            StudyStep::Collecting => {
+                let words = format!("{} of {} parts; simulating grasps, {done} of {of}", parts.0, parts.1);
+                (words, done as f64 / of.max(1) as f64)
+            }
         };
-        run.count(done, of, words);
+        parts.2 = parts.2.max((parts.0 as f64 + within).min(parts.1 as f64) / parts.1 as f64);
+        run.progress(parts.2, words);
     };
     let work = Measuring { threads: spare_threads(), cancelled: run.stop(), progress: &progress };
     Ok(study.finish(store, request.size, work, draw.as_ref())?)

@@ -161,7 +161,6 @@ impl Study for Drift {
         title: "Drift of sensors",
         about: "recognition with gains and zeros that have drifted since the training, re-zeroed or not, and with hysteresis",
         paper: "section VI, future work",
-        budget: "about 30 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {

@@ -123,7 +123,6 @@ impl Study for Grasps {
         about: "accuracy and F1 after one to eight grasps, put down anew or left as released, by feedback and by product of \
                 experts, and confident stops that are wrong",
         paper: "Fig. 8",
-        budget: "about 30 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {

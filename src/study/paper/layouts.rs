@@ -53,7 +53,6 @@ impl Crossing for Layouts {
         title: "Sensor layouts",
         about: "layouts C1 to C8 of real parts and of contact pressure, with and without force, and the layout with the fewest channels that is as good as the best",
         paper: "Fig. 5a",
-        budget: "about 40 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<SensorView>> {

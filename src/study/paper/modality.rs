@@ -1,6 +1,7 @@
 //! Curvature, pressure, and both (Fig. 5b to 5d).
 
 use super::prelude::*;
+use palpate_sim::objects::titled;
 use palpate_tactile::CATALOGUE;
 
 pub(super) struct Modality;
@@ -60,7 +61,6 @@ impl Crossing for Modality {
         title: "Curvature and pressure",
         about: "curvature alone, pressure alone and both, for each pattern of sensors, and which objects are confused",
         paper: "Fig. 5b to 5d",
-        budget: "about 30 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<Pattern>> {
@@ -139,7 +139,7 @@ fn are_confused([a, b]: [&str; 2], whole: &[(&str, &Pool)]) -> Finding {
         let (share, average) = pool.taken_for_each_other([a, b])?;
         Some((Rule::AllAbove(average), vec![(format!("{sensors}: taken for each other"), share)]))
     });
-    let claim = format!("{a} and {b} are confused, since shape and size are similar");
+    let claim = format!("{} and {} are confused, since shape and size are similar", titled(a), titled(b));
     let rule =
         "Agrees where the 95 % interval of the share is above the average of all pairs, disagrees where it is below";
     Claim("V-B", &claim, rule).on_groups(PERCENT, of_sensors)

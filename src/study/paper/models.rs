@@ -46,7 +46,6 @@ impl Crossing for Models {
         title: "Comparison of methods",
         about: "all methods on the same grasps: macro F1 and accuracy, paired differences, cost of training and answers",
         paper: "Fig. 7",
-        budget: "about 100 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<Balance>> {

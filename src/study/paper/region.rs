@@ -54,7 +54,6 @@ impl Crossing for Region {
         title: "Where the comparison holds",
         about: "the paper's network, strict and tuned, beside a single LSTM, a forest and RUSBoost: poses that vary little or much (presets A, M, B), 20 to 200 training grasps, one fit each",
         paper: "section V-D",
-        budget: "about 120 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<Case>> {

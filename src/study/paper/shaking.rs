@@ -106,7 +106,6 @@ impl Study for Shaken {
         title: "Shaking",
         about: "what inertia adds to recognition: held still, lifted, shaken; the objects, and objects that differ in mass alone",
         paper: "section VII, future work",
-        budget: "about 50 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Case> {

@@ -109,7 +109,6 @@ impl Study for Stages {
         title: "Two stages",
         about: "confusions of size and shape in stage one, and stage two with size, shape, both, the true ones or none",
         paper: "Fig. 6a and 6b",
-        budget: "about 20 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Self::Cell> {

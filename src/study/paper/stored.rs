@@ -36,7 +36,7 @@ pub(crate) fn sections() -> Result<Vec<GeneratedSection>, serde_json::Error> {
 fn overview() -> String {
     let rows = PAPER_STUDIES.iter().map(|study| {
         let card = study.card();
-        [format!("`{}`", card.key).as_str(), card.about, card.paper, card.budget].map(str::to_owned).to_vec()
+        [format!("`{}`", card.key).as_str(), card.about, card.paper, &card.cost()].map(str::to_owned).to_vec()
     });
     markdown_table(&["study", "shows", "paper", "cost of the full form"], &rows.collect::<Vec<_>>())
 }

@@ -47,7 +47,6 @@ impl Crossing for TrainingSize {
         title: "Size of the training set",
         about: "models over 5 to 800 training grasps of each object (networks and noisy SVMs to fewer), and the fewest that are enough",
         paper: "Fig. 6c",
-        budget: "about 140 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Fit<usize>> {

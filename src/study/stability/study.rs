@@ -38,7 +38,6 @@ pub(crate) const LISTED: PlainStudy<StabilityPlan> = PlainStudy {
         title: "Stability",
         about: "hard cases of the simulation with their limits, holds that chatter, and how many random scenes end wrongly without a flag",
         paper: OWN_PHYSICS,
-        budget: "about 60 CPU minutes",
     },
     of_size: |size| {
         Ok(match size {

@@ -15,6 +15,8 @@ use std::sync::Arc;
 
 /// Room that the buttons of all edits need; with less they are in a menu (points).
 const WHOLE: f32 = 280.0;
+/// Room that the buttons need beside how many are selected; with less, one is not counted (points).
+const COUNTED: f32 = 220.0;
 /// Width of a menu (points).
 const MENU: f32 = 200.0;
 /// Height of what a menu offers below its field (points).
@@ -31,7 +33,9 @@ pub(super) fn ui(
     let gone = trials.iter().all(|trial| trial.row.deleted.is_some());
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
-        ui.strong(format!("{} selected", trials.len()));
+        if trials.len() > 1 || ui.available_width() > COUNTED {
+            ui.strong(format!("{} selected", trials.len()));
+        }
         if gone {
             actions.on(&ui.button("Restore"), |app| app.library.edit(TrialEdit::Restore));
             return;

@@ -12,52 +12,68 @@ use palpate_tactile::trial::TrialSource;
 
 pub(super) fn ui(ui: &mut Ui, query: &TrialQuery, view: &LibraryView, actions: &mut Actions) {
     let mut wanted = query.clone();
+    let low = ui.available_height() < LOW;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
-        ui.menu_button("Filter", |ui| menu_ui(ui, view, &mut wanted)).response.on_hover_text("Show some trials only");
+        let filter = ui.menu_button("Filter", |ui| {
+            if low {
+                usual_ui(ui, view, &mut wanted, true);
+                ui.separator();
+            }
+            menu_ui(ui, view, &mut wanted);
+        });
+        filter.response.on_hover_text("Show some trials only");
         if ui.available_width() < columns::TABLE {
             ui.menu_button("Sort", |ui| order_ui(ui, &mut wanted.order)).response.on_hover_text("Order of the list");
         }
-        for (name, days) in [("today", [Some(0), None]), ("yesterday", [Some(1), Some(1)])] {
-            let [since, until] = days.map(|ago| ago.map(Day::Ago));
-            let set = query.since == since && query.until == until;
-            if ui.selectable_label(set, small(name)).clicked() {
-                [wanted.since, wanted.until] = if set { [None, None] } else { [since, until] };
-            }
-        }
-        let counts = &view.counts;
-        if query.unlabelled || counts.unlabelled > 0 {
-            let text = format!("unlabelled {}", counts.unlabelled);
-            if ui.selectable_label(query.unlabelled, small(&text)).clicked() {
-                wanted.unlabelled = !query.unlabelled;
-            }
-        }
-        let logged = query.place == Some(TrialPlace::DemoLog);
-        if logged || counts.demo_log > 0 {
-            let text = format!("demo log {}", counts.demo_log);
-            let hint = "Grasps of demos; newer ones push them out. K keeps the selected ones";
-            if ui.selectable_label(logged, small(&text)).on_hover_text(hint).clicked() {
-                wanted.place = (!logged).then_some(TrialPlace::DemoLog);
-            }
-        }
-        if counts.collected > 0 {
-            let text = format!("data sets {}", counts.collected);
-            let hint = "Show trials of data sets, too: grasps that studies and palpate collect simulated";
-            if ui.selectable_label(!query.without_collected, small(&text)).on_hover_text(hint).clicked() {
-                wanted.without_collected = !query.without_collected;
-            }
-        }
-        let gone = query.shown == Shown::Discarded;
-        if gone || counts.discarded > 0 {
-            let text = format!("discarded {}", counts.discarded);
-            if ui.selectable_label(gone, small(&text)).clicked() {
-                wanted.shown = if gone { Shown::Kept } else { Shown::Discarded };
-            }
-        }
+        usual_ui(ui, view, &mut wanted, !low);
         set_ui(ui, &mut wanted);
     });
     if wanted != *query {
         actions.push(|app| app.library.find(wanted));
+    }
+}
+
+/// Height of a library that has the usual filters in its menu, and only those that are set above its rows (points).
+const LOW: f32 = 330.0;
+
+/// The usual filters: all, or those that are set.
+fn usual_ui(ui: &mut Ui, view: &LibraryView, wanted: &mut TrialQuery, all: bool) {
+    for (name, days) in [("today", [Some(0), None]), ("yesterday", [Some(1), Some(1)])] {
+        let [since, until] = days.map(|ago| ago.map(Day::Ago));
+        let set = wanted.since == since && wanted.until == until;
+        if (set || all) && ui.selectable_label(set, small(name)).clicked() {
+            [wanted.since, wanted.until] = if set { [None, None] } else { [since, until] };
+        }
+    }
+    let counts = &view.counts;
+    if wanted.unlabelled || all && counts.unlabelled > 0 {
+        let text = format!("unlabelled {}", counts.unlabelled);
+        if ui.selectable_label(wanted.unlabelled, small(&text)).clicked() {
+            wanted.unlabelled = !wanted.unlabelled;
+        }
+    }
+    let logged = wanted.place == Some(TrialPlace::DemoLog);
+    if logged || all && counts.demo_log > 0 {
+        let text = format!("demo log {}", counts.demo_log);
+        let hint = "Grasps of demos; newer ones push them out. K keeps the selected ones";
+        if ui.selectable_label(logged, small(&text)).on_hover_text(hint).clicked() {
+            wanted.place = (!logged).then_some(TrialPlace::DemoLog);
+        }
+    }
+    if counts.collected > 0 && (all || !wanted.without_collected) {
+        let text = format!("data sets {}", counts.collected);
+        let hint = "Show trials of data sets, too: grasps that studies and palpate collect simulated";
+        if ui.selectable_label(!wanted.without_collected, small(&text)).on_hover_text(hint).clicked() {
+            wanted.without_collected = !wanted.without_collected;
+        }
+    }
+    let gone = wanted.shown == Shown::Discarded;
+    if gone || all && counts.discarded > 0 {
+        let text = format!("discarded {}", counts.discarded);
+        if ui.selectable_label(gone, small(&text)).clicked() {
+            wanted.shown = if gone { Shown::Kept } else { Shown::Discarded };
+        }
     }
 }
 

@@ -42,10 +42,11 @@ pub(super) fn ui(
     let seen = ui.scope_id().with("rows");
     let mut list = ScrollArea::vertical().auto_shrink(false);
     let before = ui.data(|data| data.get_temp::<Seen>(seen)).unwrap_or_default();
-    let mut now = Seen { rows: 0..0, cursor: picked.cursor, shown: picked.shown, query: view.query.clone() };
+    let room = ui.available_height();
+    let mut now = Seen { rows: 0..0, room, cursor: picked.cursor, shown: picked.shown, query: view.query.clone() };
     // One that is not in the list yet is new when it comes.
     now.shown = now.shown.filter(|id| view.found.iter().any(|trial| trial.row.id == *id));
-    if let Some(offset) = scroll_offset(ui, &before, &now, view, height) {
+    if let Some(offset) = scroll_offset(&before, &now, view, height) {
         list = list.vertical_scroll_offset(offset);
     }
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
@@ -68,6 +69,8 @@ pub(super) fn ui(
 #[derive(Clone, Default)]
 struct Seen {
     rows: Range<usize>,
+    /// Height of the list (points).
+    room: f32,
     cursor: Option<TrialId>,
     shown: Option<TrialId>,
     query: TrialQuery,
@@ -87,16 +90,20 @@ fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, a
 }
 
 /// Offset that brings a newly selected trial into sight, or else one that is newly shown, also in another list.
-fn scroll_offset(ui: &Ui, before: &Seen, now: &Seen, view: &LibraryView, height: f32) -> Option<f32> {
+fn scroll_offset(before: &Seen, now: &Seen, view: &LibraryView, height: f32) -> Option<f32> {
     let cursor = now.cursor.filter(|_| now.cursor != before.cursor);
-    let wanted = cursor.or(now.shown.filter(|_| (now.shown, &now.query) != (before.shown, &before.query)))?;
-    let place = view.found.iter().position(|trial| trial.row.id == wanted)?;
-    if (before.rows.start + 1..before.rows.end.saturating_sub(1)).contains(&place) {
+    let place_of = |id: TrialId| view.found.iter().position(|trial| trial.row.id == id);
+    // What is above or below has grown: one that was in sight stays there.
+    let lower = now.room < before.room;
+    let stays = |id: &TrialId| lower && place_of(*id).is_some_and(|place| before.rows.contains(&place));
+    let is_new = (now.shown, &now.query) != (before.shown, &before.query);
+    let wanted = cursor.or(now.shown.filter(|_| is_new)).or(now.shown.filter(stays))?;
+    let place = place_of(wanted)?;
+    if !lower && (before.rows.start + 1..before.rows.end.saturating_sub(1)).contains(&place) {
         return None;
     }
-    let room = ui.available_height();
     let at = place as f32 * height;
-    Some(if place <= before.rows.start { at } else { (at + height - room).max(0.0) })
+    Some(if place <= before.rows.start { at } else { (at + height - now.room).max(0.0) })
 }
 
 /// Titles of columns; a click sorts.
@@ -294,13 +301,13 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): 
     let width_of = |text: &str, size: f32| {
         ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(size), quiet).size().x
     };
-    // The name comes before the time of day, and that before the day: the hint has them.
+    // The name comes first; what is left of the date begins the second line.
     let room = words.width() - width_of(&name, 13.5) - GAP;
     let day = date.split(' ').next().unwrap_or_default();
-    let date = [date.as_str(), day].into_iter().find(|text| width_of(text, 11.5) <= room).unwrap_or_default();
-    let width = width_of(date, 11.5);
+    let said = [date.as_str(), day].into_iter().find(|text| width_of(text, 11.5) <= room).unwrap_or_default();
+    let width = width_of(said, 11.5);
     let upper = Rect::from_min_max(words.min, pos2(words.right(), words.center().y));
-    text(ui, upper, Align2::RIGHT_CENTER, date, 11.5, quiet);
+    text(ui, upper, Align2::RIGHT_CENTER, said, 11.5, quiet);
     let title = Rect::from_min_max(upper.min, pos2(upper.right() - width - GAP, upper.bottom()));
     let ink_of = |column: TrialColumn| colour(ink(&colours, trial, column));
     text(ui, title, Align2::LEFT_CENTER, &name, 13.5, ink_of(TrialColumn::Object));
@@ -315,7 +322,8 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): 
     let preset = trial.row.preset.map(|name| format!("preset {name}")).unwrap_or_default();
     let tags: String = trial.row.tags.iter().map(|tag| format!("#{tag} ")).collect();
     let number = format!("no {}", trial.row.id);
-    let parts = [number, cell(view, trial, TrialColumn::Source), preset, tags, trial.row.note.clone()];
+    let time = date[said.len()..].to_owned();
+    let parts = [time, number, cell(view, trial, TrialColumn::Source), preset, tags, trial.row.note.clone()];
     let parts: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
     let rest = Rect::from_min_max(pos2(left, lower.top()), lower.max);
     text(ui, rest, Align2::LEFT_CENTER, &parts.join("  \u{b7}  "), 11.5, quiet);

@@ -120,11 +120,7 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     } else {
         "Its grasps are not kept."
     };
-    // Measured where the full run comes with the program, as below its figure.
-    let results = || studies.files(key).into_iter().flat_map(|files| &files.results);
-    let measured = results().find(|result| result.origin.is_like(StudyOrigin::Shipped));
-    let budget = measured.map_or_else(|| card.budget.to_owned(), |own| format!("about {}", own.stored.cpu_time()));
-    let cost = format!("In full: {budget}. Quick: less than a minute, not to be quoted. {kept}");
+    let cost = format!("In full: {}. Quick: fewer grasps, not to be quoted. {kept}", card.cost());
     wrapped(ui, RichText::new(cost).small().weak());
     let running = progress(studies, key);
     if let Some(JobProgress { share, words }) = &running {

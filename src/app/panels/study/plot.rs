@@ -16,7 +16,7 @@ const NEAR: f32 = 12.0;
 const ROW: f32 = 15.0;
 const AROUND: f32 = 64.0;
 /// Least and largest height of other plots (points).
-const HEIGHTS: [f32; 2] = [190.0, 380.0];
+const HEIGHTS: [f32; 2] = [140.0, 380.0];
 
 /// Labelled points of a plot up to which the labels are shown.
 const MOST_LABELS: usize = 8;

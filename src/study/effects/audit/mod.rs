@@ -41,7 +41,6 @@ pub(crate) const LISTED: PlainStudy<EffectAudit> = PlainStudy {
         title: "Effects that auto leaves off",
         about: "random scenes with each physical effect flipped: what the rules that switch effects on miss, and what effects cost",
         paper: OWN_PHYSICS,
-        budget: "about 2 CPU minutes",
     },
     of_size: |size| {
         let scenes = match size {

@@ -108,7 +108,7 @@ impl AuditReport {
     pub(super) fn figure(&self) -> LinkedFigure {
         let line = |horizontal: bool, text: &str| ReferenceLine { horizontal, at: 1.0, text: text.to_owned() };
         let axes = Plot {
-            x: PlotAxis { range: Some([1e-3, 1e3]), ..PlotAxis::logarithmic("number of the rule / threshold") },
+            x: PlotAxis::logarithmic("number of the rule / threshold"),
             y: PlotAxis::logarithmic("change / visible change (0.1 1/m, 10 mN)"),
             references: vec![line(true, "seen"), line(false, "on from here")],
             ..Plot::default()

@@ -167,7 +167,6 @@ impl Study for Recognition {
         title: "Recognition beyond the paper",
         about: "trees and networks that know geometry, the shipped models, unknown grippers without labels, and unknown objects",
         paper: OWN_METHODS,
-        budget: "about 120 CPU minutes",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Case> {

@@ -202,7 +202,6 @@ impl Study for TactileSignatures {
         title: "Tactile signatures",
         about: "bending and pressure before and after contact; which of the paper's sentences hold, and for what finger",
         paper: "Fig. 4a",
-        budget: "about 1 CPU minute",
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Unit> {
