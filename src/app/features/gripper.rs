@@ -136,6 +136,7 @@ impl App {
                 self.notices.done("gripper");
             }
             self.view.source = if now.is_connected() { ViewSource::Gripper } else { ViewSource::Simulation };
+            self.labelling.show_again();
         }
         let followed = match self.view.source {
             ViewSource::Simulation => false,

@@ -261,6 +261,7 @@ impl App {
 
     /// Grasps another built-in object, drawn at random.
     pub(super) fn open_next(&mut self) {
+        self.dismiss_learned();
         let next = self.simulation.shuffled.next(&self.simulation.scene.object.source);
         self.open(next);
         self.simulation.send(Command::Play);

@@ -13,6 +13,7 @@ use palpate_lab::workers::{
     GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
 };
 use palpate_sim::objects::{catalogue, object_title};
+use palpate_store::Change;
 use palpate_store::labels::{LabelledTrial, NextTrial, TrialEdit};
 
 /// Height of the panel below which objects to choose stand in two columns (points).
@@ -143,9 +144,12 @@ fn stage_ui(ui: &mut Ui, trial: &TrialView) {
     ui.weak(format!("{}: {} readings", trial.title(), trial.samples));
 }
 
-/// Last label, with the model's prediction.
+/// Last label that was given, with the model's prediction.
 fn last_ui(ui: &mut Ui, view: &LabelView) {
-    let last = view.trials.iter().find(|trial| !trial.discarded && trial.object.is_some());
+    let mut changes = view.journal.iter().filter(|entry| matches!(entry.change, Change::Label { .. }));
+    let is_labelled = |trial: &&LabelledTrial| !trial.discarded && trial.object.is_some();
+    let given = changes.find_map(|entry| view.trial(entry.trial?)).filter(is_labelled);
+    let last = given.or_else(|| view.trials.iter().find(is_labelled));
     let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
     let (colours, title) = (theme::of(ui).colours(), object_title(label));
     let (text, ink) = match &trial.guess {

@@ -205,13 +205,13 @@ impl Identification {
         self.closed = true;
     }
 
-    /// Continues after grasps that this model judged before; without effect on those of another model.
-    pub fn resume(&mut self, earlier: &EarlierGrasps) {
-        if earlier.model == self.model.card.described()
-            && let Some(belief) = Belief::resumed(&earlier.judged, self.labels.classes.len())
-        {
-            self.belief = belief;
-        }
+    /// Continues after grasps that this model judged before; false, and without effect, after those of another model.
+    pub fn resume(&mut self, earlier: &EarlierGrasps) -> bool {
+        let same = earlier.model == self.model.card.described();
+        let resumed = same.then(|| Belief::resumed(&earlier.judged, self.labels.classes.len())).flatten();
+        let resumes = resumed.is_some();
+        resumed.into_iter().for_each(|belief| self.belief = belief);
+        resumes
     }
 
     /// The grasps so far, for [`Self::resume`]; none before the first.

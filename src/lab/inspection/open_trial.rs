@@ -10,7 +10,7 @@ use palpate_geometry::Pose;
 use palpate_learn::{Model, Models, Shipped, StopRule};
 use palpate_sim::frame::{Frame, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Phase, Side};
-use palpate_sim::objects::{EMPTY, object_title};
+use palpate_sim::objects::{EMPTY, capital_title};
 use palpate_store::Store;
 use palpate_tactile::board::{Board, Gap, SensorKind};
 use palpate_tactile::trial::{
@@ -18,6 +18,9 @@ use palpate_tactile::trial::{
 };
 use palpate_tactile::{Channel, LayoutError, Quantity, Sensors, Signals, unit_of_channel};
 use std::sync::Arc;
+
+/// What is said about a trial whose answer lacks the grasps before it.
+const OTHER_MODEL: &str = "The answer is to this grasp alone: another model judged those before it.";
 
 /// How a trial is opened.
 #[derive(Clone, Debug, Default)]
@@ -163,7 +166,7 @@ impl OpenTrial {
             created,
             title: match header.object.as_str() {
                 "" => "unlabelled".to_owned(),
-                name => object_title(name),
+                name => capital_title(name),
             },
             header,
             sensors: SensorView::default(),
@@ -242,8 +245,8 @@ impl OpenTrial {
         reader.add(&more);
         let rows = self.rows_of(&data.frames, &reader, options);
         if let Some(identification) = &mut identification {
-            if let Some(earlier) = &self.header.earlier {
-                identification.resume(earlier);
+            if self.header.earlier.as_ref().is_some_and(|earlier| !identification.resume(earlier)) {
+                self.remarks.push(OTHER_MODEL.to_owned());
             }
             let names = reader.channels().iter().map(Channel::name).enumerate();
             let off = identification.begin_grasp(names).err().map(|cause| cause.to_string());

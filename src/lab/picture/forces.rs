@@ -25,12 +25,10 @@ const FULL_SCALE: f64 = 0.5;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Least height of a picture with numbers, and with a plate for each finger; least size with numbers of friction, and height
-/// with a key (points).
+/// Least height of a picture with numbers, with a plate for each finger, and with friction and a key (points).
 const LEAST_HEIGHT: f32 = 150.0;
 const APART: f32 = 250.0;
-const WITH_FRICTION: Vec2 = Vec2::new(600.0, 250.0);
-const WITH_KEY: f32 = 320.0;
+const HIGH: f32 = 320.0;
 
 /// Colour of friction; that of a force across the pad comes from the map of pressures.
 fn friction_colour(theme: Theme) -> Rgb {
@@ -57,6 +55,11 @@ impl Forces {
     }
 }
 
+/// The friction that a picture shows: a low one has no room for its number.
+fn shown_friction(forces: &Forces, view: &PictureView) -> Option<DVec3> {
+    forces.friction.filter(|_| view.size.y >= HIGH && !view.plain)
+}
+
 /// Arrows along the forces that the object exerts on the fingers.
 pub(super) fn arrows(
     gripper: &GripperModel,
@@ -72,7 +75,7 @@ pub(super) fn arrows(
             arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
         };
         arrow(forces.normal, forces.normal_colour());
-        if let Some(friction) = forces.friction.filter(|_| !view.plain) {
+        if let Some(friction) = shown_friction(&forces, view) {
             arrow(friction, friction_colour(view.theme));
         }
     }
@@ -104,7 +107,7 @@ const KEY_MIDDLE: f32 = 17.0;
 /// An arrow of a known force above the scale bar, where there is room.
 pub(super) fn add_key(annotator: &mut Annotator<'_>) {
     let view = annotator.view;
-    if !shows_legends(view) || view.size.y < WITH_KEY {
+    if !shows_legends(view) || view.size.y < HIGH {
         return;
     }
     let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
@@ -138,8 +141,9 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         view.camera.project(from, view.size).zip(view.camera.project(to, view.size))
     };
     for forces in &all {
-        let friction = forces.friction.filter(|_| !view.plain);
-        for (from, to) in std::iter::once(forces.normal).chain(friction).filter_map(|force| ends(forces, force)) {
+        for (from, to) in
+            std::iter::once(forces.normal).chain(shown_friction(forces, view)).filter_map(|force| ends(forces, force))
+        {
             annotator.keep_clear(from, to);
         }
     }
@@ -155,9 +159,8 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         };
         let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
         let name = if view.plain || view.size.y < APART { "" } else { "normal " };
-        // A small picture has room for one line.
-        let friction = forces.friction.filter(|_| view.size.cmpge(WITH_FRICTION).all() && !view.plain);
-        let friction = friction.map(|force| (text("friction ", force), friction_colour(view.theme)));
+        let friction =
+            shown_friction(forces, view).map(|force| (text("friction ", force), friction_colour(view.theme)));
         std::iter::once((text(name, forces.normal), view.theme.colours().text)).chain(friction).collect()
     };
     for group in all.chunks(if view.size.y < APART { 2 } else { 1 }) {
