@@ -85,13 +85,13 @@ pub fn message(text: &str) -> String {
     capital(&said)
 }
 
-/// A printed number with a true minus; without one where it is zero. Nothing printed is a dash.
+/// A printed number with a true minus; without a sign where it is zero. Nothing printed is a dash.
 pub fn true_minus(text: &str) -> String {
-    match text.strip_prefix('-') {
-        Some("") => "–".to_owned(),
-        Some(size) if size.chars().all(|c| c == '0' || c == '.') => size.to_owned(),
-        Some(size) => format!("\u{2212}{size}"),
-        None => text.to_owned(),
+    match text.trim_start_matches(['-', '+']) {
+        "" => "–".to_owned(),
+        size if size.chars().all(|c| c == '0' || c == '.') => size.to_owned(),
+        size if text.starts_with('-') => format!("\u{2212}{size}"),
+        _ => text.to_owned(),
     }
 }
 

@@ -66,9 +66,12 @@ fn trials_travel_through_mcap_and_npz() {
     for name in ["t_s", "curvature_left", "force_right"] {
         assert_eq!(column(&at.join("own.csv"), name), column(&other.join("came.csv"), name), "{name}");
     }
-    // Without poses, the fingers are arcs of the curvature that was read, and it is said so.
+    // Without poses, the fingers are drawn by the curvature that was read, and it is said so.
     let drawn = run(&other, &["snapshot", "--trial", "1", "--at", "1.2", "--size", "320x200", "--out", "arcs.png"]);
-    assert!(drawn.code == Some(0) && drawn.err.contains("Fingers are arcs of the strips' curvature"), "{drawn:?}");
+    assert!(
+        drawn.code == Some(0) && drawn.err.contains("Fingers as their flex strips read, without the object."),
+        "{drawn:?}"
+    );
     // Twice is once.
     let again = run(&other, &["trials", "import", "../both.mcap"]);
     assert!(again.out.contains("0 trial(s) added"), "{again:?}");

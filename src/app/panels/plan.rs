@@ -59,7 +59,7 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
         let painter = ui.painter_at(rect);
         let lit = if response.hovered() || response.has_focus() { 0.12 } else { 0.0 };
         painter.rect_filled(rect, 3.0, colour(colours.raised.mix(colours.accent, lit)));
-        let chosen = name.clone();
+        let chosen = object.next();
         actions.on(&response.on_hover_text(format!("{spoken}. Record it next")), move |app| {
             app.edit_labels(LabelCommand::Next(chosen));
         });

@@ -403,7 +403,7 @@ fn overlay_ui(painter: &egui::Painter, corner: Pos2, overlay: &Overlay, letters:
 /// Height of axes and scale bar at the foot of the picture, and their width with the gaps (points).
 const FOOT: f32 = 26.0;
 const BESIDE: f32 = 216.0;
-/// Height of a picture from which captions have room for all they say (points).
+/// Height of a picture from which a caption clears axes and scale bar (points).
 const LOW: f32 = 220.0;
 
 /// A line at the foot of the picture, between axes and scale bar; of a ghost with its colour.
@@ -411,12 +411,10 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
     let ink = colour(theme.colours().text);
     let swatch = if ghost.is_some() { 18.0 } else { 0.0 };
     let width = (rect.width() - BESIDE).max(80.0);
-    // A low picture has room for the first clause, below the fingers.
-    let low = rect.height() < LOW;
-    let text = if low { text.split(';').next().unwrap_or_default().to_owned() } else { text };
     let galley = ui.painter().layout(text, egui::FontId::proportional(12.0), ink, width);
     let size = galley.size() + egui::vec2(swatch, 0.0);
-    let foot = if low { 0.0 } else { FOOT };
+    // In a low picture below the fingers.
+    let foot = if rect.height() < LOW { 0.0 } else { FOOT };
     let middle = rect.center_bottom() - egui::vec2(0.0, foot.max(0.5 * size.y + 8.0));
     let ground = Rect::from_center_size(middle, size).expand(4.0);
     ui.painter().rect_filled(ground, 4.0, veil(theme.colours().background, 0.7));

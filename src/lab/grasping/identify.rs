@@ -209,9 +209,9 @@ impl Identification {
     pub fn resume(&mut self, earlier: &EarlierGrasps) -> bool {
         let same = earlier.model == self.model.card.described();
         let resumed = same.then(|| Belief::resumed(&earlier.judged, self.labels.classes.len())).flatten();
-        let resumes = resumed.is_some();
-        resumed.into_iter().for_each(|belief| self.belief = belief);
-        resumes
+        let Some(belief) = resumed else { return false };
+        self.belief = belief;
+        true
     }
 
     /// The grasps so far, for [`Self::resume`]; none before the first.

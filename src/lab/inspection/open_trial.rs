@@ -447,7 +447,7 @@ impl OpenTrial {
             if options.keep >= Keep::Scenery {
                 self.stage = Some(Arc::new(Stage::new(&self.header.scene, None, resting_pose(&self.header))));
             }
-            self.remarks.push("Fingers are arcs of the strips' curvature; the object is not drawn.".to_owned());
+            self.remarks.push("Fingers as their flex strips read, without the object.".to_owned());
         }
     }
 }

@@ -15,14 +15,13 @@ const WORTH_NAMING: f64 = 1.0;
 /// Most parts named for or against.
 const MOST_NAMED: usize = 3;
 
-/// Between a channel and the phase in which it speaks most.
-const MOSTLY: &str = ", mostly ";
-
 /// Part of a grasp and its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
-    /// The part: `left pad pressure in the hold`.
+    /// The part: `left pad pressure`.
     pub part: String,
+    /// Phase that has more than half of it: `in the hold`.
+    pub mostly: Option<&'static str>,
     /// Its evidence.
     pub evidence: Evidence,
 }
@@ -38,37 +37,38 @@ impl Attribution {
     /// Strongest reasons for and against the first class, strongest first: channels, each with the phase in which it speaks
     /// most, or, where no channel counts alone, whole phases.
     pub fn reasons(&self) -> [Vec<Reason>; 2] {
-        let channels = self.by_channel.iter().enumerate();
-        let channels: Vec<(String, Evidence)> = channels.map(|(c, own)| (self.channel_part(c, own), *own)).collect();
-        let phases = self.by_phase.iter().zip(&self.phases);
-        let phases: Vec<(String, Evidence)> =
-            phases.map(|(own, span)| (format!("all channels {}", phase_words(span)), *own)).collect();
+        let channels: Vec<Reason> = (0..self.channels.len()).map(|channel| self.channel_reason(channel)).collect();
+        let of_phase = |(own, span): (&Evidence, &PhaseSpan)| Reason {
+            part: format!("all channels {}", phase_words(span)),
+            mostly: None,
+            evidence: *own,
+        };
+        let phases: Vec<Reason> = self.by_phase.iter().zip(&self.phases).map(of_phase).collect();
         [1.0, -1.0].map(|sign: f64| {
             let found = strongest(&channels, sign);
             if found.is_empty() { strongest(&phases, sign) } else { found }
         })
     }
 
-    /// A channel, and the phase that has more than half of it: `left pad pressure, mostly in the hold`; where the
-    /// pad touches nothing then, its silence is what spoke: `no left pad pressure yet, mostly while pre-shaping`.
-    fn channel_part(&self, channel: usize, own: &Evidence) -> String {
-        let most = self.by_both[channel].iter().position(|both| both.points / own.points > 0.5);
+    /// A channel; where its pad touches nothing in the phase that has most of it, its silence spoke: `no left pad pressure yet`.
+    fn channel_reason(&self, channel: usize) -> Reason {
+        let evidence = self.by_channel[channel];
+        let most = self.by_both[channel].iter().position(|both| both.points / evidence.points > 0.5);
         let name = channel_words(&self.channels[channel]);
-        let Some(phase) = most else { return name };
-        let span = &self.phases[phase];
-        let name = match self.unloaded[channel][phase] {
-            false => name,
-            true if span.phase < TouchPhase::Hold => format!("no {name} yet"),
-            true => format!("no {name}"),
+        let part = match most {
+            Some(phase) if self.unloaded[channel][phase] && self.phases[phase].phase < TouchPhase::Hold => {
+                format!("no {name} yet")
+            }
+            Some(phase) if self.unloaded[channel][phase] => format!("no {name}"),
+            _ => name,
         };
-        format!("{name}{MOSTLY}{}", phase_words(span))
+        Reason { part, mostly: most.map(|phase| phase_words(&self.phases[phase])), evidence }
     }
 
     /// The strongest reason for the first class in few words, without its phase, or that there is no single one.
     pub fn because(&self) -> String {
         let [spoke_for, _] = self.reasons();
-        let first = spoke_for.first().and_then(|reason| reason.part.split(MOSTLY).next());
-        first.unwrap_or("no single part decides").to_owned()
+        spoke_for.into_iter().next().map_or_else(|| "no single part decides".to_owned(), |reason| reason.part)
     }
 
     /// Reasons in sentences: what spoke for the first class, and what against it.
@@ -81,7 +81,8 @@ impl Attribution {
                 .enumerate()
                 .map(|(k, reason)| {
                     let unit = if k == 0 { " percentage points" } else { "" };
-                    format!("{} ({}{unit})", reason.part, points_words(reason.evidence.points))
+                    let mostly = reason.mostly.map(|phase| format!(", mostly {phase}")).unwrap_or_default();
+                    format!("{}{mostly} ({}{unit})", reason.part, points_words(reason.evidence.points))
                 })
                 .collect();
             parts.join(", ")
@@ -103,10 +104,9 @@ impl Attribution {
     }
 }
 
-fn strongest(parts: &[(String, Evidence)], sign: f64) -> Vec<Reason> {
-    let strong = parts.iter().filter(|(_, evidence)| sign * evidence.points >= WORTH_NAMING);
-    let mut found: Vec<Reason> =
-        strong.map(|(part, evidence)| Reason { part: part.clone(), evidence: *evidence }).collect();
+fn strongest(parts: &[Reason], sign: f64) -> Vec<Reason> {
+    let strong = parts.iter().filter(|part| sign * part.evidence.points >= WORTH_NAMING);
+    let mut found: Vec<Reason> = strong.cloned().collect();
     found.sort_by(|a, b| (sign * b.evidence.points).total_cmp(&(sign * a.evidence.points)));
     found.truncate(MOST_NAMED);
     found
@@ -196,7 +196,7 @@ mod tests {
         let let_go =
             Attribution { unloaded: vec![vec![false, true]; 2], ..found([12.0, 0.0], [[0.0, 12.0], [0.0; 2]]) };
         assert_eq!(let_go.because(), "no left pad pressure");
-        assert_eq!(let_go.reasons()[0][0].part, "no left pad pressure, mostly in the hold");
+        assert_eq!(let_go.reasons()[0][0].mostly, Some("in the hold"));
         // Where no phase has more than half, none is named.
         assert_eq!(found([12.0, 0.0], [[0.2; 2]; 2]).because(), "left pad pressure");
         // Neither a channel nor a phase changes the answer by a point; a channel in one phase would, beside its others.

@@ -29,8 +29,8 @@ pub enum LabelCommand {
     Want(String, u32),
     /// Remove an object from the plan; its trials stay.
     Unplan(String),
-    /// Record this object of the plan next, until a trial has it as its label.
-    Next(String),
+    /// Record this trial of the plan next.
+    Next(NextTrial),
 }
 
 /// Contents of the store, for display.
@@ -97,8 +97,8 @@ struct LabelService {
     store: OwnStore,
     /// What the view shows, as [`palpate_store::LabelRepository::revision`] counts.
     seen: Option<LabelRevision>,
-    /// Object that was chosen as the next one; in the first view since, with its trials.
-    chosen: Option<(String, Option<u32>)>,
+    /// The next trial that was chosen, until it is recorded.
+    chosen: Option<NextTrial>,
 }
 
 impl LabelService {
@@ -126,8 +126,8 @@ impl LabelService {
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "Nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
-            LabelCommand::Next(name) => {
-                self.chosen = Some((name.clone(), None));
+            LabelCommand::Next(next) => {
+                self.chosen = Some(next.clone());
                 Ok(None)
             }
         };
@@ -141,12 +141,8 @@ impl LabelService {
         let progress = store.labels().plan()?.progress(&trials);
         trials.sort_by_key(|trial| std::cmp::Reverse(trial.id));
         let last = trials.iter().find(|trial| trial.counts()).and_then(|trial| trial.object.as_deref());
-        let chosen = self.chosen.take().and_then(|(name, done)| {
-            let object = progress.objects.iter().find(|object| object.name == name)?;
-            (done.unwrap_or(object.done) == object.done).then_some(object)
-        });
-        self.chosen = chosen.map(|object| (object.name.clone(), Some(object.done)));
-        let next = chosen.map(|object| object.next()).or_else(|| progress.next(last));
+        self.chosen.take_if(|chosen| !progress.objects.iter().any(|object| object.next() == *chosen));
+        let next = self.chosen.clone().or_else(|| progress.next(last));
         let journal = store.journal().entries(ENTRIES)?;
         self.seen = Some(seen);
         Ok(LabelView { disagreements: disagreements(&trials), trials, progress, next, journal })
@@ -216,14 +212,16 @@ mod tests {
         shown(&labels, &woken, |view| view.progress.done() == 0 && view.unlabelled().is_some());
         told_of(&labels, &woken, is_done("Undone: ", String::new()));
         labels.send(LabelCommand::Want("mug".to_owned(), 3));
-        shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
+        let planned =
+            shown(&labels, &woken, |view| view.progress.objects.iter().any(|o| o.name == "mug" && o.wanted == 3));
         // One that is chosen is the next until it is recorded.
-        labels.send(LabelCommand::Next("mug".to_owned()));
+        let mug = planned.progress.objects.iter().find(|object| object.name == "mug").expect("planned");
+        labels.send(LabelCommand::Next(mug.next()));
         let is_next =
             |view: &LabelView| view.next.as_ref().is_some_and(|next| next.object == "mug" && next.number == 1);
         shown(&labels, &woken, is_next);
         labels.send(LabelCommand::Edit(ids[1], TrialEdit::Label(EMPTY.to_owned())));
-        shown(&labels, &woken, |view| is_next(view) && view.unlabelled().is_none());
+        shown(&labels, &woken, |view| is_next(view) && view.unlabelled().is_some_and(|trial| trial.id == ids[0]));
         labels.send(LabelCommand::Edit(ids[1], TrialEdit::Label("mug".to_owned())));
         shown(&labels, &woken, |view| !is_next(view) && view.next.as_ref().is_some_and(|next| next.object != "mug"));
         labels.send(LabelCommand::Want("mug".to_owned(), 0));

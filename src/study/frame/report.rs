@@ -3,7 +3,7 @@
 use super::groups::unique;
 use super::stored_study::markdown_table;
 use palpate_geometry::drawing::Figure;
-use palpate_geometry::units::three_digits;
+use palpate_geometry::units::{fixed, three_digits, true_minus};
 use palpate_learn::metrics::Interval;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
@@ -272,10 +272,10 @@ impl Cell {
     pub fn shown(&self, unit: &str) -> String {
         let scale = if [PERCENT, POINTS].contains(&unit) { 100.0 } else { 1.0 };
         let number = |value: f64| match unit {
-            PERCENT => unsigned_zero(format!("{:.1}", scale * value)),
-            POINTS => unsigned_zero(format!("{:+.1}", scale * value)),
+            PERCENT => fixed(scale * value, 1),
+            POINTS => true_minus(&format!("{:+.1}", scale * value)),
             "" | GRASPS if value.fract() == 0.0 => format!("{value:.0}"),
-            _ => three_digits(value),
+            _ => true_minus(&three_digits(value)),
         };
         match self {
             Self::Text(text) => text.clone(),
@@ -290,12 +290,6 @@ impl Cell {
             Self::Missing => "-".to_owned(),
         }
     }
-}
-
-/// A printed number without the sign of a zero.
-fn unsigned_zero(text: String) -> String {
-    let zero = text.chars().all(|c| "+-0.".contains(c));
-    if zero { text.trim_start_matches(['+', '-']).to_owned() } else { text }
 }
 
 impl From<&str> for Cell {
@@ -516,7 +510,7 @@ mod tests {
         assert_eq!(table.csv(), "model,F1,F1 low,F1 high,time (s)\n\"a, \"\"b\"\"\",0.5,0.25,0.75,1.5\nc,,,,\n");
         assert_eq!(table.cell(0, "F1").shown(PERCENT), "50.0 (25.0 to 75.0)");
         let gain = Cell::Interval(Interval { estimate: -0.0004, low: -0.012, high: 0.0 });
-        assert_eq!(gain.shown(POINTS), "0.0 (-1.2 to 0.0)");
+        assert_eq!(gain.shown(POINTS), "0.0 (−1.2 to 0.0)");
         assert_eq!([1e-9, 1e-3, 0.0].map(|p| Cell::Number(p).shown("")), ["< 0.000001", "0.00100", "0"]);
         assert_eq!((table.cell(1, "F1").shown(PERCENT), table.cell(0, "none")), ("-".to_owned(), &Cell::Missing));
         assert_eq!((table.texts("model"), table.rows_with(&[("model", "c")])), (vec!["a, \"b\"", "c"], vec![1]));
@@ -540,7 +534,7 @@ mod tests {
         let two = finding(vec![of(0.0, 0.2), of(-0.1, 0.1)]);
         let strips: Vec<String> = two.strips().map(|(_, strip)| strip.to_string()).collect();
         assert_eq!(strips, ["········│──────●────────", "────────●───────········"]);
-        assert_eq!((two.measured[0].shown(), two.left_out()), ("+10.0 (+0.0 to +20.0) points".to_owned(), None));
+        assert_eq!((two.measured[0].shown(), two.left_out()), ("+10.0 (0.0 to +20.0) points".to_owned(), None));
         let many = finding(vec![of(0.0, 0.2); 13]);
         assert_eq!(
             (many.strips().count(), many.left_out().as_deref()),
