@@ -137,7 +137,7 @@ pub(super) fn ui(
         ui.spacing_mut().item_spacing.y = measures.gap;
         let top = ui.cursor().top();
         let labels = recognised.view.map(|view| view.labels.as_ref());
-        lesson_ui(ui, tools, learned, labels, actions);
+        lesson_ui(ui, tools, learned, labels, measures, actions);
         match recognised.view {
             Some(view) => {
                 let view = calmed(ui, view);
@@ -188,6 +188,7 @@ fn lesson_ui(
     tools: &GripperTools,
     learned: Option<&Learned>,
     labels: Option<&Labels>,
+    measures: &Measures,
     actions: &mut Actions,
 ) {
     let (running, good) = (tools.teaching.running(), theme::of(ui).colours().good);
@@ -210,11 +211,18 @@ fn lesson_ui(
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
                 let ink = if warning.is_some() { theme::of(ui).colours().warning } else { good };
-                ui.label(RichText::new(format!("Learned {title}")).heading().strong().color(colour(ink)));
+                let told = RichText::new(format!("Learned {title}")).strong().color(colour(ink));
+                ui.label(if measures.is_tight() { told } else { told.heading() });
                 if let Some(lesson) = &learned.lesson {
                     let time = learned.seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.0}\u{a0}s"));
-                    let (grasps, known) = (lesson.grasps, lesson_result(lesson));
-                    ui.label(format!("from {grasps} simulated grasps{time}: {known}."));
+                    let text = format!("from {} simulated grasps{time}: {}.", lesson.grasps, lesson_result(lesson));
+                    if measures.is_tight() {
+                        // Classes need the height.
+                        let right = format!("{} of {} right", lesson.recognised, lesson.tested);
+                        ui.label(right).on_hover_text(text);
+                    } else {
+                        ui.label(text);
+                    }
                 }
                 if labels.is_some_and(|labels| labels.classes.iter().all(|class| class.name != learned.name)) {
                     ui.label("The model that answers here has not learned it.");
