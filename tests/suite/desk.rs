@@ -167,6 +167,8 @@ fn an_afternoon_by_keys_alone() {
     desk.type_text("garlic");
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
+    // The strip tells the label given last, of whichever trial.
+    desk.until_shown(true, "trial 1: garlic. The model predicts Lemon");
     // Taken back, and made again.
     desk.press_with(Modifiers::COMMAND, Key::Z);
     desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
@@ -195,6 +197,12 @@ fn an_afternoon_by_keys_alone() {
     // Too few to learn from: that is said, and what is missing.
     desk.press_with(Modifiers::COMMAND, Key::T);
     desk.until_told("Training failed: training needs two objects");
+    // A click on the plan decides what is proposed next.
+    desk.harness.get_by_role_and_label(Role::Button, "Syringe: 0 of 50").click_accesskit();
+    desk.harness.run_steps(3);
+    desk.record();
+    desk.press(Key::Enter);
+    desk.until_shown(true, "trial 6: Syringe");
 }
 
 #[test]

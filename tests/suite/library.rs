@@ -5,7 +5,7 @@ use crate::bench::{Bench, BenchSetup};
 use crate::cpu_renderer::CpuRenderer;
 use crate::program::{json, refused, run};
 use egui::accesskit::Role;
-use egui::{Key, Modifiers};
+use egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use palpate::app::{ALL_PANELS, Mode, Reach};
 use palpate_lab::grasping::grasp;
@@ -308,6 +308,10 @@ fn the_trial_shown_is_marked_in_sight_and_exported() {
     bench.tell(|app| app.library.find(search("")));
     bench.until_shown(true, "Trial 1, Lemon, shown");
     bench.until_shown(true, "1 selected");
+    // And in a lower window.
+    bench.harness.set_size(vec2(1400.0, 620.0));
+    bench.harness.run_steps(20);
+    assert!(bench.harness.query_by_label("Trial 1, Lemon, shown").is_some());
     // It is exported, until the keys select another one; its mark stays.
     for (key, file) in [(None, "trial_1.mcap"), (Some(Key::ArrowUp), "trial_2.mcap")] {
         key.into_iter().for_each(|key| bench.harness.key_press(key));

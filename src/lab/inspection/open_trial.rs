@@ -503,7 +503,7 @@ mod tests {
     use palpate_store::ImportedTrial;
     use palpate_store::labels::TrialEdit;
     use palpate_tactile::model::SensorModel;
-    use palpate_tactile::trial::SimulatedTrial;
+    use palpate_tactile::trial::{EarlierGrasps, SimulatedTrial};
 
     fn stored(object: &str) -> (tempfile::TempDir, Store, TrialId) {
         let folder = tempfile::tempdir().expect("a folder");
@@ -545,10 +545,12 @@ mod tests {
         let TrialData::Simulated(data) = trial.data.clone() else { panic!("simulated") };
         let mut older = SimulatedTrial { header: trial.header.clone(), data };
         older.header.origin.as_mut().expect("simulated").physics = 1;
+        older.header.earlier = Some(EarlierGrasps { model: "another".to_owned(), judged: Vec::new() });
         let mut other = Store::open(&folder.path().join("older.sqlite"))?;
         let id = other.insert(&older)?.id();
         let reopened = OpenTrial::open(&other, id, &options)?;
         assert!(reopened.remarks.concat().starts_with("Simulated with older physics (1, this version has 2):"));
+        assert!(reopened.remarks.iter().any(|remark| remark == OTHER_MODEL), "{:?}", reopened.remarks);
         assert_eq!((&reopened.t_s, &reopened.columns), (&open.t_s, &open.columns));
         // The last answer is the one after the grasp.
         assert!(open.answers.last().is_some_and(|answer| answer.beliefs.len() == 1 && !answer.listening));

@@ -48,6 +48,8 @@ pub(super) fn ui(
     now.shown = now.shown.filter(|id| view.found.iter().any(|trial| trial.row.id == *id));
     if let Some(offset) = scroll_offset(&before, &now, view, height) {
         list = list.vertical_scroll_offset(offset);
+        // An offset beyond the last picture's end is no swipe that springs back.
+        ui.spacing_mut().scroll.kinetic.rubber_band = false;
     }
     let shown = list.show_rows(ui, height, view.found.len(), |ui, rows| {
         for trial in &view.found[rows.clone()] {
