@@ -124,6 +124,8 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
             .with_min_inner_size(LEAST_SIZE),
         wgpu_options: viewport::wgpu_options(None),
         event_loop_builder: surroundings.event_loop_hook(),
+        // Elsewhere, the last position is used if it is on a screen; here it is not checked.
+        centered: cfg!(target_os = "linux"),
         ..Default::default()
     };
     let failed: Arc<Mutex<Option<ThreadError>>> = Arc::default();

@@ -8,7 +8,7 @@ use crate::app::modes;
 use crate::app::panels;
 use crate::app::playback::SPEEDS;
 use crate::app::theme::colour;
-use crate::app::widgets::{capital, selectable_row, text_field};
+use crate::app::widgets::{capital, put_line, selectable_row, text_field};
 use egui::{Align2, FontId, Key, ScrollArea, Ui, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_lab::workers::Command;
@@ -110,12 +110,8 @@ fn row_ui(ui: &mut Ui, theme: Theme, entry: &Entry, chosen: bool) -> egui::Respo
     painter.text(rect.left_center() + vec2(6.0, 0.0), Align2::LEFT_CENTER, group, small, quiet);
     let right = rect.right_center() - vec2(6.0, 0.0);
     let key = painter.text(right, Align2::RIGHT_CENTER, key, FontId::monospace(12.0), quiet);
-    let place = rect.left_center() + vec2(104.0, 0.0);
-    let room = (key.left() - 8.0 - place.x).max(20.0);
-    let mut job = egui::text::LayoutJob::simple_singleline(title.clone(), FontId::proportional(13.5), ink);
-    job.wrap = egui::text::TextWrapping::truncate_at_width(room);
-    let galley = painter.layout_job(job);
-    painter.galley(place - vec2(0.0, 0.5 * galley.size().y), galley, ink);
+    let place = rect.with_min_x(rect.left() + 104.0).with_max_x(key.left() - 8.0);
+    put_line(ui, place, Align2::LEFT_CENTER, title, 13.5, ink);
     response
 }
 

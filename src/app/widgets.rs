@@ -6,8 +6,8 @@ use crate::app::theme::{self, colour, veil};
 use egui::text::{LayoutJob, TextWrapping};
 use egui::text_edit::TextEditState;
 use egui::{
-    Align2, AsIdSalt, Button, Color32, FontId, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense, Stroke,
-    TextEdit, Ui, UiBuilder, Widget, WidgetInfo, pos2, vec2,
+    Align2, AsIdSalt, Button, Color32, FontId, Galley, Id, Label, ProgressBar, Rect, Response, RichText, Role, Sense,
+    Stroke, TextEdit, Ui, UiBuilder, Widget, WidgetInfo, pos2, vec2,
 };
 use palpate_geometry::palette::{Rgb, Trace};
 pub(super) use palpate_geometry::units::capital;
@@ -191,15 +191,32 @@ pub(super) fn words(name: &str) -> String {
     name.replace('-', " ")
 }
 
+/// One line of text, smaller where it needs more than the width; cut with dots where the smallest letters do not suffice.
+pub(super) fn fitted(ui: &Ui, text: &str, [least, most]: [f32; 2], width: f32, ink: Color32) -> Arc<Galley> {
+    let line = |letters: f32| LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(letters), ink);
+    let whole = ui.painter().layout_job(line(most));
+    if whole.size().x <= width {
+        return whole;
+    }
+    let mut job = line((0.97 * most * width / whole.size().x).floor().clamp(least.min(most), most));
+    job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
+    ui.painter().layout_job(job)
+}
+
+/// Paints a text aligned within a place; its right end.
+pub(super) fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) -> f32 {
+    let at = align.align_size_within_rect(text.size(), place);
+    ui.painter().galley(at.min, text, Color32::PLACEHOLDER);
+    at.right()
+}
+
 /// Writes one line, cut where there is no room; its right end.
 pub(super) fn put_line(ui: &Ui, place: Rect, align: Align2, text: &str, size: f32, ink: Color32) -> f32 {
-    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), ink);
-    job.wrap = TextWrapping::truncate_at_width(place.width().max(0.0));
-    let galley = ui.painter().layout_job(job);
-    let at = align.align_size_within_rect(galley.size(), place);
-    let right = at.right();
-    ui.painter().with_clip_rect(place.expand2(vec2(1.0, 0.0)).intersect(ui.clip_rect())).galley(at.min, galley, ink);
-    right
+    if place.is_positive() {
+        put(ui, fitted(ui, text, [size; 2], place.width(), ink), place, align)
+    } else {
+        place.left()
+    }
 }
 
 /// Least range of a sparkline: a newton, or a count.

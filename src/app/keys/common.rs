@@ -175,7 +175,6 @@ fn turn(app: &mut App, view: StandardView) {
 
 fn object_framed(app: &App) -> Option<Camera> {
     let snapshot = app.snapshot()?;
-    let place = snapshot.frame.world_from_object?.position.as_vec3();
-    let radius = snapshot.object.as_ref()?.size.length() as f32;
-    Some(app.view.camera.framing(place, 0.6 * radius.max(0.02)))
+    let (place, radius) = snapshot.stage.object_ball(&snapshot.frame)?;
+    Some(app.view.camera.framing(place, 1.2 * radius.max(0.01)))
 }

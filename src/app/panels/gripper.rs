@@ -42,7 +42,6 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         if let Some(command) = &refused.command {
             command_ui(ui, "the port", command);
         }
-        remark_ui(ui, "The Doctor panel in Label mode examines port and board.");
     } else {
         remark_ui(ui, "No gripper connected. Demo and Inspect work with the simulated one.");
     }
@@ -55,15 +54,6 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         actions.on(&ui.add(connect).on_hover_text(hint), |app| app.connect(typed));
         actions.on(&ui.button("List ports"), |app| _ = app.gripper.send(GripperCommand::ListPorts));
     });
-    let ports: &[PortInfo] = gripper.map_or(&[], |gripper| &gripper.ports);
-    for port in ports {
-        let path = port.path.display().to_string();
-        let button = Button::new(format!("{path}\n{}", port.title)).wrap();
-        if ui.add_sized([ui.available_width(), 40.0], button).on_hover_text("Connect to this port").clicked() {
-            let path = port.path.clone();
-            actions.push(|app| app.connect(Some(path)));
-        }
-    }
     ui.horizontal(|ui| {
         let label = ui.label("Port or file");
         let field = text_field(&mut path, id.with("field")).hint_text("/dev/ttyACM0 or captured bytes");
@@ -74,6 +64,18 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         }
     });
     ui.data_mut(|data| data.insert_temp(id, path));
+    let ports: &[PortInfo] = gripper.map_or(&[], |gripper| &gripper.ports);
+    for port in ports {
+        let path = port.path.display().to_string();
+        let button = Button::new(format!("{path}\n{}", port.title)).wrap();
+        if ui.add_sized([ui.available_width(), 40.0], button).on_hover_text("Connect to this port").clicked() {
+            let path = port.path.clone();
+            actions.push(|app| app.connect(Some(path)));
+        }
+    }
+    if gripper.is_some_and(|gripper| gripper.refused.is_some()) {
+        remark_ui(ui, "The Doctor panel in Label mode examines port and board.");
+    }
     let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
     let expected = format!("Expected columns of the board: {}", sensors.names());
     wrapped(ui, RichText::new(expected).small().weak());
@@ -124,6 +126,9 @@ fn connected_ui(
     control_ui(ui, control, gripper, actions);
 }
 
+/// Width of the panel from which two facts stand beside each other (points).
+const TWO_FACTS: f32 = 260.0;
+
 /// Port, board and timing.
 fn health_ui(ui: &mut Ui, link: &LinkStatus) {
     let port = format!("{}, {}", link.port.path.display(), link.port.title);
@@ -132,30 +137,28 @@ fn health_ui(ui: &mut Ui, link: &LinkStatus) {
         warning_ui(ui, link.state.sentence());
     }
     let cadence = &link.cadence;
-    Grid::new("health").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
-        let pair = |ui: &mut Ui, name: &str, value: String, bad: bool, about: &str| {
+    let now = |text: String| if link.state == LinkState::Listening { text } else { "–".to_owned() };
+    let firmware = link.board.firmware.clone().unwrap_or_else(|| "–".to_owned());
+    let jitter = format!("{:.1} ms", cadence.jitter_p95_ms);
+    let facts = [
+        ("rate", now(format!("{:.1} Hz", cadence.rate_hz)), false, "Readings per second"),
+        ("jitter", now(jitter), false, "95th percentile of the deviation between readings"),
+        ("lost", cadence.lost.to_string(), cadence.lost > 0, "Readings lost since connecting"),
+        ("bad lines", cadence.bad_lines.to_string(), cadence.troubled, "Unreadable lines"),
+        ("reconnects", link.reconnects.to_string(), false, "Reconnections since connecting"),
+        ("firmware", firmware, false, "Firmware that the board reports"),
+    ];
+    let beside = if ui.available_width() < TWO_FACTS { 1 } else { 2 };
+    Grid::new("health").num_columns(2 * beside).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (place, (name, value, bad, about)) in facts.into_iter().enumerate() {
             ui.weak(name);
             let text = RichText::new(value).monospace();
             let text = if bad { text.color(ui.visuals().error_fg_color) } else { text };
             ui.label(text).on_hover_text(about);
-        };
-        let now = |text: String| if link.state == LinkState::Listening { text } else { "–".to_owned() };
-        pair(ui, "rate", now(format!("{:.1} Hz", cadence.rate_hz)), false, "Readings per second");
-        pair(
-            ui,
-            "jitter",
-            now(format!("{:.1} ms", cadence.jitter_p95_ms)),
-            false,
-            "95th percentile of the deviation between readings",
-        );
-        ui.end_row();
-        pair(ui, "lost", cadence.lost.to_string(), cadence.lost > 0, "Readings lost since connecting");
-        pair(ui, "bad lines", cadence.bad_lines.to_string(), cadence.troubled, "Unreadable lines");
-        ui.end_row();
-        pair(ui, "reconnects", link.reconnects.to_string(), false, "Reconnections since connecting");
-        let firmware = link.board.firmware.clone().unwrap_or_else(|| "–".to_owned());
-        pair(ui, "firmware", firmware, false, "Firmware that the board reports");
-        ui.end_row();
+            if (place + 1) % beside == 0 {
+                ui.end_row();
+            }
+        }
     });
     wrapped(ui, RichText::new(link.format_summary()).small().weak());
     for text in link.line_remarks() {

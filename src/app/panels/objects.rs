@@ -9,6 +9,7 @@ use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, capital_title, catalogue};
+use std::path::Path;
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
@@ -76,10 +77,12 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
     let field = text_field(&mut path, id.with("field")).hint_text("… or paste a path");
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-        let source = std::mem::take(&mut path);
-        // Where the file cannot be opened, the next letters are another path, not keys.
-        response.request_focus();
-        actions.push(move |app| app.open(source.trim().trim_matches(['"', '\''])));
+        let source = std::mem::take(&mut path).trim().trim_matches(['"', '\'']).to_owned();
+        // Where there is no such file, the next letters are another path, not keys.
+        if !Path::new(&source).exists() {
+            response.request_focus();
+        }
+        actions.push(move |app| app.open(&source));
     }
     ui.data_mut(|data| data.insert_temp(id, path));
 }

@@ -5,8 +5,8 @@ use crate::app::actions::Actions;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{self, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, remark_ui, wrapped};
-use egui::{Align2, Color32, FontId, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use crate::app::widgets::{self, capital, remark_ui, wrapped};
+use egui::{Align2, Color32, Rect, Response, RichText, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
 use palpate_lab::inspection::TouchPhase;
@@ -251,14 +251,9 @@ fn put(ui: &Ui, text: &str, place: Rect, align: Align2, ink: Color32) {
     put_sized(ui, (text, LETTERS), place, align, ink);
 }
 
-/// Paints a line of text, made smaller to fit its place, and cut off with dots below the least size.
+/// Paints a line of text, smaller where it needs more than its place.
 fn put_sized(ui: &Ui, (text, most): (&str, f32), place: Rect, align: Align2, ink: Color32) {
-    let width = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(most), ink).size().x;
-    let letters = (most * place.width() / width.max(1.0) - 0.2).clamp(LEAST_LETTERS, most);
-    let mut job = egui::text::LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(letters), ink);
-    job.wrap = egui::text::TextWrapping::truncate_at_width(place.width().max(1.0));
-    let galley = ui.painter().layout_job(job);
-    ui.painter().galley(align.align_size_within_rect(galley.size(), place).min, galley, ink);
+    widgets::put(ui, widgets::fitted(ui, text, [LEAST_LETTERS, most], place.width(), ink), place, align);
 }
 
 fn nearest_ui(

@@ -57,6 +57,8 @@ pub(super) struct TimePlot<'a> {
 
 /// Opacity of the grasps before the current one.
 const EARLIER: f32 = 0.28;
+/// Least size of a plot (points); the usual one is cut in low windows.
+const LEAST_PLOT: egui::Vec2 = egui::vec2(64.0, 32.0);
 /// Width of the axis of values (points).
 const Y_AXIS: f32 = 44.0;
 /// Shortest time that can be shown (s).
@@ -88,6 +90,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .label_spacing(egui::Rangef::new(24.0, 40.0));
     let widget = Plot::new(plot.id)
         .width(width)
+        .min_size(LEAST_PLOT)
         .allow_zoom(false)
         .allow_drag(false)
         .allow_scroll(false)

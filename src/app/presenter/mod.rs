@@ -8,7 +8,8 @@ use crate::app::features::App;
 use crate::app::features::presenter::Score;
 use crate::app::panels::view3d::{self, View3d};
 use crate::app::theme::{colour, veil};
-use egui::text::{LayoutJob, TextWrapping};
+use crate::app::widgets::{fitted, put};
+use egui::text::LayoutJob;
 use egui::{Align2, Color32, FontId, Galley, Pos2, Rect, Role, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::units;
 use palpate_lab::grasping::{IdentificationView, Presentation};
@@ -51,12 +52,6 @@ pub(super) fn ui(ui: &Ui, app: &App, message: Option<&str>) {
     page.column_ui(ui, column.shrink(unit));
 }
 
-/// Paints a text aligned within a place.
-fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
-    let at = align.align_size_within_rect(text.size(), place).min;
-    ui.painter().galley(at, text, Color32::PLACEHOLDER);
-}
-
 struct Page<'a> {
     app: &'a App,
     /// Height of the smallest letters (points).
@@ -68,16 +63,9 @@ impl Page<'_> {
         self.app.snapshot()?.identification.as_deref()
     }
 
-    /// One line, smaller where it needs more than the width; where the smallest letters do not suffice, it is cut.
+    /// [`fitted`] with the smallest letters of the page.
     fn line(&self, ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
-        let whole = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(letters), ink);
-        if whole.size().x <= width {
-            return whole;
-        }
-        let smaller = (0.98 * letters * width / whole.size().x).clamp(self.unit, letters.max(self.unit));
-        let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(smaller), ink);
-        job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
-        ui.painter().layout_job(job)
+        fitted(ui, text, [self.unit, letters], width, ink)
     }
 
     /// At most so many rows; numbers keep their units.

@@ -26,7 +26,7 @@ pub use portrait::{PORTRAIT_BACKDROP, portrait, portrait_camera};
 pub(crate) use reconstructed::evenly_bent;
 
 use annotations::Annotator;
-use glam::{Mat4, Vec2, Vec3};
+use glam::{DVec3, Mat4, Vec2, Vec3};
 use palpate_geometry::drawing::{Camera, Detail, DrawList, Ground, SoftFinger, Solid, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::{Pose, SurfaceMesh};
@@ -102,7 +102,9 @@ pub struct Stage {
     gripper: GripperModel,
     world_from_gripper: Pose,
     object: Option<Arc<SurfaceMesh>>,
-    /// Radius of a ball that holds the object, and its largest side (m); zero for an empty hand.
+    /// Ball that holds the object: its centre in the object's frame, whose origin may be anywhere, and its radius; and the
+    /// object's largest side (m). Zero for an empty hand.
+    object_centre: DVec3,
     object_radius: f32,
     object_extent: f32,
     pedestal: Option<Arc<SurfaceMesh>>,
@@ -129,6 +131,7 @@ impl Stage {
             gripper: scene.gripper.clone(),
             world_from_gripper,
             object: object.map(|o| Arc::clone(&o.surface)),
+            object_centre: object.map_or(DVec3::ZERO, |o| o.bounds.centre()),
             object_radius: object.map_or(0.0, |o| 0.5 * o.bounds.size().length() as f32),
             object_extent: object.map_or(0.0, |o| o.bounds.size().max_element() as f32),
             pedestal,
@@ -273,8 +276,13 @@ impl Stage {
 
     /// Force of both pads on the object (N); none where they do not touch it.
     pub fn force_on_object(&self, frame: &Frame) -> Option<f32> {
-        let object = frame.world_from_object.as_ref()?.position.as_vec3();
-        self.touch(frame)?.force_on(object, self.object_radius)
+        let (object, radius) = self.object_ball(frame)?;
+        self.touch(frame)?.force_on(object, radius)
+    }
+
+    /// A ball that holds the object: centre and radius (m); none for an empty hand.
+    pub fn object_ball(&self, frame: &Frame) -> Option<(Vec3, f32)> {
+        Some((frame.world_from_object.as_ref()?.point(self.object_centre).as_vec3(), self.object_radius))
     }
 
     /// Force of each finger across its pad (N), as its arrow shows it, left and right; none where it is not touched.
@@ -307,7 +315,28 @@ fn ink(theme: Theme) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grasping::grasp;
     use palpate_geometry::palette::Trace;
+    use palpate_sim::gripper::Phase;
+
+    #[test]
+    fn an_object_is_held_wherever_the_origin_of_its_file_is() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("far.obj");
+        let corner =
+            |k: u32| [0, 1, 2].map(|axis| 0.3 + if k >> axis & 1 == 1 { [0.045, 0.045, 0.06][axis] } else { 0.0 });
+        let corners = (0..8).map(corner).map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+        let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+        std::fs::write(&file, corners.collect::<String>() + faces)?;
+        let mut scene = Scene::default();
+        scene.object.source = file.to_string_lossy().into_owned();
+        let object = scene.load_object()?;
+        let trial = grasp(&scene, object.as_ref(), 0);
+        let stage = Stage::new(&scene, object.as_ref(), trial.data.world_from_gripper);
+        let held = trial.frames().iter().rfind(|frame| frame.phase == Phase::Hold).ok_or("no hold")?;
+        assert!(stage.force_on_object(held).is_some_and(|force| force > 0.1));
+        Ok(())
+    }
 
     #[test]
     fn ghosts_stand_out_and_have_the_colour_of_no_sensor() {

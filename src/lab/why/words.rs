@@ -27,11 +27,11 @@ pub struct Reason {
 }
 
 impl Attribution {
-    /// Answer in one sentence: `Lemon 91 %, then Tomato 6 %.`
+    /// Answer in one sentence: `Lemon 91 %, then Tomato 6 %.` A second class below 1 % is left out.
     pub fn answer(&self) -> String {
         let [first, second] = [&self.first, &self.second]
             .map(|class| format!("{} {}", object_title(&class.name), percent(class.probability)));
-        format!("{first}, then {second}.")
+        if self.second.probability < 0.01 { format!("{first}.") } else { format!("{first}, then {second}.") }
     }
 
     /// Strongest reasons for and against the first class, strongest first: channels, each with the phase in which it speaks

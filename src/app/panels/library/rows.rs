@@ -43,9 +43,11 @@ pub(super) fn ui(
     let mut list = ScrollArea::vertical().auto_shrink(false);
     let before = ui.data(|data| data.get_temp::<Seen>(seen)).unwrap_or_default();
     let room = ui.available_height();
-    let mut now = Seen { rows: 0..0, room, cursor: picked.cursor, shown: picked.shown, query: view.query.clone() };
+    let (cursor, shown) = (picked.cursor, picked.shown);
+    let mut now = Seen { room, cursor, shown, query: view.query.clone(), ..Seen::default() };
     // One that is not in the list yet is new when it comes.
-    now.shown = now.shown.filter(|id| view.found.iter().any(|trial| trial.row.id == *id));
+    now.place = now.shown.and_then(|id| place_of(view, id));
+    now.shown = now.shown.filter(|_| now.place.is_some());
     if let Some(offset) = scroll_offset(&before, &now, view, height) {
         list = list.vertical_scroll_offset(offset);
         // An offset beyond the last picture's end is no swipe that springs back.
@@ -74,7 +76,9 @@ struct Seen {
     /// Height of the list (points).
     room: f32,
     cursor: Option<TrialId>,
+    /// Trial that is shown, and its place in the list.
     shown: Option<TrialId>,
+    place: Option<usize>,
     query: TrialQuery,
 }
 
@@ -91,16 +95,19 @@ fn draw_seen(ui: &Ui, seen: egui::Id, view: &LibraryView, rows: &Range<usize>, a
     }
 }
 
+fn place_of(view: &LibraryView, id: TrialId) -> Option<usize> {
+    view.found.iter().position(|trial| trial.row.id == id)
+}
+
 /// Offset that brings a newly selected trial into sight, or else one that is newly shown, also in another list.
 fn scroll_offset(before: &Seen, now: &Seen, view: &LibraryView, height: f32) -> Option<f32> {
     let cursor = now.cursor.filter(|_| now.cursor != before.cursor);
-    let place_of = |id: TrialId| view.found.iter().position(|trial| trial.row.id == id);
-    // What is above or below has grown: one that was in sight stays there.
+    // What is above, below or in the list has grown: one that was in sight stays there.
     let lower = now.room < before.room;
-    let stays = |id: &TrialId| lower && place_of(*id).is_some_and(|place| before.rows.contains(&place));
+    let moved = lower || now.place != before.place;
+    let stays = moved && before.place.is_some_and(|place| before.rows.contains(&place));
     let is_new = (now.shown, &now.query) != (before.shown, &before.query);
-    let wanted = cursor.or(now.shown.filter(|_| is_new)).or(now.shown.filter(stays))?;
-    let place = place_of(wanted)?;
+    let place = place_of(view, cursor.or(now.shown.filter(|_| is_new || stays))?)?;
     if !lower && (before.rows.start + 1..before.rows.end.saturating_sub(1)).contains(&place) {
         return None;
     }

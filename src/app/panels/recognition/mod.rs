@@ -16,7 +16,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, failed_sensors_ui, number_field, text_field};
+use crate::app::widgets::{self, capital, failed_sensors_ui, number_field, put, text_field};
 use egui::{
     Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
     WidgetInfo, pos2, vec2,
@@ -203,7 +203,7 @@ fn lesson_ui(
             ui.horizontal(|ui| {
                 actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
                 let width = ui.available_width();
-                let text = format!("{} {:.0}{SPACE}%", progress.words, 100.0 * progress.share);
+                let text = format!("{:.0}{SPACE}%  {}", 100.0 * progress.share, progress.words);
                 ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(text));
             });
         } else if let Some(learned) = learned {
@@ -513,17 +513,9 @@ fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
     (rect, response)
 }
 
-/// Line of text, made smaller to fit the width and cut off with dots below the least size.
+/// [`widgets::fitted`] with the smallest letters of this panel.
 fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
-    let lay = |text: String, letters: f32| ui.painter().layout_no_wrap(text, FontId::proportional(letters), ink);
-    let whole = lay(text.clone(), letters);
-    if whole.size().x <= width {
-        return whole;
-    }
-    let smaller = (letters * width / whole.size().x * 0.97).floor().clamp(LEAST_LETTERS.min(letters), letters);
-    let mut job = egui::text::LayoutJob::simple_singleline(text, FontId::proportional(smaller), ink);
-    job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
-    ui.painter().layout_job(job)
+    widgets::fitted(ui, &text, [LEAST_LETTERS, letters], width, ink)
 }
 
 /// Share as drawn: it follows the answer within [`EASE_S`], but jumps without an answer and at low frame rates.
@@ -531,12 +523,6 @@ fn eased(ui: &Ui, id: egui::Id, p: Option<f64>) -> f32 {
     let seldom = ui.input(|i| i.unstable_dt) > 0.5 * EASE_S;
     let time = if p.is_none() || seldom { 0.0 } else { EASE_S };
     ui.ctx().animate_value_with_time(id, p.unwrap_or(0.0) as f32, time)
-}
-
-/// Paints a text aligned within a place.
-fn put(ui: &Ui, text: Arc<Galley>, place: Rect, align: Align2) {
-    let at = align.align_size_within_rect(text.size(), place).min;
-    ui.painter().galley(at, text, Color32::PLACEHOLDER);
 }
 
 /// Marks the widget with keyboard focus.

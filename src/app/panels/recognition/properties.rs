@@ -124,11 +124,9 @@ fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: &Segment<'_>) 
     let ink = colour(if segment.leads { colours.text } else { colours.quiet_text });
     let inside = place.shrink2(vec2(3.0, 0.0)).with_max_y(line.top());
     let word = fitted(ui, segment.answer.to_owned(), segment.letters, inside.width(), ink);
-    match segment.p.filter(|_| segment.numbered) {
-        Some(p) => {
-            put(ui, word, inside, Align2::LEFT_CENTER);
-            put(ui, fitted(ui, percent(p), segment.letters, inside.width(), ink), inside, Align2::RIGHT_CENTER);
-        }
-        None => put(ui, word, inside, Align2::CENTER_CENTER),
+    let number = segment.p.filter(|_| segment.numbered).map(percent);
+    put(ui, word, inside, if number.is_some() { Align2::LEFT_CENTER } else { Align2::CENTER_CENTER });
+    if let Some(number) = number {
+        put(ui, fitted(ui, number, segment.letters, inside.width(), ink), inside, Align2::RIGHT_CENTER);
     }
 }

@@ -7,7 +7,7 @@ use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use palpate_geometry::palette::{Rgb, Theme};
-use palpate_geometry::units::{SPACE, symbol, true_minus};
+use palpate_geometry::units::{SPACE, symbol};
 use palpate_study::{Agreement, Cell, Finding};
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
@@ -70,7 +70,7 @@ const STRIP: [f32; 2] = [64.0, 12.0];
 fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
     let quiet = colour(theme.colours().quiet_text);
     for (own, strip) in finding.strips() {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
             let text = format!("{}: {}, line at {}", own.what, own.shown(), Cell::Number(own.line).shown(&own.unit));
             response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
@@ -82,9 +82,9 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
             ui.painter().hline(low..=high, rect.center().y, Stroke::new(2.5, ink));
             ui.painter().circle_filled(pos2(estimate, rect.center().y), 3.0, ink);
             response.on_hover_text(text);
-            let estimate = true_minus(&Cell::from(own.value.value()).shown(&own.unit));
+            let estimate = Cell::from(own.value.value()).shown(&own.unit);
             ui.add(Label::new(RichText::new(format!("{estimate}{SPACE}{}", symbol(&own.unit))).small()).extend());
-            ui.add(Label::new(RichText::new(&own.what).small().weak()).truncate());
+            ui.label(RichText::new(&own.what).small().weak());
         });
     }
     if let Some(more) = finding.left_out() {

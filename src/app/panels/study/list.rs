@@ -3,10 +3,10 @@
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, accented, colour};
-use crate::app::widgets::{command_ui, failure_ui, just_opened, wrapped};
-use egui::text::{LayoutJob, TextWrapping};
+use crate::app::widgets::{command_ui, failure_ui, just_opened, put_line, wrapped};
 use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, ThemeColours};
+use palpate_geometry::units::capital;
 use palpate_lab::workers::JobProgress;
 use palpate_store::Store;
 use palpate_study::jobs::{StudyFiles, StudyOrigin, StudyRequest, has_other_units};
@@ -58,19 +58,16 @@ fn row_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, chosen: bool, action
     let painter = ui.painter_at(inner);
     let small = FontId::proportional(11.5);
     let quiet = if chosen { colours.text } else { colours.quiet_text };
-    let mut title =
-        LayoutJob::simple_singleline(card.title.to_owned(), FontId::proportional(13.5), colour(colours.text));
-    title.wrap = TextWrapping::truncate_at_width(inner.width());
-    painter.galley(inner.left_top(), painter.layout_job(title), colour(colours.text));
+    put_line(ui, inner, Align2::LEFT_TOP, card.title, 13.5, colour(colours.text));
     let ink = colour(if chosen { colours.text } else { ink });
-    let left = painter.text(inner.left_bottom(), Align2::LEFT_BOTTOM, &state, small.clone(), ink).right() + 8.0;
+    let left = put_line(ui, inner, Align2::LEFT_BOTTOM, &state, 11.5, ink) + 8.0;
     // The state of a study that runs may need the line.
     let paper = painter.layout_no_wrap(card.paper.to_owned(), small, colour(quiet));
     let corner = inner.right_bottom() - paper.size();
     if corner.x > left {
         painter.galley(corner, paper, colour(quiet));
     }
-    if response.on_hover_text(card.about).clicked() {
+    if response.on_hover_text(capital(card.about)).clicked() {
         let key = card.key;
         actions.push(|app| app.studies.choose(key));
     }
@@ -114,7 +111,7 @@ fn state(studies: &Studies, key: &str, colours: &ThemeColours) -> (String, Rgb) 
 /// Purpose and cost of the chosen study, and its buttons.
 fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Actions) {
     let key = card.key;
-    wrapped(ui, RichText::new(format!("{}.", card.about)));
+    wrapped(ui, RichText::new(format!("{}.", capital(card.about))));
     let kept = if paper_study(key).is_some() {
         "Grasps that the store lacks are simulated and kept there."
     } else {

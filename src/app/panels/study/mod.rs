@@ -11,7 +11,7 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::widgets::{capital, just_opened, wrapped};
 use egui::{RichText, Ui};
-use palpate_geometry::units::{symbol, true_minus};
+use palpate_geometry::units::symbol;
 use palpate_sim::objects::object_title;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
 use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
@@ -49,13 +49,12 @@ fn result_ui(
 /// Columns with names of classes.
 const CLASSES: [&str; 3] = ["object", "true", "predicted"];
 
-/// Text of a cell, with the titles of objects and a true minus before numbers.
+/// Text of a cell, with the titles of objects.
 fn cell_text(cell: &Cell, column: &StudyColumn) -> String {
     let text = cell.shown(&column.unit);
     match cell {
         Cell::Text(_) if CLASSES.contains(&column.name.as_str()) => object_title(&text),
-        Cell::Text(_) => text,
-        _ => true_minus(&text).replace("(-", "(−").replace(" -", " −"),
+        _ => text,
     }
 }
 
