@@ -3,8 +3,8 @@
 use crate::app::theme::{colour, veil};
 use egui::{Align2, Color32, FontId, Rect, Response, RichText, Sense, Stroke, Ui, vec2};
 use egui_plot::{
-    FilledArea, GridInput, GridMark, HLine, Legend, Line, LineStyle as Dashes, MarkerShape, Plot as PlotWidget,
-    PlotPoint, PlotTransform, Points, Text, VLine,
+    AxisHints, FilledArea, GridInput, GridMark, HLine, Legend, Line, LineStyle as Dashes, MarkerShape,
+    Plot as PlotWidget, PlotPoint, PlotTransform, Points, Text, VLine, VPlacement,
 };
 use palpate_geometry::drawing::{CellAxis, DataSeries, HeatMap, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, Theme, series_colour};
@@ -81,6 +81,12 @@ pub(super) fn show(
         .show_y(false)
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
+        // Where not all is seen at once, the axis is at the end that is.
+        .custom_x_axes(vec![AxisHints::new_x().placement(if height > ui.clip_rect().height() {
+            VPlacement::Top
+        } else {
+            VPlacement::Bottom
+        })])
         .x_grid_spacer(marks(&known[0], &x_bounds))
         .y_grid_spacer(marks(&known[1], &y_bounds))
         .x_axis_formatter(texts(&known[0]))

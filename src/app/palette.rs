@@ -72,22 +72,25 @@ pub(super) fn ui(app: &App, actions: &mut Actions) {
             }
             response.request_focus();
             let height = (ROWS * ROW).min(room.height() - 130.0);
-            ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-                ui.spacing_mut().item_spacing.y = 0.0;
-                if entries.is_empty() {
-                    ui.weak("No action has this name.");
-                }
-                for (place, entry) in entries.iter().enumerate() {
-                    let chosen = place == search.chosen;
-                    let response = row_ui(ui, app.view.theme, entry, chosen);
-                    if chosen && (up || down || opened.is_none()) {
-                        response.scroll_to_me(None);
+            ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, true]).show(
+                ui,
+                |ui| {
+                    ui.spacing_mut().item_spacing.y = 0.0;
+                    if entries.is_empty() {
+                        ui.weak("No action has this name.");
                     }
-                    if response.clicked() {
-                        run = Some(place);
+                    for (place, entry) in entries.iter().enumerate() {
+                        let chosen = place == search.chosen;
+                        let response = row_ui(ui, app.view.theme, entry, chosen);
+                        if chosen && (up || down || opened.is_none()) {
+                            response.scroll_to_me(None);
+                        }
+                        if response.clicked() {
+                            run = Some(place);
+                        }
                     }
-                }
-            });
+                },
+            );
         });
     });
     let pointer = ctx.input(|input| input.pointer.any_pressed().then(|| input.pointer.interact_pos()).flatten());

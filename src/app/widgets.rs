@@ -93,7 +93,7 @@ pub(super) fn job_ui<C, O>(
     let (running, last) = job.state();
     match running.map(|running| running.progress) {
         Some(progress) => {
-            ui.add(ProgressBar::new(progress.share as f32).text(progress.words));
+            progress_ui(ui, progress.share, &progress.words);
             if let Some(remark) = remark {
                 wrapped(ui, RichText::new(remark).strong());
             }
@@ -189,6 +189,14 @@ pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: 
 /// The name of an effect or a check in words.
 pub(super) fn words(name: &str) -> String {
     name.replace('-', " ")
+}
+
+/// Progress as a bar, its words cut with dots where they have no room.
+pub(super) fn progress_ui(ui: &mut Ui, share: f64, words: &str) {
+    let bar = ui.add(ProgressBar::new(share as f32));
+    bar.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, words));
+    let inside = bar.rect.shrink2(vec2(8.0, 0.0));
+    put_line(ui, inside, Align2::LEFT_CENTER, words, 12.0, ui.visuals().strong_text_color());
 }
 
 /// One line of text, smaller where it needs more than the width; cut with dots where the smallest letters do not suffice.

@@ -148,7 +148,12 @@ impl App {
         }
         self.show_empty(now.trial.as_ref().is_some_and(|trial| trial.adapting));
         let part = now.trial.as_ref().map(|trial| trial.stage);
-        let begins = std::mem::replace(&mut self.gripper.part, part) != part;
+        let before = std::mem::replace(&mut self.gripper.part, part);
+        let begins = before != part;
+        if begins && before.is_none() {
+            // It says itself how it ends.
+            self.notices.done("gripper");
+        }
         if begins && part == Some(GraspStage::Phase(Phase::Close)) && self.view.ghost && followed {
             // The simulated fingers close beside the real ones.
             for command in [Command::SetSpeed(1.0), Command::Reset, Command::Play] {

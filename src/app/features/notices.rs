@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 /// What can be done about a message: a phrase of the messages that it helps with, its button, and what that does.
 struct Remedy(&'static str, &'static str, fn(&mut App));
 
-const REMEDIES: [Remedy; 8] = [
+const REMEDIES: [Remedy; 9] = [
     Remedy("object.collision = \"hull\"", "Use its hull", App::use_hull),
     Remedy("set object.scale to decide", "Treat as mm", |app| app.set_object_scale(1e-3)),
+    Remedy("set object.scale to decide", "Treat as cm", |app| app.set_object_scale(1e-2)),
     Remedy("set object.scale to decide", "Treat as m", |app| app.set_object_scale(1.0)),
     Remedy("cannot read \"", "Choose a file …", App::ask_for_object),
     Remedy("cannot read the mesh", "Choose a file …", App::ask_for_object),
@@ -54,7 +55,7 @@ enum Level {
 /// Message in the line.
 struct Shown {
     level: Level,
-    /// Action that has failed: when it succeeds, the message is no longer true.
+    /// Action that has failed or was stopped: when it succeeds or begins again, the message is no longer true.
     failed: Option<&'static str>,
     text: String,
     until: Instant,
@@ -124,6 +125,11 @@ impl Notices {
     /// Shows why an action has failed, until it succeeds.
     pub(in crate::app) fn failed(&mut self, attempt: &'static str, text: impl Into<String>) {
         self.error(text);
+        self.until(attempt);
+    }
+
+    /// The last message is true until this action succeeds or begins again.
+    pub(in crate::app) fn until(&mut self, attempt: &'static str) {
         if let Some(shown) = self.shown.last_mut() {
             shown.failed = Some(attempt);
         }
@@ -149,14 +155,18 @@ impl Notices {
         &self.messages
     }
 
-    /// The message to show now: the newest warning or error, else the newest.
+    /// The message to show now: the newest error or one that can be decided, else the newest warning, else the newest.
     fn first(&mut self, ctx: &egui::Context) -> Option<usize> {
         let now = Instant::now();
         self.shown.retain(|shown| shown.until > now);
         if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
             ctx.request_repaint_after(next - now);
         }
-        (0..self.shown.len()).max_by_key(|k| (self.shown[*k].level > Level::Info, *k))
+        let urgency = |shown: &Shown| match shown.level {
+            Level::Warning if remedies(&shown.text).next().is_some() => Level::Error,
+            level => level,
+        };
+        (0..self.shown.len()).max_by_key(|k| (urgency(&self.shown[*k]), *k))
     }
 
     /// The message to show now where there is no line: warnings about single grasps are left out.
@@ -289,7 +299,7 @@ mod tests {
         std::fs::write(folder.path().join("large.obj"), cube).expect("writes");
         let large = load("large.obj").expect("loads").expect("an object");
         let scale = large.warnings.iter().find(|warning| warning.contains("scale")).expect("a warning of its size");
-        assert_eq!(of(scale), ["Treat as mm", "Treat as m"]);
+        assert_eq!(of(scale), ["Treat as mm", "Treat as cm", "Treat as m"]);
         assert_eq!(of("Trial 7 discarded; Ctrl+Z brings it back"), ["Undo"]);
     }
 }

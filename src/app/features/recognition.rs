@@ -21,8 +21,8 @@ pub(in crate::app) struct RecognitionFeature {
     loading: VecDeque<ViewSource>,
     /// Models in use.
     models: Models,
-    /// Object file that the model in use was last asked to learn, and when.
-    taught: Option<String>,
+    /// Object file that the model in use was last asked to learn, its content, and when.
+    taught: Option<(String, u64)>,
     asked: Instant,
     /// The last lesson, until it is dismissed.
     pub(in crate::app) learned: Option<Learned>,
@@ -137,6 +137,11 @@ impl App {
     pub fn teach_object(&mut self) {
         self.recognition.taught = None;
         self.teach_new_object();
+        if self.tools.teaching.running().is_none() {
+            let text =
+                "Nothing to learn: it is known already (forget it first), or its object does not come from a file.";
+            self.notices.info(text);
+        }
     }
 
     /// Teaches the model of the real gripper its recorded grasps of an object; simulated ones too, where the simulation holds
@@ -190,7 +195,7 @@ impl App {
     /// Takes in a model in which a learned object has another name, or is forgotten.
     fn take_changed(&mut self, trained: &TrainedModel, TeachRequest { model, name, change, .. }: &TeachRequest) {
         self.recognition.learned = None;
-        let source = model.card.taught_from.get(name).map_or_else(String::new, |(_, file)| file.clone());
+        let (content, source) = model.card.taught_from.get(name).cloned().unwrap_or_default();
         let title = capital_title(name);
         // A shipped model without a learned object is the shipped one again.
         let card = &trained.model.card;
@@ -200,7 +205,7 @@ impl App {
         self.view.simulation_model = is_own.then(|| trained.path.clone());
         self.use_in_simulation(is_own.then_some(&trained.model));
         // It is not learned again by itself.
-        self.recognition.taught = Some(source.clone());
+        self.recognition.taught = Some((source.clone(), content));
         // The answer was the other model's.
         if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
             self.simulation.send(Command::Play);
@@ -277,13 +282,18 @@ impl App {
         if *source == simulation.scene.object.source && snapshot.scene.object.name != simulation.scene.object.name {
             return;
         }
-        // A lesson with another object of a class that was taught says why it cannot be.
+        // A lesson with another object of a class that was taught says why it cannot be, or is learned anew.
         let is_other = model.card.taught_from.get(&card.name).is_some_and(|(content, _)| *content != card.content);
         let is_known = model.card.labels.class(&card.name).is_some() && !is_other;
-        if is_known || recognition.taught.as_ref() == Some(source) {
+        let asked = Some((source.clone(), card.content));
+        if is_known || recognition.taught == asked {
             return;
         }
-        (recognition.taught, recognition.asked) = (Some(source.clone()), Instant::now());
+        if recognition.taught.as_ref().is_some_and(|(before, _)| before == source) {
+            // What is being learned has the wrong size.
+            tools.teaching.stop();
+        }
+        (recognition.taught, recognition.asked) = (asked, Instant::now());
         if Path::new(source).is_file() {
             let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
             tools.teaching.start(TeachRequest {

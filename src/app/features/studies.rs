@@ -154,6 +154,7 @@ impl App {
                     studies.files = Arc::new(end.files.clone());
                     if !end.finished {
                         notices.info(format!("Study stopped: {title}. Run it again to resume."));
+                        notices.until("study");
                         continue;
                     }
                     notices.info(format!("Study finished: {title}."));
@@ -176,6 +177,7 @@ impl App {
         if is_running || self.studies.waits(&request.key) {
             self.notices.info("This study is running or waits already.");
         } else {
+            self.notices.done("study");
             self.studies.runner.start(request);
         }
     }

@@ -315,8 +315,11 @@ fn held_words(in_hand: bool, t: f64, [from, to]: [f64; 2]) -> &'static str {
 fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String, Option<Rgb>) {
     let theme = own.data.view.theme;
     let held = own.data.held_s().map(|t| {
-        let in_hand = own.data.moment().is_none_or(|now| now.stage.force_on_object(now.frame).is_some());
-        let words = held_words(in_hand, t, own.data.hold().unwrap_or([t, t]));
+        let touched = own.data.moment().is_none_or(|now| now.stage.force_on_object(now.frame).is_some());
+        let hold = own.data.hold().unwrap_or([t, t]);
+        // Fingers may touch a support close to the object.
+        let nothing_held = own.data.recognised().is_some_and(|recognised| recognised.nothing_held);
+        let words = held_words(touched && !(nothing_held && t >= hold[1] - SOON), t, hold);
         format!("{words}, at {t:.1}{}s", units::SPACE)
     });
     if let Some(inspected) = own.data.shown_trial() {

@@ -47,7 +47,7 @@ pub struct FigureOptions {
 pub struct FigureDataError(String);
 
 /// Trials named one by one in a caption.
-const NAMED: usize = 3;
+const NAMED: usize = 4;
 /// Names of channels in an error.
 const LISTED: usize = 24;
 

@@ -8,7 +8,7 @@ use crate::picture::{Stage, evenly_bent};
 use crate::recording::{OpenTrialError, Replay};
 use palpate_geometry::Pose;
 use palpate_learn::{Model, Models, Shipped, StopRule};
-use palpate_sim::frame::{Frame, Plan, Quality};
+use palpate_sim::frame::{Frame, GraspFailure, Plan, Quality};
 use palpate_sim::gripper::{GripperModel, Phase, Side};
 use palpate_sim::objects::{EMPTY, capital_title};
 use palpate_store::Store;
@@ -125,7 +125,10 @@ impl OpenTrial {
     /// The pads of a simulated grasp do not touch the object at the end of its hold.
     pub fn nothing_held(&self) -> bool {
         let end = self.frames.iter().rfind(|frame| frame.phase == Phase::Hold && frame.world_from_object.is_some());
-        self.stage.as_ref().zip(end).is_some_and(|(stage, frame)| stage.force_on_object(frame).is_none())
+        let failure = self.simulated.as_ref().and_then(|own| own.quality.failure);
+        let never_touched = failure == Some(GraspFailure::NeverTouched);
+        let lost = |(stage, frame): (&Arc<Stage>, &Arc<Frame>)| stage.force_on_object(frame).is_none();
+        never_touched || self.stage.as_ref().zip(end).is_some_and(lost)
     }
 
     /// Opens a trial of any source. The recogniser answers as it did live, from the samples alone.

@@ -8,9 +8,12 @@ use crate::grasping::{GraspController, GraspPlan};
 use crate::gripper::{Gripper, GripperEvent, SerialGripper};
 use palpate_device::protocol::BoardEvent;
 use palpate_sim::gripper::Phase;
+use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Scene;
 use palpate_tactile::trial::{Control, PhaseMark};
 
+/// Rest before an empty hand closes (s): time to take out what it holds.
+const EMPTYING_S: f64 = 4.0;
 /// Readings from before the start that belong to the trial (s).
 pub(super) const BEFORE_S: f64 = 0.3;
 /// Longest wait for readings of the last moments (s): on a busy computer they arrive up to this late.
@@ -57,7 +60,9 @@ impl BoardTrialRecording {
         let now_s = gripper.now_s();
         let before = recent.since(from_s.unwrap_or(now_s - BEFORE_S));
         let began_s = before.iter().find_map(reading_time).unwrap_or(now_s);
-        let plan = GraspPlan { length_s: request.length_s, ..GraspPlan::recorded(scene, request.control) };
+        let usual = GraspPlan::recorded(scene, request.control);
+        let lead_s = if request.object.as_deref() == Some(EMPTY) { EMPTYING_S } else { usual.lead_s };
+        let plan = GraspPlan { length_s: request.length_s, lead_s, ..usual };
         let start_s = if request.control == Control::Free { began_s } else { now_s };
         recorder.begin_board(BoardTrialPlan {
             object: request.object.clone().unwrap_or_default(),

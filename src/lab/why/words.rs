@@ -3,7 +3,7 @@
 use super::occlusion::{Attribution, Evidence};
 use crate::inspection::{PhaseSpan, TouchPhase};
 use palpate_geometry::units::{percent, true_minus};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::{capital_title, object_title};
 use palpate_tactile::{Quantity, unit_of_channel};
 
 /// How evidence is measured, in one sentence.
@@ -30,7 +30,7 @@ impl Attribution {
     /// Answer in one sentence: `Lemon 91 %, then Tomato 6 %.` A second class below 1 % is left out.
     pub fn answer(&self) -> String {
         let [first, second] = [&self.first, &self.second]
-            .map(|class| format!("{} {}", object_title(&class.name), percent(class.probability)));
+            .map(|class| format!("{} {}", capital_title(&class.name), percent(class.probability)));
         if self.second.probability < 0.01 { format!("{first}.") } else { format!("{first}, then {second}.") }
     }
 

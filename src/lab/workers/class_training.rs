@@ -71,7 +71,13 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             progress: &progress,
             stop: run.stop(),
         };
-        let taught = lessons.teach(&request.model, Some(&store))?;
+        // A file that has changed, or whose unit has, is learned anew.
+        let from = |object: &ObjectSetup| {
+            request.model.card.taught_from.get(&request.name).map(|(_, file)| *file == object.source)
+        };
+        let again = request.object.as_ref().and_then(from).unwrap_or(false);
+        let without = again.then(|| request.model.without(&request.name)).transpose()?;
+        let taught = lessons.teach(without.as_ref().unwrap_or(&request.model), Some(&store))?;
         Ok(run.unless_stopped(TrainedModel::save(taught.model, &models, "taught", &store)?))
     })
 }

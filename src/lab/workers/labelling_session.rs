@@ -168,7 +168,7 @@ impl LabelDraft {
     }
 
     /// Objects that match the search, in the order of their number keys: best matches first, among equals the trial's label,
-    /// the next of the plan, the plan, the empty hand. A name that matches no object exactly is offered as a new one, last of
+    /// what the model took a labelled one for, the next of the plan, the plan, the empty hand. A name that matches no object exactly is offered as a new one, last of
     /// those with a number.
     pub fn objects(&self, view: &LabelView) -> Vec<String> {
         self.found(view).names
@@ -177,9 +177,11 @@ impl LabelDraft {
     fn found(&self, view: &LabelView) -> ObjectSearch {
         let next = view.next.iter().map(|next| next.object.clone());
         let label = self.trial(view).and_then(|trial| trial.object.clone());
+        let guess = self.trial(view).filter(|trial| trial.object.is_some()).and_then(|trial| trial.guess.as_ref());
+        let guess = guess.map(|guess| guess.class.clone());
         let planned = view.progress.objects.iter().map(|object| object.name.clone());
         let mut names: Vec<String> = Vec::new();
-        for name in label.into_iter().chain(next).chain(planned).chain([EMPTY.to_owned()]) {
+        for name in label.into_iter().chain(guess).chain(next).chain(planned).chain([EMPTY.to_owned()]) {
             if !names.contains(&name) {
                 names.push(name);
             }

@@ -60,7 +60,11 @@ struct Content(Cell<u64>);
 impl Content {
     /// Adds the bytes of a file that could be read.
     fn of(&self, read: std::io::Result<Vec<u8>>) -> std::io::Result<Vec<u8>> {
-        read.inspect(|bytes| self.0.set(crate::fingerprint([self.0.get().to_le_bytes().as_slice(), bytes])))
+        read.inspect(|bytes| self.add(bytes))
+    }
+
+    fn add(&self, bytes: &[u8]) {
+        self.0.set(crate::fingerprint([self.0.get().to_le_bytes().as_slice(), bytes]));
     }
 
     /// Stores the hash in the object that was made of the files.
@@ -85,6 +89,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Option<ObjectModel>, 
     let blueprint = blueprint(source, &content)?;
     let name = class_in(path, blueprint.robot.as_deref());
     let object = ObjectModel { name, ..blueprint.build(options)? };
+    // The same file in another unit is another object.
+    options.scale.iter().for_each(|scale| content.add(&scale.to_le_bytes()));
     Ok(Some(content.stamped(object)))
 }
 

@@ -16,10 +16,10 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Recognised};
 use crate::app::theme::{self, accented, colour, veil};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{self, capital, failed_sensors_ui, number_field, put, text_field};
+use crate::app::widgets::{self, capital, failed_sensors_ui, number_field, progress_ui, put, text_field};
 use egui::{
-    Align2, Color32, FontId, Galley, Label, ProgressBar, Rect, Response, RichText, Role, ScrollArea, Sense, Ui,
-    WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Galley, Label, Rect, Response, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2,
+    vec2,
 };
 use palpate_geometry::palette::ThemeColours;
 use palpate_geometry::units::SPACE;
@@ -202,9 +202,8 @@ fn lesson_ui(
         if let Some(progress) = running.map(|running| running.progress) {
             ui.horizontal(|ui| {
                 actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
-                let width = ui.available_width();
                 let text = format!("{:.0}{SPACE}%  {}", 100.0 * progress.share, progress.words);
-                ui.add(ProgressBar::new(progress.share as f32).desired_width(width).text(text));
+                progress_ui(ui, progress.share, &text);
             });
         } else if let Some(learned) = learned {
             let warning = learned.lesson.as_ref().and_then(lesson_warning);
@@ -240,7 +239,9 @@ fn lesson_ui(
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
             if let Some(warning) = warning {
-                ui.colored_label(colour(theme::of(ui).colours().warning), format!("{}.", capital(&warning)));
+                let ink = colour(theme::of(ui).colours().warning);
+                let label = Label::new(RichText::new(format!("{}.", capital(&warning))).color(ink));
+                ui.add(if measures.is_tight() { label.truncate() } else { label });
             }
         }
     });

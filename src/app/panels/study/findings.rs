@@ -56,7 +56,7 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         });
         wrapped(ui, RichText::new(&finding.claim));
         if !finding.found.is_empty() {
-            wrapped(ui, RichText::new(&finding.found));
+            wrapped(ui, RichText::new(finding.found.replace(" %", "\u{a0}%")));
         }
         numbers_ui(ui, theme, finding, colour(ink));
         wrapped(ui, RichText::new(&finding.why).small().weak());

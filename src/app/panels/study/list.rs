@@ -3,8 +3,8 @@
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, accented, colour};
-use crate::app::widgets::{command_ui, failure_ui, just_opened, put_line, wrapped};
-use egui::{Align2, Button, FontId, ProgressBar, RichText, ScrollArea, Sense, Ui, vec2};
+use crate::app::widgets::{command_ui, failure_ui, just_opened, progress_ui, put_line, wrapped};
+use egui::{Align2, Button, FontId, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_geometry::units::capital;
 use palpate_lab::workers::JobProgress;
@@ -120,17 +120,8 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     let cost = format!("In full: {}. Quick: fewer grasps, not to be quoted. {kept}", card.cost());
     wrapped(ui, RichText::new(cost).small().weak());
     let running = progress(studies, key);
-    if let Some(JobProgress { share, words }) = &running {
-        ui.add(ProgressBar::new(*share as f32).text(RichText::new(words).small()));
-    }
+    let busy = running.is_some() || studies.waits(key);
     ui.horizontal_wrapped(|ui| {
-        if running.is_some() || studies.waits(key) {
-            let stop = ui
-                .button("Stop study")
-                .on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
-            actions.on(&stop, |app| app.studies.stop());
-            return;
-        }
         let begun = |size: StudySize| studies.files(key).is_some_and(|files| files.begun.contains(&size));
         for (size, title, shortcut) in
             [(StudySize::Quick, "Run quick", "Enter"), (StudySize::Full, "Run in full", "Shift+Enter")]
@@ -140,11 +131,20 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
             if size == StudySize::Quick {
                 button = button.fill(accented(theme::of(ui)));
             }
-            if ui.add(button).on_hover_text(format!("{title} ({shortcut})")).clicked() {
+            if ui.add_enabled(!busy, button).on_hover_text(format!("{title} ({shortcut})")).clicked() {
                 run(key, size, false, actions);
             }
         }
     });
+    if let Some(JobProgress { share, words }) = &running {
+        progress_ui(ui, *share, words);
+    }
+    // Below the others: a second click on it must start nothing.
+    if busy {
+        let stop =
+            ui.button("Stop study").on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
+        actions.on(&stop, |app| app.studies.stop());
+    }
     if let Some((size, cause)) = studies.failed(key).filter(|_| running.is_none()) {
         failure_ui(ui, cause);
         if has_other_units(cause)

@@ -19,6 +19,7 @@ use crate::grasping::{Advisor, EndState, GraspSummary, Row};
 use crate::recording::{Recorder, RecorderNotice};
 use jobs::{AccuracyRequest, CheckRequest, CheckResult, GhostRequest, Subject, accuracy_job, check_job, ghost_job};
 use palpate_learn::Models;
+use palpate_sim::frame::GraspFailure;
 use palpate_sim::gripper::Phase;
 use palpate_sim::objects::ObjectError;
 use palpate_sim::poses::PoseSampler;
@@ -353,6 +354,8 @@ impl Session {
         let Some(current) = self.current.as_mut() else { return };
         current.ended = true;
         let mut trial = current.run.finish(&current.scene);
+        // A support close to the object may have been touched instead.
+        self.status.nothing_held |= trial.data.quality.failure == Some(GraspFailure::NeverTouched);
         trial.header.earlier.clone_from(&current.earlier);
         for warning in trial.header.warnings.iter().skip(current.warned) {
             self.publisher.notify(Notice::Warning(warning.clone()));
