@@ -37,7 +37,7 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     let (all, _) = ui.allocate_exact_size(size, Sense::hover());
     let width = (all.width() - GUTTER * (columns as f32 - 1.0)) / columns as f32;
     let names = (if columns > 1 { 0.54 } else { 0.40 } * width).min(104.0);
-    let width_of = |class| fitted(ui, title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
+    let width_of = |class| fitted(ui, &title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
     let letters = (LETTERS * (names / longest).min(1.0)).max(LEAST_LETTERS).min(line);
     let numbers = if columns > 1 { 31.0 } else { 46.0 };
@@ -103,7 +103,7 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
         ui.painter().circle_filled(pos2(rect.left() + 3.0, rect.center().y), 3.0, colour(colours.good));
     }
     let room = rect.with_min_x(rect.left() + dot);
-    put(ui, fitted(ui, name, columns.letters, from - 2.0 - room.left(), ink), room, Align2::LEFT_CENTER);
+    put(ui, fitted(ui, &name, columns.letters, from - 2.0 - room.left(), ink), room, Align2::LEFT_CENTER);
     let track =
         Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
     ui.painter().rect_filled(track, 2.0, colour(colours.raised));
@@ -114,7 +114,7 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     }
     // An empty bar says "0 %" already.
     if p >= 0.01 {
-        let number = fitted(ui, percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
+        let number = fitted(ui, &percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);
         put(ui, number, rect, Align2::RIGHT_CENTER);
     }
 }

@@ -366,9 +366,9 @@ impl Part<'_, '_> {
             left += side + 8.0;
         }
         let large = 0.75 * measures.headline;
-        let number = p.map(|p| fitted(ui, percent(p), large, 0.4 * rect.width(), ink));
+        let number = p.map(|p| fitted(ui, &percent(p), large, 0.4 * rect.width(), ink));
         let room = rect.right() - left - number.as_ref().map_or(0.0, |n| n.size().x + 8.0);
-        put(ui, fitted(ui, text, large, room, ink), rect.with_min_x(left), Align2::LEFT_CENTER);
+        put(ui, fitted(ui, &text, large, room, ink), rect.with_min_x(left), Align2::LEFT_CENTER);
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
@@ -430,7 +430,7 @@ impl Part<'_, '_> {
         ui.interact(row, ui.scope_id().with("truth"), Sense::hover())
             .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
         let mut left = row.left();
-        let label = fitted(ui, "truth".to_owned(), 11.5, row.width(), colour(colours.quiet_text));
+        let label = fitted(ui, "truth", 11.5, row.width(), colour(colours.quiet_text));
         left += label.size().x + 8.0;
         put(ui, label, row, Align2::LEFT_CENTER);
         if let Some((icon, ink)) = sign {
@@ -443,7 +443,7 @@ impl Part<'_, '_> {
             left += 20.0;
         }
         let ink = if sign.is_some() { colours.text } else { colours.quiet_text };
-        put(ui, fitted(ui, text, 13.5, row.right() - left, colour(ink)), row.with_min_x(left), Align2::LEFT_CENTER);
+        put(ui, fitted(ui, &text, 13.5, row.right() - left, colour(ink)), row.with_min_x(left), Align2::LEFT_CENTER);
         let hint = "Show or hide the true object";
         let toggle = ui.interact(eye, ui.scope_id().with("show the truth"), Sense::click()).on_hover_text(hint);
         toggle.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, "Show the truth"));
@@ -515,8 +515,8 @@ fn labelled(ui: &mut Ui, size: egui::Vec2, spoken: &str) -> (Rect, Response) {
 }
 
 /// [`widgets::fitted`] with the smallest letters of this panel.
-fn fitted(ui: &Ui, text: String, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
-    widgets::fitted(ui, &text, [LEAST_LETTERS, letters], width, ink)
+fn fitted(ui: &Ui, text: &str, letters: f32, width: f32, ink: Color32) -> Arc<Galley> {
+    widgets::fitted(ui, text, [LEAST_LETTERS, letters], width, ink)
 }
 
 /// Share as drawn: it follows the answer within [`EASE_S`], but jumps without an answer and at low frame rates.

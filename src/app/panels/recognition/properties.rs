@@ -60,7 +60,7 @@ fn none_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, why: &str) {
     let inside = place.shrink2(vec2(4.0, 0.0));
     let ink = colour(part.colours().quiet_text);
     let text = if named > 0.0 { why.to_owned() } else { spoken };
-    put(ui, fitted(ui, text, LETTERS, inside.width(), ink), inside, Align2::LEFT_CENTER);
+    put(ui, fitted(ui, &text, LETTERS, inside.width(), ink), inside, Align2::LEFT_CENTER);
 }
 
 /// The name of a property before its answers; returns its room (points).
@@ -69,7 +69,7 @@ fn named_ui(ui: &Ui, part: &Part<'_, '_>, name: &str, rect: Rect) -> f32 {
         return 0.0;
     }
     let quiet = colour(part.colours().quiet_text);
-    put(ui, fitted(ui, name.to_owned(), 11.5, NAME, quiet), rect, Align2::LEFT_CENTER);
+    put(ui, fitted(ui, name, 11.5, NAME, quiet), rect, Align2::LEFT_CENTER);
     NAME
 }
 
@@ -84,7 +84,7 @@ fn property_ui(ui: &mut Ui, part: &Part<'_, '_>, name: &str, answers: &[String],
     let width = (rect.width() - named) / answers.len().max(1) as f32;
     // All have numbers, or none has; letters are a little smaller for it.
     let needed =
-        |answer: &String| fitted(ui, format!("{answer} 99.9 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
+        |answer: &String| fitted(ui, &format!("{answer} 99.9 %"), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let letters = LETTERS * ((width - 10.0) / answers.iter().map(needed).fold(1.0, f32::max)).min(1.0);
     let numbered = letters >= SMALL;
     let letters = if numbered { letters } else { LETTERS };
@@ -123,10 +123,10 @@ fn segment_ui(ui: &Ui, part: &Part<'_, '_>, place: Rect, segment: &Segment<'_>) 
     ui.painter().rect_filled(filled, 1.5, colour(fill));
     let ink = colour(if segment.leads { colours.text } else { colours.quiet_text });
     let inside = place.shrink2(vec2(3.0, 0.0)).with_max_y(line.top());
-    let word = fitted(ui, segment.answer.to_owned(), segment.letters, inside.width(), ink);
+    let word = fitted(ui, segment.answer, segment.letters, inside.width(), ink);
     let number = segment.p.filter(|_| segment.numbered).map(percent);
     put(ui, word, inside, if number.is_some() { Align2::LEFT_CENTER } else { Align2::CENTER_CENTER });
     if let Some(number) = number {
-        put(ui, fitted(ui, number, segment.letters, inside.width(), ink), inside, Align2::RIGHT_CENTER);
+        put(ui, fitted(ui, &number, segment.letters, inside.width(), ink), inside, Align2::RIGHT_CENTER);
     }
 }

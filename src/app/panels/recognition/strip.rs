@@ -66,18 +66,18 @@ fn cell_ui(ui: &Ui, part: &Part<'_, '_>, number: usize, grasp: Grasp<'_>, cell: 
     let inside = cell.shrink2(vec2(4.0, 3.0));
     let quiet = colour(colours.quiet_text);
     let Some(pmf) = pmf else {
-        put(ui, fitted(ui, count.to_string(), 11.5, inside.width(), quiet), inside, Align2::CENTER_CENTER);
+        put(ui, fitted(ui, &count.to_string(), 11.5, inside.width(), quiet), inside, Align2::CENTER_CENTER);
         return;
     };
     let (class, p) = pmf.top();
     let ink = colour(colours.text);
     let picture = Rect::from_min_size(inside.min, vec2(20.0, 20.0));
     let below = inside.with_min_y(picture.bottom());
-    let number = fitted(ui, percent(p), 12.5, inside.width(), ink);
+    let number = fitted(ui, &percent(p), 12.5, inside.width(), ink);
     part.thumbnail(ui, &labels.classes[class].name, picture);
     if picture.width() + number.size().x + 4.0 <= inside.width() {
         put(ui, number, inside.with_max_y(picture.bottom()), Align2::RIGHT_CENTER);
-        put(ui, fitted(ui, title(labels, class), 11.5, inside.width(), ink), below, Align2::LEFT_BOTTOM);
+        put(ui, fitted(ui, &title(labels, class), 11.5, inside.width(), ink), below, Align2::LEFT_BOTTOM);
     } else {
         put(ui, number, below, Align2::LEFT_BOTTOM);
     }

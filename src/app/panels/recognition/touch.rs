@@ -48,7 +48,12 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
             let text = of(measure).map_or_else(|| "–".to_owned(), |estimate| words(estimate, "–"));
             explain(ui, place, (name, about), of(measure));
             let ink = colour(if of(measure).is_some() { part.colours().text } else { part.colours().quiet_text });
-            put(ui, fitted(ui, format!("{name} {text}"), height - 1.0, place.width(), ink), place, Align2::LEFT_CENTER);
+            put(
+                ui,
+                fitted(ui, &format!("{name} {text}"), height - 1.0, place.width(), ink),
+                place,
+                Align2::LEFT_CENTER,
+            );
         }
     } else {
         SHOWN.into_iter().for_each(|(measure, name, about)| line_ui(ui, part, (name, about), of(measure)));
@@ -78,7 +83,7 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
     explain(ui, rect, (name, about), estimate);
     let quiet = colour(colours.quiet_text);
     let (left, right) = (rect.left() + NAME, rect.right() - VALUE);
-    put(ui, fitted(ui, name.to_owned(), LETTERS, NAME, quiet), rect, Align2::LEFT_CENTER);
+    put(ui, fitted(ui, name, LETTERS, NAME, quiet), rect, Align2::LEFT_CENTER);
     let bar = Rect::from_min_max(
         pos2(left, rect.center().y - 0.5 * BAR * height),
         pos2(right - 8.0, rect.center().y + 0.5 * BAR * height),
@@ -95,5 +100,5 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
         }
     }
     let ink = if estimate.is_some() { colour(colours.text) } else { quiet };
-    put(ui, fitted(ui, text, LETTERS, VALUE, ink), rect, Align2::RIGHT_CENTER);
+    put(ui, fitted(ui, &text, LETTERS, VALUE, ink), rect, Align2::RIGHT_CENTER);
 }
