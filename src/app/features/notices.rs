@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 struct Remedy(&'static str, &'static str, fn(&mut App));
 
 const REMEDIES: [Remedy; 9] = [
-    Remedy("object.collision = \"hull\"", "Use its hull", App::use_hull),
-    Remedy("set object.scale to decide", "Treat as mm", |app| app.set_object_scale(1e-3)),
-    Remedy("set object.scale to decide", "Treat as cm", |app| app.set_object_scale(1e-2)),
-    Remedy("set object.scale to decide", "Treat as m", |app| app.set_object_scale(1.0)),
+    Remedy(ITS_HULL, "Use its hull", App::use_hull),
+    Remedy(ITS_UNIT, "Treat as mm", |app| app.set_object_scale(1e-3)),
+    Remedy(ITS_UNIT, "Treat as cm", |app| app.set_object_scale(1e-2)),
+    Remedy(ITS_UNIT, "Treat as m", |app| app.set_object_scale(1.0)),
     Remedy("cannot read \"", "Choose a file …", App::ask_for_object),
     Remedy("cannot read the mesh", "Choose a file …", App::ask_for_object),
     Remedy("not calibrated", "Calibrate …", |app| app.show_panel("calibration")),
@@ -26,6 +26,9 @@ const REMEDIES: [Remedy; 9] = [
     Remedy(UNDONE_BY_KEY, "Undo", |app| app.edit_labels(LabelCommand::Undo)),
 ];
 
+/// In messages about the object of the scene, until another one is asked for.
+const ITS_HULL: &str = "object.collision = \"hull\"";
+const ITS_UNIT: &str = "set object.scale to decide";
 /// In messages of what Ctrl+Z takes back, until something else is changed.
 const UNDONE_BY_KEY: &str = "Ctrl+Z brings it back";
 
@@ -148,6 +151,11 @@ impl Notices {
     /// Takes away what Ctrl+Z no longer does: something else is changed now.
     pub(in crate::app) fn changed(&mut self) {
         self.shown.retain(|shown| !shown.text.contains(UNDONE_BY_KEY));
+    }
+
+    /// Takes away what can be done about an object: another one is asked for.
+    pub(in crate::app) fn object_changed(&mut self) {
+        self.shown.retain(|shown| ![ITS_HULL, ITS_UNIT].iter().any(|phrase| shown.text.contains(phrase)));
     }
 
     /// Last messages, oldest first.
@@ -300,6 +308,17 @@ mod tests {
         let large = load("large.obj").expect("loads").expect("an object");
         let scale = large.warnings.iter().find(|warning| warning.contains("scale")).expect("a warning of its size");
         assert_eq!(of(scale), ["Treat as mm", "Treat as cm", "Treat as m"]);
+        // It comes before later warnings, and goes with its object.
+        let mut notices = Notices::default();
+        notices.warning(scale);
+        notices.warning("no finger touched the object");
+        let ctx = egui::Context::default();
+        assert_eq!(notices.first(&ctx), Some(0));
+        notices.object_changed();
+        assert_eq!(
+            notices.shown.iter().map(|shown| shown.text.as_str()).collect::<Vec<_>>(),
+            ["No finger touched the object"]
+        );
         assert_eq!(of("Trial 7 discarded; Ctrl+Z brings it back"), ["Undo"]);
     }
 }

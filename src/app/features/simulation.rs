@@ -230,6 +230,7 @@ impl App {
         }
         if scene != self.simulation.scene {
             self.simulation.changes.note(&self.simulation.scene);
+            self.notices.object_changed();
         }
         self.simulation.use_scene(scene);
     }

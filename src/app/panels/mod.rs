@@ -56,7 +56,8 @@ pub const ALL: [PanelKind; 35] = [
         let simulated = app.view.source != ViewSource::Gripper;
         let chosen = if simulated { app.simulation.scene.object.source.as_str() } else { "" };
         let learned_as = |path: &str| app.learned_as(path).map(|class| (class, app.lesson(class)));
-        objects::ui(ui, (chosen, &app.view), learned_as, &app.thumbnails, actions);
+        let loaded = app.snapshot().map_or("", |snapshot| snapshot.scene.object.source.as_str());
+        objects::ui(ui, (chosen, loaded, &app.view), learned_as, &app.thumbnails, actions);
     }),
     panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
     panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),

@@ -9,14 +9,13 @@ use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, capital_title, catalogue};
-use std::path::Path;
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
 
 pub(super) fn ui<'a>(
     ui: &mut Ui,
-    (chosen, view): (&str, &ViewState),
+    (chosen, loaded, view): (&str, &str, &ViewState),
     learned_as: impl Fn(&str) -> Option<(&'a str, Option<&'a Lesson>)>,
     pictures: &Thumbnails,
     actions: &mut Actions,
@@ -31,7 +30,7 @@ pub(super) fn ui<'a>(
             row.scroll_to_me(None);
         }
     };
-    open_row(ui, actions);
+    open_row(ui, loaded, actions);
     ui.add_space(2.0);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for path in &view.recent {
@@ -69,7 +68,7 @@ pub(super) fn ui<'a>(
 }
 
 /// Button and field for files.
-fn open_row(ui: &mut Ui, actions: &mut Actions) {
+fn open_row(ui: &mut Ui, loaded: &str, actions: &mut Actions) {
     let open = ui.add_sized([ui.available_width(), 28.0], egui::Button::new("Open URDF, OBJ, STL …").truncate());
     actions.on(&open.on_hover_text("Ctrl+O, or drop a file anywhere on the window"), App::ask_for_object);
     let id = egui::Id::unique("object path");
@@ -78,11 +77,17 @@ fn open_row(ui: &mut Ui, actions: &mut Actions) {
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
         let source = std::mem::take(&mut path).trim().trim_matches(['"', '\'']).to_owned();
-        // Where there is no such file, the next letters are another path, not keys.
-        if !Path::new(&source).exists() {
-            response.request_focus();
-        }
+        // Where the file cannot be opened, the next letters are another path, not keys.
+        response.request_focus();
         actions.push(move |app| app.open(&source));
+    }
+    // Once it is open, keys are keys again.
+    let before = ui.data_mut(|data| data.get_temp_mut_or_default::<String>(id.with("loaded")).clone());
+    if before != loaded {
+        ui.data_mut(|data| data.insert_temp(id.with("loaded"), loaded.to_owned()));
+        if path.is_empty() {
+            response.surrender_focus();
+        }
     }
     ui.data_mut(|data| data.insert_temp(id, path));
 }

@@ -10,7 +10,9 @@ use egui::{Align2, Color32, Rect, Response, RichText, ScrollArea, Sense, Ui, Wid
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
 use palpate_lab::inspection::TouchPhase;
-use palpate_lab::why::{Attribution, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words};
+use palpate_lab::why::{
+    Attribution, BeliefMove, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words,
+};
 use palpate_lab::workers::{ExplainRequest, Explainer};
 use palpate_sim::objects::{capital_title, object_title};
 use palpate_tactile::trial::TrialId;
@@ -111,15 +113,19 @@ fn evidence_ui(ui: &mut Ui, why: &Attribution) {
         heading(ui, "Grasps", &format!("Probability of {title} after each grasp"));
         for (k, step) in why.grasps.iter().enumerate() {
             let [before, alone, after] = [step.before, step.alone, step.after].map(|two| percent(two[0]));
-            let moved = Evidence { points: 100.0 * (step.after[0] - step.before[0]), decibans: 0.0 };
             let name = format!("grasp {}", k + 1);
             let hint = format!("{title}: {before} before it, {alone} by it alone, {after} after it");
-            rows.plain_bar_ui(ui, &name, moved.points).on_hover_text(hint);
+            rows.plain_bar_ui(ui, &name, moved(step)).on_hover_text(hint);
         }
     }
     ui.add_space(2.0);
     let how = format!("{MEASURED_HOW} {} answers of the model.", why.calls);
     wrapped(ui, RichText::new(how).small().weak());
+}
+
+/// Percent points by which a grasp has moved the answer.
+fn moved(step: &BeliefMove) -> f64 {
+    100.0 * (step.after[0] - step.before[0])
 }
 
 fn heading(ui: &mut Ui, text: &str, hint: &str) {
@@ -141,7 +147,9 @@ struct Rows {
 impl Rows {
     fn new(theme: Theme, why: &Attribution) -> Self {
         let parts = why.by_channel.iter().chain(&why.by_phase).chain(why.by_both.iter().flatten());
-        let scale = parts.map(|evidence| evidence.points.abs()).fold(LEAST_SCALE, f64::max);
+        let points =
+            parts.map(|evidence| evidence.points).chain(why.grasps.iter().filter(|_| why.grasps.len() > 1).map(moved));
+        let scale = points.map(f64::abs).fold(LEAST_SCALE, f64::max);
         let colours = theme.colours();
         Self {
             scale,

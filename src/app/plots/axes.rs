@@ -3,7 +3,12 @@
 use crate::app::theme::colour;
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 use palpate_geometry::palette::Theme;
-use palpate_geometry::units::{SPACE, mark as plain};
+use palpate_geometry::units::{SPACE, true_minus};
+
+/// A round value at an axis, with all of its digits: `150.5`.
+fn plain(value: f64) -> String {
+    true_minus(&format!("{}", (value * 1e6).round() / 1e6))
+}
 
 /// Time at the axis of a plot. Empty near the end of the axis, where it would be cut off.
 pub(super) fn seconds_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>) -> String {
@@ -95,6 +100,13 @@ mod tests {
     fn a_value_does_not_stand_on_the_first_time() {
         let zero = |height: f64| value_at(GridMark { value: 0.0, step_size: 1.0 }, &(-0.6..=12.0), height);
         assert_eq!((zero(120.0).as_str(), zero(50.0).as_str()), ("0", ""));
+    }
+
+    #[test]
+    fn times_far_from_zero_keep_their_halves() {
+        let texts =
+            [150.0, 150.5, -0.1 * 3.0].map(|value| seconds_at(GridMark { value, step_size: 4.0 }, &(-1.0..=154.0)));
+        assert_eq!(texts.map(|text| text.replace(SPACE, " ")), ["150 s", "150.5 s", "−0.3 s"]);
     }
 
     #[test]

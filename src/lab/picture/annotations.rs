@@ -271,7 +271,8 @@ fn add_legend(overlay: &mut Overlay, view: &PictureView, from_top: f32, title: &
         } else {
             Align::Centre
         };
-        let value = mark(low + (high - low) * f64::from(share));
+        let value = low + (high - low) * f64::from(share);
+        let value = mark(if high - low > 1.0 { (10.0 * value).round() / 10.0 } else { value });
         overlay.text(at + Vec2::new(0.0, 12.0), align, TEXT, colour, value);
     }
 }

@@ -3,7 +3,7 @@
 use super::occlusion::{Attribution, Evidence};
 use crate::inspection::{PhaseSpan, TouchPhase};
 use palpate_geometry::units::{percent, true_minus};
-use palpate_sim::objects::{capital_title, object_title};
+use palpate_sim::objects::capital_title;
 use palpate_tactile::{Quantity, unit_of_channel};
 
 /// How evidence is measured, in one sentence.
@@ -50,14 +50,15 @@ impl Attribution {
         })
     }
 
-    /// A channel; where its pad touches nothing in the phase that has most of it, its silence spoke: `no left pad pressure yet`.
+    /// A channel; where its pad touches nothing in the phase that has most of it, its silence spoke: `late left pad pressure`,
+    /// or `no left pad pressure` in the hold.
     fn channel_reason(&self, channel: usize) -> Reason {
         let evidence = self.by_channel[channel];
         let most = self.by_both[channel].iter().position(|both| both.points / evidence.points > 0.5);
         let name = channel_words(&self.channels[channel]);
         let part = match most {
             Some(phase) if self.unloaded[channel][phase] && self.phases[phase].phase < TouchPhase::Hold => {
-                format!("no {name} yet")
+                format!("late {name}")
             }
             Some(phase) if self.unloaded[channel][phase] => format!("no {name}"),
             _ => name,
@@ -73,7 +74,7 @@ impl Attribution {
 
     /// Reasons in sentences: what spoke for the first class, and what against it.
     pub fn sentences(&self) -> Vec<String> {
-        let title = object_title(&self.first.name);
+        let title = capital_title(&self.first.name);
         let [spoke_for, against] = self.reasons();
         let listed = |reasons: &[Reason]| -> String {
             let parts: Vec<String> = reasons
@@ -138,12 +139,13 @@ pub fn channel_words(name: &str) -> String {
     }
 }
 
-/// Percent points with their sign: `+38`, `−0.4`; `0` for none.
+/// Percent points with their sign: `+38`, `−0.4`; `0` for none. Rounded towards zero as probabilities are: none loses more
+/// than it has.
 pub fn points_words(points: f64) -> String {
     true_minus(&match points.abs() {
         size if size < 0.05 => "0".to_owned(),
         size if size < 0.95 => format!("{points:+.1}"),
-        _ => format!("{points:+.0}"),
+        _ => format!("{:+.0}", (points + 0.05 * points.signum()).trunc()),
     })
 }
 
@@ -191,7 +193,7 @@ mod tests {
             let cells = vec![unloaded.to_vec(), vec![false; 2]];
             Attribution { unloaded: cells, ..found([60.0, 0.0], [[96.0, 0.0], [0.0, 0.0]]) }.because()
         };
-        assert_eq!(silent([true, false]), "no left pad pressure yet");
+        assert_eq!(silent([true, false]), "late left pad pressure");
         assert_eq!(silent([false, true]), "left pad pressure");
         let let_go =
             Attribution { unloaded: vec![vec![false, true]; 2], ..found([12.0, 0.0], [[0.0, 12.0], [0.0; 2]]) };
@@ -216,6 +218,6 @@ mod tests {
         let names = ["force_right", "pressure_left_pair_1", "contact_pressure_left", "grip", "my_own_sensor"];
         let words = ["right pad force", "left pad pressure, pair 1", "left contact pressure", "grip", "my own sensor"];
         assert_eq!(names.map(channel_words), words);
-        assert_eq!([0.01, 0.31, -0.4, 12.4, -7.6].map(points_words), ["0", "+0.3", "−0.4", "+12", "−8"]);
+        assert_eq!([0.01, 0.31, -0.4, 12.4, -7.6].map(points_words), ["0", "+0.3", "−0.4", "+12", "−7"]);
     }
 }

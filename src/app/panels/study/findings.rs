@@ -70,7 +70,8 @@ const STRIP: [f32; 2] = [64.0, 12.0];
 fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
     let quiet = colour(theme.colours().quiet_text);
     for (own, strip) in finding.strips() {
-        ui.horizontal_wrapped(|ui| {
+        wrapped(ui, RichText::new(&own.what).small().weak());
+        ui.horizontal(|ui| {
             let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
             let text = format!("{}: {}, line at {}", own.what, own.shown(), Cell::Number(own.line).shown(&own.unit));
             response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
@@ -84,7 +85,6 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
             response.on_hover_text(text);
             let estimate = Cell::from(own.value.value()).shown(&own.unit);
             ui.add(Label::new(RichText::new(format!("{estimate}{SPACE}{}", symbol(&own.unit))).small()).extend());
-            ui.label(RichText::new(&own.what).small().weak());
         });
     }
     if let Some(more) = finding.left_out() {
