@@ -27,7 +27,7 @@ struct Entry {
 type Run = Box<dyn FnOnce(&mut App)>;
 
 /// Size of the palette (points).
-const WIDTH: f32 = 520.0;
+const WIDTH: f32 = 620.0;
 const ROW: f32 = 24.0;
 /// Entries of the palette in sight.
 const ROWS: f32 = 14.0;
@@ -72,25 +72,23 @@ pub(super) fn ui(app: &App, actions: &mut Actions) {
             }
             response.request_focus();
             let height = (ROWS * ROW).min(room.height() - 130.0);
-            ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, true]).show(
-                ui,
-                |ui| {
-                    ui.spacing_mut().item_spacing.y = 0.0;
-                    if entries.is_empty() {
-                        ui.weak("No action has this name.");
+            let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            list.auto_shrink([false, true]).show(ui, |ui| {
+                ui.spacing_mut().item_spacing.y = 0.0;
+                if entries.is_empty() {
+                    ui.weak("No action has this name.");
+                }
+                for (place, entry) in entries.iter().enumerate() {
+                    let chosen = place == search.chosen;
+                    let response = row_ui(ui, app.view.theme, entry, chosen);
+                    if chosen && (up || down || opened.is_none()) {
+                        response.scroll_to_me(None);
                     }
-                    for (place, entry) in entries.iter().enumerate() {
-                        let chosen = place == search.chosen;
-                        let response = row_ui(ui, app.view.theme, entry, chosen);
-                        if chosen && (up || down || opened.is_none()) {
-                            response.scroll_to_me(None);
-                        }
-                        if response.clicked() {
-                            run = Some(place);
-                        }
+                    if response.clicked() {
+                        run = Some(place);
                     }
-                },
-            );
+                }
+            });
         });
     });
     let pointer = ctx.input(|input| input.pointer.any_pressed().then(|| input.pointer.interact_pos()).flatten());

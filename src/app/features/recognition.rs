@@ -138,9 +138,10 @@ impl App {
         self.recognition.taught = None;
         self.teach_new_object();
         if self.tools.teaching.running().is_none() {
-            let text =
-                "Nothing to learn: it is known already (forget it first), or its object does not come from a file.";
-            self.notices.info(text);
+            let is_file = Path::new(&self.simulation.scene.object.source).is_file();
+            let why =
+                if is_file { "The model knows it already: forget it first." } else { "Open an object file first." };
+            self.notices.info(format!("Nothing to learn. {why}"));
         }
     }
 

@@ -230,6 +230,8 @@ impl App {
         }
         if scene != self.simulation.scene {
             self.simulation.changes.note(&self.simulation.scene);
+        }
+        if scene.object != self.simulation.scene.object {
             self.notices.object_changed();
         }
         self.simulation.use_scene(scene);

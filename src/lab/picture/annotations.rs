@@ -3,7 +3,7 @@
 use super::contact_path::PathColour;
 use super::{PictureView, ink};
 use glam::{Vec2, Vec3};
-use palpate_geometry::drawing::{Align, Camera, Inset, Overlay, Shape2};
+use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
 use palpate_geometry::units::{SPACE, mark};
 
@@ -73,9 +73,9 @@ const FOOT: f32 = 42.0;
 const STEP: f32 = 6.0;
 
 impl<'a> Annotator<'a> {
-    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside an inset; `hand` is what plates
+    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside the place of an inset; `hand` is what plates
     /// cover last of all.
-    pub(super) fn new(view: &'a PictureView, inset: Option<&Inset>, hand: Vec<Vec2>) -> Self {
+    pub(super) fn new(view: &'a PictureView, inset: Option<Plate>, hand: Vec<Vec2>) -> Self {
         let mut overlay = Overlay::default();
         if view.annotations {
             add(&mut overlay, view);
@@ -85,7 +85,6 @@ impl<'a> Annotator<'a> {
         let legends = Plate::between(Vec2::new(size.x - legends.x, 0.0), Vec2::new(size.x, legends.y));
         let bar = scale_bar(view).map_or(0.0, |(_, length)| length.max(LEAST_BAR));
         let scale_bar = Plate::between(size - Vec2::new(bar + MARGIN, SCALE_BAR), size);
-        let inset = inset.map(|inset| Plate::between(inset.corner, inset.corner + inset.size));
         let plates = [axes, legends, scale_bar].into_iter().chain(inset).collect();
         Self { view, overlay, plates, kept: Vec::new(), hand }
     }

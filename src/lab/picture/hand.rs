@@ -29,6 +29,8 @@ const MOST: [f32; 2] = [0.42, 0.34];
 const SHAPE: f32 = 4.0 / 3.0;
 /// Sizes that are tried where it would cover the hand.
 const SMALLER: [f32; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
+/// Height below which there is none (points).
+const TOO_SMALL: f32 = 48.0;
 
 /// Points of a mesh, the farthest in each direction.
 pub(super) fn outline(mesh: &SurfaceMesh) -> Vec<Vec3> {
@@ -144,7 +146,8 @@ impl Stage {
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
         let arrows = if view.forces { reach(&self.gripper, &world_from_gripper, frame, view) } else { Vec::new() };
         let arrows: Vec<Vec2> = arrows.into_iter().filter_map(&on_picture).collect();
-        let beside = std::iter::once(usual).chain(lower).filter(|plate| !hand.iter().any(|place| plate.covers(*place)));
+        let is_free = |plate: &Plate| plate.half.y >= 0.5 * TOO_SMALL && !hand.iter().any(|place| plate.covers(*place));
+        let beside = std::iter::once(usual).chain(lower).filter(is_free);
         beside.min_by_key(|plate| arrows.iter().filter(|place| plate.covers(**place)).count())
     }
 }

@@ -155,11 +155,13 @@ impl Stage {
     /// Everything in one picture of a frame.
     pub fn draw(&self, frame: &Frame, view: &PictureView) -> DrawList {
         let colours = view.theme.colours();
-        let inset = self.touch_inset(frame, view);
+        // Its place stays free where it comes and goes.
+        let place = self.inset_place(frame, view);
+        let inset = place.zip(self.touch_camera(frame)).map(|at| self.inset(frame, view, at, None));
         // Only labels have to keep clear of the hand.
         let hand = if view.annotations { self.held_points(frame) } else { Vec::new() };
         let hand = hand.into_iter().filter_map(view.camera.projector(view.size)).collect();
-        let mut annotator = Annotator::new(view, inset.as_ref(), hand);
+        let mut annotator = Annotator::new(view, place, hand);
         if view.forces && !view.plain {
             forces::add_key(&mut annotator);
         }

@@ -95,12 +95,6 @@ impl Stage {
         list
     }
 
-    /// The touch as a picture within a picture; none where nothing is touched.
-    pub(super) fn touch_inset(&self, frame: &Frame, view: &PictureView) -> Option<Inset> {
-        let camera = self.touch_camera(frame)?;
-        Some(self.inset(frame, view, (self.inset_place(frame, view)?, camera), None))
-    }
-
     /// Adds the touch of an earlier hold, by this hand or in another pose, to a picture of a frame in which nothing is touched.
     pub fn add_hold(&self, list: &mut DrawList, frame: &Frame, view: &PictureView, (stage, held): (&Self, &Frame)) {
         let place = self.inset_place(frame, view).zip(stage.touch_camera(held));
@@ -110,7 +104,8 @@ impl Stage {
         list.inset = place.map(|place| Box::new(Inset { past, ..stage.inset(held, view, place, Some("last hold")) }));
     }
 
-    fn inset(&self, frame: &Frame, view: &PictureView, at: (Plate, Camera), title: Option<&str>) -> Inset {
+    /// The touch as a picture within a picture.
+    pub(super) fn inset(&self, frame: &Frame, view: &PictureView, at: (Plate, Camera), title: Option<&str>) -> Inset {
         let (place, camera) = at;
         let (corner, size) = (place.middle - place.half, 2.0 * place.half);
         let inner =
