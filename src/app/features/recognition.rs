@@ -291,7 +291,7 @@ impl App {
             return;
         }
         if recognition.taught.as_ref().is_some_and(|(before, _)| before == source) {
-            // What is being learned has the wrong size.
+            // A lesson that runs is of the file before it changed.
             tools.teaching.stop();
         }
         (recognition.taught, recognition.asked) = (asked, Instant::now());

@@ -73,8 +73,8 @@ const FOOT: f32 = 42.0;
 const STEP: f32 = 6.0;
 
 impl<'a> Annotator<'a> {
-    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside the place of an inset; `hand` is what plates
-    /// cover last of all.
+    /// Begins with axes, scale bar, legends and badge, where the view has annotations, beside the place of an inset; `hand` is
+    /// what plates cover last of all.
     pub(super) fn new(view: &'a PictureView, inset: Option<Plate>, hand: Vec<Vec2>) -> Self {
         let mut overlay = Overlay::default();
         if view.annotations {

@@ -51,16 +51,16 @@ impl Attribution {
     }
 
     /// A channel; where its pad touches nothing in the phase that has most of it, its silence spoke: `late left pad pressure`,
-    /// or `no left pad pressure` in the hold.
+    /// or `no left pad pressure` where it touches nothing later either.
     fn channel_reason(&self, channel: usize) -> Reason {
         let evidence = self.by_channel[channel];
         let most = self.by_both[channel].iter().position(|both| both.points / evidence.points > 0.5);
         let name = channel_words(&self.channels[channel]);
         let part = match most {
-            Some(phase) if self.unloaded[channel][phase] && self.phases[phase].phase < TouchPhase::Hold => {
-                format!("late {name}")
+            Some(phase) if self.unloaded[channel][phase] => {
+                let late = self.unloaded[channel][phase..].contains(&false);
+                format!("{} {name}", if late { "late" } else { "no" })
             }
-            Some(phase) if self.unloaded[channel][phase] => format!("no {name}"),
             _ => name,
         };
         Reason { part, mostly: most.map(|phase| phase_words(&self.phases[phase])), evidence }
@@ -194,6 +194,7 @@ mod tests {
             Attribution { unloaded: cells, ..found([60.0, 0.0], [[96.0, 0.0], [0.0, 0.0]]) }.because()
         };
         assert_eq!(silent([true, false]), "late left pad pressure");
+        assert_eq!(silent([true, true]), "no left pad pressure");
         assert_eq!(silent([false, true]), "left pad pressure");
         let let_go =
             Attribution { unloaded: vec![vec![false, true]; 2], ..found([12.0, 0.0], [[0.0, 12.0], [0.0; 2]]) };
