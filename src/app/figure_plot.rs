@@ -8,7 +8,7 @@ use egui_plot::{
 };
 use palpate_geometry::drawing::{CellAxis, DataSeries, HeatMap, LineStyle, Marker, Plot};
 use palpate_geometry::palette::{Rgb, Theme, series_colour};
-use palpate_geometry::units::symbol;
+use palpate_geometry::units::{capital, symbol};
 use palpate_render::placed_labels;
 use std::ops::RangeInclusive;
 
@@ -56,6 +56,11 @@ pub(super) fn show(
     let lines = if height > 2.0 * LINE * (known[1].len() + 2) as f32 { 2 } else { 1 };
     let most = (NAMES * ui.available_width() / LETTER) as usize;
     known[1].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, most, lines));
+    if let Some(heat) = &plot.heat {
+        let names = known[1].iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
+        let cell = ((ui.available_width() / LETTER) as usize).saturating_sub(names) / heat.x.count.max(1);
+        known[0].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, cell.max(2), 1));
+    }
     let marks = |known: &[(f64, String)], bounds: &RangeInclusive<f64>| {
         let step_size = bounds.end() - bounds.start();
         let numbered = known.iter().filter(|(_, text)| !text.is_empty());
@@ -94,10 +99,20 @@ pub(super) fn show(
         .set_margin_fraction(egui::Vec2::ZERO);
     if height > ROOM_FOR_TITLES {
         widget = widget.x_axis_label(symbol(&plot.x.title)).y_axis_label(symbol(&plot.y.title));
-    } else {
-        let titles = [plot.y.title.as_str(), plot.x.title.as_str()];
-        let axes =
-            titles.into_iter().filter(|title| !title.is_empty()).map(symbol).collect::<Vec<_>>().join(" against ");
+    }
+    if height <= ROOM_FOR_TITLES || plot.heat.is_some() {
+        let titles = [plot.y.title.as_str(), plot.x.title.as_str()].map(symbol);
+        let axes = match &titles {
+            [rows, columns] if let Some(heat) = &plot.heat => {
+                format!("{} ({}). Rows: {rows}, columns: {columns}", capital(&heat.quantity), heat.unit)
+            }
+            titles => titles
+                .iter()
+                .filter(|title| !title.is_empty())
+                .map(AsRef::as_ref)
+                .collect::<Vec<&str>>()
+                .join(" against "),
+        };
         ui.add(egui::Label::new(RichText::new(axes).small().weak()).truncate());
     }
     if legend && ui.available_width() > ROOM_FOR_LEGEND[0] && height > ROOM_FOR_LEGEND[1] {
@@ -175,6 +190,9 @@ fn labels(ui: &Ui, theme: Theme, shown: &ShownPlot, plot: &Plot, labelled: impl 
         if let Some(ends) = label.lead {
             painter.line_segment(ends.map(position), Stroke::new(0.6, colour(theme.colours().quiet_text)));
         }
+        // Legible where no place is free of curves.
+        let ground = Rect::from_min_max(position(label.room[0]), position(label.room[1]));
+        painter.rect_filled(ground, 2.0, veil(theme.colours().background, 0.75));
         painter.galley(position(label.room[0]), galley(label.text), colour(theme.colours().text));
     }
 }
@@ -293,7 +311,8 @@ fn cells(ui: &Ui, shown: &ShownPlot, plot: &Plot, heat: &HeatMap) {
         if text.trim_start_matches('-') != "0" && cell.width() > ROOM_FOR_VALUE.x && cell.height() > ROOM_FOR_VALUE.y {
             let [dark, bright] = [Rgb(0, 0, 0), Rgb(255, 255, 255)];
             let ink = if fill.contrast(dark) > fill.contrast(bright) { dark } else { bright };
-            painter.text(cell.center(), Align2::CENTER_CENTER, text, FontId::proportional(10.0), colour(ink));
+            let letters = (0.35 * cell.height()).min(0.2 * cell.width()).clamp(10.0, 16.0);
+            painter.text(cell.center(), Align2::CENTER_CENTER, text, FontId::proportional(letters), colour(ink));
         }
     }
 }

@@ -126,6 +126,8 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         event_loop_builder: surroundings.event_loop_hook(),
         // Elsewhere, the last position is used if it is on a screen; here it is not checked.
         centered: cfg!(target_os = "linux"),
+        // Full screen belongs to presenter mode, which ends with the window.
+        window_builder: Some(Box::new(|builder| builder.with_fullscreen(false))),
         ..Default::default()
     };
     let failed: Arc<Mutex<Option<ThreadError>>> = Arc::default();

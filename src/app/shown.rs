@@ -423,14 +423,36 @@ impl<'a> DisplayedData<'a> {
     }
 }
 
+/// Least time of a long rest that is shown (s).
+const RESTED_S: f64 = 1.0;
+
 /// Time of a trial from its rest before closing on, or the last seconds of a stream (s).
 fn gripper_span(trace: Option<&GraspTrace>) -> [f64; 2] {
     let last = |trace: &GraspTrace| trace.t.last().copied().unwrap_or(0.0);
     match trace {
         Some(trace) if !trace.rolling => {
-            [trace.t.first().copied().unwrap_or(0.0).max(-LEAD_S), last(trace).max(TRIAL_S)]
+            // A longer rest is seen while it lasts.
+            let from = (-LEAD_S).min(last(trace) - RESTED_S);
+            [trace.t.first().copied().unwrap_or(0.0).max(from), last(trace).max(TRIAL_S)]
         }
         Some(trace) => [last(trace).max(ROLLING_S) - ROLLING_S, last(trace).max(ROLLING_S)],
         None => [0.0, ROLLING_S],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_rest_is_seen_while_it_lasts() {
+        let span = |last: f64| {
+            let t: Vec<f64> = (0..).map(|k| -4.0 + 0.02 * f64::from(k)).take_while(|t| *t <= last).collect();
+            gripper_span(Some(&GraspTrace { t, ..GraspTrace::default() }))
+        };
+        assert_eq!(span(-4.0)[0], -4.0);
+        assert!((span(-2.0)[0] + 3.0).abs() < 1e-9, "{:?}", span(-2.0));
+        // Then as much of it as of any other.
+        assert_eq!(span(1.0)[0], -LEAD_S);
     }
 }

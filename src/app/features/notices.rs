@@ -177,11 +177,10 @@ impl Notices {
         (0..self.shown.len()).max_by_key(|k| (urgency(&self.shown[*k]), *k))
     }
 
-    /// The message to show now where there is no line: warnings about single grasps are left out.
+    /// The message to show now to an audience: what has failed.
     pub(in crate::app) fn current(&mut self, ctx: &egui::Context) -> Option<&str> {
         self.first(ctx)?;
-        let shown = self.shown.iter().filter(|shown| shown.level != Level::Warning);
-        shown.max_by_key(|shown| shown.level).map(|shown| shown.text.as_str())
+        self.shown.iter().rfind(|shown| shown.level == Level::Error).map(|shown| shown.text.as_str())
     }
 
     /// Draws the line; returns what the remedy that was chosen does.

@@ -1,7 +1,7 @@
 //! Studies in the window: which is chosen, what of its results is shown, and which run.
 
 use super::App;
-use palpate_geometry::palette::Theme;
+use palpate_geometry::palette::{SERIES_COLOURS, Theme};
 use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
 use palpate_render::figure_svg;
 use palpate_study::jobs::{
@@ -182,11 +182,11 @@ impl App {
         }
     }
 
-    /// Opens the first of these trials, and compares the others with it.
+    /// Opens the first of these trials, and compares the next with it, each in a colour of its own.
     pub(in crate::app) fn open_trials(&mut self, trials: &[TrialId]) {
         let Some((first, others)) = trials.split_first() else { return };
         self.inspect.unpin_all();
         self.open_trial(*first);
-        others.iter().for_each(|id| self.pin(*id));
+        others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));
     }
 }

@@ -49,9 +49,10 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                     stroke_ui(ui, ink_of(data, colour));
                 }
                 let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
-                let link = ui.add(Label::new(&name).truncate().sense(Sense::click()));
+                let short = format!("{}, trial {}", trial.title, trial.id);
+                let link = ui.add(Label::new(short).truncate().sense(Sense::click()));
                 link.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
-                actions.on(&link.on_hover_text("Open this trial"), move |app| app.open_trial(id));
+                actions.on(&link.on_hover_text(format!("{name}. Click to open it")), move |app| app.open_trial(id));
             });
         }
         options_ui(ui, data, actions);

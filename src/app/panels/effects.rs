@@ -5,7 +5,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::theme::{self, colour, veil};
-use crate::app::widgets::{capital, words};
+use crate::app::widgets::{capital, put_line, words};
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{symbol, three_digits};
@@ -139,10 +139,11 @@ impl Row<'_> {
         let clicked = settings_ui(ui, settings, &words(self.effect.name()), now);
         if let (Some(explained), Some(explanation)) = (self.explained, self.explanation) {
             let colours = self.theme.colours();
-            let saves = explained.cost_share < 0.0;
-            let ink = if saves { colours.quiet_text } else { colours.accent };
-            let share = explained.cost_share.abs() as f32;
-            self.bar_ui(ui, cost, (share, colour(ink)), &explained.cost_in_words());
+            let share = explained.cost_share.max(0.0) as f32;
+            self.bar_ui(ui, cost, (share, colour(colours.accent)), &explained.cost_in_words());
+            if explained.is_saving() {
+                put_line(ui, cost, egui::Align2::CENTER_CENTER, "saves", 10.0, colour(colours.quiet_text));
+            }
             let size = explained.change.norms;
             let largest = size.curvature_share.max(size.pressure_share).max(size.force_share);
             let share = (1.0 - (largest.max(LEAST_CHANGE)).log10() / LEAST_CHANGE.log10()) as f32;

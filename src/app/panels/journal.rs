@@ -20,9 +20,9 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for entry in journal {
-            // Hours and minutes; `palpate trials journal` lists the day too.
+            // Number, hours and minutes; `palpate trials journal` lists the day too.
             let time: String = entry.at.chars().skip(11).take(5).collect();
-            let text = RichText::new(format!("{time}  {}", entry.sentence())).small();
+            let text = RichText::new(format!("{}  {time}  {}", entry.number, entry.sentence())).small();
             let Some(id) = entry.trial.filter(|_| entry.others.is_empty()) else {
                 wrapped(ui, text);
                 continue;

@@ -16,8 +16,8 @@ use palpate_sim::objects::{catalogue, object_title};
 use palpate_store::Change;
 use palpate_store::labels::{LabelledTrial, NextTrial, TrialEdit};
 
-/// Height of the panel below which objects to choose stand in two columns (points).
-const LOW: f32 = 440.0;
+/// Height for objects, note and tags below which objects to choose stand in two columns (points).
+const LOW: f32 = 320.0;
 /// Side of the picture of an object (points).
 const PICTURE: f32 = 72.0;
 
@@ -216,7 +216,7 @@ fn question_ui(
     }
     let shown = names.len().min(NUMBERED_OBJECTS);
     // In a low panel, tags and note stay in sight below.
-    let columns = if ui.clip_rect().height() < LOW { 2 } else { 1 };
+    let columns = if ui.clip_rect().bottom() - ui.cursor().top() < LOW { 2 } else { 1 };
     ui.columns(columns, |columns| {
         let rows = shown.div_ceil(columns.len()).max(1);
         for (place, name) in names.iter().take(shown).enumerate() {
@@ -311,7 +311,10 @@ fn remarks_ui(ui: &mut Ui, draft: &LabelDraft, trial: &LabelledTrial, actions: &
             actions.push(move |app| app.label(LabellingAction::WriteNote(id, note)));
         }
         if response.lost_focus() && note != trial.note {
-            actions.push(move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Note(note))));
+            actions.push(move |app| {
+                app.edit_labels(LabelCommand::Edit(id, TrialEdit::Note(note)));
+                app.notices.info(format!("Note of trial {id} saved."));
+            });
         }
         ui.end_row();
         let mut tags = own(&draft.tags, trial.tags.join(", "));
@@ -324,7 +327,10 @@ fn remarks_ui(ui: &mut Ui, draft: &LabelDraft, trial: &LabelledTrial, actions: &
         }
         let list = parse_tags(&tags);
         if response.lost_focus() && list != trial.tags {
-            actions.push(move |app| app.edit_labels(LabelCommand::Edit(id, TrialEdit::Tags(list))));
+            actions.push(move |app| {
+                app.edit_labels(LabelCommand::Edit(id, TrialEdit::Tags(list)));
+                app.notices.info(format!("Tags of trial {id} saved."));
+            });
         }
         ui.end_row();
     });

@@ -27,8 +27,15 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
     let next = view.next.as_ref().map(|next| next.object.as_str());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
+        let seen = ui.scope_id().with("seen");
+        let before: Option<String> = ui.data(|data| data.get_temp(seen));
         for object in &view.progress.objects {
-            row_ui(ui, object, next == Some(object.name.as_str()), actions);
+            let is_next = next == Some(object.name.as_str());
+            let row = row_ui(ui, object, is_next, actions);
+            if is_next && before.as_deref() != next {
+                ui.scroll_to_rect(row, Some(egui::Align::Center));
+                ui.data_mut(|data| data.insert_temp(seen, object.name.clone()));
+            }
         }
     });
 }
@@ -46,11 +53,11 @@ fn add_ui(ui: &mut Ui, actions: &mut Actions) {
     ui.data_mut(|data| data.insert_temp(id, name));
 }
 
-/// Name, progress, and trials wanted.
-fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Actions) {
+/// Name, progress, and trials wanted; returns its place.
+fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Actions) -> Rect {
     let colours = theme::of(ui).colours();
     let ObjectProgress { name, wanted, done, flagged } = object;
-    ui.horizontal(|ui| {
+    let row = ui.horizontal(|ui| {
         let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
         let flags = if *flagged > 0 { format!(", {flagged} flagged") } else { String::new() };
@@ -98,4 +105,5 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
             actions.push(|app| app.edit_labels(LabelCommand::Unplan(name)));
         }
     });
+    row.response.rect
 }

@@ -85,7 +85,8 @@ fn row_ui(
     let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
     let ink = if trial.object.is_some() { colours.text } else { colours.warning };
     let mark = if trial.unsure { "?" } else { "" };
-    let title = format!("{}  {name}{mark}", trial.id);
+    let tags: String = trial.tags.iter().map(|tag| format!("  #{tag}")).collect();
+    let title = format!("{}  {name}{mark}{tags}", trial.id);
     put_line(ui, words, Align2::LEFT_TOP, &title, 13.0, colour(ink));
     let blind = labelling.blind && trial.object.is_none();
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
@@ -98,10 +99,7 @@ fn row_ui(
             (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
         }
         (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
-        (_, None, None) => {
-            let tags: String = trial.tags.iter().map(|tag| format!("#{tag}, ")).collect();
-            (format!("{tags}{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text)
-        }
+        (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
     };
     put_line(ui, words, Align2::LEFT_BOTTOM, &below, 11.0, colour(ink));
     let clicked = response.clicked();

@@ -20,7 +20,7 @@ use palpate_tactile::trial::TrialId;
 /// Height of a row (points).
 const ROW: f32 = 20.0;
 /// Width of names, as a share of the panel and at most (points).
-const NAMES: (f32, f32) = (0.42, 170.0);
+const NAMES: (f32, f32) = (0.45, 170.0);
 /// Width of a number beside a bar (points).
 const NUMBER: f32 = 40.0;
 /// Evidence of a full bar, at least (percent points): small evidence looks small.

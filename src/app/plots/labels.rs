@@ -91,8 +91,8 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
         put(cell(0, 0.0, names), HEAD, quiet);
         for (k, label) in labels.iter().take(in_row).enumerate() {
             let place = cell(0, names + column * k as f32, column);
-            put(place, &label.name, quiet);
-            draw_line(ui.painter(), place.left_bottom(), quiet, label.dashed);
+            let end = draw_line(ui.painter(), place.left_center(), quiet, label.dashed);
+            put(place.with_min_x(end.x + 4.0), &label.name, quiet);
         }
     }
     for (k, own) in labels.chunks(in_row).take(shown).enumerate() {

@@ -6,6 +6,7 @@ use super::super::terminal::table;
 use palpate_geometry::palette::Theme;
 use palpate_lab::grasping::Shard;
 use palpate_render::figure_svg;
+use palpate_study::paper::paper_study;
 use palpate_study::{
     Cell, Experiment, Finding, LinkedFigure, Measuring, StoredStudy, StudyFolder, StudyOutcome, StudyProgress,
     StudyReport, StudyTable, cpu_cost, run_experiment, study_title,
@@ -84,7 +85,8 @@ impl StudyOutput {
             note("a quick study: do not quote its numbers");
         }
         let written = format!("Written to {}: {}", folder.path().display(), names.join(", "));
-        say(format!("\n{}. {written}\n", cpu_cost(stored.cpu_hours)))
+        let grasps = if paper_study(key).is_some() { ", beside the simulated grasps" } else { "" };
+        say(format!("\n{}{grasps}. {written}\n", cpu_cost(stored.cpu_hours)))
     }
 }
 

@@ -2,7 +2,7 @@
 //! are drawn from the same values.
 
 use super::PlotAxis;
-use crate::palette::{Rgb, load_colour, signed_colour};
+use crate::palette::{Rgb, SIGNED_MAP, SILICONE, load_colour, signed_colour};
 use crate::units::{SPACE, symbol, three_digits, true_minus};
 
 /// Grid of values as colours.
@@ -41,6 +41,8 @@ pub struct CellAxis {
 pub enum ColourScale {
     /// Load on a pad from zero to this value; the silicone's own colour close to zero.
     Load(f32),
+    /// Share from zero to this value, the darker the larger; the least share can be told from none.
+    Share(f32),
     /// Signed values between minus and plus this value; neutral at zero.
     Signed(f32),
 }
@@ -84,11 +86,16 @@ impl CellAxis {
     }
 }
 
+/// Colour of the least share, as a share of that of all.
+const LEAST: f32 = 0.15;
+
 impl ColourScale {
     /// Colour of a value; none where it is undefined.
     pub fn colour(self, value: f32) -> Option<Rgb> {
         (!value.is_nan()).then(|| match self {
             Self::Load(full) => load_colour(value / full),
+            Self::Share(full) if value > 0.0 => SILICONE.mix(SIGNED_MAP[0], LEAST + (1.0 - LEAST) * value / full),
+            Self::Share(_) => SILICONE,
             Self::Signed(full) => signed_colour(value / full),
         })
     }
@@ -96,7 +103,7 @@ impl ColourScale {
     /// Values at the ends of the legend.
     pub fn limits(self) -> [f32; 2] {
         match self {
-            Self::Load(full) => [0.0, full],
+            Self::Load(full) | Self::Share(full) => [0.0, full],
             Self::Signed(full) => [-full, full],
         }
     }
@@ -209,6 +216,10 @@ mod tests {
         assert_eq!((load.colour(0.0), load.colour(0.5)), (Some(SILICONE), Some(SILICONE)));
         assert_eq!(load.colour(80.0), load.colour(40.0));
         assert_eq!(load.colour(f32::NAN), None);
+        // A confusion of one per cent is seen, and the larger, the darker.
+        let share = |value| ColourScale::Share(100.0).colour(value).expect("a colour");
+        assert!(share(1.0).contrast(share(0.0)) > 1.15, "{}", share(1.0).contrast(share(0.0)));
+        assert!([1.0, 10.0, 50.0, 100.0].windows(2).all(|two| share(two[1]).luminance() < share(two[0]).luminance()));
         assert_eq!((load.limits(), ColourScale::Signed(2.0).limits()), ([0.0, 40.0], [-2.0, 2.0]));
         let [low, zero, high] = [-2.0, 0.0, 2.0].map(|value| ColourScale::Signed(2.0).colour(value).expect("a colour"));
         assert!(low.2 > low.0 && high.0 > high.2 && zero.0 == zero.2);

@@ -5,6 +5,7 @@ mod comparison;
 mod figures;
 mod open_trial;
 mod phases;
+mod replayed;
 #[cfg(test)]
 pub(crate) mod test_trials;
 

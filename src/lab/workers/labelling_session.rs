@@ -11,8 +11,9 @@ use super::gripper::GripperView;
 use super::label_worker::{LabelCommand, LabelView};
 use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
+use palpate_learn::OTHER;
 use palpate_sim::objects::{EMPTY, catalogue};
-use palpate_store::labels::{LabelledTrial, TrialEdit};
+use palpate_store::labels::{Flag, LabelledTrial, TrialEdit};
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
 
@@ -168,7 +169,8 @@ impl LabelDraft {
     }
 
     /// Objects that match the search, in the order of their number keys: best matches first, among equals the trial's label,
-    /// what the model took a labelled one for, the next of the plan, the plan, the empty hand. A name that matches no object exactly is offered as a new one, last of
+    /// the empty hand where nothing was touched, what the model took a labelled one for, the next of the plan, the plan, the
+    /// empty hand. A name that matches no object exactly is offered as a new one, last of
     /// those with a number.
     pub fn objects(&self, view: &LabelView) -> Vec<String> {
         self.found(view).names
@@ -176,12 +178,16 @@ impl LabelDraft {
 
     fn found(&self, view: &LabelView) -> ObjectSearch {
         let next = view.next.iter().map(|next| next.object.clone());
-        let label = self.trial(view).and_then(|trial| trial.object.clone());
-        let guess = self.trial(view).filter(|trial| trial.object.is_some()).and_then(|trial| trial.guess.as_ref());
-        let guess = guess.map(|guess| guess.class.clone());
+        let trial = self.trial(view);
+        let label = trial.and_then(|trial| trial.object.clone());
+        let untouched = trial.is_some_and(|trial| trial.flags.iter().any(|found| found.flag == Flag::NoContact));
+        let untouched = untouched.then(|| EMPTY.to_owned());
+        let guess = trial.filter(|trial| trial.object.is_some()).and_then(|trial| trial.guess.as_ref());
+        let guess = guess.map(|guess| guess.class.clone()).filter(|class| class != OTHER);
         let planned = view.progress.objects.iter().map(|object| object.name.clone());
         let mut names: Vec<String> = Vec::new();
-        for name in label.into_iter().chain(guess).chain(next).chain(planned).chain([EMPTY.to_owned()]) {
+        for name in label.into_iter().chain(untouched).chain(guess).chain(next).chain(planned).chain([EMPTY.to_owned()])
+        {
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -353,7 +359,9 @@ impl LabellingSession {
         let asked = if blocked { open } else { now.labels.and_then(|labels| self.draft.trial(labels)) };
         match asked.filter(|_| now.labelling).map(|trial| trial.id) {
             None => TrialInSight::Live,
-            Some(id) if Some(id) == self.ended && !self.recording => TrialInSight::Last,
+            Some(id) if Some(id) == self.ended && self.draft.selected != self.ended && !self.recording => {
+                TrialInSight::Last
+            }
             Some(id) => TrialInSight::Stored(id),
         }
     }

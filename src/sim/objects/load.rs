@@ -13,13 +13,14 @@ use std::sync::{Mutex, PoisonError};
 /// The name that stands for an empty hand.
 pub const EMPTY: &str = "empty";
 
-/// Title of an object, by the name of its class: that of a built-in one or of a random shape, or else the name itself.
+/// Title of an object, by the name of its class: that of a built-in one or of a random shape, or else the name with spaces
+/// for underscores.
 pub fn object_title(name: &str) -> String {
     if let Some(seed) = RandomShape::seed_of(name) {
         return format!("Random shape {seed}");
     }
     let built_in = catalogue().iter().find(|built_in| built_in.name == name).map(|built_in| built_in.title.as_str());
-    built_in.unwrap_or(if name == EMPTY { "Empty hand" } else { name }).to_owned()
+    built_in.map_or_else(|| if name == EMPTY { "Empty hand".to_owned() } else { name.replace('_', " ") }, str::to_owned)
 }
 
 /// Title as lists and headings have it, with a capital: `Mug` for an object of a file `mug.obj`.
@@ -38,7 +39,7 @@ pub fn class_of(text: &str) -> &str {
 /// Title of an object with the name of its class behind it, where the two differ: `Tennis ball (bigball)`.
 pub fn titled(name: &str) -> String {
     let title = object_title(name);
-    if title.to_lowercase() == name.to_lowercase() { title } else { format!("{title} ({name})") }
+    if title.to_lowercase() == name.replace('_', " ").to_lowercase() { title } else { format!("{title} ({name})") }
 }
 
 /// True for the path of a file, false for the name of a built-in object, of a random shape or of the empty hand.
@@ -289,7 +290,7 @@ mod tests {
             ["bigball", "lemon", EMPTY, "garlic"].map(object_title),
             ["Tennis ball", "Lemon", "Empty hand", "garlic"]
         );
-        assert_eq!(["bigball", "lemon"].map(titled), ["Tennis ball (bigball)", "Lemon"]);
+        assert_eq!(["bigball", "lemon", "jam_jar"].map(titled), ["Tennis ball (bigball)", "Lemon", "jam jar"]);
         assert_eq!(["random:7", "random:x"].map(object_title), ["Random shape 7", "random:x"]);
         assert_eq!(
             ["tennis Ball", "ball", " Die ", "garlic"].map(class_of),

@@ -4,10 +4,11 @@ use super::plan::{AccuracySetting, SettingFamily};
 use super::report::{AccuracyStudy, FAILED_SHARE, GroupCost, SceneGroup};
 use crate::frame::{LinkedFigure, lines, series_of};
 use palpate_geometry::drawing::{DataPoint, DataSeries, Figure, LineStyle, Marker, Plot, PlotAxis, ReferenceLine};
+use palpate_geometry::palette::NO_SERIES;
 use palpate_learn::method;
 
-/// Number of the colour of what belongs to no family.
-const GREY: usize = 6;
+/// Number of the colour of the front.
+const FRONT: usize = 6;
 
 impl AccuracyStudy {
     /// The figure.
@@ -58,19 +59,25 @@ pub fn accuracy_plot(study: &AccuracyStudy, group: SceneGroup) -> Plot {
         colour,
         ..DataSeries::default()
     };
-    let front = look("front", LineStyle::Bold, Marker::None, GREY);
+    let front = look("front", LineStyle::Bold, Marker::None, FRONT);
     let front = study.front(group).into_iter().map(|(_, cost)| (front.clone(), spread(cost, String::new())));
     let settings = SettingFamily::ALL.into_iter().flat_map(|family| study.family(family, group));
     let settings = settings.map(|(setting, cost)| {
         let AccuracySetting { family, name, .. } = setting;
         let line = look(family.title(), LineStyle::Thin, Marker::Dot, family.colour());
         let default = if setting.is_default() { " (default)" } else { "" };
-        (if cost.has_failed() { crosses(family.colour()) } else { line }, point(cost, format!("{name}{default}")))
+        let look = match cost.has_failed() {
+            true if study.family(*family, group).any(|(_, own)| !own.has_failed()) => crosses(family.colour()),
+            // None of them has a line.
+            true => DataSeries { name: family.title().to_owned(), ..crosses(family.colour()) },
+            false => line,
+        };
+        (look, point(cost, format!("{name}{default}")))
     });
     let mut series = series_of(front.chain(settings));
     if series.iter().any(|series| series.marker == Marker::Cross) {
         let name = format!("more than {:.0} % end elsewhere", 100.0 * FAILED_SHARE);
-        series.push(DataSeries { name, ..crosses(GREY) });
+        series.push(DataSeries { name, ..crosses(NO_SERIES) });
     }
     let floor = study.floor(group).map(|at| ReferenceLine { horizontal: true, at, text: "floor of SDIRK2".to_owned() });
     Plot { references: floor.into_iter().collect(), series, ..axes() }

@@ -62,17 +62,24 @@ pub struct EffectChange {
 }
 
 impl ExplainedEffect {
+    /// True where a grasp is cheaper with it.
+    pub fn is_saving(&self) -> bool {
+        self.cost_share <= -NOISE
+    }
+
     /// Describes the cost.
     pub fn cost_in_words(&self) -> String {
-        let (costs, saves) = if self.planned.on { ("costs", "saves") } else { ("would cost", "would save") };
+        let costs = if self.planned.on { "costs" } else { "would cost" };
         let percent = 100.0 * self.cost_share;
         if self.cost_share.abs() < NOISE {
             format!("{costs} less than {:.0} % of the CPU time", 100.0 * NOISE)
         } else if percent > 0.0 {
             format!("{costs} {percent:.0} % of the CPU time")
+        } else if self.planned.on {
+            // Without friction, for example, an object rolls and needs more solver steps.
+            format!("saves CPU time: without it a grasp takes {:.1} times as much", 1.0 - self.cost_share)
         } else {
-            // The cost may be negative: without friction, for example, an object rolls and needs more solver steps.
-            format!("{saves} {:.0} % of the CPU time", -percent)
+            format!("would save {:.0} % of the CPU time", -percent)
         }
     }
 

@@ -84,8 +84,8 @@ pub(crate) struct Facets<'a> {
     pub(crate) value: (&'a str, &'a str),
     /// Its place.
     pub(crate) along: Along<'a>,
-    /// Shift of the first series, and from one to the next.
-    pub(crate) shift: [f64; 2],
+    /// Shift from one series to the next, where several have a point at the same place.
+    pub(crate) shift: f64,
     /// Look of a series by its name and number.
     pub(crate) look: &'a dyn Fn(&str, usize) -> DataSeries,
     /// True where a series is named in its first plot alone.
@@ -106,7 +106,7 @@ impl Facets<'_> {
         series: &|line| line.text("model").to_owned(),
         value: ("F1", F1_PERCENT),
         along: Along::Rows(&|line| line.text("model").to_owned()),
-        shift: [0.0; 2],
+        shift: 0.0,
         look: &|_, colour| dots(colour),
         named_once: false,
         columns: 2,
@@ -210,13 +210,25 @@ impl<'a> LinkedPlots<'a> {
             let references = (facets.reference)(&title).into_iter().collect();
             self.plots.push(Plot { title, x, y, sideways, references, ..Plot::default() });
             let place = |name: String| names.iter().position(|own| *own == name).unwrap_or(0) as f64;
+            let along = |line: TableLine<'_>| match facets.along {
+                Along::Rows(name) => -place(name(line)),
+                Along::Columns(_, name) => place(name(line)),
+                Along::Axis(_, value) => value(line),
+            };
             for (number, name) in all.iter().enumerate() {
-                let shift = facets.shift[0] + facets.shift[1] * number as f64;
                 let own = lines.iter().filter(|line| (facets.series)(**line) == *name);
-                let points = own.map(|line| match facets.along {
-                    Along::Rows(name) => (*line, line.percent_row(column, shift - place(name(*line)))),
-                    Along::Columns(_, name) => (*line, line.percent(column, shift + place(name(*line)))),
-                    Along::Axis(_, value) => (*line, line.percent(column, shift + value(*line))),
+                let points = own.map(|line| {
+                    // Series beside each other, around the place.
+                    let here = lines
+                        .iter()
+                        .filter(|other| along(**other) == along(*line))
+                        .map(|other| (facets.series)(*other));
+                    let here: Vec<String> =
+                        all.iter().filter(|own| here.clone().any(|other| other == **own)).cloned().collect();
+                    let nth = here.iter().position(|own| own == name).unwrap_or(0) as f64;
+                    let at = along(*line) + facets.shift * (nth - 0.5 * (here.len().max(1) - 1) as f64);
+                    let point = if sideways { line.percent_row(column, at) } else { line.percent(column, at) };
+                    (*line, point)
                 });
                 self.series(DataSeries { name: name.clone(), ..(facets.look)(name, number) }, points);
             }
@@ -249,8 +261,11 @@ pub(crate) fn confusion_figure(
     Some(figure.figure(name, 2, size, note))
 }
 
+/// Most classes whose names fit below the columns.
+const FEW: usize = 4;
+
 /// Confusion matrix of some rows of a table with the columns "true", "predicted" and "share": a share of each true class
-/// for every cell. Rows are numbered, so that columns need no names. `plot` is its number in the figure.
+/// for every cell. Of many classes rows are numbered, so that columns need no names. `plot` is its number in the figure.
 fn confusion_plot(
     (table, at): (&StudyTable, usize),
     rows: &[usize],
@@ -278,16 +293,21 @@ fn confusion_plot(
     };
     let heat = HeatMap {
         title: title.to_owned(),
-        quantity: "share of its trials".to_owned(),
+        quantity: "share of the true class".to_owned(),
         unit: "%".to_owned(),
         x: axis("predicted"),
         y: axis("true"),
         values,
-        scale: ColourScale::Load(100.0),
+        scale: ColourScale::Share(100.0),
     };
     let mut plot = Plot::of_heat_map(heat);
     let numbered = |text: &dyn Fn(usize) -> String| (0..classes.len()).map(|k| (k as f64 + 1.0, text(k))).collect();
-    plot.x.ticks = numbered(&|k| (k + 1).to_string());
-    plot.y.ticks = numbered(&|k| format!("{} {}", object_title(classes[k]), k + 1));
+    if classes.len() > FEW {
+        plot.x.ticks = numbered(&|k| (k + 1).to_string());
+        plot.y.ticks = numbered(&|k| format!("{} {}", object_title(classes[k]), k + 1));
+    } else {
+        plot.x.ticks = numbered(&|k| object_title(classes[k]));
+        plot.y.ticks = plot.x.ticks.clone();
+    }
     (plot, links)
 }

@@ -196,7 +196,6 @@ impl Study for Grasps {
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
         let named = |line: TableLine<'_>| format!("{}, {}", line.text("model"), line.text("combined by"));
-        let series = LinkedPlots::of(report, "grasps").map_or(0, |figure| unique(figure.lines().map(named)).len());
         let axis = |lines: &[TableLine<'_>]| {
             let most = lines.iter().map(|line| line.value("grasps")).fold(0.0, f64::max);
             PlotAxis::count("grasps of the object", most as usize)
@@ -205,7 +204,7 @@ impl Study for Grasps {
             plot: &|line| format!("{} sensors, {}", line.text("sensors"), line.text("object")),
             series: &named,
             along: Along::Axis(&axis, &|line| line.value("grasps")),
-            shift: [-0.03 * (series as f64 - 1.0), 0.06],
+            shift: 0.06,
             look: &|name, colour| lines(colour, name.ends_with(FEEDBACK)),
             size: [1080, 860],
             note: "Macro F1 with 95 % intervals, by bootstrap over rounds.",

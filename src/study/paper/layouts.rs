@@ -95,7 +95,7 @@ impl Crossing for Layouts {
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
         let along = Along::Rows(&|line| line.text("layout").to_owned());
-        vec![Facets { along, shift: [0.2, -0.2], ..Facets::USUAL }.figure(report, "layouts")]
+        vec![Facets { along, shift: -0.2, ..Facets::USUAL }.figure(report, "layouts")]
     }
 }
 
@@ -145,4 +145,29 @@ fn better_than_zuo(rows: &[Row<SensorView>]) -> Finding {
     let claim = "The macro-layer is more accurate than the network of Zuo et al.";
     let rule = "Agrees where the paired 95 % interval is above zero for every layout, disagrees where one is below";
     Claim("V-B", claim, rule).on_gains(Rule::AllAbove(0.0), gains)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::ListedStudy;
+
+    #[test]
+    fn models_stand_around_the_line_of_their_layout() -> Result<(), Box<dyn std::error::Error>> {
+        let shown = Layouts.shipped()?.ok_or("it comes with the program")?;
+        let figure = &shown.figures.first().ok_or("a figure")?.figure;
+        for plot in &figure.plots {
+            let places: Vec<f64> =
+                plot.series.iter().flat_map(|series| &series.points).map(|point| point.at[1]).collect();
+            let mut lines: Vec<i64> = places.iter().map(|y| y.round() as i64).collect();
+            lines.sort_unstable();
+            lines.dedup();
+            for line in lines {
+                let off: Vec<f64> = places.iter().map(|y| y - line as f64).filter(|off| off.abs() < 0.5).collect();
+                // One alone lies on it.
+                assert!(off.iter().sum::<f64>().abs() < 1e-9, "{} {line}: {off:?}", plot.title);
+            }
+        }
+        Ok(())
+    }
 }

@@ -106,7 +106,7 @@ impl Crossing for Modality {
             (CURVATURE, pattern) => format!("κ {pattern}"),
             (_, pattern) => format!("p {pattern}"),
         });
-        let patterns = Facets { along, shift: [0.0, 0.16], columns: 1, size: [1080, 760], ..Facets::USUAL };
+        let patterns = Facets { along, shift: 0.16, columns: 1, size: [1080, 760], ..Facets::USUAL };
         let note = "Rows: true object, with its number; columns: predicted object.";
         let title = |kind: &str| Some(format!("{kind} sensors"));
         let confusions = confusion_figure(report, "modality-confusion", title, [1080, 560], note);

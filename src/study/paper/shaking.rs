@@ -174,7 +174,7 @@ impl Study for Shaken {
         let facets = Facets {
             plot: &|line| format!("{}, {}", line.text("classes"), line.text("sensors")),
             along: Along::Rows(&|line| line.text("motion").to_owned()),
-            shift: [0.0, -0.12],
+            shift: -0.12,
             named_once: true,
             size: [1000, 620],
             note: &note,

@@ -167,11 +167,11 @@ impl Study for Stages {
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {
         let of_network = |kind: &str| kind.contains(MODELS[0]).then(|| kind.to_owned());
-        let note = "Rows: true size or shape, with its number; columns: predicted.";
+        let note = "Rows: true size or shape; columns: predicted.";
         let confusions = confusion_figure(report, "stages-confusion", of_network, [900, 700], note);
         let along = Along::Rows(&|line| line.text("known").to_owned());
         let note = "Macro F1 of stage two after one grasp, with 95 % intervals, by its input beside the grasp.";
-        let second = Facets { along, shift: [0.0, -0.16], size: [1080, 420], note, ..Facets::USUAL };
+        let second = Facets { along, shift: -0.16, size: [1080, 420], note, ..Facets::USUAL };
         vec![confusions, second.figure(report, "stages")]
     }
 }

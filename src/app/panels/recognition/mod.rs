@@ -28,7 +28,7 @@ use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::capital_title;
 use std::sync::Arc;
-use words::{BEING_LEARNED, FOREIGN, Headline, percent, reason};
+use words::{ALONE, BEING_LEARNED, FOREIGN, Headline, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -327,12 +327,14 @@ impl Part<'_, '_> {
         self.data.view.theme.colours()
     }
 
-    /// Why the model's answers are not to be trusted on this gripper; none where they are.
+    /// What the answer lacks; none where it can be trusted.
     fn distrust(&self) -> Option<&'static str> {
         let is_real = self.data.board().is_some();
-        match self.view.from_perfect_sensors && is_real {
-            true => Some(FOREIGN),
-            false => self.is_being_learned.then_some(BEING_LEARNED),
+        let is_alone = self.data.shown_trial().is_some_and(|shown| shown.trial.judged_alone);
+        match (self.view.from_perfect_sensors && is_real, self.is_being_learned) {
+            (true, _) => Some(FOREIGN),
+            (false, true) => Some(BEING_LEARNED),
+            (false, false) => is_alone.then_some(ALONE),
         }
     }
 

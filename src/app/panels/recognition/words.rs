@@ -17,6 +17,9 @@ pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect se
 /// Warning about an answer of a model that is learning the object in the hand.
 pub(super) const BEING_LEARNED: &str = "Being learned: the model does not know this object yet.";
 
+/// Warning about an answer that lacks the grasps before it.
+pub(super) const ALONE: &str = "To this grasp alone: another model judged those before it.";
+
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::app) enum Headline {

@@ -113,7 +113,7 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     let key = card.key;
     wrapped(ui, RichText::new(format!("{}.", capital(card.about))));
     let kept = if paper_study(key).is_some() {
-        "Grasps that the store lacks are simulated and kept there."
+        "Beside it, grasps that the store lacks are simulated and kept there."
     } else {
         "Its grasps are not kept."
     };

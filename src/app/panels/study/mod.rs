@@ -11,6 +11,7 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::widgets::{capital, just_opened, wrapped};
 use egui::{RichText, Ui};
+use palpate_geometry::palette::SERIES_COLOURS;
 use palpate_geometry::units::symbol;
 use palpate_sim::objects::object_title;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
@@ -77,7 +78,11 @@ fn hint(result: &StudyResult, row: &StudyRow) -> String {
         (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
         ([only], _) => format!("Click to open trial {only} in Inspect"),
         ([first, others @ ..], _) => {
-            format!("Click to open trial {first} in Inspect, with {} others beside it", others.len())
+            let of = match others.len() {
+                all @ ..=SERIES_COLOURS => format!("{all} others"),
+                all => format!("{SERIES_COLOURS} of its {all} others"),
+            };
+            format!("Click to open trial {first} in Inspect, with {of} beside it")
         }
     }
 }

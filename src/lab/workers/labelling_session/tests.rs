@@ -4,7 +4,7 @@ use super::*;
 use crate::grasping::GraspStage;
 use crate::labelling::Disagreement;
 use crate::workers::{EndedTrial, TrialView};
-use palpate_store::labels::LabelPlan;
+use palpate_store::labels::{FlagRemark, GuessTop, LabelPlan};
 use std::sync::Arc;
 
 fn trial(id: TrialId, object: Option<&str>) -> LabelledTrial {
@@ -105,6 +105,21 @@ fn trials_are_picked_with_the_arrows() {
 }
 
 #[test]
+fn what_the_readings_say_is_offered_after_the_label() {
+    let mut view = view();
+    let guessed =
+        |class: &str| Some(GuessTop { model: "trees".to_owned(), class: class.to_owned(), p: 0.9, label_p: Some(0.1) });
+    view.trials[0] = LabelledTrial { guess: guessed("cube"), ..trial(4, Some("lemon")) };
+    let draft = LabelDraft { selected: Some(4), ..LabelDraft::default() };
+    assert_eq!(draft.objects(&view)[..2], ["lemon", "cube"]);
+    // "Other" is no object, and what touched nothing held none.
+    let untouched = FlagRemark { flag: Flag::NoContact, remark: String::new() };
+    view.trials[0] = LabelledTrial { flags: vec![untouched], guess: guessed(OTHER), ..trial(4, Some("lemon")) };
+    assert_eq!(draft.objects(&view)[..2], ["lemon", EMPTY]);
+    assert!(!draft.objects(&view).iter().any(|name| name == OTHER));
+}
+
+#[test]
 fn a_label_goes_to_the_trial_in_question_and_settles_a_disagreement() {
     let (labels, gripper) = (view(), GripperView::default());
     let mut session = LabellingSession::default();
@@ -199,6 +214,9 @@ fn plots_show_the_trial_that_the_card_asks_about() {
     assert_eq!(session.in_sight(&now(&after, &labels)), TrialInSight::Stored(4));
     session.apply(LabellingAction::Select(Some(3)), &now(&after, &labels));
     assert_eq!(session.in_sight(&now(&after, &labels)), TrialInSight::Stored(3));
+    // Chosen in the list, the last one is a stored one like the others.
+    session.apply(LabellingAction::Select(Some(5)), &now(&after, &labels));
+    assert_eq!(session.in_sight(&now(&after, &labels)), TrialInSight::Stored(5));
     let elsewhere = SessionContext { labelling: false, ..now(&after, &labels) };
     assert_eq!(session.in_sight(&elsewhere), TrialInSight::Live);
 }
