@@ -56,10 +56,10 @@ pub(super) fn show(
     let lines = if height > 2.0 * LINE * (known[1].len() + 2) as f32 { 2 } else { 1 };
     let most = (NAMES * ui.available_width() / LETTER) as usize;
     known[1].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, most, lines));
-    if let Some(heat) = &plot.heat {
+    if !plot.x.ticks.is_empty() {
         let names = known[1].iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
-        let cell = ((ui.available_width() / LETTER) as usize).saturating_sub(names) / heat.x.count.max(1);
-        known[0].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, cell.max(2), 1));
+        let column = ((ui.available_width() / LETTER) as usize).saturating_sub(names) / plot.x.ticks.len();
+        known[0].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, column.max(2), 2));
     }
     let marks = |known: &[(f64, String)], bounds: &RangeInclusive<f64>| {
         let step_size = bounds.end() - bounds.start();

@@ -136,6 +136,14 @@ pub(super) fn warn_of_perfect_sensors(model: &Model) {
     }
 }
 
+/// Warns about a model that answers for fingers that it has not learned.
+pub(super) fn warn_of_other_fingers() {
+    warn(
+        "the model has not learned these fingers, so most of its answers are wrong; train one on grasps by them: palpate \
+         collect --scene FILE",
+    );
+}
+
 /// Warns about a model from free objects that answers for a fixed one, or the other way round.
 pub(super) fn warn_unless_learned(model: &Model, fixed: bool) {
     if model.card.data.fixed().is_some_and(|learned| learned != fixed) {
@@ -160,13 +168,15 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     let mut belief = Belief::default();
     let mut trials = Vec::new();
     let mut is_real = false;
-    let mut fixed = BTreeSet::new();
+    let (mut fixed, mut has_fingers) = (BTreeSet::new(), true);
     let mut explanations = arguments.why.then(|| Explanations::new(&model, arguments.nearest));
     for id in &arguments.trials {
         let data = DatasetQuery::default().read_trial(&store, *id, &SensorView::of_model(&model.card))?;
         model.check_channels(&data.channels)?;
         is_real |= data.about.sensors.is_none();
         fixed.extend(data.about.fixed());
+        let fingers = data.about.fingers.first().cloned().flatten();
+        has_fingers &= !model.card.learned_from_perfect_sensors() || model.card.data.has_fingers(&fingers);
         let grasp = &data.examples[0].grasp;
         let after = |before: Option<&Pmf>| model.recogniser.recognise(grasp, before.or(prior.as_ref()));
         let alone = after(None);
@@ -210,6 +220,9 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
     });
     if is_real {
         warn_of_perfect_sensors(&model);
+    }
+    if !has_fingers {
+        warn_of_other_fingers();
     }
     fixed.into_iter().for_each(|fixed| warn_unless_learned(&model, fixed));
     RecogniseReport { trials, together }.print(arguments.json)

@@ -184,6 +184,9 @@ pub struct DataCard {
     /// Version of the physics; `None` unless all simulated grasps have the same one, and where it is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub physics: Option<u32>,
+    /// Hashes of the fingers of simulated grasps, none for those by default; empty where all had these.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fingers: Vec<Option<String>>,
     /// Numbers of the calibrations of recorded grasps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrations: Vec<i64>,
@@ -198,6 +201,17 @@ impl DataCard {
     /// True for simulated grasps read through perfect sensors.
     pub fn from_perfect_sensors(&self) -> bool {
         self.sensors.as_deref() == Some("virtual")
+    }
+
+    /// The supports of objects for which a model of these grasps answers: fixed (true), free, or both.
+    pub fn supports(&self) -> impl Iterator<Item = bool> + use<> {
+        let learned = self.fixed();
+        [false, true].into_iter().filter(move |fixed| learned.is_none_or(|learned| learned == *fixed))
+    }
+
+    /// True where grasps of these fingers, by their hash, were among them.
+    pub fn has_fingers(&self, fingers: &Option<String>) -> bool {
+        if self.fingers.is_empty() { fingers.is_none() } else { self.fingers.contains(fingers) }
     }
 
     /// Whether the object was fixed in place in all simulated grasps (true) or in none; `None` for mixed and recorded ones.

@@ -76,8 +76,7 @@ impl Models {
 
     /// With another model for simulated grasps: of fixed objects or of free ones, whichever it has learned, else of both.
     pub fn with_simulated(mut self, model: &Arc<Model>) -> Self {
-        let learned = model.card.data.fixed();
-        for fixed in [false, true].into_iter().filter(|fixed| learned.is_none_or(|learned| learned == *fixed)) {
+        for fixed in model.card.data.supports() {
             self.0[Shipped::simulated(fixed) as usize] = Some(Arc::clone(model));
         }
         self

@@ -258,7 +258,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     // Its bar is there before the next grasp.
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_label_contains("Carton, learned 0 %").is_some());
-    let saved = bench.workbench().view().simulation_model.clone().unwrap();
+    let saved = bench.workbench().view().simulation_models[0].clone().unwrap();
     let model = palpate_learn::Model::load(&saved).unwrap();
     assert_eq!(model.card.taught, ["carton"]);
     // It is learned once, and not again when it is opened again.
@@ -280,7 +280,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.until_told("\"Carton\" is \"Crate\" now.");
     let named = bench.until(|s| s.truth() == "crate");
     assert!(named.scene.to_toml().contains("name = \"crate\""), "{}", named.scene.to_toml());
-    let saved = bench.workbench().view().simulation_model.clone().unwrap();
+    let saved = bench.workbench().view().simulation_models[0].clone().unwrap();
     assert_eq!(palpate_learn::Model::load(&saved).unwrap().card.taught, ["crate"]);
     bench.tell(|app| app.open("lemon"));
     bench.until(|s| s.truth() == "lemon");
@@ -295,7 +295,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     assert!(says(&bench, "Learned Crate") && bench.harness.query_by_label_contains(test).is_some());
     bench.harness.get_by_label("Forget").click();
     bench.until_told("Forgot \"Crate\".");
-    assert_eq!(bench.workbench().view().simulation_model, None);
+    assert_eq!(bench.workbench().view().simulation_models, [None, None]);
 }
 
 #[test]

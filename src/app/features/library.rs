@@ -158,26 +158,34 @@ impl LibraryFeature {
         self.selection.look(&self.seen);
     }
 
+    /// Sends a command; the first answer is to the query as well.
+    fn send(&self, command: LibraryCommand) {
+        if self.view.is_none() {
+            self.worker.send(LibraryCommand::Find(self.selection.query.clone()));
+        }
+        self.worker.send(command);
+    }
+
     /// Makes sparklines of these trials, which are in sight.
     pub(in crate::app) fn draw(&self, ids: Vec<TrialId>) {
-        self.worker.send(LibraryCommand::Draw(ids));
+        self.send(LibraryCommand::Draw(ids));
     }
 
     /// Keeps up with the row of the open trial.
     pub(super) fn follow(&self, id: TrialId) {
-        self.worker.send(LibraryCommand::Follow(id));
+        self.send(LibraryCommand::Follow(id));
     }
 
     /// Changes the selected trials.
     pub fn edit(&self, edit: TrialEdit) {
         if !self.selection.selected.is_empty() {
-            self.worker.send(LibraryCommand::Edit(self.selection.ids(), edit));
+            self.send(LibraryCommand::Edit(self.selection.ids(), edit));
         }
     }
 
     /// Changes one trial.
     pub(super) fn edit_one(&self, id: TrialId, edit: TrialEdit) {
-        self.worker.send(LibraryCommand::Edit(vec![id], edit));
+        self.send(LibraryCommand::Edit(vec![id], edit));
     }
 
     /// Moves this trial from the demo log to the store.

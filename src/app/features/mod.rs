@@ -106,6 +106,11 @@ impl App {
                 spread: self.inspect.spread,
             },
             blind: self.labelling.blind,
+            other_fingers: match self.view.source {
+                ViewSource::Simulation => self.recognition.has_other_fingers(&self.simulation.scene),
+                ViewSource::Trial => self.inspect.inspected().is_some_and(|own| own.trial.other_fingers),
+                ViewSource::Gripper => false,
+            },
         }
     }
 

@@ -3,10 +3,12 @@
 use super::App;
 use super::tools::GripperTools;
 use super::view::{ViewSource, ViewState};
+use palpate_lab::datasets::knows_fingers;
 use palpate_lab::grasping::RecognisedGrasp;
 use palpate_lab::workers::{ClassChange, Command, EndedJob, Explainer, GripperCommand, TeachRequest, TrainedModel};
 use palpate_learn::{Lesson, Model, Models, Shipped};
 use palpate_sim::objects::capital_title;
+use palpate_sim::scene::Scene;
 use palpate_store::labels::class_name;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -61,12 +63,11 @@ impl RecognitionFeature {
             explainer,
             advised: None,
         };
-        for (path, gripper) in
-            [(view.gripper_model.take(), ViewSource::Gripper), (view.simulation_model.take(), ViewSource::Simulation)]
-        {
-            if let Some(path) = path {
-                feature.load(path, gripper, tools);
-            }
+        let mut simulated: Vec<PathBuf> = std::mem::take(&mut view.simulation_models).into_iter().flatten().collect();
+        simulated.dedup();
+        let gripper = view.gripper_model.take().into_iter().map(|path| (path, ViewSource::Gripper));
+        for (path, gripper) in gripper.chain(simulated.into_iter().map(|path| (path, ViewSource::Simulation))) {
+            feature.load(path, gripper, tools);
         }
         feature
     }
@@ -79,6 +80,12 @@ impl RecognitionFeature {
     /// Models of the simulation, for free and for fixed objects.
     fn simulated(&self) -> impl Iterator<Item = &Arc<Model>> {
         [false, true].into_iter().filter_map(|fixed| self.models.of(Shipped::simulated(fixed)))
+    }
+
+    /// True where the model of the simulation has not learned the fingers of a scene.
+    pub(super) fn has_other_fingers(&self, scene: &Scene) -> bool {
+        let model = self.models.of(Shipped::simulated(scene.holds_object()));
+        model.is_some_and(|model| !knows_fingers(&model.card, scene))
     }
 
     /// Classes that the model of the simulation has learned, with their files.
@@ -127,8 +134,9 @@ impl App {
         match path {
             Some(path) => self.recognition.load(path, ViewSource::Simulation, &self.tools),
             None => {
-                self.view.simulation_model = None;
-                self.use_in_simulation(None);
+                let shipped =
+                    [false, true].map(|fixed| self.recognition.shipped.of(Shipped::simulated(fixed)).cloned());
+                shipped.iter().flatten().for_each(|model| self.use_in_simulation(model, None));
             }
         }
     }
@@ -201,10 +209,11 @@ impl App {
         // A shipped model without a learned object is the shipped one again.
         let card = &trained.model.card;
         let shipped = [false, true].map(|fixed| self.recognition.shipped.of(Shipped::simulated(fixed)));
-        let was_shipped = shipped.iter().flatten().any(|own| own.card.data.collections == card.data.collections);
-        let is_own = !card.taught.is_empty() || !was_shipped;
-        self.view.simulation_model = is_own.then(|| trained.path.clone());
-        self.use_in_simulation(is_own.then_some(&trained.model));
+        let shipped = shipped.into_iter().flatten().find(|own| own.card.data.collections == card.data.collections);
+        match shipped.filter(|_| card.taught.is_empty()).cloned() {
+            Some(shipped) => self.use_in_simulation(&shipped, None),
+            None => self.use_in_simulation(&trained.model, Some(&trained.path)),
+        }
         // It is not learned again by itself.
         self.recognition.taught = Some((source.clone(), content));
         // The answer was the other model's.
@@ -242,13 +251,13 @@ impl App {
         self.notices.info("Model unchanged.");
     }
 
-    /// Uses a model in the simulation from now on, for grasps of objects that are held as it learned them; the shipped models
-    /// for all others.
-    fn use_in_simulation(&mut self, model: Option<&Arc<Model>>) {
+    /// Uses a model in the simulation from now on, for grasps of objects that are held as it learned them. `path` is its file;
+    /// a shipped one has none.
+    fn use_in_simulation(&mut self, model: &Arc<Model>, path: Option<&Path>) {
         let own = &mut self.recognition;
-        own.models = own.shipped.clone().with_real(own.models.of(Shipped::AnyGripper).cloned());
-        if let Some(model) = model {
-            own.models = own.models.clone().with_simulated(model);
+        own.models = own.models.clone().with_simulated(model);
+        for fixed in model.card.data.supports() {
+            self.view.simulation_models[usize::from(fixed)] = path.map(Path::to_owned);
         }
         own.taught = None;
         let models = own.models.clone();
@@ -317,8 +326,7 @@ impl App {
                 if let ClassChange::Renamed(_) | ClassChange::Forgotten = command.change {
                     return self.take_changed(&trained, &command);
                 }
-                self.view.simulation_model = Some(trained.path.clone());
-                self.use_in_simulation(Some(&trained.model));
+                self.use_in_simulation(&trained.model, Some(&trained.path));
                 self.notices.info(format!("Learned \"{}\".", capital_title(&command.name)));
                 let seconds = self.recognition.asked.elapsed().as_secs_f64();
                 self.recognition.learned = command.object.as_ref().map(|_| Learned {
@@ -376,8 +384,7 @@ impl App {
             match (ended.outcome, gripper) {
                 (Ok(trained), ViewSource::Gripper) => self.use_file_for_gripper(&trained),
                 (Ok(trained), ViewSource::Simulation | ViewSource::Trial) => {
-                    self.view.simulation_model = Some(trained.path.clone());
-                    self.use_in_simulation(Some(&trained.model));
+                    self.use_in_simulation(&trained.model, Some(&trained.path));
                     self.notices.info(format!("Model for the simulation: {}", trained.about));
                 }
                 (Err(cause), _) => self.notices.failed("model", format!("Model not changed: {cause}")),

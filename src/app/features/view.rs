@@ -61,8 +61,8 @@ pub struct ViewState {
     pub gripper_model: Option<PathBuf>,
     /// Models used for the real gripper, newest first.
     pub gripper_models: Vec<PathBuf>,
-    /// Recognition model for the simulation; the shipped one where none is named.
-    pub simulation_model: Option<PathBuf>,
+    /// Recognition models for the simulation, of free and of fixed objects; the shipped ones where none are named.
+    pub simulation_models: [Option<PathBuf>; 2],
     /// Time shown by all plots (s); `None` for the whole grasp.
     #[serde(skip)]
     pub time_window: Option<[f64; 2]>,
@@ -221,7 +221,7 @@ impl Default for ViewState {
             blind: true,
             gripper_model: None,
             gripper_models: Vec::new(),
-            simulation_model: None,
+            simulation_models: [None, None],
             time_window: None,
             keys_shown: false,
             manual_shown: false,

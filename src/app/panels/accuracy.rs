@@ -42,6 +42,8 @@ pub(super) fn ui(ui: &mut Ui, simulation: &SimulationFeature, actions: &mut Acti
 /// Room for the buttons below the plot, and the least height of the plot (points).
 const FRONT_HEIGHT: f32 = 62.0;
 const LEAST_HEIGHT: f32 = 130.0;
+/// Radius of the ring around the setting of the scene: its label begins beside it (points).
+const RING: f32 = 5.0;
 /// Height from which on points have labels.
 const ROOM_FOR_LABELS: f32 = 200.0;
 
@@ -63,11 +65,11 @@ fn mark_current(
     group: SceneGroup,
     (plot, shown): (&Plot, &ShownPlot),
 ) {
-    let stroke = egui::Stroke::new(2.0, colour(theme::of(ui).colours().text));
+    let stroke = egui::Stroke::new(1.5, colour(theme::of(ui).colours().text));
     // Joints and taxels of the scene belong to every setting of motion.
     let current = settings(study, group).find(|(setting, _)| is_current(setting, &simulation.scene));
     if let Some(place) = current.and_then(|(_, cost)| shown.position(plot, place_of(cost))) {
-        ui.painter().with_clip_rect(shown.response.rect).circle_stroke(place, 8.0, stroke);
+        ui.painter().with_clip_rect(shown.response.rect).circle_stroke(place, RING, stroke);
     }
 }
 

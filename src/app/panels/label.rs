@@ -275,7 +275,9 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
     }
     if search != draft.search {
         actions.push(|app| app.label(LabellingAction::Search(search)));
-    } else if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
+    }
+    // It may come with the last letter.
+    if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
         actions.push(|app| app.label(LabellingAction::GiveLabel));
     }
 }

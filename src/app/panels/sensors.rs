@@ -94,7 +94,7 @@ pub(super) fn ui(ui: &mut Ui, view: &ViewState, scene: &Scene, data: &Job<(), Tr
         }
         ui.add_space(8.0);
         ui.strong("Model");
-        model_ui(ui, view.simulation_model.as_ref(), data, actions);
+        model_ui(ui, view.simulation_models[usize::from(scene.holds_object())].as_ref(), data, actions);
         ui.add_space(8.0);
         ui.strong("Poses of the simulation");
         poses_ui(ui, scene, actions);

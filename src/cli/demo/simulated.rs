@@ -2,7 +2,7 @@
 
 use super::super::output::make_folder;
 use super::super::prelude::*;
-use super::super::recognise::{load_model, warn_unless_learned};
+use super::super::recognise::{load_model, warn_of_other_fingers, warn_unless_learned};
 use super::super::snapshot::Drawer;
 use super::{DemoArguments, GraspReport, Hand, PoseReport, grasp_until_recognised};
 use glam::Vec2;
@@ -10,6 +10,7 @@ use palpate_exchange::file_name_of;
 use palpate_geometry::drawing::StandardView;
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{mm, three_digits};
+use palpate_lab::datasets::knows_fingers;
 use palpate_lab::grasping::{Advisor, GraspSummary, Identification, Recompute, Row, grasp_soundly};
 use palpate_lab::picture::{PictureView, Stage};
 use palpate_learn::Shipped;
@@ -54,6 +55,9 @@ pub(super) fn run(arguments: &DemoArguments, store: Option<&Path>) -> Result<(),
     let object = load_object(&nominal)?;
     let model = Arc::new(load_model(arguments.model.as_deref(), Shipped::simulated(nominal.holds_object()))?);
     warn_unless_learned(&model, nominal.holds_object());
+    if !knows_fingers(&model.card, &nominal) {
+        warn_of_other_fingers();
+    }
     let drawer = (!arguments.no_pictures)
         .then(|| Drawer::new(DriverChoice::Any))
         .and_then(|drawer| drawer.inspect_err(|error| warn(&format!("no pictures: {error}"))).ok());

@@ -26,6 +26,8 @@ pub(super) fn card(
     let physics: BTreeSet<Option<u32>> = of_simulation.map(|row| row.physics).collect();
     let calibrations: BTreeSet<&[i64]> =
         origins.iter().map(|origin| &*origin.calibrations).filter(|ids| !ids.is_empty()).collect();
+    let fingers: BTreeSet<&Option<String>> =
+        origins.iter().filter(|origin| origin.simulated.is_some()).map(|origin| &origin.fingers).collect();
     let distinct: BTreeSet<Option<&String>> = collections.into_iter().collect();
 
     let mut mixed = Vec::new();
@@ -77,6 +79,11 @@ pub(super) fn card(
         left_out_for,
         query: asked.to_owned(),
         emulated: kinds.contains("emulated"),
+        fingers: if fingers.iter().any(|own| own.is_some()) {
+            fingers.into_iter().cloned().collect()
+        } else {
+            Vec::new()
+        },
         mixed,
         physics: physics.first().copied().flatten().filter(|_| physics.len() == 1),
         calibrations: calibrations.into_iter().flatten().copied().collect::<BTreeSet<i64>>().into_iter().collect(),

@@ -1,5 +1,8 @@
 //! Origin of the trials of a data set, as their data tell it.
 
+use crate::inspection::scene_hash;
+use palpate_learn::ModelCard;
+use palpate_sim::gripper::GripperModel;
 use palpate_sim::scene::{Between, Faces, PRESETS, PoseSpread, Scene};
 use palpate_store::CalibrationId;
 use palpate_tactile::trial::TrialHeader;
@@ -9,6 +12,8 @@ use palpate_tactile::trial::TrialHeader;
 pub(super) struct TrialOrigin {
     /// Pose preset and fixed object of a simulated trial.
     pub(super) simulated: Option<(Option<&'static str>, bool)>,
+    /// Hash of the fingers of a simulated trial, where they are not those by default.
+    pub(super) fingers: Option<String>,
     /// Calibrations of a recorded one.
     pub(super) calibrations: Vec<CalibrationId>,
     /// The build of the gripper was drawn.
@@ -36,6 +41,7 @@ impl TrialOrigin {
             && scene.object.shift != [0.0; 2];
         Self {
             simulated: Some((preset, scene.holds_object())),
+            fingers: fingers_of(scene),
             built: scene.pose.build > 0.0,
             object: header.origin.as_ref().map(|origin| (origin.object, scene.object.source.clone())),
             pose: pose_group(scene),
@@ -44,6 +50,18 @@ impl TrialOrigin {
             ..Self::default()
         }
     }
+}
+
+/// Hash of the fingers of a scene; none for those by default.
+fn fingers_of(scene: &Scene) -> Option<String> {
+    let gripper = scene.gripper.fingers();
+    (gripper != GripperModel::default()).then(|| scene_hash(&Scene { gripper, ..Scene::default() }))
+}
+
+/// False where a model answers for fingers that it has not learned: most of its answers are wrong then. One that learned from
+/// any build of the gripper is not bound to its fingers.
+pub fn knows_fingers(card: &ModelCard, scene: &Scene) -> bool {
+    !card.learned_from_perfect_sensors() || card.data.has_fingers(&fingers_of(scene))
 }
 
 /// Largest turn about the vertical at which the fingers meet the object from the same side (degrees).

@@ -1,7 +1,7 @@
 //! A stored trial, opened: everything that plots, pictures and bars show of it, sample by sample.
 
 use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, phases_of_frames};
-use crate::datasets::{SensorView, noise_seed};
+use crate::datasets::{SensorView, knows_fingers, noise_seed};
 use crate::grasping::{Identification, IdentificationView, Row};
 use crate::labelling::measured_phases;
 use crate::picture::Stage;
@@ -103,6 +103,8 @@ pub struct OpenTrial {
     pub answers: Vec<Arc<IdentificationView>>,
     /// Another model judged the grasps before this one: the answers are to this one alone.
     pub judged_alone: bool,
+    /// The model has not learned the fingers of the trial.
+    pub other_fingers: bool,
     /// Why nothing was recognised.
     pub recognition_off: Option<String>,
     /// What is missing, in sentences: an object's file that is gone, sensors without calibration.
@@ -182,6 +184,7 @@ impl OpenTrial {
             frames: Vec::new(),
             answers: Vec::new(),
             judged_alone: false,
+            other_fingers: false,
             recognition_off: None,
             remarks: Vec::new(),
         }
@@ -248,6 +251,7 @@ impl OpenTrial {
         reader.add(&more);
         let rows = self.rows_of(&data.frames, &reader, options);
         if let Some(identification) = &mut identification {
+            self.other_fingers = !knows_fingers(&identification.model().card, &scene);
             let earlier = self.header.earlier.as_ref();
             self.judged_alone = earlier.is_some_and(|earlier| !identification.resume(earlier));
             let names = reader.channels().iter().map(Channel::name).enumerate();

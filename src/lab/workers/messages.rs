@@ -245,9 +245,10 @@ impl Snapshot {
         self.object.as_ref().map_or(EMPTY, |object| &object.name)
     }
 
-    /// Whether the decision is right; none before it.
+    /// Whether the decision is right; none before it, and for a name that is given to an object that the model does not know.
     pub fn is_right(&self, view: &IdentificationView) -> Option<bool> {
-        view.is_right(self.truth(), self.status.nothing_held)
+        let is_known = view.labels.class(self.truth()).is_some();
+        view.is_right(self.truth(), self.status.nothing_held).filter(|right| *right || is_known)
     }
 }
 

@@ -93,6 +93,13 @@ impl GripperModel {
         0.5 * self.mount.opening + self.pad.thickness
     }
 
+    /// The fingers alone: held as by default, and without what is known of their constants.
+    #[must_use]
+    pub fn fingers(&self) -> Self {
+        let mount = Mount { opening: self.mount.opening, ..Mount::default() };
+        Self { mount, fitted: None, ..self.clone() }
+    }
+
     /// The grid of taxels on each pad.
     pub fn taxels(&self) -> TaxelGrid {
         TaxelGrid::new(&self.finger, &self.pad)

@@ -28,7 +28,7 @@ use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::capital_title;
 use std::sync::Arc;
-use words::{ALONE, BEING_LEARNED, FOREIGN, Headline, percent, reason};
+use words::{ALONE, BEING_LEARNED, FOREIGN, Headline, NOT_LEARNED, OTHER_FINGERS, percent, reason};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -145,10 +145,10 @@ pub(super) fn ui(
                     failed_sensors_ui(ui, gripper);
                 }
                 let told = ui.cursor().top() - top;
-                let is_being_learned = tools.teaching.running().is_some_and(|running| {
-                    data.source == ViewSource::Simulation
-                        && recognised.truth.as_ref().is_some_and(|(truth, _)| *truth == running.command.name)
-                });
+                let running = tools.teaching.running().map(|running| running.command);
+                let lessons: Vec<_> = running.into_iter().chain(tools.teaching.waiting()).collect();
+                let is_being_learned = data.source == ViewSource::Simulation
+                    && recognised.truth.as_ref().is_some_and(|(own, _)| lessons.iter().any(|next| next.name == *own));
                 let mut part = Part {
                     data,
                     pictures,
@@ -202,7 +202,10 @@ fn lesson_ui(
         if let Some(progress) = running.map(|running| running.progress) {
             ui.horizontal(|ui| {
                 actions.on(&ui.button("Stop").on_hover_text("Cancel"), App::stop_teaching);
-                let text = format!("{:.0}{SPACE}%  {}", 100.0 * progress.share, progress.words);
+                let waiting = tools.teaching.waiting();
+                let next: Vec<String> = waiting.iter().map(|next| capital_title(&next.name)).collect();
+                let next = if next.is_empty() { String::new() } else { format!("; then {}", next.join(", ")) };
+                let text = format!("{:.0}{SPACE}%  {}{next}", 100.0 * progress.share, progress.words);
                 progress_ui(ui, progress.share, &text);
             });
         } else if let Some(learned) = learned {
@@ -329,13 +332,22 @@ impl Part<'_, '_> {
 
     /// What the answer lacks; none where it can be trusted.
     fn distrust(&self) -> Option<&'static str> {
-        let is_real = self.data.board().is_some();
         let is_alone = self.data.shown_trial().is_some_and(|shown| shown.trial.judged_alone);
-        match (self.view.from_perfect_sensors && is_real, self.is_being_learned) {
-            (true, _) => Some(FOREIGN),
-            (false, true) => Some(BEING_LEARNED),
-            (false, false) => is_alone.then_some(ALONE),
+        let is_unknown = |(truth, _): &(&str, String)| self.view.labels.class(truth).is_none();
+        // "Unknown" is right for it.
+        let is_new = !self.view.is_unknown() && self.recognised.truth.as_ref().is_some_and(is_unknown);
+        match self.is_being_learned {
+            _ if self.is_foreign() => Some(FOREIGN),
+            _ if self.data.other_fingers => Some(OTHER_FINGERS),
+            true => Some(BEING_LEARNED),
+            false if is_new => Some(NOT_LEARNED),
+            false => is_alone.then_some(ALONE),
         }
+    }
+
+    /// A model from perfect sensors reads real ones.
+    fn is_foreign(&self) -> bool {
+        self.view.from_perfect_sensors && self.data.board().is_some()
     }
 
     /// Picture of a class, or a frame with a question mark.
@@ -359,7 +371,13 @@ impl Part<'_, '_> {
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);
         let right = self.recognised.is_right().filter(|_| self.data.view.truth_shown);
-        let ink = colour(headline.ink(&colours, right));
+        let distrust = self.distrust();
+        // What is not to be trusted does not look like a decision.
+        let ink = match right {
+            None | Some(true) if distrust.is_some_and(|why| why != ALONE) => colours.warning,
+            _ => headline.ink(&colours, right),
+        };
+        let ink = colour(ink);
         let mut left = rect.left();
         if let Some(class) = headline.class() {
             let side = measures.headline - 4.0;
@@ -374,7 +392,6 @@ impl Part<'_, '_> {
         if let Some(number) = number {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
-        let distrust = self.distrust();
         let by_simulation = self.view.left.is_some() && self.data.board().is_some();
         let why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
         let why = if by_simulation { format!("{why} (calibrated in simulation)") } else { why };

@@ -33,7 +33,7 @@ pub(super) fn height(measures: &Measures) -> f32 {
 /// Draws the lines; false where nothing can be measured.
 pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     // For a model from perfect sensors, the encoder knows those only; it knows free and fixed objects.
-    if !part.view.measures_geometry || part.distrust().is_some() {
+    if !part.view.measures_geometry || part.is_foreign() || part.data.other_fingers {
         return false;
     }
     let measured = part.view.measured.as_deref();

@@ -14,11 +14,17 @@ const WORTH_NAMING: f64 = 0.4;
 /// Warning about a model on a gripper whose sensors it does not know.
 pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect sensors only.";
 
+/// Warning about a model of other fingers.
+pub(super) const OTHER_FINGERS: &str = "Not to be trusted: the model has not learned these fingers.";
+
+/// Warning about an object that the model has not learned.
+pub(super) const NOT_LEARNED: &str = "The model does not know this object.";
+
 /// Warning about an answer of a model that is learning the object in the hand.
-pub(super) const BEING_LEARNED: &str = "Being learned: the model does not know this object yet.";
+pub(super) const BEING_LEARNED: &str = "To be learned: the model does not know this object yet.";
 
 /// Warning about an answer that lacks the grasps before it.
-pub(super) const ALONE: &str = "To this grasp alone: another model judged those before it.";
+pub(super) const ALONE: &str = "From this grasp alone: the model has changed since those before it.";
 
 /// Headline of the panel.
 #[derive(Clone, Copy, Debug, PartialEq)]

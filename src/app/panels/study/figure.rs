@@ -30,7 +30,8 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     if !is_ambiguous(&linked.figure.plots) {
         legend_ui(ui, theme::of(ui), linked.figure.plots.iter().flat_map(|plot| &plot.series));
     }
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    // Another figure begins at its top.
+    ScrollArea::vertical().id_salt(&linked.name).auto_shrink(false).show(ui, |ui| {
         plots_ui(ui, &result, linked, actions);
         for line in linked.figure.note.lines().chain(result.stored.result.data.iter().map(String::as_str)) {
             wrapped(ui, RichText::new(line).small().weak());

@@ -4,7 +4,7 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, accented, colour};
 use crate::app::widgets::{command_ui, failure_ui, just_opened, progress_ui, put_line, wrapped};
-use egui::{Align2, Button, FontId, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Align2, Button, FontId, Id, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::palette::{Rgb, ThemeColours};
 use palpate_geometry::units::capital;
 use palpate_lab::workers::JobProgress;
@@ -137,13 +137,19 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
         }
     });
     if let Some(JobProgress { share, words }) = &running {
-        progress_ui(ui, *share, words);
+        progress_ui(ui, *share, &format!("{:.0} %", 100.0 * share));
+        wrapped(ui, RichText::new(words).small().weak());
     }
     // Below the others: a second click on it must start nothing.
     if busy {
         let stop =
             ui.button("Stop study").on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
+        if just_begun(ui, key) {
+            stop.scroll_to_me(None);
+        }
         actions.on(&stop, |app| app.studies.stop());
+    } else {
+        ui.data_mut(|data| data.remove::<bool>(Id::unique(("begun", key))));
     }
     if let Some((size, cause)) = studies.failed(key).filter(|_| running.is_none()) {
         failure_ui(ui, cause);
@@ -158,6 +164,14 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     }
     ui.collapsing("In the terminal", |ui| command_ui(ui, "this study", &command(studies, card)));
     ui.add_space(4.0);
+}
+
+/// True once in each run.
+fn just_begun(ui: &Ui, key: &str) -> bool {
+    let id = Id::unique(("begun", key));
+    let before: Option<bool> = ui.data(|data| data.get_temp(id));
+    ui.data_mut(|data| data.insert_temp(id, true));
+    before.is_none()
 }
 
 /// Command that runs the study in the same files.

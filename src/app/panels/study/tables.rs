@@ -1,6 +1,6 @@
 //! Tables of the chosen study; a click on a row opens its trials.
 
-use super::{about_row_ui, cell_text, opening, part_title, result_ui};
+use super::{about_row_ui, cell_text, hint, opening, part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
@@ -67,19 +67,25 @@ fn columns(ui: &Ui, table: &StudyTable) -> Vec<(f32, f32, bool)> {
 fn table_ui(ui: &mut Ui, theme: Theme, result: &StudyResult, table: &StudyTable, actions: &mut Actions) {
     let places = columns(ui, table);
     let colours = theme.colours();
-    ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
+    // Another table begins at its top.
+    ScrollArea::horizontal().id_salt(&table.name).auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let whole = places.last().map_or(0.0, |(_, right, _)| right + GAP).max(ui.available_width());
         let (header, _) = ui.allocate_exact_size(vec2(whole, ROW), Sense::hover());
         let titles = table.columns.iter().map(|column| symbol(&column.titled()));
         texts(ui, header, &places, titles, colour(colours.quiet_text));
-        ScrollArea::vertical().auto_shrink(false).show_rows(ui, ROW, table.rows.len(), |ui, rows| {
-            for at in rows {
-                if let Some(row) = table.rows.get(at) {
-                    row_ui(ui, theme, result, (table, row), (whole, &places), actions);
+        ScrollArea::vertical().id_salt(&table.name).auto_shrink(false).show_rows(
+            ui,
+            ROW,
+            table.rows.len(),
+            |ui, rows| {
+                for at in rows {
+                    if let Some(row) = table.rows.get(at) {
+                        row_ui(ui, theme, result, (table, row), (whole, &places), actions);
+                    }
                 }
-            }
-        });
+            },
+        );
     });
 }
 
@@ -103,8 +109,13 @@ fn row_ui(
     texts(ui, rect, places, cells.into_iter(), colour(colours.text));
     let clicked = response.clicked();
     response.on_hover_ui(|ui| about_row_ui(ui, result, table, row));
-    if let Some(trials) = trials.filter(|_| clicked) {
-        actions.push(move |app| app.open_trials(&trials));
+    match trials {
+        Some(trials) if clicked => actions.push(move |app| app.open_trials(&trials)),
+        None if clicked => {
+            let why = hint(result, row);
+            actions.push(move |app| app.notices.info(format!("{why}.")));
+        }
+        _ => {}
     }
 }
 
