@@ -264,7 +264,8 @@ fn an_answer_typed_fast_or_before_the_question_is_an_answer() {
     desk.press(Key::Slash);
     desk.type_text("cu");
     desk.until_shown(true, "which object?");
-    desk.type_text("be");
+    // The last letters and Enter in one frame.
+    desk.harness.event(egui::Event::Text("be".to_owned()));
     desk.press(Key::Enter);
     desk.until_labelled(&[&typed[..], &[(4, Some("cube"), false)]].concat());
     // Where no question is asked or coming, there is nothing to type into.

@@ -322,4 +322,21 @@ mod tests {
         selection.look(&found);
         assert_eq!(selected(&selection), [2]);
     }
+
+    #[test]
+    fn what_comes_before_the_first_look_finds_what_the_query_asks_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("s.sqlite");
+        let mut store = Store::open(&path).expect("opens");
+        let header = TrialHeader::new("", Scene::default());
+        let id = store.begin_board(&header, &BoardInfo::default()).expect("begins");
+        let mut library = LibraryFeature::new(LibraryWorker::start(path, Arc::new(|| {})).expect("starts"));
+        library.follow(id);
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
+        while !library.worker.is_settled() && std::time::Instant::now() < end {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        library.view = library.worker.view();
+        assert!(library.view.is_some_and(|view| view.query == library.selection.query && view.query.without_collected));
+    }
 }

@@ -89,6 +89,8 @@ fn pose_group(scene: &Scene) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_learn::Shipped;
+    use std::path::Path;
 
     #[test]
     fn poses_are_grouped_by_face_and_closing_axis_or_by_shift() {
@@ -106,5 +108,26 @@ mod tests {
         assert_eq!([group([0.0; 3], 0.0), group([0.0; 3], 90.0), group([0.0; 3], 180.0)], [8, 9, 8]);
         // On its side: y up; closing along x, or along z.
         assert_eq!([group([90.0, 0.0, 0.0], 0.0), group([90.0, 0.0, 0.0], 90.0)], [7, 6]);
+    }
+
+    #[test]
+    fn a_model_from_perfect_sensors_knows_the_fingers_that_it_learned_however_they_are_held()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let [perfect, any] = [Shipped::PerfectSensors, Shipped::AnyGripper].map(Shipped::model);
+        let (perfect, any) = (perfect?, any?);
+        let (usual, mut held) = (Scene::default(), Scene::default());
+        (held.gripper.mount.yaw_deg, held.gripper.mount.offset) = (30.0, [0.004, 0.0, 0.0]);
+        held.object.source = "ball".to_owned();
+        assert!([&usual, &held].iter().all(|scene| knows_fingers(&perfect.card, scene)));
+        let mut soft = Scene::default();
+        soft.gripper.pad.thickness *= 1.5;
+        let paper = Scene::named_or_from_file(Path::new("paper"))?;
+        assert!([&soft, &paper].iter().all(|scene| !knows_fingers(&perfect.card, scene)));
+        assert!([&soft, &paper].iter().all(|scene| knows_fingers(&any.card, scene)));
+        // One that learned from grasps by both.
+        let mut own = perfect.card.clone();
+        own.data.fingers = vec![None, fingers_of(&soft)];
+        assert!([&usual, &soft].iter().all(|scene| knows_fingers(&own, scene)) && !knows_fingers(&own, &paper));
+        Ok(())
     }
 }
