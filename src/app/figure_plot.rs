@@ -60,6 +60,10 @@ pub(super) fn show(
         let names = known[1].iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
         let column = ((ui.available_width() / LETTER) as usize).saturating_sub(names) / plot.x.ticks.len();
         known[0].iter_mut().for_each(|(_, text)| *text = wrapped_name(text, column.max(2), 2));
+        // Numbers close to each other: every second.
+        if column < 3 {
+            known[0].iter_mut().skip(1).step_by(2).for_each(|(_, text)| text.clear());
+        }
     }
     let marks = |known: &[(f64, String)], bounds: &RangeInclusive<f64>| {
         let step_size = bounds.end() - bounds.start();
@@ -183,9 +187,16 @@ fn labels(ui: &Ui, theme: Theme, shown: &ShownPlot, plot: &Plot, labelled: impl 
         } else {
             Rect::from_x_y_ranges(at.x - 1.5..=at.x + 1.5, rect.y_range())
         };
-        Some(corners(drawn))
+        // Its text stands at one end.
+        let words = vec2(LETTER * line.text.chars().count() as f32, LINE);
+        let text = if line.horizontal {
+            Rect::from_min_size(egui::pos2(rect.left(), at.y - LINE), words)
+        } else {
+            Rect::from_center_size(egui::pos2(at.x, rect.top() + 0.5 * LINE), 2.0 * words)
+        };
+        Some([drawn, text].map(corners))
     });
-    let Ok(labels) = placed_labels(plot, at, size, labelled, (obstacles.collect(), corners(rect)));
+    let Ok(labels) = placed_labels(plot, at, size, labelled, (obstacles.flatten().collect(), corners(rect)));
     for label in labels {
         if let Some(ends) = label.lead {
             painter.line_segment(ends.map(position), Stroke::new(0.6, colour(theme.colours().quiet_text)));

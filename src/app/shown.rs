@@ -40,6 +40,8 @@ pub(super) struct DisplayedData<'a> {
     pub(super) comparison: ComparedTrials<'a>,
     /// The model's prediction is hidden until the label is given.
     pub(super) blind: bool,
+    /// The object in the simulated hand was learned free and is fixed, or the other way round.
+    pub(super) learned_otherwise: bool,
     /// The model has not learned the fingers that are simulated.
     pub(super) other_fingers: bool,
 }

@@ -274,6 +274,7 @@ fn an_object_from_a_file_is_learned_by_itself() {
     let mut fixed = free.clone();
     fixed.set_object_fixed(true);
     bench.tell(|app| app.set_scene(fixed));
+    bench.until_shown(true, "Learned as a free object, not yet fixed in place.");
     while bench.workbench().view().simulation_models[1].is_none() {
         bench.wait();
     }
@@ -283,6 +284,10 @@ fn an_object_from_a_file_is_learned_by_itself() {
     bench.until(|s| s.truth() == "carton" && !s.scene.holds_object());
     bench.harness.run_steps(5);
     assert!(knows(&bench) && bench.harness.query_by_label_contains("Learning Carton").is_none());
+    // Its card was about the fixed one.
+    assert!(!says(&bench, "Learned Carton"));
+    bench.tell(|app| app.change_learned(&file.to_string_lossy()));
+    bench.harness.run_steps(3);
 
     // Another name is its class, its truth and its name in scene files, also when it is opened again.
     bench.harness.get_by_label("Rename").click();

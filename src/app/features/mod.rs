@@ -106,6 +106,10 @@ impl App {
                 spread: self.inspect.spread,
             },
             blind: self.labelling.blind,
+            learned_otherwise: self.view.source == ViewSource::Simulation
+                && self.snapshot().is_some_and(|snapshot| {
+                    self.recognition.is_learned_otherwise(snapshot.truth(), snapshot.scene.holds_object())
+                }),
             other_fingers: match self.view.source {
                 ViewSource::Simulation => self.recognition.has_other_fingers(&self.simulation.scene),
                 ViewSource::Trial => self.inspect.inspected().is_some_and(|own| own.trial.other_fingers),

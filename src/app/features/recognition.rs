@@ -38,6 +38,8 @@ pub(in crate::app) struct RecognitionFeature {
 pub(in crate::app) struct Learned {
     /// Its class.
     pub(in crate::app) name: String,
+    /// It was fixed in place.
+    pub(in crate::app) fixed: bool,
     /// How well it is known; none where that was not tested.
     pub(in crate::app) lesson: Option<Lesson>,
     /// Time that the lesson took (s); none where that was before.
@@ -86,6 +88,12 @@ impl RecognitionFeature {
     pub(super) fn has_other_fingers(&self, scene: &Scene) -> bool {
         let model = self.models.of(Shipped::simulated(scene.holds_object()));
         model.is_some_and(|model| !knows_fingers(&model.card, scene))
+    }
+
+    /// True where a class of own objects is known only to the model of objects that are held otherwise.
+    pub(super) fn is_learned_otherwise(&self, class: &str, fixed: bool) -> bool {
+        let knows = |fixed: bool| self.learned_from(fixed).any(|(own, _)| own == class);
+        knows(!fixed) && !knows(fixed)
     }
 
     /// Classes that the model of the simulation has learned, with their files.
@@ -169,15 +177,16 @@ impl App {
         let Some(name) = self.learned_as(source).map(str::to_owned) else {
             return self.notices.info("No learned object is in the hand.");
         };
-        let lesson = self.lesson(&name).cloned();
-        self.recognition.learned = Some(Learned { name, lesson, seconds: None });
+        let (lesson, fixed) = (self.lesson(&name).cloned(), self.simulation.scene.holds_object());
+        self.recognition.learned = Some(Learned { name, fixed, lesson, seconds: None });
         self.show_panel("recognition");
     }
 
     /// Changes the model of the simulation in the object of the last lesson.
     fn change_class(&mut self, change: ClassChange) {
-        let Some(Learned { name, .. }) = &self.recognition.learned else { return };
-        let Some(model) = self.recognition.simulated().find(|model| model.card.taught.contains(name)) else { return };
+        let Some(Learned { name, fixed, .. }) = &self.recognition.learned else { return };
+        let model = self.recognition.models.of(Shipped::simulated(*fixed));
+        let Some(model) = model.filter(|model| model.card.taught.contains(name)) else { return };
         let request = TeachRequest { model: Arc::clone(model), name: name.clone(), object: None, change };
         self.tools.teaching.start(request);
     }
@@ -242,7 +251,7 @@ impl App {
 
     /// How well the model in use knows a class that it has learned.
     pub(in crate::app) fn lesson(&self, class: &str) -> Option<&Lesson> {
-        self.recognition.simulated().find_map(|model| model.card.lesson(class))
+        self.recognition.models.of(Shipped::simulated(self.simulation.scene.holds_object()))?.card.lesson(class)
     }
 
     /// Cancels the lesson.
@@ -331,6 +340,7 @@ impl App {
                 let seconds = self.recognition.asked.elapsed().as_secs_f64();
                 self.recognition.learned = command.object.as_ref().map(|_| Learned {
                     name: command.name.clone(),
+                    fixed: trained.model.card.data.fixed() == Some(true),
                     lesson: trained.model.card.lesson(&command.name).cloned(),
                     seconds: Some(seconds),
                 });

@@ -19,7 +19,9 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         remark_ui(ui, "No trial is compared. Select trials in the library and press P.");
         return;
     }
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    // A bar below the rows, not over one.
+    ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         let own = data.shown_trial().map(|own| own.trial.id);
         let own = comparison.pinned.iter().find(|pinned| Some(pinned.trial.id) == own).map(|pinned| pinned.trial.id);
         let remove_ui = |ui: &mut Ui, id: TrialId, actions: &mut Actions| {
@@ -90,39 +92,37 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     let pinned: Vec<&Pinned> = pinned.collect();
     ui.separator();
     ui.strong("Mean in the hold, and difference to the trial shown");
-    ScrollArea::horizontal().id_salt("hold").show(ui, |ui| {
-        Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]).show(ui, |ui| {
-            ui.weak("");
-            ui.weak(shown.id.to_string());
-            for own in &pinned {
-                ui.label(RichText::new(own.trial.id.to_string()).color(ink_of(data, own.colour)).strong());
+    Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]).show(ui, |ui| {
+        ui.weak("");
+        ui.weak(shown.id.to_string());
+        for own in &pinned {
+            ui.label(RichText::new(own.trial.id.to_string()).color(ink_of(data, own.colour)).strong());
+        }
+        ui.end_row();
+        for column in shown.columns.iter().filter(|column| column.channel.is_some()) {
+            let (unit, factor) = match column.unit {
+                "Pa" => ("kPa", 1e-3),
+                unit => (unit, 1.0),
+            };
+            let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
+            ui.weak(format!("{}, {}", column.name.replace('_', " "), symbol(unit)));
+            ui.monospace(number(own, unit));
+            for other in &pinned {
+                let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
+                let Some(mean) = mean else {
+                    ui.monospace("–");
+                    continue;
+                };
+                let sign = if mean > own { "+" } else { "" };
+                let (mean, off) = (number(mean, unit), format!("{sign}{}", number(mean - own, unit)));
+                // A panel has room for both of one trial.
+                match pinned.len() {
+                    1 => ui.monospace(format!("{mean} ({off})")),
+                    _ => ui.monospace(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
+                };
             }
             ui.end_row();
-            for column in shown.columns.iter().filter(|column| column.channel.is_some()) {
-                let (unit, factor) = match column.unit {
-                    "Pa" => ("kPa", 1e-3),
-                    unit => (unit, 1.0),
-                };
-                let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
-                ui.weak(format!("{}, {}", column.name.replace('_', " "), symbol(unit)));
-                ui.monospace(number(own, unit));
-                for other in &pinned {
-                    let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
-                    let Some(mean) = mean else {
-                        ui.monospace("–");
-                        continue;
-                    };
-                    let sign = if mean > own { "+" } else { "" };
-                    let (mean, off) = (number(mean, unit), format!("{sign}{}", number(mean - own, unit)));
-                    // A panel has room for both of one trial.
-                    match pinned.len() {
-                        1 => ui.monospace(format!("{mean} ({off})")),
-                        _ => ui.monospace(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
-                    };
-                }
-                ui.end_row();
-            }
-        });
+        }
     });
 }
 

@@ -5,7 +5,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::simulation::SimulationFeature;
 use crate::app::theme::{self, colour, veil};
-use crate::app::widgets::{capital, put_line, words};
+use crate::app::widgets::{capital, fitted, put, put_line, words};
 use egui::{Align, Color32, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::{symbol, three_digits};
@@ -110,9 +110,9 @@ fn header_ui(ui: &mut Ui) {
         ),
     ];
     for (rect, title, hover) in titles {
-        let label = egui::Label::new(RichText::new(title).small().weak()).extend();
-        let builder = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center));
-        ui.scope_builder(builder, |ui| ui.add(label).on_hover_text(hover));
+        // What reaches beyond its column would widen the rows below.
+        put_line(ui, rect, egui::Align2::LEFT_CENTER, title, 11.0, ui.visuals().weak_text_color());
+        ui.interact(rect, ui.scope_id().with(("column", title)), Sense::hover()).on_hover_text(hover);
     }
 }
 
@@ -158,9 +158,10 @@ impl Row<'_> {
         let response = ui.interact(rect, ui.scope_id().with(("name", self.effect.name())), Sense::click());
         let colours = self.theme.colours();
         let ink = if response.hovered() || open { colours.accent } else { colours.text };
-        let font = egui::TextStyle::Body.resolve(ui.style());
-        let painter = ui.painter().with_clip_rect(rect.expand2(vec2(GAP, 0.0)));
-        painter.text(rect.left_center(), egui::Align2::LEFT_CENTER, words(self.effect.name()), font, colour(ink));
+        let name = words(self.effect.name());
+        let text =
+            fitted(ui, &name, [9.0, egui::TextStyle::Body.resolve(ui.style()).size], rect.width() + GAP, colour(ink));
+        put(ui, text, rect, egui::Align2::LEFT_CENTER);
         response.widget_info(|| {
             egui::WidgetInfo::selected(egui::Role::Button, true, open, format!("about {}", words(self.effect.name())))
         });

@@ -70,7 +70,11 @@ fn round_marks(low: f64, high: f64, most: f64) -> Vec<GridMark> {
     }
     let decade = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| *s >= rough).unwrap_or(10.0 * decade);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    let between = |step: f64| ((low / step).ceil() as i64, (high / step).floor() as i64);
+    // One mark alone tells no scale.
+    let is_lonely = |(first, last): (i64, i64)| first == last && first != 0 && most >= 2.0;
+    let step = if is_lonely(between(step)) { 0.5 * step } else { step };
+    let (first, last) = between(step);
     // A step of a whole range makes all marks equally strong.
     (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: high - low }).collect()
 }
@@ -92,6 +96,8 @@ mod tests {
                 "{marks:?}"
             );
         }
+        // One mark away from zero is none.
+        assert_eq!(value_marks(1010.0, 1990.0).iter().map(|m| m.value).collect::<Vec<_>>(), [1250.0, 1500.0, 1750.0]);
         assert!(value_marks(1.0, 1.0).is_empty());
         assert!(value_marks(f64::NAN, 1.0).is_empty());
     }

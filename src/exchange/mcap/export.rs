@@ -8,7 +8,7 @@ use crate::format::{ExchangeError, TrialExport, new_file};
 use crate::taxels::LoadedTaxel;
 use crate::urdf::gripper_urdf;
 use palpate_geometry::Pose;
-use palpate_lab::inspection::scene_hash;
+use palpate_lab::datasets::scene_hash;
 use palpate_learn::Pmf;
 use palpate_sim::gripper::Side;
 use palpate_store::{FileKind, NewFile};

@@ -12,7 +12,7 @@ pub use labelled_training::{
     HELD_BACK, JudgedModel, LEAST_TRIALS, LabelledClass, LabelledTraining, TrainingError, TrainingStage,
     labelled_classes,
 };
-pub use origin::knows_fingers;
+pub use origin::{knows_fingers, scene_hash};
 pub use query::{
     DatasetError, DatasetQuery, NoPhysicsVersion, PhysicsVersion, SensorView, TrialSignals, labels_of_catalogue,
     noise_seed, sequence_of, trial_signals,

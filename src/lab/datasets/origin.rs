@@ -1,6 +1,5 @@
 //! Origin of the trials of a data set, as their data tell it.
 
-use crate::inspection::scene_hash;
 use palpate_learn::ModelCard;
 use palpate_sim::gripper::GripperModel;
 use palpate_sim::scene::{Between, Faces, PRESETS, PoseSpread, Scene};
@@ -50,6 +49,11 @@ impl TrialOrigin {
             ..Self::default()
         }
     }
+}
+
+/// Short stable name of a scene: CRC-32 of its TOML, eight hexadecimal digits.
+pub fn scene_hash(scene: &Scene) -> String {
+    format!("{:08x}", crc32fast::hash(scene.to_toml().as_bytes()))
 }
 
 /// Hash of the fingers of a scene; none for those by default.

@@ -4,14 +4,13 @@
 use super::comparison::{Alignment, MeanTrial};
 use super::open_trial::{Column, OpenTrial};
 use super::phases::TouchPhase;
-use crate::datasets::SensorView;
+use crate::datasets::{SensorView, scene_hash};
 use crate::picture::{BendUnit, LoadUnit, joints_over_time, pad_rows_over_time, touched_rows};
 use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
 use palpate_geometry::palette::{NO_SERIES, SHOWN_SERIES};
 use palpate_sim::gripper::Side;
-use palpate_sim::scene::Scene;
 use palpate_tactile::SignalDefinition;
 use palpate_tactile::trial::{TrialId, TrialSource};
 
@@ -51,11 +50,6 @@ const NAMED: usize = 4;
 /// Names of channels in an error.
 const LISTED: usize = 24;
 
-/// Short stable name of a scene: CRC-32 of its TOML, eight hexadecimal digits.
-pub fn scene_hash(scene: &Scene) -> String {
-    format!("{:08x}", crc32fast::hash(scene.to_toml().as_bytes()))
-}
-
 /// Facts that make a figure repeatable, in lines: each trial's object, source, seed, scene and version, and the version
 /// that drew it.
 pub fn caption(trials: &[&OpenTrial]) -> String {
@@ -94,6 +88,7 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
     };
     let title = match trials {
         [one] => format!("{}, trial {}", one.title, one.id),
+        _ if trials.len() <= LISTED_IDS => each(trials),
         _ => format!("{}: {}", titles(trials), numbers(trials)),
     };
     let plots = match options.heat {
@@ -139,6 +134,13 @@ fn lacking(trial: &OpenTrial, others: &str, what: &str) -> FigureDataError {
 /// Objects of several trials: `Lemon (2), Tomato (1)`.
 fn titles(trials: &[&OpenTrial]) -> String {
     let texts: Vec<String> = by_title(trials).iter().map(|(title, own)| format!("{title} ({})", own.len())).collect();
+    texts.join(", ")
+}
+
+/// Objects of a few trials with their numbers: `Lemon (trial 2), Pear (trials 5, 7)`.
+fn each(trials: &[&OpenTrial]) -> String {
+    let texts: Vec<String> =
+        by_title(trials).iter().map(|(title, own)| format!("{title} ({})", numbers(own))).collect();
     texts.join(", ")
 }
 
@@ -413,6 +415,7 @@ mod tests {
     use super::super::{Keep, OpenOptions};
     use super::*;
     use crate::grasping::grasp;
+    use palpate_sim::scene::Scene;
     use palpate_store::Store;
 
     fn opened(objects: &[&str]) -> Vec<OpenTrial> {

@@ -11,7 +11,7 @@ pub(crate) mod test_trials;
 
 pub use crate::recording::OpenTrialError;
 pub use comparison::{Alignment, MeanColumn, MeanTrial};
-pub use figures::{FigureDataError, FigureOptions, HeatKind, caption, comparison_figure, scene_hash, trial_numbers};
+pub use figures::{FigureDataError, FigureOptions, HeatKind, caption, comparison_figure, trial_numbers};
 pub use open_trial::{Column, Instant, Keep, OpenOptions, OpenTrial, SimulatedFacts};
 pub(crate) use phases::onset;
 pub use phases::{PhaseSpan, TouchPhase, phases_of_frames};

@@ -53,7 +53,8 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
             run.progress(share, format!("Learning {name}: {words}"));
         };
         let store = Store::open(&store)?;
-        let save = |model| -> Result<_, JobError> { Ok(Some(TrainedModel::save(model, &models, "taught", &store)?)) };
+        let file = format!("taught-{}", plain_name(&request.name));
+        let save = |model| -> Result<_, JobError> { Ok(Some(TrainedModel::save(model, &models, &file, &store)?)) };
         match &request.change {
             ClassChange::Renamed(new) => return save(request.model.renamed(&request.name, new)),
             ClassChange::Forgotten => return save(request.model.without(&request.name)?),
@@ -78,6 +79,12 @@ pub fn class_training_job(store: PathBuf, models: PathBuf, wake: Wake) -> Job<Te
         let again = request.object.as_ref().and_then(from).unwrap_or(false);
         let without = again.then(|| request.model.without(&request.name)).transpose()?;
         let taught = lessons.teach(without.as_ref().unwrap_or(&request.model), Some(&store))?;
-        Ok(run.unless_stopped(TrainedModel::save(taught.model, &models, "taught", &store)?))
+        Ok(run.unless_stopped(TrainedModel::save(taught.model, &models, &file, &store)?))
     })
+}
+
+/// A name as a part of a file's name.
+fn plain_name(name: &str) -> String {
+    const LONGEST: usize = 40;
+    name.chars().take(LONGEST).map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
 }

@@ -197,7 +197,11 @@ impl LabelDraft {
 
     /// Place in the list of objects that a label is given from; none while the search may mean several.
     pub fn place(&self, view: &LabelView) -> Option<usize> {
-        self.chosen.or_else(|| self.found(view).sure)
+        // What comes next in the plan is no answer for a trial that others have followed.
+        let trial = self.trial(view).filter(|trial| trial.object.is_none() && self.search.is_empty());
+        let is_late =
+            trial.is_some_and(|trial| view.trials.iter().any(|own| own.id > trial.id && own.object.is_some()));
+        self.chosen.or_else(|| self.found(view).sure.filter(|_| !is_late))
     }
 
     /// Label that is chosen now.

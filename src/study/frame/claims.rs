@@ -53,17 +53,17 @@ impl Rule {
             Self::AllAbove(_) => [
                 "Every interval lies above the line.",
                 "Some intervals lie above the line, others do not.",
-                "Intervals lie below the line.",
+                "One interval lies below the line, or several.",
             ],
             Self::AllBelow(_) => [
                 "Every interval lies below the line.",
                 "Some intervals lie below the line, others do not.",
-                "Intervals lie above the line.",
+                "One interval lies above the line, or several.",
             ],
             Self::NoneBelow(_) => [
                 "No interval lies below the line.",
                 "In some cases an interval lies below the line.",
-                "Intervals lie below the line.",
+                "One interval lies below the line, or several.",
             ],
             Self::Within(..) => [
                 "Every interval reaches the paper's number.",

@@ -129,7 +129,7 @@ fn findings(rows: &[Row<Balance>]) -> Vec<Finding> {
     let gains = |claim: &str, why: &str, factor: Balance, group: MethodKind, rule: Rule| {
         let own = rows.iter().filter(|row| row.kind.factor == factor && row.kind.method.kind == group);
         let named = |row: &Row<Balance>| {
-            Some((grasps(&row.kind), (format!("over {}", row.kind.method.key), negated(row.gain?))))
+            Some((grasps(&row.kind), (format!("{PAPERS_MODEL} over {}", row.kind.method.key), negated(row.gain?))))
         };
         let mut gains = grouped(own.filter_map(named));
         gains.iter_mut().for_each(|(_, gains)| gains.sort_by(|a, b| a.1.estimate.total_cmp(&b.1.estimate)));

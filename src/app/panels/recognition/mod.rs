@@ -28,7 +28,9 @@ use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::capital_title;
 use std::sync::Arc;
-use words::{ALONE, BEING_LEARNED, FOREIGN, Headline, NOT_LEARNED, OTHER_FINGERS, percent, reason};
+use words::{
+    ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, percent, reason,
+};
 
 /// Time in which bars follow a new answer (s).
 const EASE_S: f32 = 0.12;
@@ -94,12 +96,12 @@ impl Measures {
     }
 
     /// Columns for classes, and the height of a line: all have one, in whatever window.
-    fn lines(&self, height: f32, labels: &Labels, has_touch: bool) -> (usize, f32) {
+    fn lines(&self, height: f32, labels: &Labels, has_touch: bool, below: f32) -> (usize, f32) {
         let (properties, classes) = (properties::rows(labels) as f32, labels.classes.len());
         let properties = properties * self.properties + (properties - 1.0).max(0.0) * self.gap;
         let touch = if has_touch { touch::height(self) } else { 0.0 };
-        let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + self.button;
-        let room = height - parts - properties - touch - 7.0 * self.gap;
+        let parts = self.headline + self.reason + self.truth + THRESHOLD_LINE + self.strip + below;
+        let room = height - parts - properties - touch - 6.0 * self.gap;
         let line = |columns: usize| (2.0 * room / classes.div_ceil(columns).max(1) as f32).floor() / 2.0;
         match [line(1), line(2)] {
             [one, _] if one >= ONE_COLUMN => (1, one.min(self.class)),
@@ -137,6 +139,8 @@ pub(super) fn ui(
         ui.spacing_mut().item_spacing.y = measures.gap;
         let top = ui.cursor().top();
         let labels = recognised.view.map(|view| view.labels.as_ref());
+        // What was learned of fixed objects says nothing about free ones.
+        let learned = learned.filter(|learned| learned.fixed == data.scene.holds_object());
         lesson_ui(ui, tools, learned, labels, measures, actions);
         match recognised.view {
             Some(view) => {
@@ -166,7 +170,7 @@ pub(super) fn ui(
                 }
                 properties::ui(ui, &part);
                 let has_touch = touch::ui(ui, &part);
-                let lines = measures.lines(room.y - advised, &view.labels, has_touch);
+                let lines = measures.lines(room.y - advised, &view.labels, has_touch, below);
                 classes::ui(ui, &mut part, lines);
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);
@@ -210,16 +214,24 @@ fn lesson_ui(
             });
         } else if let Some(learned) = learned {
             let warning = learned.lesson.as_ref().and_then(lesson_warning);
+            // Classes need the height.
+            let warned_above = measures.is_tight() && warning.is_some();
+            if let Some(warning) = warning.as_ref().filter(|_| warned_above) {
+                let text = format!("{}: {warning}.", capital_title(&learned.name));
+                let ink = colour(theme::of(ui).colours().warning);
+                ui.add(Label::new(RichText::new(&text).color(ink)).truncate()).on_hover_text(text);
+            }
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
                 let ink = if warning.is_some() { theme::of(ui).colours().warning } else { good };
                 let told = RichText::new(format!("Learned {title}")).strong().color(colour(ink));
-                ui.label(if measures.is_tight() { told } else { told.heading() });
-                if let Some(lesson) = &learned.lesson {
+                if !warned_above {
+                    ui.label(if measures.is_tight() { told } else { told.heading() });
+                }
+                if let Some(lesson) = learned.lesson.as_ref().filter(|_| !warned_above) {
                     let time = learned.seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.0}\u{a0}s"));
                     let text = format!("from {} simulated grasps{time}: {}.", lesson.grasps, lesson_result(lesson));
                     if measures.is_tight() {
-                        // Classes need the height.
                         let right = format!("{} of {} right", lesson.recognised, lesson.tested);
                         ui.label(right).on_hover_text(text);
                     } else {
@@ -241,10 +253,9 @@ fn lesson_ui(
                 }
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
-            if let Some(warning) = warning {
+            if let Some(warning) = warning.filter(|_| !warned_above) {
                 let ink = colour(theme::of(ui).colours().warning);
-                let label = Label::new(RichText::new(format!("{}.", capital(&warning))).color(ink));
-                ui.add(if measures.is_tight() { label.truncate() } else { label });
+                ui.add(Label::new(RichText::new(format!("{}.", capital(&warning))).color(ink)));
             }
         }
     });
@@ -339,6 +350,9 @@ impl Part<'_, '_> {
         match self.is_being_learned {
             _ if self.is_foreign() => Some(FOREIGN),
             _ if self.data.other_fingers => Some(OTHER_FINGERS),
+            _ if self.data.learned_otherwise && is_new => {
+                Some(if self.data.scene.holds_object() { LEARNED_FREE } else { LEARNED_FIXED })
+            }
             true => Some(BEING_LEARNED),
             false if is_new => Some(NOT_LEARNED),
             false => is_alone.then_some(ALONE),
@@ -519,7 +533,10 @@ impl Part<'_, '_> {
                     self.actions.push(|app| app.show_panel("why"));
                 }
                 if let Some(because) = self.because() {
-                    ui.add(Label::new(RichText::new(because).small().weak()).truncate());
+                    let room = ui.available_rect_before_wrap();
+                    let (letters, ink) = (self.measures.reason_letters.min(11.5), ui.visuals().weak_text_color());
+                    let (place, _) = labelled(ui, room.size(), &because);
+                    put(ui, fitted(ui, &because, letters, place.width(), ink), place, Align2::LEFT_CENTER);
                 }
             }
         });

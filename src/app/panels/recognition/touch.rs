@@ -70,10 +70,22 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
-/// An estimate in words: `34 mm (30 to 38)`.
+/// A range this many times as long as where it begins has no number in its middle that says anything.
+const VAGUE: f64 = 3.0;
+
+/// True where little is known of a length.
+fn is_vague(estimate: &MeasureEstimate) -> bool {
+    estimate.range[1] > VAGUE * estimate.range[0]
+}
+
+/// An estimate in words: `34 mm (30 to 38)`; `16 to 82 mm` where little is known.
 fn words(estimate: &MeasureEstimate, between: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    format!("{value:.0} mm ({from:.0}{between}{to:.0})")
+    if is_vague(estimate) {
+        format!("{from:.0}{between}{to:.0} mm")
+    } else {
+        format!("{value:.0} mm ({from:.0}{between}{to:.0})")
+    }
 }
 
 fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
@@ -96,9 +108,25 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
             let range = Rect::from_min_max(pos2(from, bar.top()), pos2(to.max(from + 2.0), bar.bottom()));
             ui.painter().rect_filled(range, 2.0, colour(colours.background.mix(colours.accent, 0.45)));
             let middle = Rect::from_center_size(pos2(at(estimate.value), bar.center().y), vec2(2.5, height * 0.7));
-            ui.painter().rect_filled(middle, 1.0, colour(colours.accent));
+            if !is_vague(estimate) {
+                ui.painter().rect_filled(middle, 1.0, colour(colours.accent));
+            }
         }
     }
     let ink = if estimate.is_some() { colour(colours.text) } else { quiet };
     put(ui, fitted(ui, &text, LETTERS, VALUE, ink), rect, Align2::RIGHT_CENTER);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_of_which_little_is_known_has_no_number_in_its_middle() {
+        let of =
+            |value: f64, range: [f64; 2]| words(&MeasureEstimate { measure: Measure::Height, value, range }, " to ");
+        assert_eq!(of(0.034, [0.030, 0.038]), "34 mm (30 to 38)");
+        assert_eq!(of(0.036, [0.016, 0.082]), "16 to 82 mm");
+        assert_eq!(of(0.0, [0.0, 0.0]), "0 mm (0 to 0)");
+    }
 }

@@ -17,6 +17,10 @@ pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect se
 /// Warning about a model of other fingers.
 pub(super) const OTHER_FINGERS: &str = "Not to be trusted: the model has not learned these fingers.";
 
+/// Warnings about an object that was learned only as it is not held now.
+pub(super) const LEARNED_FREE: &str = "Learned as a free object, not yet fixed in place.";
+pub(super) const LEARNED_FIXED: &str = "Learned fixed in place, not yet as a free object.";
+
 /// Warning about an object that the model has not learned.
 pub(super) const NOT_LEARNED: &str = "The model does not know this object.";
 

@@ -63,6 +63,8 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
 const NAME: f32 = 84.0;
 const NUMBER: f32 = 88.0;
 const CHOICE: f32 = 140.0;
+/// Room for the scroll bar (points).
+const BAR: f32 = 10.0;
 
 /// Number in another unit than the scene's. The range limits what the user enters; a value outside of it is shown and
 /// kept.
@@ -254,7 +256,9 @@ fn support_ui(ui: &mut Ui, scene: &mut Scene) {
 /// Choice by name, as a row of a grid.
 fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T, &str)]) {
     let label = ui.label(name);
-    let width = ui.available_width().min(CHOICE);
+    // A grid remembers how wide it was.
+    let in_sight = ui.clip_rect().right() - ui.cursor().left() - BAR;
+    let width = ui.available_width().min(CHOICE).min(in_sight).max(NAME * 0.5);
     // Explanations after a comma are shown in the list only.
     let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
     let shown = text.split(", ").next().unwrap_or(text);

@@ -13,7 +13,8 @@ use palpate_study::{Agreement, Cell, Finding};
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
     let Some(result) = result_ui(ui, studies, "study-findings", "findings", actions) else { return };
     let findings = &result.stored.result.findings;
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    // Those of another study begin at the top.
+    ScrollArea::vertical().id_salt(studies.chosen().card().key).auto_shrink(false).show(ui, |ui| {
         let count = |verdict: Agreement| findings.iter().filter(|finding| finding.verdict == verdict).count();
         let all = [Agreement::Agrees, Agreement::Partly, Agreement::Disagrees, Agreement::NotMeasured];
         let counts = all.map(|verdict| (count(verdict), verdict.name()));
@@ -58,7 +59,8 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         if !finding.found.is_empty() {
             wrapped(ui, RichText::new(finding.found.replace(" %", "\u{a0}%")));
         }
-        numbers_ui(ui, theme, finding, colour(ink));
+        // The verdict is on all of them; each may stand on either side.
+        numbers_ui(ui, theme, finding, colour(theme.colours().accent));
         wrapped(ui, RichText::new(&finding.why).small().weak());
     });
 }

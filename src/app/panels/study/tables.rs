@@ -106,7 +106,10 @@ fn row_ui(
     if response.hovered() || response.has_focus() {
         ui.painter().rect_filled(rect, 3.0, colour(colours.background.mix(colours.accent, 0.14)));
     }
-    texts(ui, rect, places, cells.into_iter(), colour(colours.text));
+    // Like a link where it leads to trials.
+    let ink = colour(if trials.is_some() { colours.accent } else { colours.text });
+    texts(ui, rect, &places[..1.min(places.len())], cells.iter().take(1).cloned(), ink);
+    texts(ui, rect, &places[1.min(places.len())..], cells.into_iter().skip(1), colour(colours.text));
     let clicked = response.clicked();
     response.on_hover_ui(|ui| about_row_ui(ui, result, table, row));
     match trials {

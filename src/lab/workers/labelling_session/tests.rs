@@ -105,6 +105,16 @@ fn trials_are_picked_with_the_arrows() {
 }
 
 #[test]
+fn the_plan_is_no_answer_for_a_trial_that_others_have_followed() {
+    let view = view();
+    let mut late = LabelDraft { selected: Some(2), ..LabelDraft::default() };
+    assert_eq!((late.place(&view), late.label(&view)), (None, None));
+    late.search = "lemon".to_owned();
+    assert_eq!(late.label(&view).as_deref(), Some("lemon"));
+    assert!(LabelDraft::default().label(&view).is_some(), "the newest");
+}
+
+#[test]
 fn what_the_readings_say_is_offered_after_the_label() {
     let mut view = view();
     let guessed =
