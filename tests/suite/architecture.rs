@@ -30,7 +30,7 @@ const HOMES: &[(&str, &[&str])] = &[
     ),
     (
         "crc32fast",
-        &["src/geometry/grid_file.rs", "src/store/checksum.rs", "src/exchange/mcap", "src/lab/inspection/figures.rs"],
+        &["src/geometry/grid_file.rs", "src/store/checksum.rs", "src/exchange/mcap", "src/lab/datasets/origin.rs"],
     ),
     ("csv", &["src/exchange/csv_files"]),
     ("ctrlc", &["src/cli/interrupt.rs"]),

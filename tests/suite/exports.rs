@@ -107,9 +107,14 @@ fn figures_of_trials_are_drawn_and_named() {
     let at = folder.path();
     done(at, &["plot", "1", "2", "--channels", "pressure,line", "--align", "contact", "--out", "two.svg"]);
     let svg = std::fs::read_to_string(at.join("two.svg")).unwrap();
-    for text in
-        ["Lemon (1), ", "pressure (kPa)", "line pressure (bar)", "time since contact (s)", "scene ", "Drawn by Palpate"]
-    {
+    for text in [
+        "Lemon (trial ",
+        "pressure (kPa)",
+        "line pressure (bar)",
+        "time since contact (s)",
+        "scene ",
+        "Drawn by Palpate",
+    ] {
         assert!(svg.contains(text), "{text}");
     }
     done(at, &["plot", "1", "2", "--mean", "--out", "mean.svg"]);

@@ -6,8 +6,8 @@ use crate::cpu_renderer::CpuRenderer;
 use crate::golden::{compare, sheet};
 use crate::study_mode::scripted_result;
 use egui::accesskit::Role;
-use egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable as _;
+use egui::{Key, Modifiers, Rect};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Mode, PanelKind};
 use palpate_geometry::palette::Theme;
@@ -241,6 +241,39 @@ fn scene_settings_reach_the_simulation() {
 }
 
 #[test]
+fn a_click_on_any_number_of_the_scene_begins_to_edit_it() {
+    let panel = ALL_PANELS.iter().find(|panel| panel.name == "scene").unwrap();
+    let mut bench = bench(BenchSetup { size: [320.0, 1600.0], panel: Some(panel), ..BenchSetup::default() });
+    bench.until(|s| s.truth() == "lemon");
+    for section in ["Finger", "Pad", "Support"] {
+        bench.harness.get_by_label(section).click();
+        bench.harness.run_steps(8);
+    }
+    let numbers = |bench: &Bench| -> Vec<Rect> {
+        let numbers = bench.harness.query_all_by_role(Role::SpinButton);
+        numbers.filter(|node| !node.accesskit_node().is_disabled()).map(|node| node.rect()).collect()
+    };
+    let places = numbers(&bench);
+    assert!(places.len() > 20, "{}", places.len());
+    for place in places {
+        for pressed in [true, false] {
+            bench.harness.event(egui::Event::PointerMoved(place.center()));
+            let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);
+            bench.harness.event(egui::Event::PointerButton { pos: place.center(), button, pressed, modifiers });
+            bench.harness.step();
+        }
+        bench.harness.run_steps(2);
+        let is_edited = [Role::SpinButton, Role::TextInput].into_iter().any(|role| {
+            let mut nodes = bench.harness.query_all_by_role(role);
+            nodes.any(|node| node.accesskit_node().is_focused() && node.rect().contains(place.center()))
+        });
+        assert!(is_edited, "{place:?}");
+        bench.harness.key_press(Key::Escape);
+        bench.harness.run_steps(2);
+    }
+}
+
+#[test]
 fn fingers_are_let_bend_sideways() {
     let panel = ALL_PANELS.iter().find(|panel| panel.name == "scene").unwrap();
     let [dark, light] = Theme::ALL.map(|theme| {
@@ -362,7 +395,7 @@ fn effects_are_switched_and_both_numbers_move() {
     assert!(bench.harness.query_by_label_contains("measuring").is_some(), "it says so while it is not known");
     bench.until_effects_are_measured();
     // Without contact the empty hand feels nothing; what that costs is in front of it.
-    let cost = "% of the CPU time";
+    let cost = "the CPU time";
     assert!(bench.harness.query_all_by_label_contains(cost).count() == Effect::ALL.len());
     assert!(bench.harness.query_all_by_label_contains("without it: curvature").count() >= 3);
     let before = bench.workbench().snapshot().unwrap();

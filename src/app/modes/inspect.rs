@@ -51,6 +51,7 @@ const KEYS: &[Act] = &[
             Alignment::Closing => Alignment::Contact,
             Alignment::Contact => Alignment::Closing,
         };
+        app.notices.info(format!("Compared trials are aligned at {}.", app.inspect.alignment.name()));
     }),
     key(NONE, Key::S, "mean and spread of each class, or each trial", |app| app.inspect.spread = !app.inspect.spread),
 ];

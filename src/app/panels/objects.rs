@@ -39,7 +39,7 @@ pub(super) fn ui<'a>(
             let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital_title(class));
             let learned = match class {
                 Some((_, Some(Lesson { recognised, tested, .. }))) => {
-                    format!("learned, {recognised} of {tested} recognised, ")
+                    format!("learned, {recognised} of {tested} right, ")
                 }
                 Some((_, None)) => "learned, ".to_owned(),
                 None => String::new(),

@@ -5,7 +5,7 @@ use crate::app::features::view::{Derivation, ViewSource};
 use crate::app::shown::DisplayedData;
 use crate::app::widgets::adapt_button;
 use egui::Ui;
-use palpate_lab::inspection::FigureOptions;
+use palpate_lab::inspection::{Alignment, FigureOptions};
 use palpate_sim::objects::object_title;
 
 /// Choice of derived curves, and the times of cursor and marks; `uncalibrated` where raw counts stand in for values.
@@ -70,6 +70,8 @@ pub(super) fn ui(
         }
         times.extend(playback.marks.iter().zip(["A", "B"]).rev().filter_map(|(t, name)| Some(time(name, (*t)?))));
         times.extend(playback.cursor_s.map(|t| time("cursor", t)));
+        let is_shifted = data.comparison.alignment == Alignment::Contact && !data.comparison.traces.is_empty();
+        times.extend(is_shifted.then(|| "others: aligned at contact".to_owned()));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             times.into_iter().for_each(|time| {
                 ui.label(egui::RichText::new(time).small());

@@ -77,7 +77,7 @@ impl ExplainedEffect {
             format!("{costs} {percent:.0} % of the CPU time")
         } else if self.planned.on {
             // Without friction, for example, an object rolls and needs more solver steps.
-            format!("saves CPU time: without it a grasp takes {:.1} times as much", 1.0 - self.cost_share)
+            format!("saves: without it a grasp takes {:.1} times the CPU time", 1.0 - self.cost_share)
         } else {
             format!("would save {:.0} % of the CPU time", -percent)
         }

@@ -53,17 +53,17 @@ impl Rule {
             Self::AllAbove(_) => [
                 "Every interval lies above the line.",
                 "Some intervals lie above the line, others do not.",
-                "One interval lies below the line, or several.",
+                "At least one interval lies below the line.",
             ],
             Self::AllBelow(_) => [
                 "Every interval lies below the line.",
                 "Some intervals lie below the line, others do not.",
-                "One interval lies above the line, or several.",
+                "At least one interval lies above the line.",
             ],
             Self::NoneBelow(_) => [
                 "No interval lies below the line.",
                 "In some cases an interval lies below the line.",
-                "One interval lies below the line, or several.",
+                "At least one interval lies below the line.",
             ],
             Self::Within(..) => [
                 "Every interval reaches the paper's number.",

@@ -55,7 +55,10 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
     // Without indentation and with one width of names, all sections have the same columns.
     CollapsingHeader::new(title).default_open(open).show_unindented(ui, |ui| {
         ui.spacing_mut().interact_size.x = NUMBER;
-        Grid::new(title).num_columns(2).min_col_width(NAME).spacing([6.0, 5.0]).show(ui, contents);
+        // Names are those of numbers in other sections, too.
+        ui.push_id(title, |ui| {
+            Grid::new(title).num_columns(2).min_col_width(NAME).spacing([6.0, 5.0]).show(ui, contents);
+        });
     });
 }
 
