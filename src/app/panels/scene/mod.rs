@@ -66,6 +66,8 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
 const NAME: f32 = 84.0;
 const NUMBER: f32 = 88.0;
 const CHOICE: f32 = 140.0;
+/// Least width of choices: that of the longest.
+const LEAST_CHOICE: f32 = 96.0;
 /// Room for the scroll bar (points).
 const BAR: f32 = 10.0;
 
@@ -261,7 +263,7 @@ fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(T
     let label = ui.label(name);
     // A grid remembers how wide it was.
     let in_sight = ui.clip_rect().right() - ui.cursor().left() - BAR;
-    let width = ui.available_width().min(CHOICE).min(in_sight).max(NAME * 0.5);
+    let width = ui.available_width().min(CHOICE).min(in_sight).max(LEAST_CHOICE);
     // Explanations after a comma are shown in the list only.
     let text = all.iter().find(|(each, _)| each == value).map_or("", |(_, text)| *text);
     let shown = text.split(", ").next().unwrap_or(text);
