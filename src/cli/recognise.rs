@@ -176,7 +176,7 @@ pub(super) fn run(arguments: &RecogniseArguments, store: Option<&Path>) -> Resul
         is_real |= data.about.sensors.is_none();
         fixed.extend(data.about.fixed());
         let fingers = data.about.fingers.first().cloned().flatten();
-        has_fingers &= !model.card.learned_from_perfect_sensors() || model.card.data.has_fingers(&fingers);
+        has_fingers &= model.card.knows_fingers(&fingers);
         let grasp = &data.examples[0].grasp;
         let after = |before: Option<&Pmf>| model.recogniser.recognise(grasp, before.or(prior.as_ref()));
         let alone = after(None);

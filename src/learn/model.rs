@@ -197,6 +197,12 @@ impl ModelCard {
         self.data.from_perfect_sensors()
     }
 
+    /// False where it answers for fingers, by their hash, that it has not learned: most of its answers are wrong then. One
+    /// that learned from any build of the gripper is not bound to its fingers.
+    pub fn knows_fingers(&self, fingers: &Option<String>) -> bool {
+        !self.learned_from_perfect_sensors() || self.data.has_fingers(fingers)
+    }
+
     /// True where it reads channels that only simulations have.
     pub fn only_simulated(&self) -> bool {
         self.channels.iter().any(|channel| channel.starts_with(CONTACT_PRESSURE))

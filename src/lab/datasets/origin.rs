@@ -62,10 +62,9 @@ fn fingers_of(scene: &Scene) -> Option<String> {
     (gripper != GripperModel::default()).then(|| scene_hash(&Scene { gripper, ..Scene::default() }))
 }
 
-/// False where a model answers for fingers that it has not learned: most of its answers are wrong then. One that learned from
-/// any build of the gripper is not bound to its fingers.
+/// [`ModelCard::knows_fingers`] for those of a scene.
 pub fn knows_fingers(card: &ModelCard, scene: &Scene) -> bool {
-    !card.learned_from_perfect_sensors() || card.data.has_fingers(&fingers_of(scene))
+    card.knows_fingers(&fingers_of(scene))
 }
 
 /// Largest turn about the vertical at which the fingers meet the object from the same side (degrees).

@@ -219,14 +219,12 @@ impl<'a> LinkedPlots<'a> {
                 let own = lines.iter().filter(|line| (facets.series)(**line) == *name);
                 let points = own.map(|line| {
                     // Series beside each other, around the place.
-                    let here = lines
-                        .iter()
-                        .filter(|other| along(**other) == along(*line))
-                        .map(|other| (facets.series)(*other));
-                    let here: Vec<String> =
-                        all.iter().filter(|own| here.clone().any(|other| other == **own)).cloned().collect();
-                    let nth = here.iter().position(|own| own == name).unwrap_or(0) as f64;
-                    let at = along(*line) + facets.shift * (nth - 0.5 * (here.len().max(1) - 1) as f64);
+                    let here = |own: &&String| {
+                        lines.iter().any(|other| along(*other) == along(*line) && (facets.series)(*other) == **own)
+                    };
+                    let (before, after) =
+                        (all[..number].iter().filter(here).count(), all[number + 1..].iter().filter(here).count());
+                    let at = along(*line) + 0.5 * facets.shift * (before as f64 - after as f64);
                     let point = if sideways { line.percent_row(column, at) } else { line.percent(column, at) };
                     (*line, point)
                 });

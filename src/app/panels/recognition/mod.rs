@@ -214,17 +214,17 @@ fn lesson_ui(
             });
         } else if let Some(learned) = learned {
             let warning = learned.lesson.as_ref().and_then(lesson_warning);
-            // Classes need the height.
+            let amber = colour(theme::of(ui).colours().warning);
+            // Classes need the height: in a small window the warning stands for all that is said.
             let warned_above = measures.is_tight() && warning.is_some();
             if let Some(warning) = warning.as_ref().filter(|_| warned_above) {
                 let text = format!("{}: {warning}.", capital_title(&learned.name));
-                let ink = colour(theme::of(ui).colours().warning);
-                ui.add(Label::new(RichText::new(&text).color(ink)).truncate()).on_hover_text(text);
+                ui.add(Label::new(RichText::new(&text).color(amber)).truncate()).on_hover_text(text);
             }
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
-                let ink = if warning.is_some() { theme::of(ui).colours().warning } else { good };
-                let told = RichText::new(format!("Learned {title}")).strong().color(colour(ink));
+                let ink = if warning.is_some() { amber } else { colour(good) };
+                let told = RichText::new(format!("Learned {title}")).strong().color(ink);
                 if !warned_above {
                     ui.label(if measures.is_tight() { told } else { told.heading() });
                 }
@@ -254,8 +254,7 @@ fn lesson_ui(
                 actions.on(&ui.small_button("Dismiss"), App::dismiss_learned);
             });
             if let Some(warning) = warning.filter(|_| !warned_above) {
-                let ink = colour(theme::of(ui).colours().warning);
-                ui.add(Label::new(RichText::new(format!("{}.", capital(&warning))).color(ink)));
+                ui.add(Label::new(RichText::new(format!("{}.", capital(&warning))).color(amber)));
             }
         }
     });
