@@ -407,12 +407,14 @@ impl<'a> DisplayedData<'a> {
             return phases.iter().find(|span| span.phase == TouchPhase::Hold).map(|span| [span.from_s, span.to_s]);
         }
         if self.source == ViewSource::Gripper {
-            // Only timed trials follow the programme.
+            // Only timed trials follow the programme; an emulated hand that moves by itself has its own times.
             let gripper = self.gripper?;
             let ended = || gripper.ended.as_ref().map(|ended| ended.request.control);
             let control = gripper.trial.as_ref().map(|trial| trial.request.control).or_else(ended);
             let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
-            if rolling || control.is_none_or(|control| control == Control::Free) {
+            let emulated = gripper.link.as_ref().is_some_and(|link| link.board.emulated);
+            let follows = |control| control == Control::Driven || control == Control::ByHand && !emulated;
+            if rolling || !control.is_some_and(follows) {
                 return None;
             }
         }

@@ -227,8 +227,9 @@ pub(super) fn put_line(ui: &Ui, place: Rect, align: Align2, text: &str, size: f3
     }
 }
 
-/// Least range of a sparkline: a newton, or a count.
+/// Least range of a sparkline: a newton or a count, and a share of the largest value, so that noise stays low.
 const LEAST_RANGE: f32 = 1.0;
+const LEAST_SHARE: f32 = 0.03;
 
 /// Sparkline of both pads, over the range of its values.
 pub(super) fn sparkline(ui: &Ui, values: &Sparkline, place: Rect) {
@@ -237,7 +238,7 @@ pub(super) fn sparkline(ui: &Ui, values: &Sparkline, place: Rect) {
     let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
     let all = || values.iter().flatten().flatten().copied();
     let (low, high) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
-    let range = (high - low).max(LEAST_RANGE);
+    let range = (high - low).max(LEAST_RANGE).max(LEAST_SHARE * high);
     for (finger, ink) in values.iter().zip(inks) {
         let last = finger.len().saturating_sub(1).max(1) as f32;
         let at = |(k, value): (usize, &Option<f32>)| {

@@ -349,9 +349,12 @@ fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_
     desk.press(Key::R);
     desk.until_shown(true, "Recording: the emulated hand moves by itself");
     desk.press(Key::Escape);
-    desk.until_told("The emulated hand stays open until the next trial");
+    desk.until_told("The emulated hand stays open until a trial with actuation \"board\" drives it");
     desk.press(Key::R);
     desk.until_shown(true, "Closing");
+    // Its trials have no answer, and say so.
+    desk.tell(|app| app.open_trial(1));
+    desk.until_shown(true, "No answer");
 }
 
 #[test]

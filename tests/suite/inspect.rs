@@ -210,7 +210,7 @@ fn compared_trials_have_a_line_each_or_a_mean() {
     bench.until_shown(true, "Tomato, trial 2, simulated");
     bench.until_shown(true, "Lemon, trial 3, simulated");
     // The one that is shown stands in the list once, and can be taken out of it.
-    bench.until_shown(true, "Lemon, trial 1, shown");
+    bench.until_shown(true, "Trial 1, shown: Lemon");
     assert!(bench.harness.query_by_label_contains("Lemon, trial 1, simulated").is_none());
     bench.harness.get_by_label("Remove trial 1 from the comparison").click();
     bench.look();

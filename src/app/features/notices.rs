@@ -220,7 +220,9 @@ impl Notices {
                         });
                     }
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                        ui.add(Label::new(RichText::new(text).small().color(colour(ink))).wrap());
+                        // The buttons beside it decide.
+                        let said = text.replace(&format!("; {ITS_UNIT}"), "");
+                        ui.add(Label::new(RichText::new(said).small().color(colour(ink))).wrap());
                     });
                 });
                 if closed || chosen.is_some() {

@@ -64,6 +64,6 @@ fn layout(tiles: &mut Tiles<String>) -> TileId {
     let middle = split(tiles, LinearDir::Vertical, [(curvature, 0.28), (loads, 0.28), (view, 0.44)]);
     let label = tabs(tiles, &["label", "recognition", "why"]);
     let gripper = tabs(tiles, &["gripper", "calibration", "doctor", "fit", "training", "console"]);
-    let right = split(tiles, LinearDir::Vertical, [(label, 0.56), (gripper, 0.44)]);
+    let right = split(tiles, LinearDir::Vertical, [(label, 0.64), (gripper, 0.36)]);
     split(tiles, LinearDir::Horizontal, [(left, 0.22), (middle, 0.48), (right, 0.30)])
 }

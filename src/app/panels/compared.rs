@@ -21,7 +21,8 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     }
     // A bar below the rows, not over one.
     ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
-    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
         let own = data.shown_trial().map(|own| own.trial.id);
         let own = comparison.pinned.iter().find(|pinned| Some(pinned.trial.id) == own).map(|pinned| pinned.trial.id);
         let remove_ui = |ui: &mut Ui, id: TrialId, actions: &mut Actions| {
@@ -51,11 +52,15 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
                     stroke_ui(ui, ink_of(data, colour));
                 }
                 let name = format!("{}, trial {}, {}", trial.title, trial.id, trial.source_title());
-                let short = format!("{}, trial {}", trial.title, trial.id);
+                let short = format!("Trial {}: {}", trial.id, trial.title);
                 let link = ui.add(Label::new(short).truncate().sense(Sense::click()));
                 link.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
                 actions.on(&link.on_hover_text(format!("{name}. Click to open it")), move |app| app.open_trial(id));
             });
+            let shows_counts = data.shown_trial().is_some_and(|shown| shown.trial.has_counts_alone());
+            if trial.has_counts_alone() && !shows_counts {
+                ui.label(RichText::new("Not calibrated: no values to compare").small().weak());
+            }
         }
         options_ui(ui, data, actions);
         hold_ui(ui, data);
@@ -77,7 +82,7 @@ fn options_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     });
     let mut spread = comparison.spread;
     let hint = "Draw the mean of each class, and its spread as a band, in place of each trial (S)";
-    if ui.checkbox(&mut spread, "Mean and spread of each class").on_hover_text(hint).changed() {
+    if ui.checkbox(&mut spread, "Mean and spread by class").on_hover_text(hint).changed() {
         actions.push(move |app| app.inspect.spread = spread);
     }
 }
@@ -92,14 +97,16 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     let pinned: Vec<&Pinned> = pinned.collect();
     ui.separator();
     ui.strong("Mean in the hold, and difference to the trial shown");
-    Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]).show(ui, |ui| {
+    let table = Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]);
+    let table_ui = |ui: &mut Ui| {
         ui.weak("");
         ui.weak(shown.id.to_string());
         for own in &pinned {
             ui.label(RichText::new(own.trial.id.to_string()).color(ink_of(data, own.colour)).strong());
         }
         ui.end_row();
-        for column in shown.columns.iter().filter(|column| column.channel.is_some()) {
+        let counts = shown.has_counts_alone();
+        for column in shown.columns.iter().filter(|column| column.channel.is_none() == counts) {
             let (unit, factor) = match column.unit {
                 "Pa" => ("kPa", 1e-3),
                 unit => (unit, 1.0),
@@ -123,13 +130,14 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
             }
             ui.end_row();
         }
-    });
+    };
+    ScrollArea::horizontal().show(ui, |ui| table.show(ui, table_ui));
 }
 
 /// Name of the trial or gripper shown.
 fn shown_name(data: &DisplayedData<'_>) -> Option<String> {
     match data.source {
-        ViewSource::Trial => data.inspected.map(|own| format!("{}, trial {}, shown", own.trial.title, own.trial.id)),
+        ViewSource::Trial => data.inspected.map(|own| format!("Trial {}, shown: {}", own.trial.id, own.trial.title)),
         ViewSource::Simulation => Some("Simulation, live".to_owned()),
         ViewSource::Gripper => Some("Real gripper, live".to_owned()),
     }

@@ -39,11 +39,12 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     };
     ui.weak("Pressure over curvature. Left finger solid, right finger dashed; the dot is the cursor.");
     let now = data.sample();
+    let room = f64::from(ui.available_height());
     Plot::new("hysteresis")
         .x_axis_label(format!("curvature ({})", symbol("1/m")))
         .y_axis_label("pressure (kPa)")
-        .x_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
-        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .x_grid_spacer(move |grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1, room))
+        .y_grid_spacer(move |grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1, room))
         .show_background(false)
         .allow_scroll(false)
         .show_x(false)

@@ -24,10 +24,13 @@ pub(super) fn ui<'a>(
     let seen = egui::Id::unique("object seen");
     let before = ui.data(|data| data.get_temp::<String>(seen));
     let moved = before.as_deref() != Some(chosen);
-    ui.data_mut(|data| data.insert_temp(seen, chosen.to_owned()));
     let follow = |is_chosen: bool, row: &egui::Response| {
-        if is_chosen && moved && before.is_some() {
-            row.scroll_to_me(None);
+        // Its row may come later than the object.
+        if is_chosen && moved {
+            row.ctx.data_mut(|data| data.insert_temp(seen, chosen.to_owned()));
+            if before.is_some() {
+                row.scroll_to_me(None);
+            }
         }
     };
     open_row(ui, loaded, actions);
@@ -39,7 +42,7 @@ pub(super) fn ui<'a>(
             let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital_title(class));
             let learned = match class {
                 Some((_, Some(Lesson { recognised, tested, .. }))) => {
-                    format!("learned, {recognised} of {tested} right, ")
+                    format!("learned: right in {recognised} of {tested}, ")
                 }
                 Some((_, None)) => "learned, ".to_owned(),
                 None => String::new(),
@@ -63,6 +66,7 @@ pub(super) fn ui<'a>(
             actions.on(&clicked, |app| app.open(&built_in.name));
         }
         let clicked = row(ui, chosen == EMPTY, None, "Empty hand", "nothing to grasp");
+        follow(chosen == EMPTY, &clicked);
         actions.on(&clicked, |app| app.open(EMPTY));
     });
 }

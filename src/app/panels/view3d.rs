@@ -403,11 +403,8 @@ fn overlay_ui(painter: &egui::Painter, corner: Pos2, overlay: &Overlay, letters:
     }
 }
 
-/// Height of axes and scale bar at the foot of the picture, and their width with the gaps (points).
-const FOOT: f32 = 26.0;
+/// Width of axes and scale bar at the foot of the picture, with the gaps (points).
 const BESIDE: f32 = 216.0;
-/// Height of a picture from which a caption clears axes and scale bar (points).
-const LOW: f32 = 220.0;
 
 /// A line at the foot of the picture, between axes and scale bar; of a ghost with its colour.
 fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb>) {
@@ -416,9 +413,8 @@ fn caption_ui(ui: &Ui, rect: Rect, theme: Theme, text: String, ghost: Option<Rgb
     let width = (rect.width() - BESIDE).max(80.0);
     let galley = ui.painter().layout(text, egui::FontId::proportional(12.0), ink, width);
     let size = galley.size() + egui::vec2(swatch, 0.0);
-    // In a low picture below the fingers.
-    let foot = if rect.height() < LOW { 0.0 } else { FOOT };
-    let middle = rect.center_bottom() - egui::vec2(0.0, foot.max(0.5 * size.y + 8.0));
+    // Below the fingers and their arrows.
+    let middle = rect.center_bottom() - egui::vec2(0.0, 0.5 * size.y + 8.0);
     let ground = Rect::from_center_size(middle, size).expand(4.0);
     ui.painter().rect_filled(ground, 4.0, veil(theme.colours().background, 0.7));
     if let Some(ghost) = ghost {

@@ -31,6 +31,9 @@ pub(super) fn value_at(mark: GridMark, shown: &std::ops::RangeInclusive<f64>, he
 const LEAST_ABOVE: f64 = 2.5;
 /// Least distance of times at their axis (points).
 const BETWEEN_TIMES: f64 = 56.0;
+/// Distance of values at their axis in large plots, and the least one (points).
+const BETWEEN_VALUES: f64 = 42.0;
+const LEAST_BETWEEN: f64 = 14.0;
 
 /// Plot without interaction, its axes as wide as those of the others.
 pub(in crate::app) fn static_plot(
@@ -51,15 +54,15 @@ pub(in crate::app) fn static_plot(
         .grid_spacing(10.0..=44.0)
         .y_axis_min_width(44.0)
         .y_axis_label(y_label.to_owned())
-        .y_grid_spacer(|grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1))
+        .y_grid_spacer(move |grid: GridInput| value_marks(grid.bounds.0, grid.bounds.1, f64::from(height)))
         .y_axis_formatter(|mark: GridMark, _| plain(mark.value))
         .custom_x_axes(vec![below.label_spacing(egui::Rangef::new(24.0, 40.0))])
         .set_margin_fraction(egui::vec2(air_beside, 0.12))
 }
 
-/// About four marks at round values.
-pub(in crate::app) fn value_marks(low: f64, high: f64) -> Vec<GridMark> {
-    round_marks(low, high, 4.0)
+/// Marks at round values along so many points: about four, fewer where they would touch, more where there is room.
+pub(in crate::app) fn value_marks(low: f64, high: f64, room: f64) -> Vec<GridMark> {
+    round_marks(low, high, (room / BETWEEN_VALUES).max(4.0).min(room / LEAST_BETWEEN))
 }
 
 /// At most so many marks and one, at round values.
@@ -90,16 +93,19 @@ mod tests {
             (-1.3, 23.0, vec![0.0, 10.0, 20.0]),
             (0.0, 0.4, vec![0.0, 0.1, 0.2, 0.3, 0.4]),
         ] {
-            let marks: Vec<f64> = value_marks(low, high).iter().map(|m| m.value).collect();
+            let marks: Vec<f64> = value_marks(low, high, 100.0).iter().map(|m| m.value).collect();
             assert!(
                 marks.len() == want.len() && marks.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9),
                 "{marks:?}"
             );
         }
         // One mark away from zero is none.
-        assert_eq!(value_marks(1010.0, 1990.0).iter().map(|m| m.value).collect::<Vec<_>>(), [1250.0, 1500.0, 1750.0]);
-        assert!(value_marks(1.0, 1.0).is_empty());
-        assert!(value_marks(f64::NAN, 1.0).is_empty());
+        let of = |low: f64, high: f64, room| value_marks(low, high, room).iter().map(|m| m.value).collect::<Vec<_>>();
+        assert_eq!(of(1010.0, 1990.0, 100.0), [1250.0, 1500.0, 1750.0]);
+        assert!(of(1.0, 1.0, 100.0).is_empty() && of(f64::NAN, 1.0, 100.0).is_empty());
+        // Large plots have more of them.
+        assert_eq!(of(-0.5, 9.0, 320.0), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert_eq!([of(-1.0, 16.0, 80.0).len(), of(-1.0, 16.0, 36.0).len()], [4, 2]);
     }
 
     #[test]

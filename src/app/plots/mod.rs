@@ -105,7 +105,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)
         .x_grid_spacer(move |grid: GridInput| axes::time_marks(grid.bounds.0, grid.bounds.1, plotted))
-        .y_grid_spacer(|grid: GridInput| axes::value_marks(grid.bounds.0, grid.bounds.1))
+        .y_grid_spacer(move |grid: GridInput| axes::value_marks(grid.bounds.0, grid.bounds.1, plotted_height))
         .custom_x_axes(vec![seconds])
         .y_axis_formatter(move |mark: GridMark, shown| axes::value_at(mark, shown, plotted_height))
         .set_margin_fraction(egui::Vec2::ZERO);

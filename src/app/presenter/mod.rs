@@ -100,12 +100,14 @@ impl Page<'_> {
         let colours = self.app.view.theme.colours();
         let mut place = picture.shrink(self.unit).with_max_x(picture.left() + 0.58 * picture.width());
         let texts = message.map(str::to_owned).into_iter().chain(hard).chain(encoding).map(|text| (text, 1.0));
-        for (text, letters) in texts.chain(hold.map(|text| (text, 1.25))) {
+        // News above the hand, its last forces below it.
+        let below = hold.map(|text| (text, 1.25, Align2::LEFT_BOTTOM));
+        for (text, letters, corner) in texts.map(|(text, letters)| (text, letters, Align2::LEFT_TOP)).chain(below) {
             let rows = self.paragraph(ui, (&text, 3), letters * self.unit, place.width());
-            let ground = Align2::LEFT_TOP.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
+            let ground = corner.align_size_within_rect(rows.size(), place).expand(0.4 * self.unit);
             self.speak(ui, &text, ground, &text);
             ui.painter().rect_filled(ground, 0.3 * self.unit, veil(colours.background, 0.8));
-            put(ui, rows, place, Align2::LEFT_TOP);
+            put(ui, rows, place, corner);
             place.set_top(ground.bottom() + 0.8 * self.unit);
         }
     }
@@ -127,7 +129,7 @@ impl Page<'_> {
         if let Some(view) = self.answer() {
             self.guess_ui(ui, view, guess);
             self.beliefs_ui(ui, view, beliefs);
-            let text = words::reason(view);
+            let text = words::reason(view, snapshot.status.nothing_held);
             self.speak(ui, "reason", reason, &text);
             let rows = self.paragraph(ui, (&text, 4), 1.1 * self.unit, reason.width());
             put(ui, rows, reason, Align2::LEFT_TOP);
@@ -167,9 +169,11 @@ impl Page<'_> {
         let title = snapshot.object.as_ref().map_or_else(|| object_title(truth), |object| object.title.clone());
         let finished = snapshot.status.finished;
         let right = self.answer().filter(|_| finished).and_then(|view| snapshot.is_right(view));
+        let is_new = self.answer().is_some_and(|view| view.labels.class(truth).is_none());
         let (word, ink) = match right {
             Some(true) => ("Right", colours.good),
             Some(false) => ("Wrong", colours.error),
+            None if finished && is_new => ("Not learned", colours.quiet_text),
             None if finished => ("No verdict", colours.quiet_text),
             None => ("What is it?", colours.quiet_text),
         };
@@ -196,7 +200,11 @@ impl Page<'_> {
             (false, false) => "Shown once it decides.".to_owned(),
         };
         let quiet = colour(if finished { colours.text } else { colours.quiet_text });
-        put(ui, self.line(ui, &name, 1.4 * unit, below.width(), quiet), below, Align2::LEFT_CENTER);
+        let mut text = self.line(ui, &name, 1.4 * unit, below.width(), quiet);
+        if text.elided {
+            text = self.paragraph(ui, (&name, 2), unit, below.width());
+        }
+        put(ui, text, below, Align2::LEFT_CENTER);
         let spoken = if finished { format!("{word}: it is {title}") } else { word.to_owned() };
         self.speak(ui, "truth", lines, &spoken);
     }

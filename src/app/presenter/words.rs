@@ -18,16 +18,17 @@ pub(super) fn story(snapshot: &Snapshot) -> &'static str {
     let again = snapshot.status.grasp_of_round > 1;
     match (snapshot.status.finished, snapshot.frame.phase) {
         (true, _) => "This is where the fingers felt it.",
-        (false, Phase::Close) if !touches && again => "Not sure yet: another grasp, from another side.",
+        (false, Phase::Close) if !touches && again => "Another grasp, from another side.",
         (false, Phase::Close) if !touches => "It cannot see. Its soft fingers close on something.",
         (false, Phase::Close) => "Touch! The fingers bend, the pads feel it press.",
+        (false, Phase::Hold) if snapshot.status.nothing_held => "The object has left the hand.",
         (false, Phase::Hold) => "It holds: bend tells size, pressure tells shape.",
         (false, _) => "It lets go.",
     }
 }
 
-/// Why this answer, and what follows from it.
-pub(super) fn reason(view: &IdentificationView) -> String {
+/// Why this answer, and what follows from it. Where the object has left the hand, its width is not felt.
+pub(super) fn reason(view: &IdentificationView, is_lost: bool) -> String {
     let threshold = percent(view.rule.threshold);
     let grasps = match view.beliefs.len() {
         1 => "one grasp".to_owned(),
@@ -54,7 +55,8 @@ pub(super) fn reason(view: &IdentificationView) -> String {
         (None, _) => "It compares this touch with the grasps that it has learned from.".to_owned(),
     };
     let others = left(view).map_or_else(|| rival(view), |left| format!("{}.", capital(&left)));
-    [felt(view), others, follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    let felt = if is_lost { String::new() } else { felt(view) };
+    [felt, others, follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// The width that it has measured; none of an empty hand.

@@ -189,12 +189,12 @@ fn origins(trials: &[&OpenTrial], align: Alignment) -> Vec<f64> {
     }
 }
 
-/// Columns of a trial that a figure shows.
+/// Columns of a trial that a figure shows: counts also where there is nothing else.
 fn shown(trial: &OpenTrial, raw: bool) -> impl Iterator<Item = &Column> {
-    let derived = trial.columns.iter().any(|column| column.channel.is_some());
+    let raw = raw || trial.has_counts_alone();
     trial.columns.iter().filter(move |column| {
         let counts = trial.source == TrialSource::Recorded && column.channel.is_none();
-        if raw { counts } else { !counts || !derived }
+        counts == raw && (counts || column.is_read())
     })
 }
 
@@ -262,7 +262,8 @@ fn found<'a>(trial: &'a OpenTrial, term: &str, raw: bool) -> Result<(Vec<Curve<'
         let more = if names.len() > LISTED { ", …" } else { "" };
         names.truncate(LISTED);
         let (id, known) = (trial.id, names.join(", "));
-        return Err(FigureDataError(format!("trial {id} has no channel \"{term}\"; it has {known}{more}")));
+        let why = if trial.has_counts_alone() { " (not calibrated)" } else { "" };
+        return Err(FigureDataError(format!("trial {id}{why} has no channel \"{term}\"; it has {known}{more}")));
     }
     Ok((curves, unit))
 }
@@ -462,6 +463,26 @@ mod tests {
         for part in ["Lemon: trial 1, simulated, seed 7, scene ", &hash, "Drawn by Palpate ", "sensors C1"] {
             assert!(figure.note.contains(part), "{part} in {}", figure.note);
         }
+        Ok(())
+    }
+
+    #[test]
+    fn trials_without_calibration_are_drawn_by_their_counts_and_mixed_with_no_others() -> Result<(), FigureDataError> {
+        let trials = opened(&["lemon"]);
+        let mut counted = OpenTrial { id: 2, source: TrialSource::Recorded, ..trials[0].clone() };
+        counted.columns.iter_mut().flat_map(|column| &mut column.values).for_each(|value| *value = f32::NAN);
+        assert!(counted.has_counts_alone() && !trials[0].has_counts_alone());
+        let values = vec![512.0; counted.t_s.len()];
+        counted.columns.push(Column { name: "pad_left".to_owned(), channel: None, unit: "counts", values });
+        let figure = comparison_figure(&[&counted], &FigureOptions::default())?;
+        assert_eq!(figure.plots.iter().map(|plot| plot.y.title.as_str()).collect::<Vec<_>>(), ["pad (counts)"]);
+        let refused = |trials: [&OpenTrial; 2]| {
+            comparison_figure(&trials, &FigureOptions::default()).expect_err("other channels").to_string()
+        };
+        let said = refused([&trials[0], &counted]);
+        assert!(said.starts_with("trial 2 (not calibrated) has no channel \"curvature\"; it has pad_left"), "{said}");
+        let said = refused([&counted, &trials[0]]);
+        assert!(said.starts_with("trial 1 has no channel \"pad\""), "{said}");
         Ok(())
     }
 

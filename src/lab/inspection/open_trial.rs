@@ -68,6 +68,13 @@ pub struct Column {
     pub values: Vec<f32>,
 }
 
+impl Column {
+    /// True where it has a value at any sample.
+    pub(super) fn is_read(&self) -> bool {
+        self.values.iter().any(|value| value.is_finite())
+    }
+}
+
 /// A stored trial, opened.
 #[derive(Clone, Debug)]
 pub struct OpenTrial {
@@ -202,6 +209,12 @@ impl OpenTrial {
     /// Its first and last time (s); zero without samples.
     pub fn span_s(&self) -> [f64; 2] {
         [self.t_s.first(), self.t_s.last()].map(|t| t.copied().unwrap_or(0.0))
+    }
+
+    /// True where a board's sensors were not calibrated, so that there are counts alone.
+    pub fn has_counts_alone(&self) -> bool {
+        self.source == TrialSource::Recorded
+            && !self.columns.iter().any(|column| column.channel.is_some() && column.is_read())
     }
 
     /// A column by its name.

@@ -64,14 +64,17 @@ impl OpenTrial {
             *last = Arc::new(identification.view());
         }
         let nothing = replay.identification().is_some_and(|own| own.verdict().is_none());
-        let unread = |column: &Column| column.channel.is_some() && column.values.iter().all(|value| value.is_nan());
+        let unread = |column: &Column| column.channel.is_some() && !column.is_read();
         let unread: Vec<String> = self.columns.iter().filter(|column| unread(column)).map(|c| c.name.clone()).collect();
         self.recognition_off = match replay.why_off() {
-            Some(_) if !unread.is_empty() => Some("the sensors were not calibrated".to_owned()),
+            Some(_) if !unread.is_empty() => Some("the sensors were not calibrated: adapt before recording".to_owned()),
             Some(cause) => Some(cause.to_string()),
             None if nothing => Some("no grasp was found in it".to_owned()),
             None => None,
         };
+        if self.recognition_off.is_some() {
+            self.answers.clear();
+        }
         if !unread.is_empty() {
             self.remarks.push(format!("Not calibrated: {}. The raw counts can be plotted.", unread.join(", ")));
         }

@@ -21,6 +21,8 @@ const TABLE_ROW: f32 = 30.0;
 const LIST_ROW: f32 = 42.0;
 /// Room between a column's text and the next column (points).
 const GAP: f32 = 8.0;
+/// Between the parts of a second line.
+const BETWEEN: &str = "  \u{b7}  ";
 /// Room of the scroll bar (points).
 const SCROLL_BAR: f32 = 10.0;
 
@@ -332,10 +334,14 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): 
     let tags: String = trial.row.tags.iter().map(|tag| format!("#{tag} ")).collect();
     let number = format!("no {}", trial.row.id);
     let time = date[said.len()..].to_owned();
-    let parts = [time, number, cell(view, trial, TrialColumn::Source), preset, tags, trial.row.note.clone()];
-    let parts: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
+    let parts = [time, number, cell(view, trial, TrialColumn::Source), tags, trial.row.note.clone(), preset];
+    let mut parts: Vec<&str> = parts.iter().map(|part| part.trim()).filter(|part| !part.is_empty()).collect();
     let rest = Rect::from_min_max(pos2(left, lower.top()), lower.max);
-    text(ui, rest, Align2::LEFT_CENTER, &parts.join("  \u{b7}  "), 11.5, quiet);
+    // The name above says what most presets do.
+    if trial.row.preset.is_some() && width_of(&parts.join(BETWEEN), 11.5) > rest.width() {
+        parts.pop();
+    }
+    text(ui, rest, Align2::LEFT_CENTER, &parts.join(BETWEEN), 11.5, quiet);
 }
 
 fn ink(colours: &ThemeColours, trial: &LibraryTrial, column: TrialColumn) -> palpate_geometry::palette::Rgb {

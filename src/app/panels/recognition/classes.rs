@@ -14,12 +14,16 @@ const LETTERS: f32 = 12.5;
 /// Distance within which the line of the threshold can be dragged (points).
 const GRIP: f32 = 6.0;
 /// Distance between two columns (points).
-const GUTTER: f32 = 16.0;
+const GUTTER: f32 = 12.0;
+
+/// Share of a bar that names on it take where they can: the usual threshold is beyond.
+const ON_BAR: f32 = 0.88;
 
 /// Columns of a line (points).
 #[derive(Clone, Copy)]
 struct Columns {
-    left: f32,
+    /// Of names, beside the bars or on them.
+    names: [f32; 2],
     bars: [f32; 2],
     right: f32,
     line: f32,
@@ -36,15 +40,20 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     let size = vec2(ui.available_width(), line * rows as f32);
     let (all, _) = ui.allocate_exact_size(size, Sense::hover());
     let width = (all.width() - GUTTER * (columns as f32 - 1.0)) / columns as f32;
-    let names = (if columns > 1 { 0.54 } else { 0.40 } * width).min(104.0);
+    // Names stand on the bars of two columns, so that there is room for both.
+    let on_bars = columns > 1;
+    let numbers = if on_bars { 29.0 } else { 46.0 };
+    let names = if on_bars { [4.0, width - numbers - 2.0] } else { [0.0, (0.40 * width).min(104.0) + 2.0] };
+    let usual = (names[1] - names[0]) * if on_bars { ON_BAR } else { 1.0 };
+    let bars = [if on_bars { 0.0 } else { names[1] + 2.0 }, width - numbers];
     let width_of = |class| fitted(ui, &title(labels, class), LETTERS, f32::INFINITY, Color32::WHITE).size().x;
     let longest = (0..labels.classes.len()).map(width_of).fold(1.0, f32::max);
-    let letters = (LETTERS * (names / longest).min(1.0)).max(LEAST_LETTERS).min(line);
-    let numbers = if columns > 1 { 31.0 } else { 46.0 };
+    let letters = (LETTERS * (usual / longest).min(1.0)).max(LEAST_LETTERS).min(line);
     let places: Vec<Columns> = (0..columns)
         .map(|column| {
             let left = all.left() + (width + GUTTER) * column as f32;
-            Columns { left, bars: [left + names + 4.0, left + width - numbers], right: left + width, line, letters }
+            let [names, bars] = [names, bars].map(|ends| ends.map(|x| left + x));
+            Columns { names, bars, right: left + width, line, letters }
         })
         .collect();
     for (place, class) in order.iter().enumerate() {
@@ -88,7 +97,7 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     let (name, taught) = (title(&part.view.labels, class), is_taught(&part.view.labels.classes[class].name));
     let p = pmf.map_or(0.0, |pmf| pmf.probabilities()[class]);
     let leads = pmf.is_some_and(|pmf| pmf.top().0 == class);
-    let rect = Rect::from_min_max(pos2(columns.left, top), pos2(columns.right, top + columns.line));
+    let rect = Rect::from_min_max(pos2(columns.names[0], top), pos2(columns.right, top + columns.line));
     let is_gone = part.view.left.as_ref().is_some_and(|left| !left[class]) && !part.view.beliefs.is_empty();
     let learned = if taught { ", learned" } else { "" };
     let spoken = format!("{name}{learned} {}{}", percent(p), if is_gone { ", ruled out" } else { "" });
@@ -97,21 +106,27 @@ fn class_ui(ui: &Ui, part: &Part<'_, '_>, class: usize, pmf: Option<&Pmf>, (colu
     let quiet = if is_gone { colours.background.mix(colours.quiet_text, 0.6) } else { colours.quiet_text };
     let ink = colour(if leads { colours.text } else { quiet });
     let [from, to] = columns.bars;
+    let on_bar = from <= columns.names[0];
+    let shrunk = if on_bar { 0.06 } else { 0.18 };
+    let track =
+        Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, shrunk * columns.line));
+    ui.painter().rect_filled(track, 2.0, colour(colours.raised));
+    let share = eased(ui, ui.scope_id().with(("class", class)), pmf.map(|_| p));
+    let fill = match leads {
+        true if on_bar => colours.background.mix(colours.accent, 0.5),
+        true => colours.accent,
+        false => colours.background.mix(colours.quiet_text, if on_bar { 0.35 } else { 0.7 }),
+    };
+    if share > 0.003 {
+        ui.painter().rect_filled(track.with_max_x(from + (to - from) * share), 2.0, colour(fill));
+    }
     // A dot marks what was learned.
     let dot = if taught { 8.0 } else { 0.0 };
     if taught {
         ui.painter().circle_filled(pos2(rect.left() + 3.0, rect.center().y), 3.0, colour(colours.good));
     }
     let room = rect.with_min_x(rect.left() + dot);
-    put(ui, fitted(ui, &name, columns.letters, from - 2.0 - room.left(), ink), room, Align2::LEFT_CENTER);
-    let track =
-        Rect::from_min_max(pos2(from, rect.top()), pos2(to, rect.bottom())).shrink2(vec2(0.0, 0.18 * columns.line));
-    ui.painter().rect_filled(track, 2.0, colour(colours.raised));
-    let share = eased(ui, ui.scope_id().with(("class", class)), pmf.map(|_| p));
-    let fill = if leads { colours.accent } else { colours.background.mix(colours.quiet_text, 0.7) };
-    if share > 0.003 {
-        ui.painter().rect_filled(track.with_max_x(from + (to - from) * share), 2.0, colour(fill));
-    }
+    put(ui, fitted(ui, &name, columns.letters, columns.names[1] - room.left(), ink), room, Align2::LEFT_CENTER);
     // An empty bar says "0 %" already.
     if p >= 0.01 {
         let number = fitted(ui, &percent(p), LETTERS.min(columns.line), rect.right() - to - 4.0, ink);

@@ -79,10 +79,11 @@ const TIGHT: Measures = Measures {
 
 /// Height of the line with the threshold (points).
 const THRESHOLD_LINE: f32 = 24.0;
-/// Least height of the line of a class in one column, and in two; its height where there is less room and the panel scrolls
-/// (points).
-const ONE_COLUMN: f32 = 9.5;
+/// Least height of the line of a class in one column; least and largest in two; its height where there is less room and the
+/// panel scrolls (points).
+const ONE_COLUMN: f32 = 13.0;
 const LEAST_CLASS: f32 = 8.0;
+const TWO_COLUMNS: f32 = 18.0;
 const SCROLLED_CLASS: f32 = 14.0;
 
 impl Measures {
@@ -105,7 +106,7 @@ impl Measures {
         let line = |columns: usize| (2.0 * room / classes.div_ceil(columns).max(1) as f32).floor() / 2.0;
         match [line(1), line(2)] {
             [one, _] if one >= ONE_COLUMN => (1, one.min(self.class)),
-            [_, two] if two >= LEAST_CLASS => (2, two.min(TIGHT.class)),
+            [_, two] if two >= LEAST_CLASS => (2, two.min(TWO_COLUMNS)),
             // What scrolls can as well be read.
             _ => (1, SCROLLED_CLASS),
         }
@@ -175,7 +176,7 @@ pub(super) fn ui(
                 part.threshold_ui(ui);
                 strip::ui(ui, &part);
             }
-            None => off_ui(ui, recognised.off),
+            None => off_ui(ui, data.source, recognised.off),
         }
     });
     if has_buttons {
@@ -219,7 +220,7 @@ fn lesson_ui(
             let warned_above = measures.is_tight() && warning.is_some();
             if let Some(warning) = warning.as_ref().filter(|_| warned_above) {
                 let text = format!("{}: {warning}.", capital_title(&learned.name));
-                ui.add(Label::new(RichText::new(&text).color(amber)).truncate()).on_hover_text(text);
+                ui.add(Label::new(RichText::new(text).color(amber)).truncate());
             }
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
@@ -302,9 +303,12 @@ fn next_ui(ui: &mut Ui, data: &DisplayedData<'_>, measures: &Measures, actions: 
     actions.on(&ui.add_sized([ui.available_width(), measures.button], next).on_hover_text(hint), App::next_object);
 }
 
-fn off_ui(ui: &mut Ui, why: Option<&str>) {
-    ui.heading("Recognition is off");
-    ui.label(why.unwrap_or("No recognition model. Grasps are still recorded."));
+fn off_ui(ui: &mut Ui, source: ViewSource, why: Option<&str>) {
+    ui.heading(if source == ViewSource::Trial { "No answer" } else { "Recognition is off" });
+    ui.label(why.map_or_else(
+        || "No recognition model. Grasps are still recorded.".to_owned(),
+        |why| format!("{}.", capital(why)),
+    ));
 }
 
 /// Newest answer, at most ten different ones per second.

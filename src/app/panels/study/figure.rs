@@ -67,14 +67,25 @@ fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize
             App::export_study_figure,
         );
     });
+    let mut tables = result.stored.result.tables.iter();
+    let opens = tables.any(|table| table.rows.iter().any(|row| !row.trials.is_empty()));
     let warning = match result.origin {
         _ if !result.current => "From other settings, methods or physics than today's: run the study again.",
         StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "Quick run: do not quote.",
-        StudyOrigin::Shipped if paper_study(card.key).is_some() => "Shipped result. Run the study to open its trials.",
+        StudyOrigin::Shipped if opens && paper_study(card.key).is_some() => {
+            "Shipped result. After a run here, rows in blue open their trials."
+        }
         StudyOrigin::Shipped => "Shipped result.",
-        StudyOrigin::Run(StudySize::Full) => return,
+        StudyOrigin::Run(StudySize::Full) => "",
     };
-    wrapped(ui, RichText::new(warning).small().color(ui.visuals().warn_fg_color));
+    let own_trials = opens && result.origin != StudyOrigin::Shipped;
+    let opening = if own_trials { "Rows in blue open their trials." } else { "" };
+    if !(warning.is_empty() && opening.is_empty()) {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new(warning).small().color(ui.visuals().warn_fg_color));
+            ui.label(RichText::new(opening).small().weak());
+        });
+    }
 }
 
 fn about_origin(origin: StudyOrigin) -> &'static str {

@@ -92,8 +92,12 @@ fn about_row_ui(ui: &mut Ui, result: &StudyResult, table: &StudyTable, row: &Stu
     ui.spacing_mut().item_spacing.y = 2.0;
     for (cell, column) in row.cells.iter().zip(&table.columns) {
         if *cell != Cell::Missing {
-            let unit = if column.unit.is_empty() { String::new() } else { format!(" {}", symbol(&column.unit)) };
-            ui.label(RichText::new(format!("{}: {}{unit}", column.name, cell_text(cell, column))).small());
+            let text = cell_text(cell, column);
+            let unit = symbol(&column.unit);
+            let one = unit.strip_suffix('s').filter(|one| text == "1" && one.len() > 1);
+            let unit = one.unwrap_or(&unit);
+            let gap = if unit.is_empty() { "" } else { " " };
+            ui.label(RichText::new(format!("{}: {text}{gap}{unit}", column.name)).small());
         }
     }
     ui.label(RichText::new(hint(result, row)).small().weak());

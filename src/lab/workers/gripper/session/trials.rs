@@ -62,7 +62,7 @@ impl GripperSession {
                 "Vent sent, but this board reports no pressure output. Vent by hand.".to_owned(),
             )),
             Ok(()) if connection.board.emulated && !driven => self.publisher.notify(Notice::Warning(
-                "Vent sent. The emulated hand stays open until the next trial, which drives it.".to_owned(),
+                "Vent sent. The emulated hand stays open until a trial with actuation \"board\" drives it.".to_owned(),
             )),
             Ok(()) => self.publisher.notify(Notice::Warning("Vent sent.".to_owned())),
         }
