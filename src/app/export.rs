@@ -96,7 +96,7 @@ fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError
     let what = match export.taxels {
         _ if folder => "as CSV",
         true => "with taxels",
-        false => "without taxels (the menu Export of the library adds them)",
+        false => "without taxels (the box \"With taxels\" in the library's Export adds them)",
     };
     let written = if written.is_empty() { "no trial".to_owned() } else { trial_numbers(written) };
     let missing = match missing.is_empty() {

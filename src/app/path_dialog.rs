@@ -49,7 +49,12 @@ impl PathDialog {
             let room = ui.ctx().content_rect().size();
             ui.set_width((room.x - 60.0).min(560.0));
             ui.heading(title);
-            wrapped(ui, RichText::new("Write or paste a path, or choose from its folder.").small().weak());
+            let formats = match self.question.extensions {
+                many @ [_, _, ..] if saves => format!(" Its ending is the format: .{}.", many.join(", .")),
+                _ => String::new(),
+            };
+            let hint = format!("Write or paste a path, or choose from its folder.{formats}");
+            wrapped(ui, RichText::new(hint).small().weak());
             let id = Id::unique("path of a file");
             let field = text_field(&mut self.path, id).hint_text("path of a file");
             let response = ui.add(field);

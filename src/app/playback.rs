@@ -28,9 +28,9 @@ impl Default for Playback {
 /// Where the cursor goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Seek {
-    /// To a time (s).
+    /// To the sample nearest to a time (s).
     To(f64),
-    /// By a time (s).
+    /// By a time (s), to the nearest sample, one at least.
     By(f64),
     /// By so many samples.
     Samples(isize),
@@ -46,16 +46,15 @@ impl Playback {
         let (Some(first), Some(last)) = (t_s.first().copied(), t_s.last().copied()) else { return };
         let now = self.cursor_s.unwrap_or(last);
         let wanted = match to {
-            Seek::To(t) => t,
-            Seek::By(by) => now + by,
+            Seek::To(t) => nearest(t_s, t),
+            Seek::By(by) => match nearest(t_s, now + by) {
+                there if there == nearest(t_s, now) => step(t_s, now, by.signum() as isize),
+                there => there,
+            },
             Seek::Start => first,
             Seek::End if live => return *self = Self { cursor_s: None, playing: false, ..self.clone() },
             Seek::End => last,
-            Seek::Samples(by) => {
-                // From the sample shown.
-                let shown = t_s.partition_point(|t| *t <= now + 1e-9).saturating_sub(1);
-                t_s[shown.saturating_add_signed(by).min(t_s.len() - 1)]
-            }
+            Seek::Samples(by) => step(t_s, now, by),
         };
         if wanted.is_finite() {
             self.cursor_s = Some(wanted.clamp(first, last));
@@ -102,6 +101,19 @@ impl Playback {
     }
 }
 
+/// The time so many samples after the one shown at `now`.
+fn step(t_s: &[f64], now: f64, by: isize) -> f64 {
+    let shown = t_s.partition_point(|t| *t <= now + 1e-9).saturating_sub(1);
+    t_s[shown.saturating_add_signed(by).min(t_s.len() - 1)]
+}
+
+/// The time of a sample that is nearest to `t`; not finite where `t` is not.
+fn nearest(t_s: &[f64], t: f64) -> f64 {
+    let after = t_s.partition_point(|sample| *sample < t);
+    let beside = t_s[after.saturating_sub(1)..].iter().take(2).copied();
+    beside.min_by(|a, b| (a - t).abs().total_cmp(&(b - t).abs())).filter(|_| t.is_finite()).unwrap_or(t)
+}
+
 /// Speed that many places further in [`SPEEDS`].
 pub(super) fn next_speed(now: f64, by: isize) -> f64 {
     let nearest = (0..SPEEDS.len()).min_by(|a, b| (SPEEDS[*a] - now).abs().total_cmp(&(SPEEDS[*b] - now).abs()));
@@ -125,7 +137,8 @@ mod tests {
         assert_eq!(after(Seek::Samples(-1)), 0.1);
         assert_eq!(after(Seek::Samples(-9)), 0.0);
         assert_eq!(after(Seek::Samples(9)), 0.4);
-        assert_eq!(after(Seek::By(-0.25)), 0.4 - 0.25);
+        assert_eq!([after(Seek::By(-0.22)), after(Seek::By(0.01)), after(Seek::By(-0.01))], [0.2, 0.3, 0.2]);
+        assert_eq!([after(Seek::To(0.16)), after(Seek::To(0.14)), after(Seek::To(-7.0))], [0.2, 0.1, 0.0]);
         assert_eq!(after(Seek::To(7.0)), 0.4);
         assert_eq!(after(Seek::To(f64::NAN)), 0.4);
         assert_eq!(after(Seek::Start), 0.0);

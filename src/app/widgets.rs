@@ -227,18 +227,19 @@ pub(super) fn put_line(ui: &Ui, place: Rect, align: Align2, text: &str, size: f3
     }
 }
 
-/// Least range of a sparkline: a newton or a count, and a share of the largest value, so that noise stays low.
-const LEAST_RANGE: f32 = 1.0;
+/// Least ranges of sparklines of counts and of forces (N), and share of the largest value that one has, so that noise stays low.
+pub(super) const LEAST_COUNTS: f32 = 40.0;
+pub(super) const LEAST_FORCE: f32 = 1.0;
 const LEAST_SHARE: f32 = 0.03;
 
-/// Sparkline of both pads, over the range of its values.
-pub(super) fn sparkline(ui: &Ui, values: &Sparkline, place: Rect) {
+/// Sparkline of both pads, over the range of its values, `least` at least.
+pub(super) fn sparkline(ui: &Ui, (values, least): (&Sparkline, f32), place: Rect) {
     let (theme, painter) = (theme::of(ui), ui.painter_at(place));
     painter.rect_filled(place, 2.0, colour(theme.colours().raised));
     let inks: [Color32; 2] = [Trace::Pressure, Trace::PressureDistal].map(|trace| colour(trace.colour(theme)));
     let all = || values.iter().flatten().flatten().copied();
     let (low, high) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
-    let range = (high - low).max(LEAST_RANGE).max(LEAST_SHARE * high);
+    let range = (high - low).max(least).max(LEAST_SHARE * high);
     for (finger, ink) in values.iter().zip(inks) {
         let last = finger.len().saturating_sub(1).max(1) as f32;
         let at = |(k, value): (usize, &Option<f32>)| {

@@ -121,7 +121,7 @@ impl Change {
             Self::Phases { to: Some(_), .. } => "phases corrected".to_owned(),
             Self::Phases { to: None, .. } => "phases as measured".to_owned(),
             Self::Guess { guess } => match guess.top() {
-                Some((class, p)) => format!("{} predicted {} ({})", guess.model, shown_title(class), percent(*p)),
+                Some((class, p)) => format!("{} predicted {}, {}", guess.model, shown_title(class), percent(*p)),
                 None => format!("{} predicted nothing", guess.model),
             },
             Self::Reviewed => "label reviewed and kept".to_owned(),

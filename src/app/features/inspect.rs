@@ -400,8 +400,13 @@ impl App {
 
     /// Plays or pauses.
     pub(in crate::app) fn toggle_playing(&mut self) {
-        let span = span_of(&self.times());
-        self.playback().toggle(span);
+        let times = self.times();
+        let playback = self.playback();
+        playback.toggle(span_of(&times));
+        // At rest, time and values are those of one sample.
+        if let Some(now) = playback.cursor_s.filter(|_| !playback.playing) {
+            playback.seek(Seek::To(now), &times, false);
+        }
     }
 
     /// Repeats the part between the marks, or stops that.

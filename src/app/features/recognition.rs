@@ -264,7 +264,18 @@ impl App {
     /// a shipped one has none.
     fn use_in_simulation(&mut self, model: &Arc<Model>, path: Option<&Path>) {
         let own = &mut self.recognition;
-        own.models = own.models.clone().with_simulated(model);
+        let before = own.models.clone();
+        own.models = before.clone().with_simulated(model);
+        // Lessons of the model before are given to this one.
+        self.tools.teaching.renew(|lesson| {
+            let kinds = [false, true].map(Shipped::simulated);
+            let kind =
+                kinds.into_iter().find(|kind| before.of(*kind).is_some_and(|own| Arc::ptr_eq(own, &lesson.model)))?;
+            let now = self.recognition.models.of(kind).filter(|now| !Arc::ptr_eq(now, &lesson.model))?;
+            let is_new = lesson.change == ClassChange::Simulated && now.card.labels.class(&lesson.name).is_none();
+            is_new.then(|| TeachRequest { model: Arc::clone(now), ..lesson.clone() })
+        });
+        let own = &mut self.recognition;
         for fixed in model.card.data.supports() {
             self.view.simulation_models[usize::from(fixed)] = path.map(Path::to_owned);
         }
@@ -312,9 +323,13 @@ impl App {
             // A lesson that runs is of the file before it changed.
             tools.teaching.stop();
         }
+        let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
+        let lessons =
+            tools.teaching.running().map(|running| running.command).into_iter().chain(tools.teaching.waiting());
+        let same = |lesson: &TeachRequest| Arc::ptr_eq(&lesson.model, model) && lesson.object == object;
+        let is_on_its_way = lessons.into_iter().any(|lesson| same(&lesson));
         (recognition.taught, recognition.asked) = (asked, Instant::now());
-        if Path::new(source).is_file() {
-            let (name, object) = (card.name.clone(), Some(snapshot.scene.object.clone()));
+        if Path::new(source).is_file() && !is_on_its_way {
             tools.teaching.start(TeachRequest {
                 model: Arc::clone(model),
                 name,

@@ -4,6 +4,7 @@ use super::App;
 use palpate_geometry::palette::{SERIES_COLOURS, Theme};
 use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
 use palpate_render::figure_svg;
+use palpate_store::TrialQuery;
 use palpate_study::jobs::{
     StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner, study_files_job, study_runner,
 };
@@ -186,7 +187,12 @@ impl App {
     pub(in crate::app) fn open_trials(&mut self, trials: &[TrialId]) {
         let Some((first, others)) = trials.split_first() else { return };
         self.inspect.unpin_all();
+        // They are of the study's data set: the list shows them, too.
+        let query = TrialQuery { without_collected: false, ..self.library.selection.query.clone() };
+        self.library.find(query);
         self.open_trial(*first);
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));
+        let beside = others.len().min(SERIES_COLOURS);
+        self.notices.info(format!("Trial {first} of the row is open, {beside} of its others are compared with it."));
     }
 }

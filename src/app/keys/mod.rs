@@ -1,5 +1,5 @@
 //! Keys: one table for behaviour and key sheet alike, that of the mode before that of all modes. While a text field has focus,
-//! only those that open a mode.
+//! only those that write nothing: function keys, and those that open a mode.
 
 mod common;
 
@@ -42,11 +42,9 @@ pub(super) fn pressed(app: &App, actions: &mut Actions) {
         return stop(ctx, actions);
     }
     if ctx.text_edit_focused() {
-        for kind in &modes::ALL {
-            let shortcut =
-                kind.open.shortcut.filter(|shortcut| ctx.input_mut(|input| input.consume_shortcut(shortcut)));
-            if shortcut.is_some() {
-                actions.push(|app| kind.open.run(app));
+        for act in acts(app.view.mode).filter(|act| writes_nothing(act)) {
+            if act.shortcut.is_some_and(|own| ctx.input_mut(|input| input.consume_shortcut(&own))) {
+                actions.push(|app| act.run(app));
             }
         }
         return stop(ctx, actions);
@@ -76,6 +74,12 @@ pub(super) fn pressed(app: &App, actions: &mut Actions) {
             }
         });
     }
+}
+
+/// A function key, or one that opens a mode.
+fn writes_nothing(act: &Act) -> bool {
+    let is_function_key = act.shortcut.is_some_and(|own| (Key::F1..=Key::F12).contains(&own.logical_key));
+    is_function_key || modes::ALL.iter().any(|kind| kind.open.shortcut == act.shortcut)
 }
 
 /// Key pressed in this frame.

@@ -7,7 +7,7 @@ use crate::app::icons::{self, Icon};
 use crate::app::shown::{DisplayedData, Pinned};
 use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
-use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
 use palpate_geometry::units::{number, symbol};
 use palpate_lab::inspection::Alignment;
@@ -97,8 +97,10 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     let pinned: Vec<&Pinned> = pinned.collect();
     ui.separator();
     ui.strong("Mean in the hold, and difference to the trial shown");
-    let table = Grid::new("hold").num_columns(2 + pinned.len()).spacing([12.0, 3.0]);
+    let table = Grid::new("hold").num_columns(2 + pinned.len()).spacing([8.0, 2.0]);
     let table_ui = |ui: &mut Ui| {
+        // Small letters, so that several trials have room.
+        ui.style_mut().override_text_style = Some(TextStyle::Small);
         ui.weak("");
         ui.weak(shown.id.to_string());
         for own in &pinned {
@@ -113,19 +115,19 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
             };
             let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
             ui.weak(format!("{}, {}", column.name.replace('_', " "), symbol(unit)));
-            ui.monospace(number(own, unit));
+            ui.label(number(own, unit));
             for other in &pinned {
                 let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
                 let Some(mean) = mean else {
-                    ui.monospace("–");
+                    ui.label("–");
                     continue;
                 };
                 let sign = if mean > own { "+" } else { "" };
                 let (mean, off) = (number(mean, unit), format!("{sign}{}", number(mean - own, unit)));
                 // A panel has room for both of one trial.
                 match pinned.len() {
-                    1 => ui.monospace(format!("{mean} ({off})")),
-                    _ => ui.monospace(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
+                    1 => ui.label(format!("{mean} ({off})")),
+                    _ => ui.label(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
                 };
             }
             ui.end_row();

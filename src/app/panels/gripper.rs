@@ -238,7 +238,7 @@ fn control_ui(ui: &mut Ui, mut control: Control, gripper: &GripperView, actions:
         };
         let can = kind != Control::ByHand || !gripper.driven_only;
         let radio = ui.add_enabled_ui(can, |ui| ui.radio_value(&mut control, kind, control_title(kind))).inner;
-        let radio = radio.on_disabled_hover_text("Nobody has a valve of the emulated hand");
+        let radio = radio.on_disabled_hover_text("The emulated hand has no control box: the board moves it");
         if radio.on_hover_text(about).changed() {
             actions.push(move |app| app.view.control = control);
         }

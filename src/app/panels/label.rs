@@ -154,7 +154,8 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
     let (colours, title) = (theme::of(ui).colours(), object_title(label));
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
-            (format!("trial {}: {title}. The model agrees ({})", trial.id, percent(guess.p)), colours.accent)
+            let agrees = if guess.p < 0.5 { "Also the model's first guess" } else { "The model agrees" };
+            (format!("trial {}: {title}. {agrees} ({})", trial.id, percent(guess.p)), colours.accent)
         }
         Some(guess) => {
             let (class, p) = (object_title(&guess.class), percent(guess.p));

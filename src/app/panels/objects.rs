@@ -80,8 +80,8 @@ fn open_row(ui: &mut Ui, loaded: &str, actions: &mut Actions) {
     let field = text_field(&mut path, id.with("field")).hint_text("… or paste a path");
     let response = ui.add(field);
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !path.trim().is_empty() {
-        let source = std::mem::take(&mut path).trim().trim_matches(['"', '\'']).to_owned();
-        // Where the file cannot be opened, the next letters are another path, not keys.
+        let source = path.trim().trim_matches(['"', '\'']).to_owned();
+        // Where the file cannot be opened, its path can be corrected; the next letters are no keys.
         response.request_focus();
         actions.push(move |app| app.open(&source));
     }
@@ -89,7 +89,8 @@ fn open_row(ui: &mut Ui, loaded: &str, actions: &mut Actions) {
     let before = ui.data_mut(|data| data.get_temp_mut_or_default::<String>(id.with("loaded")).clone());
     if before != loaded {
         ui.data_mut(|data| data.insert_temp(id.with("loaded"), loaded.to_owned()));
-        if path.is_empty() {
+        if path.trim().trim_matches(['"', '\'']) == loaded {
+            path.clear();
             response.surrender_focus();
         }
     }

@@ -86,7 +86,7 @@ fn facts_ui(ui: &mut Ui, trial: &OpenTrial) {
     let header = &trial.header;
     let mut facts = vec![
         ("samples", trial.t_s.len().to_string()),
-        ("length", format!("{:.2}{SPACE}s", trial.span_s()[1] - trial.span_s()[0])),
+        ("ends at", format!("{:.2}{SPACE}s", trial.span_s()[1])),
         ("channels", trial.columns.len().to_string()),
         ("made by", format!("Palpate {}", header.version)),
     ];

@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::features::labelling::LabellingFeature;
 use crate::app::theme::{self, colour};
-use crate::app::widgets::{put_line, selectable_row, sparkline};
+use crate::app::widgets::{LEAST_COUNTS, put_line, selectable_row, sparkline};
 use egui::{Align2, Rect, RichText, ScrollArea, Ui, pos2, vec2};
 use palpate_geometry::units::percent;
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
@@ -80,7 +80,7 @@ fn row_ui(
     let height = ROW - ui.spacing().item_spacing.y;
     let (rect, response) = selectable_row(ui, height, current, &format!("Trial {}, {name}", trial.id));
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
-    sparkline(ui, &trial.sparkline, picture);
+    sparkline(ui, (&trial.sparkline, LEAST_COUNTS), picture);
     let disagrees = view.disagreements.iter().find(|found| found.id == trial.id);
     let words = Rect::from_min_max(pos2(picture.right() + 8.0, rect.top() + 3.0), rect.max - vec2(4.0, 3.0));
     let ink = if trial.object.is_some() { colours.text } else { colours.warning };

@@ -59,8 +59,9 @@ pub(super) struct TimePlot<'a> {
 const EARLIER: f32 = 0.28;
 /// Least size of a plot (points); the usual one is cut in low windows.
 const LEAST_PLOT: egui::Vec2 = egui::vec2(64.0, 32.0);
-/// Width of the axis of values (points).
+/// Width of the axis of values, and of that of counts (points).
 const Y_AXIS: f32 = 44.0;
+const WIDE_Y_AXIS: f32 = 56.0;
 /// Shortest time that can be shown (s).
 const NARROWEST: f64 = 0.05;
 
@@ -84,7 +85,9 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     let [low, high] = value_range(data, &plot, [from, to], ui.available_height());
     let labelled = ui.available_width() > ROOM_FOR_LABELS;
     let width = ui.available_width() - if labelled { labels::WIDTH } else { 0.0 };
-    let (plotted, plotted_height) = (f64::from(width - Y_AXIS), f64::from(ui.available_height() - TIMES));
+    // Counts have four digits; all plots of a board are in line.
+    let axis = if data.board().is_some() { WIDE_Y_AXIS } else { Y_AXIS };
+    let (plotted, plotted_height) = (f64::from(width - axis), f64::from(ui.available_height() - TIMES));
     let seconds = AxisHints::new_x()
         .formatter(|mark: GridMark, shown| axes::seconds_at(mark, shown))
         .label_spacing(egui::Rangef::new(24.0, 40.0));
@@ -100,7 +103,7 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         .show_background(false)
         .show_x(false)
         .show_y(false)
-        .y_axis_min_width(Y_AXIS)
+        .y_axis_min_width(axis)
         .y_axis_label(units::symbol(&unit))
         .grid_color(colour(theme.colours().border))
         .grid_spacing(10.0..=44.0)

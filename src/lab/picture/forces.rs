@@ -10,10 +10,10 @@ use palpate_geometry::units;
 use palpate_sim::frame::{Frame, TaxelLoad};
 use palpate_sim::gripper::{GripperModel, Side};
 
-/// Length of the arrow of one newton, and the greatest and the least length, as shares of the height of the picture at the
-/// camera's target.
-const PER_NEWTON: f64 = 0.26;
+/// Greatest and least length of an arrow, as shares of the height of the picture at the camera's target; and the forces that may
+/// have the greatest (N): the least of them that none exceeds.
 const LONGEST: f64 = 0.26;
+const FORCES: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 const SHORTEST: f64 = 0.03;
 /// Radius of a shaft, as a share of that height.
 const RADIUS: f64 = 0.0042;
@@ -67,11 +67,12 @@ pub(super) fn arrows(
     frame: &Frame,
     view: &PictureView,
 ) -> Vec<Arrow> {
-    let (height, span) = (f64::from(view.camera.height_at_target()), span(view));
+    let (height, all) = (f64::from(view.camera.height_at_target()), on_fingers(gripper, world_from_gripper, frame));
+    let scale = [span(view), longest_force(&all)];
     let mut arrows = Vec::new();
-    for forces in on_fingers(gripper, world_from_gripper, frame) {
+    for forces in all {
         let mut arrow = |vector: DVec3, colour: Rgb| {
-            let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, span));
+            let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, scale));
             arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
         };
         arrow(forces.normal, forces.normal_colour());
@@ -99,20 +100,28 @@ pub(super) fn reach(gripper: &GripperModel, world_from_gripper: &Pose, frame: &F
     on_fingers(gripper, world_from_gripper, frame).into_iter().flat_map(along).collect()
 }
 
-/// Force of the arrow in the key (N), and the height of its tip and of the middle of the key above the scale bar (points).
+/// Force that has the longest arrow beside these (N).
+fn longest_force(all: &[Forces]) -> f64 {
+    let sizes = all.iter().flat_map(|own| [Some(own.normal), own.friction]).flatten().map(DVec3::length);
+    let largest = sizes.fold(0.0, f64::max);
+    FORCES.into_iter().find(|force| *force >= largest).unwrap_or(largest)
+}
+
+/// Force of the arrow in the key (share of that of the longest arrow), and the height of its tip and of the middle of the key above the scale bar (points).
 const KEY: f64 = 0.2;
 const KEY_TIP: f32 = 10.0;
 const KEY_MIDDLE: f32 = 17.0;
 
 /// An arrow of a known force above the scale bar, where there is room.
-pub(super) fn add_key(annotator: &mut Annotator<'_>) {
+pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, frame: &Frame) {
     let view = annotator.view;
     if !shows_legends(view) || view.size.y < HIGH {
         return;
     }
     let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
-    let length = view.size.y * (PER_NEWTON * KEY) as f32;
-    let (tail, ink) = (tip - Vec2::new(length, 0.0), pressure_colour(0.35 + 0.65 * (KEY / FULL_SCALE) as f32));
+    let force = KEY * longest_force(&on_fingers(gripper, &Pose::IDENTITY, frame));
+    let length = view.size.y * (LONGEST * KEY) as f32;
+    let (tail, ink) = (tip - Vec2::new(length, 0.0), pressure_colour(0.35 + 0.65 * (force / FULL_SCALE) as f32));
     let half = Vec2::new((0.5 * length).max(1.5 * TEXT) + 5.0, LINE);
     let middle_x = (tip.x - 0.5 * length).min(view.size.x - half.x - 8.0);
     let middle = Vec2::new(middle_x, view.size.y - SCALE_BAR - KEY_MIDDLE);
@@ -127,17 +136,17 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>) {
         Align::Centre,
         TEXT,
         view.theme.colours().text,
-        units::shown(KEY, "N"),
+        units::shown(force, "N"),
     );
 }
 
 /// Their numbers, beyond the tips or near by: a plate for each finger, or one for both in a low picture.
 pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) {
     let view = annotator.view;
-    let span = span(view);
     let all = on_fingers(gripper, world_from_gripper, frame);
+    let scale = [span(view), longest_force(&all)];
     let ends = |forces: &Forces, force: DVec3| {
-        let [from, to] = [forces.from.as_vec3(), tip(forces.from, force, span)];
+        let [from, to] = [forces.from.as_vec3(), tip(forces.from, force, scale)];
         view.camera.project(from, view.size).zip(view.camera.project(to, view.size))
     };
     for forces in &all {
@@ -233,10 +242,10 @@ fn span(view: &PictureView) -> f64 {
     share * f64::from(view.camera.height_at_target())
 }
 
-/// Point of the arrow of a force.
-fn tip(from: DVec3, force: DVec3, span: f64) -> Vec3 {
+/// Point of the arrow of a force, where a span (m) has that of so many newtons as its longest.
+fn tip(from: DVec3, force: DVec3, [span, longest]: [f64; 2]) -> Vec3 {
     let size = force.length();
-    let length = span * (PER_NEWTON * size).clamp(SHORTEST, LONGEST);
+    let length = span * (LONGEST * size / longest).max(SHORTEST);
     (from + force / size * length).as_vec3()
 }
 

@@ -163,7 +163,7 @@ impl Stage {
         let hand = hand.into_iter().filter_map(view.camera.projector(view.size)).collect();
         let mut annotator = Annotator::new(view, place, hand);
         if view.forces && !view.plain {
-            forces::add_key(&mut annotator);
+            forces::add_key(&mut annotator, &self.gripper, frame);
         }
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);

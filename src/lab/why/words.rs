@@ -26,6 +26,9 @@ pub struct Reason {
     pub evidence: Evidence,
 }
 
+/// Times the evidence of a phase is that of the strongest channel where channels count together only.
+const TOGETHER: f64 = 4.0;
+
 impl Attribution {
     /// Answer in one sentence: `Lemon 91 %, then Tomato 6 %.` A second class below 1 % is left out.
     pub fn answer(&self) -> String {
@@ -35,7 +38,7 @@ impl Attribution {
     }
 
     /// Strongest reasons for and against the first class, strongest first: channels, each with the phase in which it speaks
-    /// most, or, where no channel counts alone, whole phases.
+    /// most, or, where channels count together only, whole phases.
     pub fn reasons(&self) -> [Vec<Reason>; 2] {
         let channels: Vec<Reason> = (0..self.channels.len()).map(|channel| self.channel_reason(channel)).collect();
         let of_phase = |(own, span): (&Evidence, &PhaseSpan)| Reason {
@@ -45,8 +48,9 @@ impl Attribution {
         };
         let phases: Vec<Reason> = self.by_phase.iter().zip(&self.phases).map(of_phase).collect();
         [1.0, -1.0].map(|sign: f64| {
-            let found = strongest(&channels, sign);
-            if found.is_empty() { strongest(&phases, sign) } else { found }
+            let [found, together] = [&channels, &phases].map(|parts| strongest(parts, sign));
+            let most = |parts: &[Reason]| parts.first().map_or(0.0, |part| sign * part.evidence.points);
+            if most(&together) > TOGETHER * most(&found) { together } else { found }
         })
     }
 
@@ -212,6 +216,9 @@ mod tests {
         // A whole phase does, although no channel in it does alone.
         let together = Attribution { by_phase: [0.0, 44.0].map(evidence).to_vec(), ..sure };
         assert_eq!(together.sentences()[0], "For Lemon: all channels in the hold (+44 percentage points).");
+        // Channels that say the same lose little alone.
+        let same = Attribution { by_channel: [2.0, 1.0].map(evidence).to_vec(), ..together };
+        assert_eq!(same.because(), "all channels in the hold");
     }
 
     #[test]

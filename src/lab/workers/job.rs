@@ -95,6 +95,19 @@ struct State<C, O> {
     shown: Option<Instant>,
 }
 
+impl<C, O> State<C, O> {
+    /// The running command was stopped, and others wait for its end.
+    fn is_stopping(&self) -> bool {
+        self.running.as_ref().is_some_and(RunningJob::is_stopped) && !self.waiting.is_empty()
+    }
+}
+
+impl<C> RunningJob<C> {
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
 impl<C: Send + Sync + 'static, O: Send + Sync + 'static> Job<C, O> {
     /// A job whose thread has this name. `work` looks at [`JobRun::stopped`] as often as it can; once stopped it returns
     /// `None`, or the outcome so far. A failure after that is not shown.
@@ -158,12 +171,12 @@ impl<C, O> Job<C, O> {
         }
     }
 
-    /// The running command, where a newer one replaces it that newer one; and the command that ended last with an outcome or a
+    /// The running command, where it was stopped for another that other one; and the command that ended last with an outcome or a
     /// failure. Both are of one moment: a command that has just ended is not running.
     pub fn state(&self) -> (Option<RunningJob<C>>, Option<EndedJob<C, O>>) {
         let state = locked(&self.shared.state);
-        let newest = state.waiting.back().filter(|_| self.shared.newer == Newer::Replaces);
-        (newest.or(state.running.as_ref()).cloned(), state.last.clone())
+        let next = if state.is_stopping() { state.waiting.front() } else { None };
+        (next.or(state.running.as_ref()).cloned(), state.last.clone())
     }
 
     /// The running command of [`Self::state`].
@@ -171,9 +184,27 @@ impl<C, O> Job<C, O> {
         self.state().0
     }
 
-    /// Commands that wait.
+    /// Commands that wait for that of [`Self::running`].
     pub fn waiting(&self) -> Vec<Arc<C>> {
-        locked(&self.shared.state).waiting.iter().map(|next| Arc::clone(&next.command)).collect()
+        let state = locked(&self.shared.state);
+        let next = usize::from(state.is_stopping());
+        state.waiting.iter().skip(next).map(|next| Arc::clone(&next.command)).collect()
+    }
+
+    /// Replaces those of the commands that run and wait for which there is another, each in its place.
+    pub fn renew(&self, renewed: impl Fn(&C) -> Option<C>) {
+        let mut state = locked(&self.shared.state);
+        for waiting in &mut state.waiting {
+            renewed(&waiting.command).into_iter().for_each(|command| waiting.command = Arc::new(command));
+        }
+        let Some(running) = state.running.as_ref().filter(|running| !running.is_stopped()) else { return };
+        let Some(command) = renewed(&running.command) else { return };
+        running.stop.store(true, Ordering::Relaxed);
+        state.started += 1;
+        let number = state.started;
+        let next =
+            RunningJob { number, command: Arc::new(command), progress: JobProgress::default(), stop: Arc::default() };
+        state.waiting.push_front(next);
     }
 
     /// True when no command runs or waits.
@@ -371,6 +402,22 @@ mod tests {
         job.start(9);
         settled(&job, &woken);
         assert_eq!(job.take().iter().map(|ended| ended.number).collect::<Vec<_>>(), [4, 5]);
+    }
+
+    #[test]
+    fn commands_are_renewed_in_their_places() {
+        let (job, woken) = counter(Newer::Waits);
+        for most in [u64::MAX, 5, u64::MAX - 1] {
+            job.start(most);
+        }
+        job.renew(|most| (*most > 100).then(|| 100 - (u64::MAX - most)));
+        // The one that runs is stopped: its successor stands for it.
+        let running = job.running().map(|running| *running.command);
+        assert!(running.is_none_or(|running| running <= 100), "{running:?}");
+        settled(&job, &woken);
+        assert_eq!(job.take().iter().map(|ended| *ended.command).collect::<Vec<_>>(), [100, 5, 99]);
+        job.renew(|_| Some(1));
+        assert!(job.is_settled());
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub(super) struct Blueprint {
 
 /// An object larger than this is taken to be in millimetres when that makes sense of it (m).
 const LARGEST_PLAUSIBLE: f64 = 3.0;
+/// An object smaller than this if in millimetres is taken to be in centimetres (m): little that is grasped is as small.
+const SMALL: f64 = 0.012;
 /// An object smaller than this is taken to be given in units of a thousand metres (m).
 const SMALLEST_PLAUSIBLE: f64 = 5e-4;
 /// What is larger than this (m) does not fit between the fingers, and smaller than this, between two taxels.
@@ -266,7 +268,9 @@ impl Blueprint {
             return Ok(scale);
         }
         let size = solids.iter().map(SolidPart::bounds).fold(Bounds::EMPTY, Bounds::union).size().max_element();
-        let (scale, guess) = if size > LARGEST_PLAUSIBLE {
+        let (scale, guess) = if size > LARGEST_PLAUSIBLE && size * 1e-3 < SMALL {
+            (1e-2, "centimetres taken for metres")
+        } else if size > LARGEST_PLAUSIBLE {
             (1e-3, "millimetres taken for metres")
         } else if size > 0.0 && size < SMALLEST_PLAUSIBLE {
             (1e3, "metres scaled to millimetres twice")

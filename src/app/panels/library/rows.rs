@@ -7,13 +7,13 @@ use crate::app::features::library::{LibraryFeature, LibrarySelection, Reach};
 use crate::app::shown::Pinned;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
-use crate::app::widgets::{capital, put_line as text, sparkline};
+use crate::app::widgets::{LEAST_COUNTS, LEAST_FORCE, capital, put_line as text, sparkline};
 use egui::{Align2, Color32, FontId, Rect, Response, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::{ThemeColours, series_colour};
 use palpate_lab::workers::LibraryView;
 use palpate_store::labels::TrialEdit;
 use palpate_store::{LibraryTrial, TrialColumn, TrialOrder, TrialPlace, TrialQuality, TrialQuery};
-use palpate_tactile::trial::TrialId;
+use palpate_tactile::trial::{TrialId, TrialSource};
 use std::ops::Range;
 
 /// Heights of rows in the table and in the list (points).
@@ -23,6 +23,8 @@ const LIST_ROW: f32 = 42.0;
 const GAP: f32 = 8.0;
 /// Between the parts of a second line.
 const BETWEEN: &str = "  \u{b7}  ";
+/// Least room of a part that is cut (points).
+const LEAST_CUT: f32 = 36.0;
 /// Room of the scroll bar (points).
 const SCROLL_BAR: f32 = 10.0;
 
@@ -284,7 +286,7 @@ fn table_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, trial: &Library
             Shows::Thumbnail => thumbnail(ui, pictures, trial, inner.shrink2(vec2(0.0, 3.0))),
             Shows::Sparkline => {
                 if let Some(lines) = view.sparklines.get(&trial.row.id) {
-                    sparkline(ui, lines, inner.shrink2(vec2(0.0, 4.0)));
+                    sparkline(ui, (lines, least_of(trial)), inner.shrink2(vec2(0.0, 4.0)));
                 }
             }
             Shows::Text(column) => {
@@ -304,7 +306,7 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): 
     if pictures.get(&trial.row.object).is_some() {
         thumbnail(ui, pictures, trial, picture);
     } else if let Some(lines) = view.sparklines.get(&trial.row.id) {
-        sparkline(ui, lines, picture);
+        sparkline(ui, (lines, least_of(trial)), picture);
     }
     let words = Rect::from_min_max(pos2(picture.right() + GAP, inside.top()), inside.max);
     let (date, name) = (cell(view, trial, TrialColumn::Date), cell(view, trial, TrialColumn::Object));
@@ -341,6 +343,10 @@ fn list_row(ui: &Ui, pictures: &Thumbnails, view: &LibraryView, (trial, shown): 
     if trial.row.preset.is_some() && width_of(&parts.join(BETWEEN), 11.5) > rest.width() {
         parts.pop();
     }
+    // A letter or two of the last one say nothing.
+    while parts.len() > 1 && width_of(&parts[..parts.len() - 1].join(BETWEEN), 11.5) + LEAST_CUT > rest.width() {
+        parts.pop();
+    }
     text(ui, rest, Align2::LEFT_CENTER, &parts.join(BETWEEN), 11.5, quiet);
 }
 
@@ -356,6 +362,11 @@ fn ink(colours: &ThemeColours, trial: &LibraryTrial, column: TrialColumn) -> pal
         TrialColumn::Object => colours.text,
         _ => colours.quiet_text,
     }
+}
+
+/// Least range of the sparkline of a trial.
+fn least_of(trial: &LibraryTrial) -> f32 {
+    if trial.row.source == TrialSource::Recorded { LEAST_COUNTS } else { LEAST_FORCE }
 }
 
 fn thumbnail(ui: &Ui, pictures: &Thumbnails, trial: &LibraryTrial, place: Rect) {

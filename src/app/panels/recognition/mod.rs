@@ -225,7 +225,8 @@ fn lesson_ui(
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
                 let ink = if warning.is_some() { amber } else { colour(good) };
-                let told = RichText::new(format!("Learned {title}")).strong().color(ink);
+                let learned_badly = if warning.is_some() { " poorly" } else { "" };
+                let told = RichText::new(format!("Learned {title}{learned_badly}")).strong().color(ink);
                 if !warned_above {
                     ui.label(if measures.is_tight() { told } else { told.heading() });
                 }
@@ -384,11 +385,18 @@ impl Part<'_, '_> {
     fn headline_ui(&self, ui: &mut Ui) {
         let (colours, measures) = (self.colours(), self.measures);
         let headline = Headline::of(self.view);
-        let (text, p) = headline.text(&self.view.labels);
+        let (mut text, mut p) = headline.text(&self.view.labels);
+        let distrust = self.distrust();
+        let mut why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
+        // No answer can be right: the likest known object is no headline.
+        let is_new = distrust == Some(BEING_LEARNED);
+        if let Some(probability) = p.take_if(|_| is_new) {
+            why = format!("{why} So far like {text} ({}).", percent(probability));
+            "New object".clone_into(&mut text);
+        }
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);
-        let right = self.recognised.is_right().filter(|_| self.data.view.truth_shown);
-        let distrust = self.distrust();
+        let right = self.recognised.is_right().filter(|_| self.data.view.truth_shown && !is_new);
         // What is not to be trusted does not look like a decision.
         let ink = match right {
             None | Some(true) if distrust.is_some_and(|why| why != ALONE) => colours.warning,
@@ -396,7 +404,7 @@ impl Part<'_, '_> {
         };
         let ink = colour(ink);
         let mut left = rect.left();
-        if let Some(class) = headline.class() {
+        if let Some(class) = headline.class().filter(|_| !is_new) {
             let side = measures.headline - 4.0;
             let place = Rect::from_min_size(pos2(left, rect.top() + 2.0), vec2(side, side));
             self.thumbnail(ui, &self.view.labels.classes[class].name, place);
@@ -410,7 +418,6 @@ impl Part<'_, '_> {
             put(ui, number, rect, Align2::RIGHT_CENTER);
         }
         let by_simulation = self.view.left.is_some() && self.data.board().is_some();
-        let why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
         let why = if by_simulation { format!("{why} (calibrated in simulation)") } else { why };
         let ink = colour(if distrust.is_some() { colours.warning } else { colours.quiet_text });
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.reason), &why);
@@ -449,7 +456,7 @@ impl Part<'_, '_> {
     fn truth_ui(&mut self, ui: &mut Ui, title: &str) {
         let colours = self.colours();
         let shown = self.data.view.truth_shown;
-        let right = self.recognised.is_right().filter(|_| shown);
+        let right = self.recognised.is_right().filter(|_| shown && !self.is_being_learned);
         let title = capital(title);
         let title = if right.is_some() && self.recognised.nothing_held { format!("{title}, not held") } else { title };
         let (text, spoken, sign) = match right {
@@ -537,9 +544,15 @@ impl Part<'_, '_> {
                 }
                 if let Some(because) = self.because() {
                     let room = ui.available_rect_before_wrap();
-                    let (letters, ink) = (self.measures.reason_letters.min(11.5), ui.visuals().weak_text_color());
+                    let ink = ui.visuals().weak_text_color();
                     let (place, _) = labelled(ui, room.size(), &because);
-                    put(ui, fitted(ui, &because, letters, place.width(), ink), place, Align2::LEFT_CENTER);
+                    let mut text = fitted(ui, &because, self.measures.reason_letters.min(11.5), place.width(), ink);
+                    if text.elided {
+                        // Two lines have room for it.
+                        let font = FontId::proportional(LEAST_LETTERS);
+                        text = ui.painter().layout(because, font, ink, place.width());
+                    }
+                    put(ui, text, place, Align2::LEFT_CENTER);
                 }
             }
         });

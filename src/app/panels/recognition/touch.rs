@@ -13,8 +13,8 @@ const NAME: f32 = 44.0;
 const VALUE: f32 = 84.0;
 /// Size of letters (points).
 const LETTERS: f32 = 11.5;
-/// Text before the first contact.
-const UNKNOWN: &str = "no contact yet";
+/// Text without contact.
+const UNKNOWN: &str = "no contact";
 /// Share of a line that its bar takes.
 const BAR: f32 = 0.4;
 

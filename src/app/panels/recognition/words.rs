@@ -25,7 +25,7 @@ pub(super) const LEARNED_FIXED: &str = "Learned fixed in place, not yet as a fre
 pub(super) const NOT_LEARNED: &str = "The model does not know this object.";
 
 /// Warning about an answer of a model that is learning the object in the hand.
-pub(super) const BEING_LEARNED: &str = "To be learned: the model does not know this object yet.";
+pub(super) const BEING_LEARNED: &str = "Being learned: the model does not know it yet.";
 
 /// Warning about an answer that lacks the grasps before it.
 pub(super) const ALONE: &str = "From this grasp alone: the model has changed since those before it.";

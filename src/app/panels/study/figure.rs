@@ -18,6 +18,9 @@ use palpate_study::paper::paper_study;
 const LEAST_WIDTH: f32 = 300.0;
 /// Room below a single row of plots (points).
 const BELOW: f32 = 46.0;
+/// Height of a title and a legend above each row of plots, and least height of plots that are seen at once (points).
+const ABOVE: f32 = 44.0;
+const SEEN: f32 = 220.0;
 
 pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut Actions) {
     let Some(result) = result_ui(ui, studies, "study-figure", "figures", actions) else { return };
@@ -103,8 +106,10 @@ fn plots_ui(ui: &mut Ui, result: &StudyResult, linked: &LinkedFigure, actions: &
     let most = if linked.figure.columns == 0 { plots.len() } else { linked.figure.columns };
     let fitting = (ui.available_width() / LEAST_WIDTH) as usize;
     let columns = most.min(plots.len()).min(fitting).max(1);
-    // A single row fills the panel.
-    let room = (ui.available_height() - BELOW, plots.len() <= columns);
+    // A single row fills the panel; more of them are seen at once where they are high enough then.
+    let (whole, rows) = (ui.available_height() - BELOW, plots.len().div_ceil(columns).max(1));
+    let each = whole / rows as f32 - ABOVE;
+    let room = (if each >= SEEN { each } else { whole }, rows == 1);
     let own_legends = is_ambiguous(plots);
     for (row, chunk) in plots.chunks(columns).enumerate() {
         // Above the plots, so that the axes of a row are in line.

@@ -77,13 +77,8 @@ fn hint(result: &StudyResult, row: &StudyRow) -> String {
         ([], _) => "No trials are kept for this row".to_owned(),
         (_, StudyOrigin::Shipped) => "Run the study here to open its trials".to_owned(),
         ([only], _) => format!("Click to open trial {only} in Inspect"),
-        ([first, others @ ..], _) => {
-            let of = match others.len() {
-                all @ ..=SERIES_COLOURS => format!("{all} others"),
-                all => format!("{SERIES_COLOURS} of its {all} others"),
-            };
-            format!("Click to open trial {first} in Inspect, with {of} beside it")
-        }
+        (all, _) if all.len() <= SERIES_COLOURS + 1 => format!("Click to open its {} trials in Inspect", all.len()),
+        (all, _) => format!("Click to open {} of the {} trials kept of it in Inspect", SERIES_COLOURS + 1, all.len()),
     }
 }
 

@@ -7,11 +7,12 @@ use crate::app::theme::{self, colour};
 use crate::app::widgets::capital;
 use egui::{Rect, RichText, Stroke, StrokeKind, Tooltip, Ui, Vec2};
 use palpate_geometry::drawing::Plot;
+use palpate_geometry::units::{symbol, three_digits, true_minus};
 use palpate_study::jobs::StudyResult;
 use palpate_study::{FigureLink, FigureMark, LinkedFigure};
 
 /// Distance within which the pointer means a point (points).
-const NEAR: f32 = 12.0;
+const NEAR: f32 = 16.0;
 /// Heights of a named row and of what stands around the rows (points).
 const ROW: f32 = 15.0;
 const AROUND: f32 = 64.0;
@@ -87,19 +88,44 @@ fn pointed_ui<'a>(
     let Some(pointer) = shown.response.hover_pos() else { return };
     let places = links.filter_map(|link| Some((link, place(plot, shown, link.mark, pointer)?)));
     let nearest = places.min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).filter(|(_, (_, distance))| *distance < NEAR);
-    let Some((link, (rect, _))) = nearest else { return };
+    let Some((link, (rect, _))) = nearest else { return values_ui(ui, (plot, shown), pointer) };
     let Some(table) = result.stored.result.tables.get(link.table) else { return };
     let Some(row) = table.rows.get(link.row) else { return };
-    let stroke = Stroke::new(2.0, colour(theme::of(ui).colours().text));
-    let painter = ui.painter().with_clip_rect(shown.response.rect.intersect(ui.clip_rect()));
-    match link.mark {
-        FigureMark::Point(..) => painter.circle_stroke(rect.center(), 7.0, stroke),
-        FigureMark::Cell(..) => painter.rect_stroke(rect, 0.0, stroke, StrokeKind::Inside),
-    };
-    // Beside the mark at once, without the delay of hints.
-    let (ctx, response) = (ui.ctx().clone(), &shown.response);
-    Tooltip::always_open(ctx, response.layer_id, response.id, rect).show(|ui| about_row_ui(ui, result, table, row));
+    mark_ui(ui, shown, rect, matches!(link.mark, FigureMark::Cell(..)), |ui| about_row_ui(ui, result, table, row));
     let Some(trials) = opening(result, row) else { return };
     ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-    actions.on(response, move |app| app.open_trials(&trials));
+    actions.on(&shown.response, move |app| app.open_trials(&trials));
+}
+
+/// Marks a point or a cell, with what is said about it beside it.
+fn mark_ui(ui: &Ui, shown: &ShownPlot, rect: Rect, is_cell: bool, about: impl FnOnce(&mut Ui)) {
+    let stroke = Stroke::new(2.0, colour(theme::of(ui).colours().text));
+    let painter = ui.painter().with_clip_rect(shown.response.rect.intersect(ui.clip_rect()));
+    match is_cell {
+        true => painter.rect_stroke(rect, 0.0, stroke, StrokeKind::Inside),
+        false => painter.circle_stroke(rect.center(), 7.0, stroke),
+    };
+    // At once, without the delay of hints.
+    let (ctx, response) = (ui.ctx().clone(), &shown.response);
+    Tooltip::always_open(ctx, response.layer_id, response.id, rect).show(about);
+}
+
+/// Values of a point that belongs to no row.
+fn values_ui(ui: &Ui, (plot, shown): (&Plot, &ShownPlot), pointer: egui::Pos2) {
+    let series = plot.series.iter().rev();
+    let points = series.flat_map(|series| series.points.iter().map(move |point| (series, point)));
+    let places = points.filter_map(|(series, point)| {
+        let at = shown.position(plot, point.at)?;
+        Some((series, point, at, at.distance(pointer)))
+    });
+    let nearest = places.min_by(|a, b| a.3.total_cmp(&b.3)).filter(|(.., distance)| *distance < NEAR);
+    let Some((series, point, at, _)) = nearest else { return };
+    let names = [&series.name, &point.label].into_iter().filter(|name| !name.is_empty()).cloned();
+    // An axis of names has no values.
+    let axes = [&plot.x, &plot.y].into_iter().zip(point.at).filter(|(axis, _)| axis.ticks.is_empty());
+    let values = axes.map(|(axis, value)| format!("{}: {}", symbol(&axis.title), true_minus(&three_digits(value))));
+    let lines: Vec<String> = names.chain(values).collect();
+    mark_ui(ui, shown, Rect::from_center_size(at, Vec2::splat(2.0 * NEAR)), false, |ui| {
+        lines.into_iter().for_each(|line| _ = ui.label(RichText::new(line).small()));
+    });
 }
