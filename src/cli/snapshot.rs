@@ -413,7 +413,7 @@ fn scene_picture(
         }
     };
     if let Some(ghost) = &ghost {
-        list.ghosts = stage.ghosts(ghost, view.theme);
+        list.ghosts.extend(stage.ghosts(ghost, view.theme));
     }
     let drawer = drawers.of(arguments.driver)?;
     Ok(DrawnPicture { picture: drawer.draw(&list, size)?, driver: drawer.gpu.driver.clone(), scene: text })

@@ -9,6 +9,8 @@ use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, capital_title, catalogue};
+use std::ffi::OsStr;
+use std::path::Path;
 
 /// Side of a thumbnail (points).
 const THUMBNAIL: f32 = 40.0;
@@ -89,7 +91,8 @@ fn open_row(ui: &mut Ui, loaded: &str, actions: &mut Actions) {
     let before = ui.data_mut(|data| data.get_temp_mut_or_default::<String>(id.with("loaded")).clone());
     if before != loaded {
         ui.data_mut(|data| data.insert_temp(id.with("loaded"), loaded.to_owned()));
-        if path.trim().trim_matches(['"', '\'']) == loaded {
+        let name_of = |path: &str| Path::new(path.trim().trim_matches(['"', '\''])).file_name().map(OsStr::to_owned);
+        if name_of(&path) == name_of(loaded) {
             path.clear();
             response.surrender_focus();
         }

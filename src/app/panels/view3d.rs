@@ -205,7 +205,7 @@ fn drawn(ctx: &egui::Context, own: &View3d<'_>, moment: Moment<'_>, size: Vec2) 
         stage.add_hold(&mut list, frame, &view, (&held.stage, &held.frame));
     }
     if let Some(ghost) = ghost {
-        list.ghosts = stage.ghosts(ghost, own.data.view.theme);
+        list.ghosts.extend(stage.ghosts(ghost, own.data.view.theme));
     }
     if let Some((shown, colour)) = &grasp_path {
         let path = stage.path(&path_mesh(ctx, stage, shown, *colour), frame);

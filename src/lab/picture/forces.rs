@@ -107,13 +107,14 @@ fn longest_force(all: &[Forces]) -> f64 {
     FORCES.into_iter().find(|force| *force >= largest).unwrap_or(largest)
 }
 
-/// Force of the arrow in the key (share of that of the longest arrow), and the height of its tip and of the middle of the key above the scale bar (points).
+/// Force of the arrow in the key (share of that of the longest arrow), and the height of its tip and of the middle of the key
+/// above the scale bar (points).
 const KEY: f64 = 0.2;
 const KEY_TIP: f32 = 10.0;
 const KEY_MIDDLE: f32 = 17.0;
 
-/// An arrow of a known force above the scale bar, where there is room.
-pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, frame: &Frame) {
+/// An arrow of a known force above the scale bar, where there is room beside an inset.
+pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, frame: &Frame, inset: Option<Plate>) {
     let view = annotator.view;
     if !shows_legends(view) || view.size.y < HIGH {
         return;
@@ -125,7 +126,11 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, fra
     let half = Vec2::new((0.5 * length).max(1.5 * TEXT) + 5.0, LINE);
     let middle_x = (tip.x - 0.5 * length).min(view.size.x - half.x - 8.0);
     let middle = Vec2::new(middle_x, view.size.y - SCALE_BAR - KEY_MIDDLE);
-    annotator.add_plate(Plate { middle, half });
+    let plate = Plate { middle, half };
+    if inset.is_some_and(|inset| inset.meets(&plate)) {
+        return;
+    }
+    annotator.add_plate(plate);
     let overlay = &mut annotator.overlay;
     overlay.line(tail, tip, 2.0, ink);
     for side in [-4.0, 4.0] {

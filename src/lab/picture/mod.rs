@@ -85,6 +85,10 @@ impl Default for PictureView {
     }
 }
 
+/// Name of the palm with its tubes.
+const PALM: &str = "palm";
+/// Cosine of the angle between the eye and the fingers below which the palm is translucent.
+const ALONG: f32 = 0.95;
 /// Usual height of the inset with the touch, as a share of the picture's.
 const INSET: f32 = 0.27;
 
@@ -163,7 +167,7 @@ impl Stage {
         let hand = hand.into_iter().filter_map(view.camera.projector(view.size)).collect();
         let mut annotator = Annotator::new(view, place, hand);
         if view.forces && !view.plain {
-            forces::add_key(&mut annotator, &self.gripper, frame);
+            forces::add_key(&mut annotator, &self.gripper, frame, place);
         }
         let palm = self.world_from_gripper.position.as_vec3();
         let world_from_gripper = frame.world_from_gripper(&self.world_from_gripper);
@@ -179,6 +183,10 @@ impl Stage {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
             fingers.iter_mut().for_each(|finger| finger.sensors = drawn.clone());
         }
+        // Seen along the fingers, the palm would hide all that they touch.
+        let along = world_from_gripper.direction(DVec3::Z).as_vec3().dot(view.camera.axes()[2]);
+        let (hiding, solids): (Vec<_>, Vec<_>) =
+            self.solids(frame).into_iter().partition(|(name, _)| *name == PALM && along > ALONG);
         DrawList {
             camera: view.camera,
             backdrop: [colours.sky, colours.horizon],
@@ -189,8 +197,8 @@ impl Stage {
                 grid: colours.grid,
                 radius: 0.45,
             }),
-            solids: self.solids(frame).into_iter().map(|(_, solid)| solid).collect(),
-            ghosts: Vec::new(),
+            solids: solids.into_iter().map(|(_, solid)| solid).collect(),
+            ghosts: hiding.into_iter().map(|(_, solid)| Solid { tint: Some(colours.quiet_text), ..solid }).collect(),
             fingers,
             arrows: if view.forces {
                 forces::arrows(&self.gripper, &world_from_gripper, frame, view)
@@ -255,7 +263,7 @@ impl Stage {
             world_from_mesh: matrix(pose),
             tint: None,
         };
-        let mut solids = vec![("palm", solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper)))];
+        let mut solids = vec![(PALM, solid(&self.palm, &frame.world_from_gripper(&self.world_from_gripper)))];
         solids.extend(self.pedestal.as_ref().map(|mesh| ("pedestal", solid(mesh, &Pose::IDENTITY))));
         if let (Some(mesh), Some(pose)) = (&self.object, &frame.world_from_object) {
             solids.push(("object", solid(mesh, pose)));

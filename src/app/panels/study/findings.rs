@@ -75,7 +75,8 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
         wrapped(ui, RichText::new(&own.what).small().weak());
         ui.horizontal(|ui| {
             let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
-            let text = format!("{}: {}, line at {}", own.what, own.shown(), Cell::Number(own.line).shown(&own.unit));
+            let line_at = format!("line at {}", Cell::Number(own.line).shown(&own.unit));
+            let text = format!("{}: {}, {line_at}", own.what, own.shown());
             response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
             let inner = rect.shrink2(vec2(4.0, 1.0));
             let at = |place: f64| inner.left() + inner.width() * place as f32;
@@ -87,6 +88,7 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
             response.on_hover_text(text);
             let estimate = Cell::from(own.value.value()).shown(&own.unit);
             ui.add(Label::new(RichText::new(format!("{estimate}{SPACE}{}", symbol(&own.unit))).small()).extend());
+            ui.add(Label::new(RichText::new(line_at).small().weak()).truncate());
         });
     }
     if let Some(more) = finding.left_out() {
