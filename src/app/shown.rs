@@ -296,13 +296,22 @@ impl<'a> DisplayedData<'a> {
         let pmf = view.verdict.as_ref().map(|verdict| &verdict.pmf).or(view.beliefs.last())?;
         let open = view.listening && pmf.top().1 < LEAST_FOR_BANDS;
         let mut bands = bands_for(view.signatures.as_deref().filter(|_| !open)?, &view.labels, pmf, channel)?;
-        // A recorded trial counts its time from the rest before the closing, a signature from the closing.
-        let recorded = |own: &Inspected<'_>| own.trial.source == TrialSource::Recorded;
-        if let Some(own) = self.inspected.filter(|own| self.source == ViewSource::Trial && recorded(own)) {
-            let closing_s = Alignment::Closing.origin_s(own.trial);
-            bands.iter_mut().flat_map(|band| &mut band.t_s).for_each(|t| *t += closing_s);
-        }
+        // A signature begins with the closing.
+        let closing_s = self.closing_s();
+        bands.iter_mut().flat_map(|band| &mut band.t_s).for_each(|t| *t += closing_s);
         Some(bands)
+    }
+
+    /// Time at which the closing begins (s): that of a real gripper is counted from the rest before it.
+    fn closing_s(&self) -> f64 {
+        match self.source {
+            ViewSource::Simulation => 0.0,
+            ViewSource::Gripper => self.traces.current().map_or(0.0, |trace| trace.closing_s),
+            ViewSource::Trial => {
+                let recorded = self.inspected.filter(|own| own.trial.source == TrialSource::Recorded);
+                recorded.map_or(0.0, |own| Alignment::Closing.origin_s(own.trial))
+            }
+        }
     }
 
     /// Board of the real gripper or of a recorded trial, where one is shown.
@@ -424,6 +433,7 @@ impl<'a> DisplayedData<'a> {
         };
         let tick = 1.0 / f64::from(scene.timing.actuation_hz.max(1));
         let closed = f64::from(scene.programme.close_ticks()) * tick;
+        let closed = closed + self.closing_s();
         let released = (closed + f64::from(scene.programme.hold_ticks) * tick).min(self.time_span()[1]);
         (closed < released).then_some([closed, released])
     }
@@ -438,8 +448,8 @@ fn gripper_span(trace: Option<&GraspTrace>) -> [f64; 2] {
     match trace {
         Some(trace) if !trace.rolling => {
             // A longer rest is seen while it lasts.
-            let from = (-LEAD_S).min(last(trace) - RESTED_S);
-            [trace.t.first().copied().unwrap_or(0.0).max(from), last(trace).max(TRIAL_S)]
+            let from = (trace.closing_s - LEAD_S).min(last(trace) - RESTED_S);
+            [trace.t.first().copied().unwrap_or(0.0).max(from), last(trace).max(trace.closing_s + TRIAL_S)]
         }
         Some(trace) => [last(trace).max(ROLLING_S) - ROLLING_S, last(trace).max(ROLLING_S)],
         None => [0.0, ROLLING_S],
@@ -453,12 +463,12 @@ mod tests {
     #[test]
     fn a_long_rest_is_seen_while_it_lasts() {
         let span = |last: f64| {
-            let t: Vec<f64> = (0..).map(|k| -4.0 + 0.02 * f64::from(k)).take_while(|t| *t <= last).collect();
-            gripper_span(Some(&GraspTrace { t, ..GraspTrace::default() }))
+            let t: Vec<f64> = (0..).map(|k| 0.02 * f64::from(k)).take_while(|t| *t <= last).collect();
+            gripper_span(Some(&GraspTrace { t, closing_s: 4.0, ..GraspTrace::default() }))
         };
-        assert_eq!(span(-4.0)[0], -4.0);
-        assert!((span(-2.0)[0] + 3.0).abs() < 1e-9, "{:?}", span(-2.0));
+        assert_eq!(span(0.0), [0.0, 4.0 + TRIAL_S]);
+        assert!((span(2.0)[0] - 1.0).abs() < 1e-9, "{:?}", span(2.0));
         // Then as much of it as of any other.
-        assert_eq!(span(1.0)[0], -LEAD_S);
+        assert_eq!(span(5.0), [4.0 - LEAD_S, 4.0 + TRIAL_S]);
     }
 }

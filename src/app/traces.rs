@@ -18,6 +18,8 @@ pub struct GraspTrace {
     pub rolling: bool,
     /// Its trial was discarded: it is not drawn behind later ones.
     pub discarded: bool,
+    /// Time at which the fingers begin to close (s); zero where unknown.
+    pub closing_s: f64,
     /// Times (s).
     pub t: Vec<f64>,
     /// Line pressures (bar).
@@ -119,6 +121,7 @@ impl TraceHistory {
         if !row.rolling && last.t.len() > 1 && row.sample.t_s <= last.t[0] {
             last.clear();
         }
+        last.closing_s = row.closing_s;
         last.t.push(row.sample.t_s);
         last.line_bar.push(row.sample.line_bar);
         last.frames.push(row.frame.clone());
@@ -191,7 +194,7 @@ mod tests {
 
     fn row(grasp: u64, rolling: bool, t_s: f64, values: impl Into<Box<[f32]>>) -> TraceRow {
         let sample = Row { t_s, line_bar: 0.5, phase: None, values: values.into() };
-        TraceRow { grasp, rolling, sample, errors: Box::default(), frame: None, answer: None }
+        TraceRow { grasp, rolling, sample, closing_s: 0.0, errors: Box::default(), frame: None, answer: None }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::calibration::{calibrated, parts};
 use crate::scripted;
 use crate::streams;
 use palpate_device::emulator::{EmulatorSetup, HandPlan, HiddenParts, parse_faults};
-use palpate_lab::grasping::GraspStage;
+use palpate_lab::grasping::{GraspStage, LEAD_S};
 use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{
@@ -209,7 +209,10 @@ fn a_driven_trial_is_recorded_with_its_rest_and_its_phases() {
     let own: Vec<&TraceRow> = desk.rows.iter().filter(|row| row.grasp == 2).collect();
     assert!(own.iter().all(|row| !row.rolling && row.sample.values.len() == 6 + 4));
     let [first_s, last_s] = [own[0], own[own.len() - 1]].map(|row| row.sample.t_s);
-    assert!(first_s < -0.9 && last_s > 3.9, "{first_s} to {last_s}");
+    // Its times are those of the stored trial.
+    let began_s = trial.course.began_s;
+    assert!((0.0..0.9).contains(&first_s) && last_s > close - began_s + 3.9, "{first_s} to {last_s}");
+    assert!((own[own.len() - 1].closing_s - (close - began_s)).abs() < 1e-9, "{close} {began_s}");
     assert!(desk.rows.iter().filter(|row| row.grasp == 1).all(|row| row.rolling));
 }
 
@@ -270,9 +273,11 @@ fn trials_are_ended_begun_anew_and_given_up() {
     desk.connect();
     desk.command(GripperCommand::Begin(request()));
     let first = desk.until(numbered).trial.clone().unwrap();
-    assert_eq!(first.length_s.map(|s| (s * 10.0).round()), Some(44.0));
+    // Time counts from the beginning of the recording, as when the trial is opened; 4.4 s from the closing on.
+    let closing_s = first.length_s.unwrap() - 4.4;
+    assert!((LEAD_S..LEAD_S + 0.35).contains(&closing_s), "{first:?}");
     // A busy machine may see it only after its lead.
-    assert_eq!(first.stage == GraspStage::Lead, first.t_s < 0.0, "{first:?}");
+    assert_eq!(first.stage == GraspStage::Lead, first.t_s < closing_s, "{first:?}");
     // Another begins: the first ends there and is kept.
     desk.command(GripperCommand::Begin(request()));
     let second = desk.until(|view| numbered(view) && view.trial.as_ref().is_some_and(|trial| trial.id != first.id));

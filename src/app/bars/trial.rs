@@ -7,7 +7,7 @@ use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
 use palpate_geometry::units::SPACE;
-use palpate_lab::grasping::{GraspStage, LEAD_S};
+use palpate_lab::grasping::GraspStage;
 use palpate_lab::workers::{GripperCommand, GripperView, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
 
@@ -67,7 +67,7 @@ fn progress_ui(ui: &mut Ui, trial: &TrialView, ink: Rgb, ground: Rgb) {
     let Some(length_s) = trial.length_s.filter(|_| ui.available_width() > 60.0) else { return };
     let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width() - 6.0, 16.0), egui::Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, "Time in the trial"));
-    let share = ((trial.t_s + LEAD_S) / (length_s + LEAD_S)).clamp(0.0, 1.0) as f32;
+    let share = (trial.t_s / length_s).clamp(0.0, 1.0) as f32;
     ui.painter().rect_filled(rect, 3.0, colour(ground));
     let done = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * share, rect.height()));
     ui.painter().rect_filled(done, 3.0, veil(ink, 0.55));

@@ -135,16 +135,18 @@ pub(super) fn add_gaps(plot_ui: &mut egui_plot::PlotUi<'_>, gaps: &[[f64; 2]], t
     }
 }
 
+/// Draws the curves of a grasp, later by `by_s`.
 pub(super) fn add_curves(
     plot_ui: &mut egui_plot::PlotUi<'_>,
     trace: &GraspTrace,
+    by_s: f64,
     plot: &TimePlot<'_>,
     shade: impl Fn(&PlotCurve) -> Color32,
     width: f32,
 ) {
     for curve in &plot.curves {
         let style = if curve.dashed { LineStyle::Dashed { length: 7.0 } } else { LineStyle::Solid };
-        for points in runs(trace, curve) {
+        for points in runs(trace, by_s, curve) {
             plot_ui.line(
                 Line::new("", PlotPoints::from(points))
                     .id(egui::Id::unique((&curve.name, trace.grasp, width.to_bits())))
@@ -157,13 +159,13 @@ pub(super) fn add_curves(
     }
 }
 
-/// Parts of a curve where it is defined, as points of time (s) and value. Nothing is drawn between them: some line styles
+/// Parts of a curve where it is defined, as points of time (s), later by `by_s`, and value. Nothing is drawn between them: some line styles
 /// break off at a point that is not a number, others forbid it.
-fn runs(trace: &GraspTrace, curve: &PlotCurve) -> Vec<Vec<[f64; 2]>> {
+fn runs(trace: &GraspTrace, by_s: f64, curve: &PlotCurve) -> Vec<Vec<[f64; 2]>> {
     let mut runs = vec![Vec::new()];
     for (k, t) in trace.t.iter().enumerate() {
         match ((curve.values)(trace, k).filter(|value| value.is_finite()), runs.last_mut()) {
-            (Some(value), Some(run)) => run.push([*t, value]),
+            (Some(value), Some(run)) => run.push([*t + by_s, value]),
             (None, Some(run)) if !run.is_empty() => runs.push(Vec::new()),
             _ => {}
         }
@@ -204,6 +206,6 @@ mod tests {
             half_width: Box::new(|_, _| None),
             channel: None,
         };
-        assert_eq!(runs(&trace, &curve), [vec![[1.0, 1.0], [2.0, 2.0]], vec![[5.0, 3.0]]]);
+        assert_eq!(runs(&trace, 0.0, &curve), [vec![[1.0, 1.0], [2.0, 2.0]], vec![[5.0, 3.0]]]);
     }
 }

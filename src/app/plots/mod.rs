@@ -121,8 +121,11 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         plot_ui.set_plot_bounds_y(low..=high);
         layers::add_phases(plot_ui, data, [from, to], high - 0.04 * (high - low));
         layers::add_gaps(plot_ui, &gaps, theme);
+        let closing_s = data.traces.current().map_or(0.0, |trace| trace.closing_s);
         for trace in data.traces.earlier() {
-            layers::add_curves(plot_ui, trace, &plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0);
+            // Closing begins at the same place.
+            let by_s = closing_s - trace.closing_s;
+            layers::add_curves(plot_ui, trace, by_s, &plot, |c| veil(c.trace.colour(theme), EARLIER), 1.0);
         }
         if data.view.class_bands {
             layers::add_class_bands(plot_ui, data, &plot);
@@ -130,11 +133,11 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
         for compared in data.comparison.traces {
             let ink = series_colour(compared.colour, theme);
             layers::add_spread(plot_ui, compared, &plot, ink);
-            layers::add_curves(plot_ui, &compared.trace, &plot, |_| colour(ink), 1.3);
+            layers::add_curves(plot_ui, &compared.trace, 0.0, &plot, |_| colour(ink), 1.3);
         }
         if let Some(trace) = data.traces.current() {
             layers::add_bands(plot_ui, trace, &plot, theme);
-            layers::add_curves(plot_ui, trace, &plot, |c| own_ink(data, c), 1.8);
+            layers::add_curves(plot_ui, trace, 0.0, &plot, |c| own_ink(data, c), 1.8);
         }
         if nothing.is_none() {
             layers::add_cursor(plot_ui, data);

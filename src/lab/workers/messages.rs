@@ -93,8 +93,10 @@ pub struct TraceRow {
     pub grasp: u64,
     /// True outside of grasps: live view, of which plots show only the last seconds.
     pub rolling: bool,
-    /// The sample, with its time in the grasp and a value per channel of the snapshot's list.
+    /// The sample, with its time since the beginning of the trial and a value per channel of the snapshot's list.
     pub sample: Row,
+    /// Time at which the fingers begin or began to close (s); zero where unknown.
+    pub closing_s: f64,
     /// Estimated numerical error of each value, in its unit; empty without a refined run.
     pub errors: Box<[f32]>,
     /// Fingers and object at that time; none for a real gripper.

@@ -103,9 +103,9 @@ pub struct TrialView {
     pub stage: GraspStage,
     /// Time left in this stage (s), where known.
     pub left_s: Option<f64>,
-    /// Time since the closing began; negative before it (s).
+    /// Time since its beginning (s).
     pub t_s: f64,
-    /// Length of the trial from the beginning of the closing (s), where it is known.
+    /// Length (s), where it is known.
     pub length_s: Option<f64>,
     /// Readings so far.
     pub samples: u64,

@@ -385,10 +385,12 @@ impl GripperSession {
         let (grasp, from_s) = self.stretch;
         let rolling = self.recording.is_none();
         let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
+        let closing_s = self.recording.as_ref().and_then(|recording| recording.controller.closing_s());
+        let closing_s = closing_s.map_or(0.0, |closing_s| closing_s - from_s);
         for row in rows {
             let sample = Row { t_s: row.t_s - from_s, ..row };
-            let answer = answer.clone();
-            self.publisher.row(TraceRow { grasp, rolling, sample, errors: Box::default(), frame: None, answer });
+            let (errors, answer) = (Box::default(), answer.clone());
+            self.publisher.row(TraceRow { grasp, rolling, sample, closing_s, errors, frame: None, answer });
         }
     }
 

@@ -347,7 +347,8 @@ impl Session {
         }
         sample.values = sample.values[..plotted].into();
         let answer = self.recognition.as_ref().and_then(LiveRecognition::view);
-        self.publisher.row(TraceRow { grasp: self.grasp, rolling: false, sample, errors, frame: Some(frame), answer });
+        let (grasp, frame) = (self.grasp, Some(frame));
+        self.publisher.row(TraceRow { grasp, rolling: false, sample, closing_s: 0.0, errors, frame, answer });
     }
 
     fn end_grasp(&mut self) {

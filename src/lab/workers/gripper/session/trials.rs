@@ -164,7 +164,7 @@ impl GripperSession {
             request,
             from_s,
         );
-        self.begin_stretch(recording.controller.closing_s().unwrap_or(recording.began_s));
+        self.begin_stretch(recording.began_s);
         self.recording = Some(recording);
         self.recording_id = None;
         self.begun += 1;
@@ -251,15 +251,14 @@ impl GripperSession {
     /// The view of a trial that is recorded.
     pub(super) fn trial_view(&self, recording: &BoardTrialRecording, now_s: f64) -> TrialView {
         let controller = &recording.controller;
-        let closing_s = controller.closing_s().unwrap_or(recording.began_s);
         let (stage, until_s) = controller.stage(now_s);
         TrialView {
             id: self.recording_id,
             request: recording.request.clone(),
             stage,
             left_s: until_s.map(|until_s| (until_s - now_s).max(0.0)),
-            t_s: now_s - closing_s,
-            length_s: controller.end_s().map(|end_s| end_s - closing_s),
+            t_s: now_s - recording.began_s,
+            length_s: controller.end_s().map(|end_s| end_s - recording.began_s),
             samples: recording.samples,
             automatic: recording.automatic,
             adapting: self.adapting,
