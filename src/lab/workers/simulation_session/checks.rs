@@ -95,15 +95,7 @@ impl Session {
             sample.values = sample.values[..plotted].into();
             let (errors, frame) = (Box::default(), Some(Arc::new(frame.clone())));
             // The recogniser has answered to the first computation only.
-            self.publisher.row(TraceRow {
-                grasp,
-                rolling: false,
-                sample,
-                closing_s: 0.0,
-                errors,
-                frame,
-                answer: None,
-            });
+            self.publisher.row(TraceRow { grasp, rolling: false, sample, closing_s: 0.0, errors, frame, answer: None });
         }
         if let Some(frame) = trial.frames().last() {
             current.frame = Arc::new(frame.clone());
