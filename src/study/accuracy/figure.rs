@@ -124,6 +124,11 @@ fn worth(study: &AccuracyStudy) -> Plot {
             marks.push((look, DataPoint { spread, label, ..DataPoint::new(row.cpu_ms, score.f1.estimate) }));
         }
     }
+    let mut series = series_of(marks);
+    if series.iter().any(|series| series.marker == Marker::Square) {
+        let name = "other settings".to_owned();
+        series.push(DataSeries { name, colour: NO_SERIES, marker: Marker::Square, ..DataSeries::default() });
+    }
     let knee = study.knee().map(|row| {
         let text = format!("knee: {}", row.setting.name);
         ReferenceLine { horizontal: false, at: row.cpu_ms, text }
@@ -133,7 +138,7 @@ fn worth(study: &AccuracyStudy) -> Plot {
         x: PlotAxis::logarithmic("CPU time of a training grasp (ms)"),
         y: PlotAxis::linear("macro F1 after one grasp"),
         references: knee.into_iter().collect(),
-        series: series_of(marks),
+        series,
         ..Plot::default()
     }
 }
