@@ -10,7 +10,7 @@ use palpate_lab::picture::Stage;
 use palpate_lab::why::{Band, bands_for};
 use palpate_lab::workers::{ExplainRequest, GripperView, Snapshot};
 use palpate_sim::frame::Frame;
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::{capital_title, object_title};
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Board;
@@ -42,6 +42,8 @@ pub(super) struct DisplayedData<'a> {
     pub(super) blind: bool,
     /// The object in the simulated hand was learned free and is fixed, or the other way round.
     pub(super) learned_otherwise: bool,
+    /// Class as which a model has learned the file of the open trial.
+    pub(super) learned_name: Option<&'a str>,
     /// The model has not learned the fingers that are simulated.
     pub(super) other_fingers: bool,
 }
@@ -344,7 +346,12 @@ impl<'a> DisplayedData<'a> {
     pub(super) fn recognised(&self) -> Option<Recognised<'a>> {
         match self.source {
             ViewSource::Trial => self.inspected.map(|Inspected { trial, cursor_s, .. }| {
-                let object = trial.header.object.as_str();
+                // An object that was renamed since has its new name.
+                let knows = |name: &str| trial.answers.last().is_some_and(|view| view.labels.class(name).is_some());
+                let (object, title) = match self.learned_name.filter(|_| !knows(&trial.header.object)) {
+                    Some(name) => (name, capital_title(name)),
+                    None => (trial.header.object.as_str(), trial.title.clone()),
+                };
                 Recognised {
                     // Before the cursor is moved, the answer to the whole grasp.
                     view: match self.playback.cursor_s {
@@ -352,7 +359,7 @@ impl<'a> DisplayedData<'a> {
                         Some(_) => trial.at(cursor_s).and_then(|now| now.answer),
                     },
                     off: trial.recognition_off.as_deref(),
-                    truth: (!object.is_empty()).then(|| (object, trial.title.clone())),
+                    truth: (!object.is_empty()).then_some((object, title)),
                     nothing_held: trial.nothing_held(),
                     waiting: "Fingers closing",
                     again: GRASPING_AGAIN,

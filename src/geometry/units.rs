@@ -105,6 +105,12 @@ pub fn shown(value: f64, unit: &str) -> String {
     format!("{}{SPACE}{}", number(value, unit), symbol(unit))
 }
 
+/// A difference of two such values, with its sign and a decimal more: values that read alike may differ.
+pub fn difference(value: f64, unit: &str) -> String {
+    let text = decimals(unit).map_or_else(|| true_minus(&three_digits(value)), |decimals| fixed(value, decimals + 1));
+    if value > 0.0 { format!("+{text}") } else { text }
+}
+
 /// A number at an axis: without trailing zeros.
 pub fn mark(value: f64) -> String {
     let text = true_minus(&three_digits(value));
@@ -122,6 +128,7 @@ mod tests {
         assert_eq!(texts, ["0.57 N", "0.00 N", "31.0 kPa", "−7.29 m⁻¹", "−1.50 m⁻¹/s", "0.00412 V"]);
         assert_eq!([mark(-0.5), mark(20.0), mark(0.25), mark(-1e-9)], ["−0.5", "20", "0.25", "0"]);
         assert_eq!(number(f64::NAN, "N"), "–");
+        assert_eq!([difference(0.0071, "N"), difference(-0.0719, "kPa")], ["+0.007", "−0.07"]);
     }
 
     #[test]

@@ -347,7 +347,7 @@ fn before_it_is_calibrated_an_emulated_gripper_shows_its_counts_and_says_how_it_
         desk.until_shown(true, text);
     }
     desk.press(Key::R);
-    desk.until_shown(true, "Recording: the emulated hand moves by itself until driven");
+    desk.until_shown(true, "Recording: the emulated hand moves by itself");
     desk.press(Key::Escape);
     desk.until_told("The emulated hand stays open until a trial with actuation \"board\" drives it");
     desk.press(Key::R);

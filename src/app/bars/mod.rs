@@ -396,7 +396,7 @@ fn speeds(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
     let actual = if status.playing && status.actual_speed > 0.0 {
         format!("{:.2}×", status.actual_speed)
     } else {
-        "–".to_owned()
+        String::new()
     };
     ui.add_sized([46.0, 20.0], egui::Label::new(RichText::new(actual).monospace()))
         .on_hover_text("Actual speed, as a multiple of real time");
@@ -407,7 +407,8 @@ const NAMED: f32 = 620.0;
 
 /// Where grasps are recorded, a button that keeps the last one, and how many grasps there are at most.
 fn recording(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
-    if ui.available_width() > NAMED {
+    let is_wide = ui.available_width() > NAMED;
+    if is_wide {
         ui.weak("Record into");
     }
     let chosen = choice_ui(
@@ -429,6 +430,7 @@ fn recording(ui: &mut Ui, app: &App, status: &Status, actions: &mut Actions) {
     let mut grasps = status.grasps.max(1);
     let unit = if grasps == 1 { " grasp" } else { " grasps" };
     let drag = egui::DragValue::new(&mut grasps).range(1..=1000).speed(0.05).suffix(unit);
+    let drag = if is_wide { drag.prefix("up to ") } else { drag };
     if number_field(ui, "grasps", drag).on_hover_text("Most grasps; all but the first in random poses").changed() {
         actions.push(move |app| app.simulation.send(Command::SetGrasps(grasps)));
     }

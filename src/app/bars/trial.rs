@@ -6,7 +6,7 @@ use crate::app::features::gripper::instruction;
 use crate::app::theme::{colour, veil};
 use egui::{Button, RichText, Ui};
 use palpate_geometry::palette::Rgb;
-use palpate_geometry::units::SPACE;
+use palpate_geometry::units::{SPACE, capital};
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::workers::{GripperCommand, GripperView, LabellingAction, TrialView};
 use palpate_sim::gripper::Phase;
@@ -32,7 +32,11 @@ pub(super) fn ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         ui.separator();
         let colours = app.view.theme.colours();
         match (trial, silent_s) {
-            (Some(trial), _) => {
+            (Some(trial), Some(silent_s)) => {
+                let text = format!("{}: no readings for {silent_s}{SPACE}s", capital(&trial.title()));
+                ui.label(RichText::new(text).heading().strong().color(colour(colours.warning)));
+            }
+            (Some(trial), None) => {
                 let (text, ink) = (instruction(trial), part_colour(app, trial.stage));
                 ui.label(RichText::new(text).heading().strong().color(colour(ink)));
                 progress_ui(ui, trial, ink, colours.raised);
@@ -61,8 +65,8 @@ fn part_colour(app: &App, part: GraspStage) -> Rgb {
 
 /// Progress of the trial, and time left of this part.
 fn progress_ui(ui: &mut Ui, trial: &TrialView, ink: Rgb, ground: Rgb) {
-    let left = trial.left_s.map_or_else(String::new, |left_s| format!("{left_s:.1} s"));
-    ui.add_sized([52.0, 20.0], egui::Label::new(RichText::new(left).monospace()));
+    let left = trial.left_s.map_or_else(String::new, |left_s| format!("{left_s:.1} s left"));
+    ui.add_sized([84.0, 20.0], egui::Label::new(RichText::new(left).monospace()));
     ui.weak(format!("{}, {} readings", trial.title(), trial.samples));
     let Some(length_s) = trial.length_s.filter(|_| ui.available_width() > 60.0) else { return };
     let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width() - 6.0, 16.0), egui::Sense::hover());

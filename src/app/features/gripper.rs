@@ -259,7 +259,7 @@ pub(in crate::app) fn control_title(control: Control) -> &'static str {
 pub(in crate::app) fn instruction(trial: &TrialView) -> &'static str {
     let by_hand = trial.request.control == Control::ByHand;
     match trial.stage {
-        _ if by_hand && trial.emulated => "Recording: the emulated hand moves by itself until driven",
+        _ if by_hand && trial.emulated => "Recording: the emulated hand moves by itself",
         GraspStage::Lead if by_hand => "Get ready to close",
         GraspStage::Lead => "At rest",
         GraspStage::Phase(Phase::Close) if by_hand => "CLOSE: raise the pressure",

@@ -60,6 +60,8 @@ pub struct InspectFeature {
     moved_at: Option<f64>,
     /// The newest trial is opened once the library is read.
     opens_newest: bool,
+    /// Trial that was opened because it was the newest; a newer one takes its place.
+    as_newest: Option<TrialId>,
 }
 
 impl InspectFeature {
@@ -85,6 +87,7 @@ impl InspectFeature {
             grasp: 0,
             moved_at: None,
             opens_newest: false,
+            as_newest: None,
         }
     }
 
@@ -347,7 +350,12 @@ impl App {
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         // A grasp that is being recorded stays in sight.
         let live = self.gripper_view().is_some_and(|gripper| gripper.trial.is_some());
-        let wanted = self.inspect.wanted.or_else(|| self.newest_trial().filter(|_| !live));
+        let chosen = self.inspect.wanted.filter(|id| self.inspect.as_newest != Some(*id));
+        let newest = self.newest_trial().filter(|_| !live && chosen.is_none());
+        let wanted = chosen.or(newest).or(self.inspect.wanted);
+        if mode == Mode::Inspect && newest.is_some() {
+            self.inspect.as_newest = newest;
+        }
         self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && !live;
         match (mode, wanted) {
             (Mode::Inspect, Some(id)) => self.show_trial(id),

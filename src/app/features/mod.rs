@@ -27,6 +27,7 @@ use labelling::LabellingFeature;
 use library::LibraryFeature;
 use notices::Notices;
 use palpate_lab::workers::{GripperView, LabelView, Snapshot};
+use palpate_tactile::trial::TrialSource;
 use presenter::PresenterFeature;
 use recognition::RecognitionFeature;
 use simulation::SimulationFeature;
@@ -110,6 +111,11 @@ impl App {
                 && self.snapshot().is_some_and(|snapshot| {
                     self.recognition.is_learned_otherwise(snapshot.truth(), snapshot.scene.holds_object())
                 }),
+            learned_name: self.inspect.inspected().filter(|_| self.view.source == ViewSource::Trial).and_then(|own| {
+                // Labels name what a real gripper held.
+                let simulated = own.trial.source == TrialSource::Simulated;
+                simulated.then(|| self.name_of_learned(&own.trial.header.scene.object.source))?
+            }),
             other_fingers: match self.view.source {
                 ViewSource::Simulation => self.recognition.has_other_fingers(&self.simulation.scene),
                 ViewSource::Trial => self.inspect.inspected().is_some_and(|own| own.trial.other_fingers),

@@ -71,6 +71,8 @@ pub(in crate::app) struct Notices {
     messages: VecDeque<String>,
     /// When the last message came.
     told: Option<Instant>,
+    /// What was said of the unit of the object: once, until another one is asked for.
+    of_unit: Option<String>,
 }
 
 /// Remedies for a message.
@@ -82,6 +84,9 @@ impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
     fn tell(&mut self, level: Level, text: &str) {
         let text = message(text);
+        if text.contains(ITS_UNIT) && self.of_unit.replace(text.clone()).as_ref() == Some(&text) {
+            return;
+        }
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
         let time = if text.contains(STORE_LOST) { LASTING } else { time };
@@ -155,6 +160,7 @@ impl Notices {
 
     /// Takes away what can be done about an object: another one is asked for.
     pub(in crate::app) fn object_changed(&mut self) {
+        self.of_unit = None;
         self.shown.retain(|shown| ![ITS_HULL, ITS_UNIT].iter().any(|phrase| shown.text.contains(phrase)));
     }
 

@@ -185,10 +185,16 @@ impl App {
     /// Changes the model of the simulation in the object of the last lesson.
     fn change_class(&mut self, change: ClassChange) {
         let Some(Learned { name, fixed, .. }) = &self.recognition.learned else { return };
-        let model = self.recognition.models.of(Shipped::simulated(*fixed));
-        let Some(model) = model.filter(|model| model.card.taught.contains(name)) else { return };
-        let request = TeachRequest { model: Arc::clone(model), name: name.clone(), object: None, change };
-        self.tools.teaching.start(request);
+        let models = &self.recognition.models;
+        let knows = |fixed: bool| {
+            models.of(Shipped::simulated(fixed)).filter(|model| model.card.taught.contains(name)).cloned()
+        };
+        // An object has one name, free or fixed.
+        let other = knows(!*fixed).filter(|_| matches!(change, ClassChange::Renamed(_)));
+        for model in knows(*fixed).into_iter().chain(other) {
+            let (name, change) = (name.clone(), change.clone());
+            self.tools.teaching.start(TeachRequest { model, name, object: None, change });
+        }
     }
 
     /// Uses the model without the object of the last lesson.
@@ -246,6 +252,13 @@ impl App {
     /// Class as which the model in use has learned the object in this file.
     pub(in crate::app) fn learned_as(&self, source: &str) -> Option<&str> {
         let mut learned = self.recognition.learned_from(self.simulation.scene.holds_object());
+        learned.find(|(_, file)| *file == source).map(|(class, _)| class)
+    }
+
+    /// Class as which a model of the simulation has learned the object in this file, if any: the one in use, or else the other.
+    pub(in crate::app) fn name_of_learned(&self, source: &str) -> Option<&str> {
+        let fixed = self.simulation.scene.holds_object();
+        let mut learned = self.recognition.learned_from(fixed).chain(self.recognition.learned_from(!fixed));
         learned.find(|(_, file)| *file == source).map(|(class, _)| class)
     }
 

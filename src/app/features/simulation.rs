@@ -9,7 +9,7 @@ use palpate_lab::workers::{Command, GhostGrasp, Job, MeasuredAccuracy, Notice, R
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Auto, Phase};
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
-use palpate_sim::scene::Scene;
+use palpate_sim::scene::{ObjectSetup, Scene};
 use palpate_store::TrialPlace;
 use palpate_study::Explanation;
 use palpate_study::accuracy::{AccuracyStudy, stored_accuracy};
@@ -100,7 +100,7 @@ impl SimulationFeature {
 
     /// Last grasp of the other engine, where it is to be drawn.
     pub(in crate::app) fn ghost(&self, view: &ViewState) -> Option<Arc<GhostGrasp>> {
-        self.worker.ghost().filter(|_| view.ghost)
+        self.worker.ghost().filter(|_| view.ghost && !view.presents)
     }
 
     /// The scene with another object: a built-in name or a file.
@@ -231,7 +231,8 @@ impl App {
         if scene != self.simulation.scene {
             self.simulation.changes.note(&self.simulation.scene);
         }
-        if scene.object != self.simulation.scene.object {
+        let named = |scene: &Scene| ObjectSetup { name: None, ..scene.object.clone() };
+        if named(&scene) != named(&self.simulation.scene) {
             self.notices.object_changed();
         }
         self.simulation.use_scene(scene);
@@ -258,7 +259,7 @@ impl App {
     pub(super) fn grasp_object(&mut self, source: &str) {
         let mut scene = self.simulation.scene_with(source);
         // A file that the model has learned keeps the name that it had then.
-        scene.object.name = self.learned_as(&scene.object.source).map(str::to_owned);
+        scene.object.name = self.name_of_learned(&scene.object.source).map(str::to_owned);
         self.set_scene(scene);
     }
 

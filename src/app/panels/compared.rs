@@ -9,7 +9,7 @@ use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
-use palpate_geometry::units::{number, symbol};
+use palpate_geometry::units::{difference, number, symbol};
 use palpate_lab::inspection::Alignment;
 use palpate_tactile::trial::TrialId;
 
@@ -122,8 +122,7 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                     ui.label("–");
                     continue;
                 };
-                let sign = if mean > own { "+" } else { "" };
-                let (mean, off) = (number(mean, unit), format!("{sign}{}", number(mean - own, unit)));
+                let (mean, off) = (number(mean, unit), difference(mean - own, unit));
                 // A panel has room for both of one trial.
                 match pinned.len() {
                     1 => ui.label(format!("{mean} ({off})")),

@@ -95,13 +95,13 @@ fn connected_ui(
     ui.horizontal_wrapped(|ui| {
         stop_button(ui, actions);
         if ui
-            .button("Tare")
+            .add_enabled(silent_s.is_none(), Button::new("Tare"))
             .on_hover_text("Set the present readings as zero; nothing may touch the fingers (T)")
             .clicked()
         {
             actions.push(|app| _ = app.gripper.send(GripperCommand::Tare));
         }
-        adapt_button(ui, Some(gripper), control, actions);
+        adapt_button(ui, Some(gripper).filter(|_| silent_s.is_none()), control, actions);
         actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| {
             _ = app.gripper.send(GripperCommand::Disconnect);
         });

@@ -24,7 +24,7 @@ const PICTURE: f32 = 72.0;
 pub(super) fn ui(
     ui: &mut Ui,
     labelling: &LabellingFeature,
-    gripper: Option<&GripperView>,
+    (gripper, silent_s): (Option<&GripperView>, Option<u64>),
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -42,9 +42,9 @@ pub(super) fn ui(
                 wrapped(ui, RichText::new(text).small().color(colour(theme::of(ui).colours().accent)));
                 open.into_iter().for_each(|asked| question_ui(ui, labelling, pictures, (view, asked), actions));
             }
-            (Some(trial), _) if trial.adapting => adapting_ui(ui, trial),
+            (Some(trial), _) if trial.adapting => adapting_ui(ui, (trial, silent_s)),
             (Some(trial), _) => {
-                running_ui(ui, pictures, view, trial);
+                running_ui(ui, pictures, view, (trial, silent_s));
                 answer_ahead_ui(ui, labelling, actions);
             }
             (None, Some(trial)) => question_ui(ui, labelling, pictures, (view, trial), actions),
@@ -121,25 +121,29 @@ fn cue(next: &NextTrial) -> String {
     format!("Placement {}: {turn}{shifts}", next.number)
 }
 
-fn running_ui(ui: &mut Ui, pictures: &Thumbnails, view: &LabelView, trial: &TrialView) {
-    stage_ui(ui, trial);
+fn running_ui(ui: &mut Ui, pictures: &Thumbnails, view: &LabelView, running: (&TrialView, Option<u64>)) {
+    stage_ui(ui, running);
     if let Some(next) = &view.next {
         object_ui(ui, pictures, &next.object, &cue(next));
     }
 }
 
 /// A close to adapt to holds no object.
-fn adapting_ui(ui: &mut Ui, trial: &TrialView) {
+fn adapting_ui(ui: &mut Ui, running: (&TrialView, Option<u64>)) {
     ui.strong("Adapting: take everything out of the hand");
-    stage_ui(ui, trial);
+    stage_ui(ui, running);
 }
 
-/// Instruction, large enough to be read at the control box.
-fn stage_ui(ui: &mut Ui, trial: &TrialView) {
-    let accent = colour(theme::of(ui).colours().accent);
-    ui.label(RichText::new(instruction(trial)).size(26.0).strong().color(accent));
-    if let Some(left_s) = trial.left_s {
-        ui.label(RichText::new(format!("{left_s:.1} s")).size(30.0).monospace());
+/// Instruction, large enough to be read at the control box; without readings there is none.
+fn stage_ui(ui: &mut Ui, (trial, silent_s): (&TrialView, Option<u64>)) {
+    let colours = theme::of(ui).colours();
+    let (text, ink) = match silent_s {
+        Some(silent_s) => (format!("No readings for {silent_s}\u{a0}s"), colours.warning),
+        None => (instruction(trial).to_owned(), colours.accent),
+    };
+    ui.label(RichText::new(text).size(26.0).strong().color(colour(ink)));
+    if let Some(left_s) = trial.left_s.filter(|_| silent_s.is_none()) {
+        ui.label(RichText::new(format!("{left_s:.1} s left")).size(30.0).monospace());
     }
     ui.weak(format!("{}: {} readings", trial.title(), trial.samples));
 }

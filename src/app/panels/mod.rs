@@ -33,6 +33,7 @@ use crate::app::actions::Actions;
 use crate::app::features::App;
 use crate::app::features::view::ViewSource;
 use egui::Ui;
+use palpate_sim::objects::capital_title;
 use view3d::View3d;
 
 /// Kind of a panel.
@@ -57,7 +58,11 @@ pub const ALL: [PanelKind; 35] = [
         let chosen = if simulated { app.simulation.scene.object.source.as_str() } else { "" };
         let learned_as = |path: &str| app.learned_as(path).map(|class| (class, app.lesson(class)));
         let loaded = app.snapshot().map_or("", |snapshot| snapshot.scene.object.source.as_str());
-        objects::ui(ui, (chosen, loaded, &app.view), learned_as, &app.thumbnails, actions);
+        let title_of = |path: &str| match app.name_of_learned(path) {
+            Some(class) => capital_title(class),
+            None => app.view.title_of(path),
+        };
+        objects::ui(ui, (chosen, loaded, &app.view.recent), (title_of, learned_as), &app.thumbnails, actions);
     }),
     panel("view", "3-D view", |ui, app, actions| view3d::ui(ui, &View3d::of(app), actions)),
     panel("curvature", "Curvature", |ui, app, actions| curves::curvature_ui(ui, &app.shown(), actions)),
@@ -77,7 +82,7 @@ pub const ALL: [PanelKind; 35] = [
     panel("effects", "Effects", |ui, app, actions| effects::ui(ui, &app.simulation, actions)),
     panel("accuracy", "Accuracy", |ui, app, actions| accuracy::ui(ui, &app.simulation, actions)),
     panel("label", "Label", |ui, app, actions| {
-        label::ui(ui, &app.labelling, app.gripper_view(), &app.thumbnails, actions);
+        label::ui(ui, &app.labelling, (app.gripper_view(), app.gripper.silent_s()), &app.thumbnails, actions);
     }),
     panel("plan", "Plan", |ui, app, actions| plan::ui(ui, app.labels(), actions)),
     panel("trials", "Trials", |ui, app, actions| trials::ui(ui, &app.labelling, actions)),

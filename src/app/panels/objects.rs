@@ -2,13 +2,12 @@
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
-use crate::app::features::view::ViewState;
 use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
 use palpate_learn::Lesson;
-use palpate_sim::objects::{EMPTY, capital_title, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue};
 use std::ffi::OsStr;
 use std::path::Path;
 
@@ -17,8 +16,8 @@ const THUMBNAIL: f32 = 40.0;
 
 pub(super) fn ui<'a>(
     ui: &mut Ui,
-    (chosen, loaded, view): (&str, &str, &ViewState),
-    learned_as: impl Fn(&str) -> Option<(&'a str, Option<&'a Lesson>)>,
+    (chosen, loaded, recent): (&str, &str, &[String]),
+    (title_of, learned_as): (impl Fn(&str) -> String, impl Fn(&str) -> Option<(&'a str, Option<&'a Lesson>)>),
     pictures: &Thumbnails,
     actions: &mut Actions,
 ) {
@@ -38,10 +37,10 @@ pub(super) fn ui<'a>(
     open_row(ui, loaded, actions);
     ui.add_space(2.0);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for path in &view.recent {
+        for path in recent {
             let texture = pictures.get(path);
             let class = learned_as(path);
-            let title = class.map_or_else(|| view.title_of(path), |(class, _)| capital_title(class));
+            let title = title_of(path);
             let learned = match class {
                 Some((_, Some(Lesson { recognised, tested, .. }))) => {
                     format!("learned: right in {recognised} of {tested}, ")

@@ -322,6 +322,7 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
     let left_out =
         if report.left_out > 0 { format!("; {} have other channels", report.left_out) } else { String::new() };
     let compared = match report.older {
+        0 if report.compared == 1 => "1 trial is compared".to_owned(),
         0 => format!("{} trials are compared", report.compared),
         older => format!("The newest {} trials are compared, {older} older ones are not", report.compared),
     };

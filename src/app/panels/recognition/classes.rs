@@ -42,7 +42,7 @@ pub(super) fn ui(ui: &mut Ui, part: &mut Part<'_, '_>, (columns, line): (usize, 
     let width = (all.width() - GUTTER * (columns as f32 - 1.0)) / columns as f32;
     // Names stand on the bars of two columns, so that there is room for both.
     let on_bars = columns > 1;
-    let numbers = if on_bars { 29.0 } else { 46.0 };
+    let numbers = if on_bars { (0.24 * width).clamp(29.0, 37.0) } else { 46.0 };
     let names = if on_bars { [4.0, width - numbers - 2.0] } else { [0.0, (0.40 * width).min(104.0) + 2.0] };
     let usual = (names[1] - names[0]) * if on_bars { ON_BAR } else { 1.0 };
     let bars = [if on_bars { 0.0 } else { names[1] + 2.0 }, width - numbers];

@@ -65,8 +65,12 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
     let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
     let spoken = format!("{name} {text}");
+    let told = match estimate {
+        Some(estimate) if is_vague(estimate) => "it is longer with 95 % probability; how much is not felt",
+        _ => "median, and the range that holds the true value with 90 % probability",
+    };
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
-        .on_hover_text(format!("{about}: median, and the range that holds the true value with 90 % probability"))
+        .on_hover_text(format!("{about}: {told}"))
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
@@ -78,14 +82,11 @@ fn is_vague(estimate: &MeasureEstimate) -> bool {
     estimate.range[1] > VAGUE * estimate.range[0]
 }
 
-/// An estimate in words: `34 mm (30 to 38)`; `16 to 82 mm` where little is known.
+/// An estimate in words: `34 mm (30 to 38)`; `over 16 mm` where little is known. The other end of a long range is that of the
+/// objects that were learned, which the fingers do not feel: a bottle is longer.
 fn words(estimate: &MeasureEstimate, between: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    if is_vague(estimate) {
-        format!("{from:.0}{between}{to:.0} mm")
-    } else {
-        format!("{value:.0} mm ({from:.0}{between}{to:.0})")
-    }
+    if is_vague(estimate) { format!("over {from:.0} mm") } else { format!("{value:.0} mm ({from:.0}{between}{to:.0})") }
 }
 
 fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
@@ -105,6 +106,7 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
         if let Some(estimate) = estimate {
             let at = |x: f64| bar.left() + bar.width() * (x * 1e3 / LONGEST).clamp(0.0, 1.0) as f32;
             let [from, to] = estimate.range.map(at);
+            let to = if is_vague(estimate) { bar.right() } else { to };
             let range = Rect::from_min_max(pos2(from, bar.top()), pos2(to.max(from + 2.0), bar.bottom()));
             ui.painter().rect_filled(range, 2.0, colour(colours.background.mix(colours.accent, 0.45)));
             let middle = Rect::from_center_size(pos2(at(estimate.value), bar.center().y), vec2(2.5, height * 0.7));
@@ -126,7 +128,7 @@ mod tests {
         let of =
             |value: f64, range: [f64; 2]| words(&MeasureEstimate { measure: Measure::Height, value, range }, " to ");
         assert_eq!(of(0.034, [0.030, 0.038]), "34 mm (30 to 38)");
-        assert_eq!(of(0.036, [0.016, 0.082]), "16 to 82 mm");
+        assert_eq!(of(0.036, [0.016, 0.082]), "over 16 mm");
         assert_eq!(of(0.0, [0.0, 0.0]), "0 mm (0 to 0)");
     }
 }

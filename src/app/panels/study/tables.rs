@@ -5,7 +5,7 @@ use crate::app::actions::Actions;
 use crate::app::features::studies::Studies;
 use crate::app::theme::{self, colour};
 use crate::app::widgets::put_line;
-use egui::{Align2, Color32, FontId, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use egui::{Align, Align2, Color32, FontId, Layout, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_geometry::palette::Theme;
 use palpate_geometry::units::symbol;
 use palpate_study::jobs::StudyResult;
@@ -17,6 +17,8 @@ const GAP: f32 = 14.0;
 const WIDEST: f32 = 300.0;
 /// Size of the texts (points).
 const SIZE: f32 = 12.5;
+/// Rows that are seen in a low panel.
+const IN_SIGHT: usize = 4;
 /// Rows whose texts decide the widths of columns.
 const MEASURED: usize = 300;
 
@@ -42,8 +44,18 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
         });
     }
     let table = tables.get(chosen).unwrap_or(first);
-    ui.add(egui::Label::new(RichText::new(&table.title).strong()).truncate());
-    table_ui(ui, theme::of(ui), &result, table, actions);
+    let first = table.rows.iter().position(|row| opening(&result, row).is_some());
+    let mut goes = false;
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.set_max_height(ROW);
+        if let Some(first) = first.filter(|first| *first >= IN_SIGHT) {
+            goes = ui.small_button(format!("To row {}, which opens trials", first + 1)).clicked();
+        }
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            ui.add(egui::Label::new(RichText::new(&table.title).strong()).truncate());
+        });
+    });
+    table_ui(ui, (theme::of(ui), first.filter(|_| goes)), &result, table, actions);
 }
 
 /// Columns, from their left ends to their right ones, and whether they hold numbers.
@@ -64,7 +76,14 @@ fn columns(ui: &Ui, table: &StudyTable) -> Vec<(f32, f32, bool)> {
     places
 }
 
-fn table_ui(ui: &mut Ui, theme: Theme, result: &StudyResult, table: &StudyTable, actions: &mut Actions) {
+/// Draws a table, from a row on where it is to come into sight.
+fn table_ui(
+    ui: &mut Ui,
+    (theme, sought): (Theme, Option<usize>),
+    result: &StudyResult,
+    table: &StudyTable,
+    actions: &mut Actions,
+) {
     let places = columns(ui, table);
     let colours = theme.colours();
     // Another table begins at its top.
@@ -74,18 +93,17 @@ fn table_ui(ui: &mut Ui, theme: Theme, result: &StudyResult, table: &StudyTable,
         let (header, _) = ui.allocate_exact_size(vec2(whole, ROW), Sense::hover());
         let titles = table.columns.iter().map(|column| symbol(&column.titled()));
         texts(ui, header, &places, titles, colour(colours.quiet_text));
-        ScrollArea::vertical().id_salt(&table.name).auto_shrink(false).show_rows(
-            ui,
-            ROW,
-            table.rows.len(),
-            |ui, rows| {
-                for at in rows {
-                    if let Some(row) = table.rows.get(at) {
-                        row_ui(ui, theme, result, (table, row), (whole, &places), actions);
-                    }
+        let mut rows = ScrollArea::vertical().id_salt(&table.name).auto_shrink(false);
+        if let Some(sought) = sought {
+            rows = rows.vertical_scroll_offset(ROW * sought as f32);
+        }
+        rows.show_rows(ui, ROW, table.rows.len(), |ui, rows| {
+            for at in rows {
+                if let Some(row) = table.rows.get(at) {
+                    row_ui(ui, theme, result, (table, row), (whole, &places), actions);
                 }
-            },
-        );
+            }
+        });
     });
 }
 

@@ -101,7 +101,7 @@ pub struct TrialView {
     pub request: TrialRequest,
     /// Stage of the grasp.
     pub stage: GraspStage,
-    /// Time left in this stage (s), where known.
+    /// Time left in this stage (s), where known; of an emulated hand that moves by itself, in the trial.
     pub left_s: Option<f64>,
     /// Time since its beginning (s).
     pub t_s: f64,

@@ -251,7 +251,11 @@ impl GripperSession {
     /// The view of a trial that is recorded.
     pub(super) fn trial_view(&self, recording: &BoardTrialRecording, now_s: f64) -> TrialView {
         let controller = &recording.controller;
-        let (stage, until_s) = controller.stage(now_s);
+        let emulated = self.connection.as_ref().is_some_and(|connection| connection.board.emulated);
+        let (stage, stage_s) = controller.stage(now_s);
+        // An emulated hand that moves by itself has other stages.
+        let own_stages = emulated && recording.request.control == Control::ByHand;
+        let until_s = if own_stages { controller.end_s() } else { stage_s };
         TrialView {
             id: self.recording_id,
             request: recording.request.clone(),
@@ -262,7 +266,7 @@ impl GripperSession {
             samples: recording.samples,
             automatic: recording.automatic,
             adapting: self.adapting,
-            emulated: self.connection.as_ref().is_some_and(|connection| connection.board.emulated),
+            emulated,
         }
     }
 }
