@@ -183,7 +183,7 @@ impl App {
     }
 
     /// Changes the model of the simulation in the object of the last lesson.
-    fn change_class(&mut self, change: ClassChange) {
+    fn change_class(&mut self, change: &ClassChange) {
         let Some(Learned { name, fixed, .. }) = &self.recognition.learned else { return };
         let models = &self.recognition.models;
         let knows = |fixed: bool| {
@@ -199,7 +199,7 @@ impl App {
 
     /// Uses the model without the object of the last lesson.
     pub(in crate::app) fn forget_learned(&mut self) {
-        self.change_class(ClassChange::Forgotten);
+        self.change_class(&ClassChange::Forgotten);
     }
 
     /// Gives the object of the last lesson another name.
@@ -213,7 +213,7 @@ impl App {
             Err(cause) => return self.notices.failed("name", cause.to_string()),
         };
         self.notices.done("name");
-        self.change_class(ClassChange::Renamed(name));
+        self.change_class(&ClassChange::Renamed(name));
     }
 
     /// Takes in a model in which a learned object has another name, or is forgotten.
