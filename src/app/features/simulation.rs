@@ -9,7 +9,7 @@ use palpate_lab::workers::{Command, GhostGrasp, Job, MeasuredAccuracy, Notice, R
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Auto, Phase};
 use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
-use palpate_sim::scene::{ObjectSetup, Scene};
+use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
 use palpate_study::Explanation;
 use palpate_study::accuracy::{AccuracyStudy, stored_accuracy};
@@ -231,8 +231,8 @@ impl App {
         if scene != self.simulation.scene {
             self.simulation.changes.note(&self.simulation.scene);
         }
-        let named = |scene: &Scene| ObjectSetup { name: None, ..scene.object.clone() };
-        if named(&scene) != named(&self.simulation.scene) {
+        let (new, old) = (&scene.object, &self.simulation.scene.object);
+        if (&new.source, new.scale, new.collision) != (&old.source, old.scale, old.collision) {
             self.notices.object_changed();
         }
         self.simulation.use_scene(scene);
