@@ -49,8 +49,8 @@ impl ExportRequest {
         let shown = format!("{} {plot}", figure.title).to_lowercase();
         let words: Vec<&str> = shown.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
         // As many whole words as there is room for.
-        let whole = (1..=words.len()).rev().map(|count| words[..count].join("_"));
-        let name = whole.into_iter().find(|name| name.chars().count() <= LONGEST_NAME).unwrap_or_default();
+        let mut whole = (1..=words.len()).rev().map(|count| words[..count].join("_"));
+        let name = whole.find(|name| name.chars().count() <= LONGEST_NAME).unwrap_or_default();
         if name.is_empty() { "palpate".to_owned() } else { name }
     }
 

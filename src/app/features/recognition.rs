@@ -257,9 +257,9 @@ impl App {
 
     /// Class as which a model of the simulation has learned the object in this file, if any: the one in use, or else the other.
     pub(in crate::app) fn name_of_learned(&self, source: &str) -> Option<&str> {
-        let fixed = self.simulation.scene.holds_object();
-        let mut learned = self.recognition.learned_from(fixed).chain(self.recognition.learned_from(!fixed));
-        learned.find(|(_, file)| *file == source).map(|(class, _)| class)
+        let mut otherwise = self.recognition.learned_from(!self.simulation.scene.holds_object());
+        let other = || otherwise.find(|(_, file)| *file == source).map(|(class, _)| class);
+        self.learned_as(source).or_else(other)
     }
 
     /// How well the model in use knows a class that it has learned.

@@ -65,12 +65,12 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
     let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
     let spoken = format!("{name} {text}");
-    let told = match estimate {
+    let meaning = match estimate {
         Some(estimate) if is_vague(estimate) => "it is longer with 95 % probability; how much is not felt",
         _ => "median, and the range that holds the true value with 90 % probability",
     };
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
-        .on_hover_text(format!("{about}: {told}"))
+        .on_hover_text(format!("{about}: {meaning}"))
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
