@@ -162,6 +162,8 @@ pub(super) fn port_field(ui: &mut Ui, id: egui::Id) -> Option<PathBuf> {
     named
 }
 
+/// Opacity of values that were read in the past.
+pub(super) const PAST: f32 = 0.45;
 /// Hint in an empty field for a port.
 pub(super) const ANY_PORT: &str = "automatic";
 
@@ -177,7 +179,8 @@ pub(super) fn stop_button(ui: &mut Ui, actions: &mut Actions) {
 
 /// Button that calibrates the sensors by one close of the empty hand.
 pub(super) fn adapt_button(ui: &mut Ui, gripper: Option<&GripperView>, control: Control, actions: &mut Actions) {
-    let free = gripper.is_some_and(|gripper| gripper.trial.is_none()) && control != Control::Free;
+    let free =
+        gripper.is_some_and(|gripper| gripper.trial.is_none() && !gripper.is_silent()) && control != Control::Free;
     let button = ui.add_enabled(free, Button::new("Adapt")).on_hover_text(
         "Close the empty hand once and calibrate the sensors by it, so that objects are recognised without labels. Sensors \
          that were calibrated by hand stay so",

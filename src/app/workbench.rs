@@ -108,6 +108,15 @@ pub struct Workbench {
 /// Width of the ring around the widget that has the keyboard (points).
 const RING: f32 = 2.0;
 
+/// Closes an open list when what is under it scrolls: it would stay over other rows.
+fn leave_list(ctx: &egui::Context) {
+    let scrolls = ctx.input(|i| i.events.iter().any(|event| matches!(event, egui::Event::MouseWheel { .. })));
+    let layer = ctx.input(|i| i.pointer.hover_pos()).and_then(|place| ctx.layer_id_at(place));
+    if scrolls && layer.is_none_or(|layer| layer.order < egui::Order::Foreground) {
+        egui::Popup::close_all(ctx);
+    }
+}
+
 /// Rings the widget that has the keyboard, whatever it is.
 fn focus_ring(ctx: &egui::Context, theme: Theme) {
     let Some(focused) = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id)) else { return };
@@ -260,6 +269,7 @@ impl Workbench {
         let mut layout = self.app.view.layouts.remove(&mode).unwrap_or_else(|| modes::default_layout(mode));
         let app = &self.app;
         keys::pressed(app, &mut actions);
+        leave_list(&ctx);
         let colours = app.view.theme.colours();
         let bar = Frame::new().fill(colour(colours.raised)).inner_margin(Margin::symmetric(12, 6));
         Panel::top("top").exact_size(40.0).frame(bar).show(ui, |ui| bars::top(ui, app, &mut actions));

@@ -8,7 +8,7 @@ use super::prelude::*;
 use super::recognise::{StageOne, left_in_words, named};
 use palpate_geometry::units::{mm, percent, three_digits};
 use palpate_lab::grasping::{GraspSummary, Identification, SHAPES};
-use palpate_learn::{Measure, Model, OTHER, StopReason, StopRule};
+use palpate_learn::{Measure, MeasureEstimate, Model, OTHER, StopReason, StopRule};
 use palpate_sim::objects::titled;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -245,6 +245,9 @@ struct Touched {
     width_mm: [f64; 3],
     /// Extent along the gripper's axis (mm).
     height_mm: [f64; 3],
+    /// True where width, and height, are only known to be over the first end of their ranges.
+    #[serde(skip)]
+    is_vague: [bool; 2],
     /// Likeliest shape.
     shape: &'static str,
     shape_probability: f64,
@@ -254,21 +257,26 @@ impl Touched {
     /// The newest estimate; none before the first contact.
     fn of(identification: &Identification) -> Option<Self> {
         let measured = identification.view().measured?;
-        let of = |measure: Measure| {
-            let estimate = measured.of(measure)?;
+        let [width, height] = [measured.of(Measure::Width)?, measured.of(Measure::Height)?];
+        let of = |estimate: &MeasureEstimate| {
             let tenths = |metres: f64| (mm(metres) * 10.0).round() * 0.1;
-            Some([estimate.value, estimate.range[0], estimate.range[1]].map(tenths))
+            [estimate.value, estimate.range[0], estimate.range[1]].map(tenths)
         };
         let (shape, shape_probability) = measured.shape.top();
         let shape = SHAPES.get(shape)?.name();
-        Some(Self { width_mm: of(Measure::Width)?, height_mm: of(Measure::Height)?, shape, shape_probability })
+        let is_vague = [width, height].map(MeasureEstimate::is_vague);
+        Some(Self { width_mm: of(width), height_mm: of(height), is_vague, shape, shape_probability })
     }
 }
 
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let of = |[value, low, high]: [f64; 3]| format!("{value:.0} mm ({low:.0} to {high:.0})");
-        let (width, height, shape) = (of(self.width_mm), of(self.height_mm), self.shape);
+        let of = |[value, low, high]: [f64; 3], is_vague: bool| match is_vague {
+            true => format!("over {low:.0} mm"),
+            false => format!("{value:.0} mm ({low:.0} to {high:.0})"),
+        };
+        let [width, height] = [of(self.width_mm, self.is_vague[0]), of(self.height_mm, self.is_vague[1])];
+        let shape = self.shape;
         write!(f, "{width} wide, {height} high, {shape} ({})", percent(self.shape_probability))
     }
 }

@@ -182,11 +182,11 @@ impl App {
         });
     }
 
-    /// Exports a figure of the trial that is open and of those compared with it.
+    /// Exports a figure of the trial that is open and of those compared with it; heat maps are those of the open trial.
     pub(in crate::app) fn export_figure(&mut self, options: FigureOptions) {
         let own = self.inspect.inspected().map(|own| own.trial.as_ref());
         let others = self.inspect.pinned.iter().filter(|pinned| own.is_none_or(|own| own.id != pinned.trial.id));
-        let others = others.map(|pinned| (pinned.trial.as_ref(), pinned.colour));
+        let others = others.filter(|_| options.heat.is_none()).map(|own| (own.trial.as_ref(), own.colour));
         let shown = own.into_iter().map(|own| (own, SHOWN_SERIES));
         let (trials, colours): (Vec<&OpenTrial>, Vec<usize>) = shown.chain(others).unzip();
         if trials.is_empty() {

@@ -3,7 +3,6 @@
 use super::App;
 use super::view::ViewSource;
 use crate::app::traces::TraceHistory;
-use palpate_device::serial::LinkState;
 use palpate_lab::grasping::GraspStage;
 use palpate_lab::recording::TrialRequest;
 use palpate_lab::workers::{Command, GripperCommand, GripperView, GripperWorker, Notice, TrialView};
@@ -85,8 +84,7 @@ impl GripperFeature {
 
     /// Time for which a connected board has sent no readings (s); none while they come. What was read before is not so any more.
     pub(in crate::app) fn silent_s(&self) -> Option<u64> {
-        let link = self.view.as_ref()?.link.as_ref()?;
-        (link.state != LinkState::Listening).then(|| self.heard.elapsed().as_secs())
+        self.view.as_ref()?.is_silent().then(|| self.heard.elapsed().as_secs())
     }
 
     /// Vents the fingers, where a board is connected.

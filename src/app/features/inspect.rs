@@ -60,8 +60,8 @@ pub struct InspectFeature {
     moved_at: Option<f64>,
     /// The newest trial is opened once the library is read.
     opens_newest: bool,
-    /// Trial that was opened because it was the newest; a newer one takes its place.
-    as_newest: Option<TrialId>,
+    /// The newest trial when Inspect mode was left; a newer one takes the place of the trial that is open.
+    newest_then: Option<TrialId>,
 }
 
 impl InspectFeature {
@@ -87,7 +87,7 @@ impl InspectFeature {
             grasp: 0,
             moved_at: None,
             opens_newest: false,
-            as_newest: None,
+            newest_then: None,
         }
     }
 
@@ -345,23 +345,26 @@ impl App {
         self.inspect.show_live(&mut self.view);
     }
 
-    /// Shows the open trial in Inspect mode, or the newest of the library unless a real gripper is connected; in the others
-    /// the live gripper.
+    /// Shows the open trial in Inspect mode, or the newest where there is a newer one, unless one is being recorded; in the
+    /// others the live gripper.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
+        let is_shown = self.view.source == ViewSource::Trial;
+        if mode != Mode::Inspect {
+            self.inspect.show_live(&mut self.view);
+            if is_shown {
+                self.inspect.newest_then = self.newest_trial();
+            }
+            return;
+        }
         // A grasp that is being recorded stays in sight.
         let live = self.gripper_view().is_some_and(|gripper| gripper.trial.is_some());
-        let chosen = self.inspect.wanted.filter(|id| self.inspect.as_newest != Some(*id));
-        let newest = self.newest_trial().filter(|_| !live && chosen.is_none());
-        let wanted = chosen.or(newest).or(self.inspect.wanted);
-        if mode == Mode::Inspect && newest.is_some() {
-            self.inspect.as_newest = newest;
-        }
-        self.inspect.opens_newest = mode == Mode::Inspect && wanted.is_none() && !live;
-        match (mode, wanted) {
-            (Mode::Inspect, Some(id)) => self.show_trial(id),
-            (Mode::Inspect, None) | (Mode::Demo | Mode::Label | Mode::Study, _) => {
-                self.inspect.show_live(&mut self.view);
-            }
+        let newest = self.newest_trial().filter(|_| !live);
+        let newer = newest.filter(|_| !is_shown && newest != self.inspect.newest_then);
+        let wanted = newer.or(self.inspect.wanted).or(newest);
+        self.inspect.opens_newest = wanted.is_none() && !live;
+        match wanted {
+            Some(id) => self.show_trial(id),
+            None => self.inspect.show_live(&mut self.view),
         }
     }
 

@@ -71,8 +71,13 @@ pub(in crate::app) struct Notices {
     messages: VecDeque<String>,
     /// When the last message came.
     told: Option<Instant>,
-    /// What was said of the unit of the object: once, until another one is asked for.
-    of_unit: Option<String>,
+    /// What was said of the object: once, until another one is asked for.
+    of_object: Vec<String>,
+}
+
+/// True for what is said of an object when it is loaded.
+fn is_of_object(text: &str) -> bool {
+    [ITS_HULL, ITS_UNIT, "gives no usable mass"].iter().any(|phrase| text.contains(phrase))
 }
 
 /// Remedies for a message.
@@ -84,8 +89,11 @@ impl Notices {
     /// Shows a message. Long sentences stay until they can have been read, errors twice as long.
     fn tell(&mut self, level: Level, text: &str) {
         let text = message(text);
-        if text.contains(ITS_UNIT) && self.of_unit.replace(text.clone()).as_ref() == Some(&text) {
-            return;
+        if is_of_object(&text) {
+            if self.of_object.contains(&text) {
+                return;
+            }
+            self.of_object.push(text.clone());
         }
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
@@ -158,10 +166,10 @@ impl Notices {
         self.shown.retain(|shown| !shown.text.contains(UNDONE_BY_KEY));
     }
 
-    /// Takes away what can be done about an object: another one is asked for.
+    /// Takes away what was said of an object: another one is asked for.
     pub(in crate::app) fn object_changed(&mut self) {
-        self.of_unit = None;
-        self.shown.retain(|shown| ![ITS_HULL, ITS_UNIT].iter().any(|phrase| shown.text.contains(phrase)));
+        self.of_object.clear();
+        self.shown.retain(|shown| !is_of_object(&shown.text));
     }
 
     /// Last messages, oldest first.

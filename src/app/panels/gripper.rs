@@ -5,8 +5,8 @@ use crate::app::features::App;
 use crate::app::features::gripper::{CONTROLS, control_title};
 use crate::app::theme::{self, accented};
 use crate::app::widgets::{
-    adapt_button, chip, command_ui, failed_sensors_ui, failure_ui, remark_ui, stop_button, text_field, warning_ui,
-    wrapped,
+    PAST, adapt_button, chip, command_ui, failed_sensors_ui, failure_ui, remark_ui, stop_button, text_field,
+    warning_ui, wrapped,
 };
 use egui::{Button, Grid, RichText, ScrollArea, Ui};
 use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
@@ -31,9 +31,6 @@ pub(super) fn ui(
         }
     });
 }
-
-/// Opacity of values that were read in the past.
-const PAST: f32 = 0.45;
 
 /// Ports to connect to.
 fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
@@ -101,7 +98,7 @@ fn connected_ui(
         {
             actions.push(|app| _ = app.gripper.send(GripperCommand::Tare));
         }
-        adapt_button(ui, Some(gripper).filter(|_| silent_s.is_none()), control, actions);
+        adapt_button(ui, Some(gripper), control, actions);
         actions.on(&ui.button("Disconnect").on_hover_text("Release the port (Ctrl+G)"), |app| {
             _ = app.gripper.send(GripperCommand::Disconnect);
         });

@@ -97,12 +97,11 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
         }
     }
     ui.add_space(4.0);
-    let connected = gripper.is_some_and(GripperView::is_connected);
-    if connected {
-        let button = Button::new("Record  R").fill(accented(theme::of(ui)));
-        actions.on(&ui.add_sized([ui.available_width(), 36.0], button).on_hover_text("Record a grasp (R)"), |app| {
-            app.label(LabellingAction::Record);
-        });
+    if let Some(gripper) = gripper.filter(|gripper| gripper.is_connected()) {
+        let button = Button::new("Record  R").fill(accented(theme::of(ui))).min_size(vec2(ui.available_width(), 36.0));
+        let shown = ui.add_enabled(!gripper.is_silent(), button).on_hover_text("Record a grasp (R)");
+        let shown = shown.on_disabled_hover_text("The board sends no readings: is it plugged in?");
+        actions.on(&shown, |app| app.label(LabellingAction::Record));
     } else {
         warning_ui(ui, "Connect the gripper: Ctrl+G, or the panel Gripper below.");
     }

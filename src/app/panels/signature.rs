@@ -8,7 +8,7 @@ use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{MAP_COLUMNS, ShownGrasp, shown_joints, shown_rows};
 use crate::app::widgets::choice_ui;
-use egui::{RichText, Ui, vec2};
+use egui::{RichText, ScrollArea, Ui, vec2};
 use palpate_geometry::units;
 use palpate_lab::inspection::{FigureOptions, HeatKind};
 use palpate_lab::picture::BendUnit;
@@ -50,18 +50,21 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let rows = ((0.5 * each * ui.ctx().pixels_per_point()).floor() as usize).max(1);
     let most = [columns, rows];
     let maps = [shown_joints(ui, &grasp, bend_unit, most), shown_rows(ui, &grasp, load_unit, most)];
-    for (shown, (names, seconds)) in maps.iter().zip(parts) {
-        let over_time = OverTime {
-            theme: data.view.theme,
-            shown,
-            time,
-            cursor_s: Some(grasp.cursor_s),
-            phases: &grasp.phases,
-            names,
-            seconds,
-        };
-        if let Some(t) = over_time_ui(ui, &over_time, height_beside(names, seconds) + each) {
-            actions.push(move |app| app.seek(Seek::To(t)));
+    // A low panel scrolls.
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for (shown, (names, seconds)) in maps.iter().zip(parts) {
+            let over_time = OverTime {
+                theme: data.view.theme,
+                shown,
+                time,
+                cursor_s: Some(grasp.cursor_s),
+                phases: &grasp.phases,
+                names,
+                seconds,
+            };
+            if let Some(t) = over_time_ui(ui, &over_time, height_beside(names, seconds) + each) {
+                actions.push(move |app| app.seek(Seek::To(t)));
+            }
         }
-    }
+    });
 }

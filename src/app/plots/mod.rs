@@ -19,11 +19,13 @@ use crate::app::playback::Seek;
 use crate::app::shown::DisplayedData;
 use crate::app::theme::{colour, veil};
 use crate::app::traces::GraspTrace;
+use crate::app::widgets::PAST;
 use egui::{Color32, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotPoint, PlotTransform};
 use labels::CurveLabel;
 use palpate_geometry::palette::{SHOWN_SERIES, Trace, series_colour};
 use palpate_geometry::units;
+use palpate_lab::workers::GripperView;
 use palpate_tactile::trial::TrialSource;
 
 /// Value of one row of a trace; `None` where it is undefined.
@@ -220,7 +222,10 @@ fn curve_labels<'a>(data: &DisplayedData<'_>, plot: &TimePlot<'a>, transform: &P
     };
     let own = data.traces.current().into_iter();
     let own = own.flat_map(|trace| plot.curves.iter().map(move |curve| (trace, curve)));
-    let own = own.map(|(trace, curve)| label(trace, curve, own_ink(data, curve)));
+    // Values of a board that is silent are of the past.
+    let past = data.source == ViewSource::Gripper && data.gripper.is_some_and(GripperView::is_silent);
+    let ink = |curve: &PlotCurve| own_ink(data, curve).gamma_multiply(if past { PAST } else { 1.0 });
+    let own = own.map(|(trace, curve)| label(trace, curve, ink(curve)));
     let others = data.comparison.traces.iter().flat_map(|compared| plot.curves.iter().map(move |c| (compared, c)));
     let others =
         others.map(|(compared, curve)| label(&compared.trace, curve, colour(series_colour(compared.colour, theme))));

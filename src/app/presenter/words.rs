@@ -50,7 +50,7 @@ pub(super) fn reason(view: &IdentificationView, is_lost: bool) -> String {
             format!("{} is less than {threshold}: it grasps again and adds up what it feels.", percent(p))
         }
         (None, _) if !view.beliefs.is_empty() => {
-            format!("It adds this grasp to the {grasps} before, until one name reaches {threshold}.")
+            format!("It adds this grasp to the {grasps} before, until one name has {threshold} when a grasp ends.")
         }
         (None, _) => "It compares this touch with the grasps that it has learned from.".to_owned(),
     };

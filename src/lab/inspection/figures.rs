@@ -23,6 +23,16 @@ pub enum HeatKind {
     Pads,
 }
 
+impl HeatKind {
+    /// What a trial must have for it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Joints => "joint angles",
+            Self::Pads => "taxels",
+        }
+    }
+}
+
 /// Choice of what a figure shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FigureOptions {
@@ -87,7 +97,10 @@ pub fn comparison_figure(trials: &[&OpenTrial], options: &FigureOptions) -> Resu
         return Err(FigureDataError("no trial is chosen; choose at least one".to_owned()));
     };
     let title = match trials {
-        [one] => format!("{}, trial {}", one.title, one.id),
+        [one] => match options.heat {
+            Some(heat) => format!("{}, trial {}, {}", one.title, one.id, heat.name()),
+            None => format!("{}, trial {}", one.title, one.id),
+        },
         _ if trials.len() <= LISTED_IDS => each(trials),
         _ => format!("{}: {}", titles(trials), numbers(trials)),
     };
@@ -384,12 +397,8 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
     let first = trials.iter().map(|trial| rows(trial).start).min().unwrap_or(0);
     for trial in trials {
         let simulated = trial.source == TrialSource::Simulated && !trial.frames.is_empty();
-        let what = match kind {
-            HeatKind::Joints => "joint angles",
-            HeatKind::Pads => "taxels",
-        };
         if !simulated {
-            return Err(lacking(trial, "simulated trials", what));
+            return Err(lacking(trial, "simulated trials", kind.name()));
         }
         let gripper = &trial.header.scene.gripper;
         let maps: [HeatMap; 2] = match kind {

@@ -90,6 +90,17 @@ pub struct MeasureEstimate {
     pub range: [f64; 2],
 }
 
+/// A range this many times as long as where it begins has no number in its middle that says anything.
+const VAGUE: f64 = 3.0;
+
+impl MeasureEstimate {
+    /// True where little is known: the other end of the range is then that of the objects that were learned, which the fingers
+    /// do not feel. A bottle is longer.
+    pub fn is_vague(&self) -> bool {
+        self.range[1] > VAGUE * self.range[0]
+    }
+}
+
 /// What one grasp tells about the geometry of the object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {

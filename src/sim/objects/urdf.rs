@@ -36,6 +36,7 @@ struct Joint<'a> {
 /// Parses the bytes of a URDF.
 pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Result<Blueprint, ObjectError> {
     let malformed = |cause: String| ObjectError::malformed(name, &cause);
+    let in_file = |cause: ObjectError| ObjectError(format!("\"{name}\": {cause}"));
     let robot = robot_of(bytes).map_err(malformed)?;
     let mut blueprint = Blueprint::new(name);
     blueprint.robot = robot.attribute("name").map(str::to_owned);
@@ -71,7 +72,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
                 }
                 // The collision shape is drawn in place of a missing visual.
                 Err(error) if !collisions.is_empty() => blueprint.warnings.push(error.to_string()),
-                Err(error) => return Err(error),
+                Err(error) => return Err(in_file(error)),
             }
         }
         for (collision, shape) in &collisions {
@@ -85,7 +86,7 @@ pub(super) fn parse(name: &str, bytes: &[u8], read_mesh: MeshReader<'_>) -> Resu
                         .push(format!("{error}; the visual shape of link \"{link}\" is used in its place"));
                     blueprint.touch_visual(seen);
                 }
-                Err(error) => return Err(error),
+                Err(error) => return Err(in_file(error)),
             }
             note_modulus(collision, link, &mut blueprint);
         }

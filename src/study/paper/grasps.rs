@@ -292,7 +292,8 @@ fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
     // The paper's figure: the iterated network with feedback.
     let most =
         |kind: &Kind<(Way, usize)>| all.iter().find(|own| own.kind == kind.with(kind.factor.0)).map_or(0, Merged::most);
-    let named = |kind: &Kind<(Way, usize)>| format!("{}, {}", kind.model(), kind.factor.0.placed);
+    let named =
+        |kind: &Kind<(Way, usize)>| format!("{}, {}, {}", kind.model(), kind.factor.0.combined, kind.factor.0.placed);
     // Gain of grasps after some over fewer, or by feedback over the product.
     let gains = |at: usize, name: &dyn Fn(usize) -> String, other: &dyn Fn(Way) -> (Way, usize)| {
         gains_over(rows, |kind| {
@@ -310,7 +311,8 @@ fn findings(rows: &[Row<(Way, usize)>], all: &[Merged]) -> Vec<Finding> {
     let papers = all.iter().filter(|own| own.kind.factor == Way { placed: ANEW, combined: FEEDBACK });
     let wrong = papers.filter_map(|own| {
         let count = own.rounds.iter().filter(|own| own.sure).count();
-        Some((format!("{}: wrong of {count} confident stops", own.kind.model()), own.wrong()?))
+        let named = format!("{}, {FEEDBACK}, {ANEW}", own.kind.model());
+        Some((format!("{named}: wrong of {count} confident stops"), own.wrong()?))
     });
     let above = Rule::AllAbove(0.0);
     vec![

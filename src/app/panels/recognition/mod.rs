@@ -30,6 +30,7 @@ use palpate_sim::objects::capital_title;
 use std::sync::Arc;
 use words::{
     ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, percent, reason,
+    title,
 };
 
 /// Time in which bars follow a new answer (s).
@@ -390,8 +391,8 @@ impl Part<'_, '_> {
         let mut why = distrust.map_or_else(|| reason(self.view, self.recognised), str::to_owned);
         // No answer can be right: the likest known object is no headline.
         let is_new = distrust == Some(BEING_LEARNED);
-        if let Some(probability) = p.take_if(|_| is_new) {
-            why = format!("{why} So far like {text} ({}).", percent(probability));
+        if let Some((class, probability)) = headline.class().zip(p.take_if(|_| is_new)) {
+            why = format!("{why} So far like {} ({}).", title(&self.view.labels, class), percent(probability));
             "New object".clone_into(&mut text);
         }
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));

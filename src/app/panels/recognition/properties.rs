@@ -46,7 +46,7 @@ fn why_none(labels: &Labels, class: usize) -> String {
     match labels.classes[class].name.as_str() {
         EMPTY => "none: the hand is empty".to_owned(),
         OTHER => "not known of other objects".to_owned(),
-        _ => format!("not known of {}", title(labels, class)),
+        _ => format!("none was given for {}", title(labels, class)),
     }
 }
 

@@ -1,10 +1,12 @@
 //! The measured touch: width and height of the object with their spread, as the fingers feel them, before any
 //! class is named.
 
+use super::words::newest;
 use super::{Measures, Part, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 use palpate_learn::{Measure, MeasureEstimate};
+use palpate_sim::objects::EMPTY;
 
 /// Longest length on the scale (mm).
 const LONGEST: f64 = 110.0;
@@ -36,7 +38,10 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     if !part.view.measures_geometry || part.is_foreign() || part.data.other_fingers {
         return false;
     }
-    let measured = part.view.measured.as_deref();
+    // Fingers that touch each other measure nothing.
+    let is_empty = newest(part.view).is_some_and(|pmf| part.view.labels.class(EMPTY) == Some(pmf.top().0));
+    let measured = part.view.measured.as_deref().filter(|_| !is_empty);
+    let unknown = if is_empty { "none" } else { UNKNOWN };
     let of = |measure: Measure| measured.and_then(|measured| measured.of(measure));
     if part.measures.is_tight() {
         let height = part.measures.class - part.measures.gap;
@@ -46,7 +51,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
             let corner = pos2(line.left() + share * k as f32, line.top());
             let place = Rect::from_min_size(corner, vec2(share - 4.0, line.height()));
             let text = of(measure).map_or_else(|| "–".to_owned(), |estimate| words(estimate, "–"));
-            explain(ui, place, (name, about), of(measure));
+            explain(ui, place, (name, about), of(measure).ok_or(unknown));
             let ink = colour(if of(measure).is_some() { part.colours().text } else { part.colours().quiet_text });
             put(
                 ui,
@@ -56,17 +61,19 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
             );
         }
     } else {
-        SHOWN.into_iter().for_each(|(measure, name, about)| line_ui(ui, part, (name, about), of(measure)));
+        SHOWN
+            .into_iter()
+            .for_each(|(measure, name, about)| line_ui(ui, part, (name, about), of(measure).ok_or(unknown)));
     }
     true
 }
 
 /// Text of an estimate for people who point at it, and for screen readers.
-fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
-    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
+fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Result<&MeasureEstimate, &str>) {
+    let text = estimate.map_or_else(str::to_owned, |estimate| words(estimate, " to "));
     let spoken = format!("{name} {text}");
     let meaning = match estimate {
-        Some(estimate) if is_vague(estimate) => "it is longer with 95 % probability; how much is not felt",
+        Ok(estimate) if estimate.is_vague() => "it is longer with 95 % probability; how much is not felt",
         _ => "median, and the range that holds the true value with 90 % probability",
     };
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
@@ -74,25 +81,20 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Option<&
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
-/// A range this many times as long as where it begins has no number in its middle that says anything.
-const VAGUE: f64 = 3.0;
-
-/// True where little is known of a length.
-fn is_vague(estimate: &MeasureEstimate) -> bool {
-    estimate.range[1] > VAGUE * estimate.range[0]
-}
-
-/// An estimate in words: `34 mm (30 to 38)`; `over 16 mm` where little is known. The other end of a long range is that of the
-/// objects that were learned, which the fingers do not feel: a bottle is longer.
+/// An estimate in words: `34 mm (30 to 38)`; `over 16 mm` where little is known.
 fn words(estimate: &MeasureEstimate, between: &str) -> String {
     let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    if is_vague(estimate) { format!("over {from:.0} mm") } else { format!("{value:.0} mm ({from:.0}{between}{to:.0})") }
+    if estimate.is_vague() {
+        format!("over {from:.0} mm")
+    } else {
+        format!("{value:.0} mm ({from:.0}{between}{to:.0})")
+    }
 }
 
-fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Option<&MeasureEstimate>) {
+fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Result<&MeasureEstimate, &str>) {
     let (colours, height) = (part.colours(), part.measures.class);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
-    let text = estimate.map_or_else(|| UNKNOWN.to_owned(), |estimate| words(estimate, " to "));
+    let text = estimate.map_or_else(str::to_owned, |estimate| words(estimate, " to "));
     explain(ui, rect, (name, about), estimate);
     let quiet = colour(colours.quiet_text);
     let (left, right) = (rect.left() + NAME, rect.right() - VALUE);
@@ -103,19 +105,19 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
     );
     if bar.width() > 20.0 {
         ui.painter().rect_filled(bar, 2.0, colour(colours.raised));
-        if let Some(estimate) = estimate {
+        if let Ok(estimate) = estimate {
             let at = |x: f64| bar.left() + bar.width() * (x * 1e3 / LONGEST).clamp(0.0, 1.0) as f32;
             let [from, to] = estimate.range.map(at);
-            let to = if is_vague(estimate) { bar.right() } else { to };
+            let to = if estimate.is_vague() { bar.right() } else { to };
             let range = Rect::from_min_max(pos2(from, bar.top()), pos2(to.max(from + 2.0), bar.bottom()));
             ui.painter().rect_filled(range, 2.0, colour(colours.background.mix(colours.accent, 0.45)));
             let middle = Rect::from_center_size(pos2(at(estimate.value), bar.center().y), vec2(2.5, height * 0.7));
-            if !is_vague(estimate) {
+            if !estimate.is_vague() {
                 ui.painter().rect_filled(middle, 1.0, colour(colours.accent));
             }
         }
     }
-    let ink = if estimate.is_some() { colour(colours.text) } else { quiet };
+    let ink = if estimate.is_ok() { colour(colours.text) } else { quiet };
     put(ui, fitted(ui, &text, LETTERS, VALUE, ink), rect, Align2::RIGHT_CENTER);
 }
 

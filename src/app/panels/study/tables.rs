@@ -46,8 +46,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     let table = tables.get(chosen).unwrap_or(first);
     let first = table.rows.iter().position(|row| opening(&result, row).is_some());
     let mut goes = false;
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.set_max_height(ROW);
+    ui.allocate_ui_with_layout(vec2(ui.available_width(), ROW), Layout::right_to_left(Align::Center), |ui| {
         if let Some(first) = first.filter(|first| *first >= IN_SIGHT) {
             goes = ui.small_button(format!("To row {}, which opens trials", first + 1)).clicked();
         }

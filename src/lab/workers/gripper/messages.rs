@@ -8,7 +8,7 @@ use crate::gripper::{Listen, NotOpened};
 use crate::recording::TrialRequest;
 use crate::workers::messages::Wake;
 use palpate_device::protocol::ConsoleLine;
-use palpate_device::serial::{LinkStatus, PortInfo};
+use palpate_device::serial::{LinkState, LinkStatus, PortInfo};
 use palpate_learn::Model;
 use palpate_sim::scene::Scene;
 use palpate_store::labels::FlagRemark;
@@ -206,5 +206,10 @@ impl GripperView {
     /// True while a board is connected.
     pub fn is_connected(&self) -> bool {
         self.link.is_some()
+    }
+
+    /// True while a connected board sends no readings.
+    pub fn is_silent(&self) -> bool {
+        self.link.as_ref().is_some_and(|link| link.state != LinkState::Listening)
     }
 }

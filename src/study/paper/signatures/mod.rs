@@ -15,6 +15,7 @@ use palpate_lab::grasping::grasp;
 use palpate_learn::metrics::Bootstrap;
 use palpate_sim::objects::{ObjectModel, catalogue};
 use palpate_sim::scene::Scene;
+use palpate_tactile::SignalDefinition;
 use palpate_tactile::trial::SimulatedTrial;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -205,7 +206,14 @@ impl Study for TactileSignatures {
     };
 
     fn grid(plan: &StudyPlan) -> Vec<Unit> {
-        let read = |view: &SensorView| format!("{}, {}", view.sensors.name(), view.signals.name());
+        let read = |view: &SensorView| {
+            let pressure = match view.signals {
+                SignalDefinition::Contact => "contact pressure",
+                SignalDefinition::Parts => "pad pressure",
+                SignalDefinition::Hull => "hull pressure",
+            };
+            format!("{}, {pressure}", view.sensors.name())
+        };
         if plan.query.is_some() {
             let stored = plan.sensors.iter().map(|&sensors| view_of(sensors));
             return stored
