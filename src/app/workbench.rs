@@ -303,7 +303,11 @@ impl Workbench {
         let shown = self.app.shown();
         let subject = match shown.source {
             ViewSource::Trial => shown.inspected.map(|own| format!("{}, trial {}", own.trial.title, own.trial.id)),
-            ViewSource::Gripper => Some("Real gripper".to_owned()),
+            ViewSource::Gripper => {
+                let emulated =
+                    shown.gripper.and_then(|gripper| gripper.link.as_ref()).is_some_and(|l| l.board.emulated);
+                Some(if emulated { "Emulated gripper" } else { "Real gripper" }.to_owned())
+            }
             ViewSource::Simulation if !shown.view.truth_shown => None,
             ViewSource::Simulation => shown.snapshot.map(|snapshot| {
                 snapshot.object.as_ref().map_or("Empty hand".to_owned(), |object| object.title.clone())

@@ -188,11 +188,11 @@ pub enum RecomputeCause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrustLevel {
-    /// Another simulation gives the same result, and nothing was flagged.
+    /// Runs at other accuracies end alike, and nothing was flagged.
     Green,
-    /// Not compared with another simulation, or some steps missed the accuracy.
+    /// Not compared with runs at other accuracies, or some steps missed the accuracy.
     Amber,
-    /// Other simulations give another result, or the trial is unsound or failed.
+    /// Runs at other accuracies end elsewhere, or the trial is unsound or failed.
     Red,
 }
 
@@ -263,9 +263,9 @@ impl Quality {
             (Some(cause), _) => (TrustLevel::Red, cause),
             (None, _) if missed > 0 => (TrustLevel::Amber, format!("{missed} steps missed the accuracy")),
             (None, None | Some(false)) => {
-                (TrustLevel::Amber, "not verified: no other simulation to compare with".to_owned())
+                (TrustLevel::Amber, "not verified: no run at another accuracy to compare with".to_owned())
             }
-            (None, Some(true)) => (TrustLevel::Green, "another simulation gives the same result".to_owned()),
+            (None, Some(true)) => (TrustLevel::Green, "runs at other accuracies end alike".to_owned()),
         }
     }
 
@@ -287,7 +287,7 @@ impl Quality {
                  unbalanced at its end"
             ));
         }
-        let elsewhere = (self.agrees == Some(false)).then(|| "other simulations give another result".to_owned());
+        let elsewhere = (self.agrees == Some(false)).then(|| "runs at other accuracies end elsewhere".to_owned());
         self.failure.map(|failure| failure.to_string()).or(elsewhere)
     }
 }

@@ -203,6 +203,23 @@ fn compared_trials_are_exported_without_an_open_one() {
 }
 
 #[test]
+fn a_heat_map_is_exported_alone_beside_compared_trials() {
+    let mut bench = inspecting(2);
+    bench.tell(|app| app.pin(1));
+    bench.until_shown(true, "Lemon, trial 1, simulated");
+    bench.harness.get_by_label("Signature").click();
+    bench.look();
+    for (button, name) in [("Export joints", "joint_angles"), ("Export pads", "taxels")] {
+        bench.harness.get_by_label(button).click();
+        bench.harness.run_steps(3);
+        let field = bench.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "Path").value();
+        assert!(field.as_ref().is_some_and(|path| path.ends_with(&format!("tomato_trial_2_{name}.svg"))), "{field:?}");
+        bench.harness.key_press(Key::Escape);
+        bench.harness.run_steps(3);
+    }
+}
+
+#[test]
 fn compared_trials_have_a_line_each_or_a_mean() {
     let mut bench = inspecting(1);
     for id in [1, 2, 3] {

@@ -1,7 +1,7 @@
 //! The trial library: found, sorted, labelled, tagged, discarded and exported, many trials at once, in the window and on
 //! the command line, each of which sees what the other does.
 
-use crate::bench::{Bench, BenchSetup};
+use crate::bench::{Bench, BenchSetup, HANG};
 use crate::cpu_renderer::CpuRenderer;
 use crate::program::{json, refused, run};
 use egui::accesskit::Role;
@@ -16,6 +16,7 @@ use palpate_store::labels::TrialEdit;
 use palpate_store::{BoardInfo, ImportedTrial, Store, TrialPlace, TrialQuery};
 use palpate_tactile::Signals;
 use palpate_tactile::trial::{TrialHeader, TrialId};
+use std::time::{Duration, Instant};
 
 /// Trials 1 and 2 simulated (lemon, tomato), 3 to 5 recorded (lemon, cube, unlabelled), 6 imported (mug).
 fn fill(store: &mut Store) {
@@ -356,6 +357,29 @@ fn a_grasp_that_is_stored_already_names_its_trial_which_opens() {
     bench.tell(|app| app.set_mode(Mode::Inspect));
     bench.until_shown(true, "TRIAL 1, SIMULATED");
     bench.until_shown(true, "Trial 1, Lemon, shown");
+    // A trial that was chosen stays open, until there is a newer one.
+    bench.tell(|app| app.open_trial(3));
+    bench.until_shown(true, "TRIAL 3, SIMULATED");
+    let look = |bench: &mut Bench| {
+        bench.tell(|app| app.set_mode(Mode::Demo));
+        bench.harness.run_steps(3);
+        bench.tell(|app| app.set_mode(Mode::Inspect));
+        for _ in 0..20 {
+            bench.harness.step();
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        bench.workbench().inspected().map(|own| own.trial.id)
+    };
+    assert_eq!(look(&mut bench), Some(3));
+    bench.tell(|app| app.set_mode(Mode::Demo));
+    let mut scene = Scene::default();
+    "ball".clone_into(&mut scene.object.source);
+    bench.tell(|app| app.set_scene(scene));
+    bench.tell(|app| app.simulation.send(Command::Play));
+    let began = Instant::now();
+    while look(&mut bench) != Some(4) {
+        assert!(began.elapsed() < HANG, "the new grasp is not opened");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::cpu_renderer::CpuRenderer;
 use crate::golden::{compare, sheet};
 use crate::study_mode::scripted_result;
 use egui::accesskit::Role;
-use egui::{Key, Modifiers, Rect};
+use egui::{Key, Modifiers, Rect, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use image::RgbaImage;
 use palpate::app::{ALL_PANELS, Mode, PanelKind};
@@ -227,6 +227,17 @@ fn scene_settings_reach_the_simulation() {
     let mut bench = whole_window();
     bench.harness.get_by_label("Scene").click();
     bench.harness.run_steps(2);
+    let support = bench.harness.get_by_role_and_label(Role::ComboBox, "support").rect();
+    bench.harness.get_by_role_and_label(Role::ComboBox, "support").click();
+    bench.harness.run_steps(3);
+    // The list closes when the panel under it scrolls.
+    assert!(bench.harness.query_by_label("fixed").is_some());
+    bench.harness.event(egui::Event::PointerMoved(support.left_top() - vec2(0.0, 20.0)));
+    let (unit, phase, modifiers) = (egui::MouseWheelUnit::Point, egui::TouchPhase::Move, Modifiers::NONE);
+    let (delta, source) = (vec2(0.0, -10.0), egui::MouseWheelSource::Wheel);
+    bench.harness.event(egui::Event::MouseWheel { unit, delta, source, phase, modifiers });
+    bench.harness.run_steps(3);
+    assert!(bench.harness.query_by_label("fixed").is_none());
     bench.harness.get_by_role_and_label(Role::ComboBox, "support").click();
     bench.harness.run_steps(3);
     bench.harness.get_by_label("fixed").click();

@@ -30,6 +30,14 @@ pub struct Studies {
     figure: usize,
 }
 
+/// What is said of the result of a quick run.
+pub(in crate::app) const QUICK: &str = "Quick run: do not quote.";
+
+/// True for results of fewer grasps than the study needs.
+pub(in crate::app) fn is_quick(origin: StudyOrigin) -> bool {
+    matches!(origin, StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }))
+}
+
 impl Studies {
     /// Studies on the store at `store`.
     pub(in crate::app) fn new(store: &Path, wake: &Wake) -> Self {
@@ -94,7 +102,8 @@ impl Studies {
     pub(in crate::app) fn exported(&self) -> Option<LinkedFigure> {
         let result = self.result()?;
         let linked = result.figures.get(self.figure_of(&result))?.clone();
-        Some(linked.with_note(&result.stored.plain_origin()))
+        let note = result.stored.plain_origin();
+        Some(linked.with_note(&if is_quick(result.origin) { format!("{QUICK} {note}") } else { note }))
     }
 
     /// Reads the results again.

@@ -89,7 +89,7 @@ fn readings_ui(ui: &mut Ui, data: &DisplayedData<'_>, snapshot: &Snapshot) {
         let line = RichText::new(format!("{:.2}", frame.line_bar)).monospace();
         ui.add_sized([52.0, 18.0], egui::Label::new(line));
         ui.end_row();
-        ui.label("phase");
+        ui.label("command");
         ui.label(frame.phase.name());
         ui.end_row();
     });
@@ -100,7 +100,7 @@ fn trust_ui(ui: &mut Ui, theme: Theme, last: &FinishedGrasp, checking: Option<Ch
     let quality = &last.summary.quality;
     let (level, reason) = quality.trust();
     let reason = match checking {
-        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with another simulation …".to_owned(),
+        Some(Checking::Comparing) if quality.agrees.is_none() => "comparing with runs at other accuracies …".to_owned(),
         Some(Checking::ComputingAgain) => "computing again at finer accuracy …".to_owned(),
         _ => reason,
     };

@@ -202,9 +202,9 @@ fn question_ui(
     }
     search_ui(ui, labelling, actions);
     ui.horizontal_wrapped(|ui| {
-        actions.on(&ui.add(Button::new("Label  N, Enter").fill(accented(theme::of(ui)))), |app| {
-            app.label(LabellingAction::GiveLabel);
-        });
+        let button = Button::new("Label  N, Enter").fill(accented(theme::of(ui)));
+        let shown = ui.add_enabled(draft.label(view).is_some(), button).on_disabled_hover_text("No object is chosen");
+        actions.on(&shown, |app| app.label(LabellingAction::GiveLabel));
         let record = ui.button("Record  R").on_hover_text("Record a grasp; a trial without a label is kept (R)");
         actions.on(&record, |app| app.label(LabellingAction::Record));
         actions.on(&ui.button("Discard  D"), |app| app.label(LabellingAction::Discard));

@@ -350,7 +350,8 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
             let (far, share) = (units::shown(units::mm(far), "mm"), 100.0 * share);
             format!(": its fingers differ by up to {far}, {share:.1}{}% of their length", units::SPACE)
         });
-        let texts: Vec<String> = std::iter::once(format!("The same grasp by {engine}{off}")).chain(held).collect();
+        let texts: Vec<String> =
+            std::iter::once(format!("The same grasp by the engine {engine}{off}")).chain(held).collect();
         (texts.join(". "), Some(ghost_colour(theme)))
     } else {
         let begins = own.data.view.recent.is_empty() && own.data.source == ViewSource::Simulation;

@@ -11,7 +11,7 @@ use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
 use palpate_lab::inspection::TouchPhase;
 use palpate_lab::why::{
-    Attribution, BeliefMove, Evidence, MEASURED_HOW, NearestReport, channel_words, percent, points_words,
+    Attribution, BeliefMove, Evidence, MEASURED_HOW, NearestReport, NearestTrial, channel_words, percent, points_words,
 };
 use palpate_lab::workers::{ExplainRequest, Explainer};
 use palpate_sim::objects::{capital_title, object_title};
@@ -296,7 +296,9 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
     }
     let colours = theme::of(ui).colours();
     // The grasp itself, as it was just stored, is none of its neighbours.
-    for trial in report.trials.iter().filter(|own| own.distance >= SAME || Some(own.id) != last) {
+    let is_other = |own: &&NearestTrial| own.distance >= SAME || Some(own.id) != last;
+    let itself = report.trials.iter().filter(|own| !is_other(own)).count();
+    for trial in report.trials.iter().filter(is_other) {
         let name = if trial.label.is_empty() { "unlabelled".to_owned() } else { capital_title(&trial.label) };
         let same = if trial.distance < SAME { ", same readings" } else { "" };
         let source = trial.source.title();
@@ -321,13 +323,11 @@ fn report_ui(ui: &mut Ui, pictures: &Thumbnails, report: &NearestReport, last: O
     }
     let left_out =
         if report.left_out > 0 { format!("; {} have other channels", report.left_out) } else { String::new() };
-    let compared = match report.older {
-        0 if report.compared == 1 => "1 trial is compared".to_owned(),
-        0 => format!("{} trials are compared", report.compared),
-        older => format!("The newest {} trials are compared, {older} older ones are not", report.compared),
+    let compared = match (report.older, report.compared - itself) {
+        (0, 1) => "1 trial is compared".to_owned(),
+        (0, compared) => format!("{compared} trials are compared"),
+        (older, compared) => format!("The newest {compared} trials are compared, {older} older ones are not"),
     };
-    let about = format!(
-        "Distance in spreads within a class: two grasps of one class are about 1.4 apart. {compared}{left_out}."
-    );
+    let about = format!("Distance in spreads within a class; 0 for the same readings. {compared}{left_out}.");
     wrapped(ui, RichText::new(about).small().weak());
 }

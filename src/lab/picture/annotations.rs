@@ -137,7 +137,7 @@ fn add(overlay: &mut Overlay, view: &PictureView) {
     if shows_legends(view) {
         add_scale_bar(overlay, view, [MARGIN, TEXT], false);
         let full = f64::from(view.full_scale) * 1e-3;
-        add_legend(overlay, view, MARGIN, "pad pressure, kPa", [0.0, full]);
+        add_legend(overlay, view, MARGIN, "taxel pressure, kPa", [0.0, full]);
         if let Some(PathColour::Time(span)) = view.path {
             add_legend(overlay, view, MARGIN + LEGEND_HEIGHT, "first touch, s", span.map(f64::from));
         }
@@ -318,7 +318,7 @@ mod tests {
     fn everything_is_labelled_and_small_pictures_get_less() {
         let view = PictureView { badge: Some("SIMULATED".into()), ..PictureView::default() };
         let all = texts(&view);
-        for want in ["x", "y", "z", "pad pressure, kPa", "0", "20", "40", "SIMULATED"] {
+        for want in ["x", "y", "z", "taxel pressure, kPa", "0", "20", "40", "SIMULATED"] {
             assert!(all.iter().any(|t| t == want), "{want} in {all:?}");
         }
         let timed = PictureView { path: Some(PathColour::Time([0.0, 3.0])), ..view.clone() };

@@ -3,7 +3,7 @@
 //! Curvature is 1 / radius (paper, section IV-A1). The finger follows the circle where it bends evenly; where it does not,
 //! the gap between them is what the strip cannot tell.
 
-use super::annotations::{Annotator, shows_legends};
+use super::annotations::Annotator;
 use glam::{DVec3, Vec2};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::Align;
@@ -108,9 +108,7 @@ pub(super) fn number(annotator: &mut Annotator<'_>, own: &CircleNumber) {
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
     let wanted = own.back + own.outward * (GAP + half.dot(own.outward.abs()));
     if annotator.view.size.y >= LEAST_HEIGHT
-        && let Some(plate) = annotator
-            .place(&[wanted], half, FARTHEST)
-            .or_else(|| annotator.place(&[wanted], half, f32::INFINITY).filter(|_| shows_legends(annotator.view)))
+        && let Some(plate) = annotator.place(&[wanted], half, FARTHEST)
     {
         annotator.add_plate(plate);
         annotator.overlay.text(plate.middle, Align::Centre, TEXT, own.colour, text);

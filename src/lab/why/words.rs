@@ -8,7 +8,7 @@ use palpate_tactile::{Quantity, unit_of_channel};
 
 /// How evidence is measured, in one sentence.
 pub const MEASURED_HOW: &str = "How much the answer's probability drops when this part is replaced by an average \
-     (percentage points; they overlap).";
+     (percentage points). They do not add up: without a whole row or column the model looks at the rest.";
 
 /// Evidence below this is not worth a sentence (percent points).
 const WORTH_NAMING: f64 = 1.0;
@@ -46,7 +46,14 @@ impl Attribution {
             mostly: None,
             evidence: *own,
         };
-        let phases: Vec<Reason> = self.by_phase.iter().zip(&self.phases).map(of_phase).collect();
+        // A phase whose channels speak the other way, one by one, is no reason.
+        let is_clear = |phase: usize| {
+            let opposed =
+                |both: &Evidence| both.points * self.by_phase[phase].points < 0.0 && both.points.abs() >= WORTH_NAMING;
+            !self.by_both.iter().any(|own| opposed(&own[phase]))
+        };
+        let phases = self.by_phase.iter().zip(&self.phases).enumerate().filter(|(phase, _)| is_clear(*phase));
+        let phases: Vec<Reason> = phases.map(|(_, own)| of_phase(own)).collect();
         [1.0, -1.0].map(|sign: f64| {
             let [found, together] = [&channels, &phases].map(|parts| strongest(parts, sign));
             let most = |parts: &[Reason]| parts.first().map_or(0.0, |part| sign * part.evidence.points);

@@ -12,7 +12,7 @@ use super::label_worker::{LabelCommand, LabelView};
 use super::object_search::{ObjectSearch, search_objects};
 use crate::recording::TrialRequest;
 use palpate_learn::OTHER;
-use palpate_sim::objects::{EMPTY, catalogue};
+use palpate_sim::objects::{EMPTY, catalogue, object_title};
 use palpate_store::labels::{Flag, LabelledTrial, TrialEdit};
 use palpate_tactile::trial::Control;
 use palpate_tactile::trial::TrialId;
@@ -460,13 +460,22 @@ impl LabellingSession {
             return vec![self.no_question(now)];
         };
         let Some(label) = self.draft.label(labels) else {
-            // The text in the field stays, to be completed or chosen from.
-            self.draft.focus_search = true;
             let (text, many) = (self.draft.search.trim(), self.draft.objects(labels).len());
+            if text.is_empty() {
+                let text = "No object is chosen: use its number, the arrow keys or the mouse, or type its name (/).";
+                return vec![LabellingEffect::Inform(text.to_owned())];
+            }
+            // The text in the field stays, to be completed or chosen from.
             let text = format!("\"{text}\" may be {many} objects: choose one with the arrow keys or the mouse.");
+            self.draft.focus_search = true;
             return vec![LabellingEffect::Inform(text)];
         };
+        let corrected = trial.object.as_ref().filter(|old| **old != label).map(|old| {
+            let [new, old] = [&label, old].map(|name| object_title(name));
+            LabellingEffect::Inform(format!("Trial {}: {new}, no longer {old}; Ctrl+Z brings it back", trial.id))
+        });
         let mut effects = vec![LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Label(label)))];
+        effects.extend(corrected);
         if labels.disagreements.iter().any(|found| found.id == trial.id) {
             effects.push(LabellingEffect::Edit(LabelCommand::Reviewed(trial.id)));
         }

@@ -94,10 +94,10 @@ pub struct MeasureEstimate {
 const VAGUE: f64 = 3.0;
 
 impl MeasureEstimate {
-    /// True where little is known: the other end of the range is then that of the objects that were learned, which the fingers
-    /// do not feel. A bottle is longer.
+    /// True where only the lower end of the range is felt: heights, for nothing touches what stands out above and below the
+    /// pads, and long ranges. The other end is that of the objects that were learned; a bottle is longer.
     pub fn is_vague(&self) -> bool {
-        self.range[1] > VAGUE * self.range[0]
+        self.measure == Measure::Height || self.range[1] > VAGUE * self.range[0]
     }
 }
 

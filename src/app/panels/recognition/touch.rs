@@ -128,9 +128,11 @@ mod tests {
     #[test]
     fn a_length_of_which_little_is_known_has_no_number_in_its_middle() {
         let of =
-            |value: f64, range: [f64; 2]| words(&MeasureEstimate { measure: Measure::Height, value, range }, " to ");
+            |value: f64, range: [f64; 2]| words(&MeasureEstimate { measure: Measure::Width, value, range }, " to ");
         assert_eq!(of(0.034, [0.030, 0.038]), "34 mm (30 to 38)");
         assert_eq!(of(0.036, [0.016, 0.082]), "over 16 mm");
         assert_eq!(of(0.0, [0.0, 0.0]), "0 mm (0 to 0)");
+        let height = MeasureEstimate { measure: Measure::Height, value: 0.010, range: [0.007, 0.013] };
+        assert_eq!(words(&height, " to "), "over 7 mm", "an egg cup stands out of the hand");
     }
 }

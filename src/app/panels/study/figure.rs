@@ -4,15 +4,14 @@ use super::plot::{plot_ui, title_ui};
 use super::{part_title, result_ui};
 use crate::app::actions::Actions;
 use crate::app::features::App;
-use crate::app::features::studies::Studies;
+use crate::app::features::studies::{QUICK, Studies, is_quick};
 use crate::app::figure_plot::{is_ambiguous, legend_ui};
 use crate::app::theme;
 use crate::app::widgets::wrapped;
 use egui::{RichText, ScrollArea, Ui};
-use palpate_study::LinkedFigure;
-use palpate_study::StudySize;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
 use palpate_study::paper::paper_study;
+use palpate_study::{LinkedFigure, StudySize};
 
 /// Least width of a plot (points).
 const LEAST_WIDTH: f32 = 300.0;
@@ -74,12 +73,12 @@ fn header_ui(ui: &mut Ui, studies: &Studies, result: &StudyResult, number: usize
     let opens = tables.any(|table| table.rows.iter().any(|row| !row.trials.is_empty()));
     let warning = match result.origin {
         _ if !result.current => "From other settings, methods or physics than today's: run the study again.",
-        StudyOrigin::Run(StudySize::Quick | StudySize::Sample { .. }) => "Quick run: do not quote.",
+        origin if is_quick(origin) => QUICK,
         StudyOrigin::Shipped if opens && paper_study(card.key).is_some() => {
             "Shipped result. After a run here, rows in blue open their trials."
         }
         StudyOrigin::Shipped => "Shipped result.",
-        StudyOrigin::Run(StudySize::Full) => "",
+        StudyOrigin::Run(_) => "",
     };
     let own_trials = opens && result.origin != StudyOrigin::Shipped;
     let opening = if own_trials { "Rows in blue open their trials." } else { "" };

@@ -59,9 +59,9 @@ fn finding_ui(ui: &mut Ui, theme: Theme, finding: &Finding) {
         if !finding.found.is_empty() {
             wrapped(ui, RichText::new(finding.found.replace(" %", "\u{a0}%")));
         }
+        wrapped(ui, RichText::new(&finding.why).small().weak());
         // The verdict is on all of them; each may stand on either side.
         numbers_ui(ui, theme, finding, colour(theme.colours().accent));
-        wrapped(ui, RichText::new(&finding.why).small().weak());
     });
 }
 
