@@ -60,7 +60,7 @@ pub struct InspectFeature {
     moved_at: Option<f64>,
     /// The newest trial is opened once the library is read.
     opens_newest: bool,
-    /// The newest trial when Inspect mode was left; a newer one takes the place of the trial that is open.
+    /// The newest trial when one was opened beside the live gripper; a newer one takes its place.
     newest_then: Option<TrialId>,
 }
 
@@ -325,10 +325,11 @@ impl App {
 
     /// Opens a stored trial in the present mode.
     pub(super) fn show_trial(&mut self, id: TrialId) {
-        let Self { inspect, view, .. } = self;
-        if view.source != ViewSource::Trial {
-            inspect.before = view.source;
+        if self.view.source != ViewSource::Trial {
+            self.inspect.newest_then = self.newest_trial();
+            self.inspect.before = self.view.source;
         }
+        let Self { inspect, view, .. } = self;
         view.source = ViewSource::Trial;
         view.time_window = None;
         if inspect.wanted == Some(id) && inspect.open.is_some() {
@@ -350,11 +351,7 @@ impl App {
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let is_shown = self.view.source == ViewSource::Trial;
         if mode != Mode::Inspect {
-            self.inspect.show_live(&mut self.view);
-            if is_shown {
-                self.inspect.newest_then = self.newest_trial();
-            }
-            return;
+            return self.inspect.show_live(&mut self.view);
         }
         // A grasp that is being recorded stays in sight.
         let live = self.gripper_view().is_some_and(|gripper| gripper.trial.is_some());
