@@ -534,6 +534,24 @@ fn zeros_are_taken_from_open_hands_alone() {
 }
 
 #[test]
+fn a_hand_that_is_not_the_calibrated_one_is_noticed_at_rest() {
+    let (calibrated, other) = (parts(1, false), parts(7, false));
+    let mut desk = Desk::on(board(&other));
+    store_calibrations(&desk.store, &calibrated);
+    desk.connect();
+    desk.until_said("not the hand that was calibrated? At rest it reads");
+    let view = desk.until(|view| !view.remarks.is_empty());
+    assert!(view.remarks[0].contains("flex strip"), "{:?}", view.remarks);
+    // The hand that was calibrated fits.
+    let mut desk = Desk::on(board(&calibrated));
+    store_calibrations(&desk.store, &calibrated);
+    desk.connect();
+    desk.trial(Control::Driven, true);
+    let view = desk.until(|view| view.drift.len() == 4);
+    assert!(view.remarks.iter().all(|remark| !remark.contains("not the hand")), "{:?}", view.remarks);
+}
+
+#[test]
 fn a_store_that_cannot_be_written_ends_a_trial_before_the_fingers_close() {
     // Written before the thread starts, which looks into the store at once.
     let folder = tempfile::tempdir().unwrap();

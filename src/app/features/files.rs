@@ -72,12 +72,18 @@ impl FileFeature {
 
     /// Asks where to write this.
     pub(in crate::app) fn export(&mut self, request: ExportRequest) {
+        let name = request.name();
+        self.export_as(&name, request);
+    }
+
+    /// The same, under a name of its own, without ending.
+    fn export_as(&mut self, name: &str, request: ExportRequest) {
         let (title, extensions) = match request {
             ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
             ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
         };
-        let name = Some(format!("{}.{}", request.name(), extensions[0]));
+        let name = Some(format!("{name}.{}", extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));
     }
 }
@@ -203,7 +209,10 @@ impl App {
     /// Exports the figure of a study that is shown.
     pub(in crate::app) fn export_study_figure(&mut self) {
         match self.studies.exported() {
-            Some(linked) => self.files.export(ExportRequest::Figure(linked.figure, Theme::Light, linked.size)),
+            Some(linked) => {
+                let request = ExportRequest::Figure(linked.figure, Theme::Light, linked.size);
+                self.files.export_as(&linked.name, request);
+            }
             None => self.notices.warning("There is no figure: run the study first."),
         }
     }

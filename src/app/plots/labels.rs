@@ -118,6 +118,9 @@ const LETTERS: f32 = 11.5;
 /// Draws the labels beside a plot whose frame this is; those that do not fit are left out, the last first.
 pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<'_>>) {
     let room = ((frame.height() / LINE).floor().max(1.0)) as usize;
+    if room == 1 && labels.len() > 1 && draw_row(ui, frame, &labels) {
+        return;
+    }
     let hidden = labels.len().saturating_sub(room);
     labels.truncate(if hidden > 0 { room.saturating_sub(1) } else { room });
     let wanted: Vec<f32> = labels.iter().map(|label| label.y.unwrap_or(frame.bottom())).collect();
@@ -134,6 +137,24 @@ pub(super) fn draw(ui: &Ui, frame: Rect, quiet: Rgb, mut labels: Vec<CurveLabel<
         let text = format!("and {} more", hidden + 1);
         painter.text(place, Align2::LEFT_CENTER, text, FontId::proportional(11.0), colour(quiet));
     }
+}
+
+/// Draws the labels beside each other in a low plot; false where they have no room.
+fn draw_row(ui: &Ui, frame: Rect, labels: &[CurveLabel<'_>]) -> bool {
+    let font = FontId::proportional(10.0);
+    let texts = labels.iter().map(|label| ui.painter().layout_no_wrap(label.text(), font.clone(), label.ink));
+    let texts: Vec<_> = texts.collect();
+    let width: f32 = texts.iter().map(|text| SAMPLE + 3.0 + text.size().x + GAP).sum();
+    if width > WIDTH {
+        return false;
+    }
+    let mut place = pos2(frame.right() + 6.0, frame.center().y);
+    for (label, text) in labels.iter().zip(texts) {
+        let corner = draw_line(ui.painter(), place, label.ink, label.dashed) + vec2(3.0, -0.5 * text.size().y);
+        place.x = corner.x + text.size().x + GAP;
+        ui.painter().galley(corner, text, label.ink);
+    }
+    true
 }
 
 /// Heights near the wanted ones, at least `line` apart and between `top` and `bottom` where there is room.

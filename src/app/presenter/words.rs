@@ -59,9 +59,10 @@ pub(super) fn reason(view: &IdentificationView, is_lost: bool) -> String {
     [felt, others, follows].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// The width that it has measured; none of an empty hand.
+/// The width that it has measured; none of an empty hand, nor of what is like nothing that it knows.
 fn felt(view: &IdentificationView) -> String {
-    if newest(view).is_some_and(|pmf| view.labels.class(EMPTY) == Some(pmf.top().0)) {
+    let leader = newest(view).map(|pmf| pmf.top().0);
+    if leader.is_some_and(|class| [view.labels.class(EMPTY), view.labels.other()].contains(&Some(class))) {
         return String::new();
     }
     let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));

@@ -180,7 +180,9 @@ impl LabelDraft {
         let next = view.next.iter().map(|next| next.object.clone());
         let trial = self.trial(view);
         let label = trial.and_then(|trial| trial.object.clone());
-        let untouched = trial.is_some_and(|trial| trial.flags.iter().any(|found| found.flag == Flag::NoContact));
+        // A trial that was cut may have ended before the touch.
+        let has = |flag: Flag| trial.is_some_and(|trial| trial.flags.iter().any(|found| found.flag == flag));
+        let untouched = has(Flag::NoContact) && !has(Flag::Interrupted);
         let untouched = untouched.then(|| EMPTY.to_owned());
         let guess = trial.filter(|trial| trial.object.is_some()).and_then(|trial| trial.guess.as_ref());
         let guess = guess.map(|guess| guess.class.clone()).filter(|class| class != OTHER);

@@ -351,7 +351,9 @@ impl Part<'_, '_> {
         let is_alone = self.data.shown_trial().is_some_and(|shown| shown.trial.judged_alone);
         let is_unknown = |(truth, _): &(&str, String)| self.view.labels.class(truth).is_none();
         // "Unknown" is right for it.
-        let is_new = !self.view.is_unknown() && self.recognised.truth.as_ref().is_some_and(is_unknown);
+        let is_new = !self.view.is_unknown()
+            && !self.recognised.nothing_held
+            && self.recognised.truth.as_ref().is_some_and(is_unknown);
         match self.is_being_learned {
             _ if self.is_foreign() => Some(FOREIGN),
             _ if self.data.other_fingers => Some(OTHER_FINGERS),
@@ -394,6 +396,10 @@ impl Part<'_, '_> {
         if let Some((class, probability)) = headline.class().zip(p.take_if(|_| is_new)) {
             why = format!("{why} So far like {} ({}).", title(&self.view.labels, class), percent(probability));
             "New object".clone_into(&mut text);
+        }
+        // Without a grasp, what the pads touch is no contact of one.
+        if matches!(headline, Headline::Waiting) && !self.view.listening {
+            "No answer yet".clone_into(&mut text);
         }
         let spoken = p.map_or_else(|| text.clone(), |p| format!("{text}, {}", percent(p)));
         let (rect, _) = labelled(ui, vec2(ui.available_width(), measures.headline), &spoken);

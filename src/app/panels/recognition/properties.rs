@@ -30,7 +30,9 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) {
     };
     let known = newest(part.view).filter(|pmf| share_of_known(pmf) > 0.5);
     let properties = known.map(|pmf| Properties::of_classes(labels, pmf));
-    let leader = newest(part.view).filter(|_| known.is_none()).map(|pmf| pmf.top().0);
+    // A class that merely leads is no fact.
+    let sure = |(_, p): &(usize, f64)| part.view.decision.is_some() || *p >= part.view.rule.threshold;
+    let leader = newest(part.view).filter(|_| known.is_none()).map(Pmf::top).filter(sure).map(|(class, _)| class);
     let why = leader.filter(|class| !has_any(&labels.classes[*class])).map(|class| why_none(labels, class));
     let mut row = |name: &str, answers: &[String], pmf: Option<&Pmf>| match &why {
         _ if answers.is_empty() => {}

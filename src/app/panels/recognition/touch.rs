@@ -41,7 +41,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     // Fingers that touch each other measure nothing.
     let is_empty = newest(part.view).is_some_and(|pmf| part.view.labels.class(EMPTY) == Some(pmf.top().0));
     let measured = part.view.measured.as_deref().filter(|_| !is_empty);
-    let unknown = if is_empty { "none" } else { UNKNOWN };
+    let unknown = if is_empty { "–" } else { UNKNOWN };
     let of = |measure: Measure| measured.and_then(|measured| measured.of(measure));
     if part.measures.is_tight() {
         let height = part.measures.class - part.measures.gap;

@@ -75,7 +75,8 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
         wrapped(ui, RichText::new(&own.what).small().weak());
         ui.horizontal(|ui| {
             let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
-            let line_at = format!("line at {}", Cell::Number(own.line).shown(&own.unit));
+            let line_at = format!("line at {}{SPACE}{}", Cell::Number(own.line).shown(&own.unit), symbol(&own.unit));
+            let line_at = line_at.trim_end().to_owned();
             let text = format!("{}: {}, {line_at}", own.what, own.shown());
             response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
             let inner = rect.shrink2(vec2(4.0, 1.0));

@@ -48,6 +48,9 @@ struct Connection {
     readout: Readout,
     remarks: Vec<String>,
     drift: Vec<Drift>,
+    /// Number of reconnects at which the hand was last seen at rest, and what its sensors read there that no drift explains.
+    rested: Option<u32>,
+    misfit: Option<String>,
     latest: Option<LatestReading>,
     plotted: Plotted,
     /// Opened for a calibration or a test, and closed after the last of them.
@@ -258,6 +261,8 @@ impl GripperSession {
             readout: Readout::default(),
             remarks: Vec::new(),
             drift: Vec::new(),
+            rested: None,
+            misfit: None,
             latest: None,
             plotted: Plotted::new(Vec::new(), 0),
             borrowed: false,
@@ -312,6 +317,7 @@ impl GripperSession {
             self.refused = Some(why.into());
             self.publish();
         } else if self.published.elapsed() >= CALM || self.connection.is_none() {
+            self.judge_rest();
             // Without a board there are no later readings to publish with.
             self.publish();
         }
@@ -418,7 +424,7 @@ impl GripperSession {
             sensors: self.sensors,
             channels: Arc::clone(&self.channels),
             drift: connection.map(|connection| connection.drift.clone()).unwrap_or_default(),
-            remarks: connection.map(|connection| connection.remarks.clone()).unwrap_or_default(),
+            remarks: connection.map(|c| c.misfit.iter().chain(&c.remarks).cloned().collect()).unwrap_or_default(),
             kept_bar: self.pressing.as_ref().map(|pressing| pressing.plan().programme.peak_bar),
             driven_only: connection.is_some_and(|connection| connection.taken_over && connection.board.emulated),
             trial,

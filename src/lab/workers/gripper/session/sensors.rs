@@ -10,6 +10,7 @@ use crate::workers::gripper::guided::{CrosstalkCommand, Guided};
 use crate::workers::gripper::plotted::Plotted;
 use crate::workers::job::JobError;
 use palpate_device::doctor::{CrosstalkTest, DoctorError};
+use palpate_geometry::units::true_minus;
 use palpate_tactile::board::{Reading, SensorList};
 use palpate_tactile::calibration::{Drift, DriftLevel, Readout, Zero};
 use std::path::Path;
@@ -67,6 +68,7 @@ impl GripperSession {
             connection.readout = readout;
             connection.remarks = remarks;
             connection.drift.clear();
+            (connection.rested, connection.misfit) = (None, None);
             if let Some(zero) = zero {
                 connection.set_zero(zero);
             }
@@ -88,6 +90,32 @@ impl GripperSession {
         let Some(connection) = &mut self.connection else { return };
         let zero = connection.readout.zero_from(&connection.recent.between(closing_s - REST_S, closing_s));
         connection.set_zero(zero);
+    }
+
+    /// Once after each connection, with open fingers: says where the calibrations are those of another hand.
+    pub(super) fn judge_rest(&mut self) {
+        let Some(connection) = &mut self.connection else { return };
+        let reconnects = connection.gripper.stream().status().reconnects;
+        if connection.rested == Some(reconnects) || self.recording.is_some() {
+            return;
+        }
+        let readings = connection.recent.last(2.0 * REST_S);
+        // Without a line pressure the fingers may be closed.
+        let open = readings.iter().all(|reading| reading.line_bar.is_some());
+        if !open || connection.readout.tare(&readings).is_err() {
+            return;
+        }
+        let drift = connection.readout.drift(&connection.readout.zero_from(&readings));
+        let far = drift.iter().filter(|drift| drift.level == DriftLevel::TooFar);
+        let far: Vec<String> =
+            far.map(|drift| format!("{} {}", drift.sensor.label(), true_minus(&drift.with_unit()))).collect();
+        connection.rested = Some(reconnects);
+        connection.misfit = (!far.is_empty()).then(|| {
+            format!("not the hand that was calibrated? At rest it reads {}: adapt, or calibrate again", far.join(", "))
+        });
+        if let Some(misfit) = connection.misfit.clone() {
+            self.publisher.notify(Notice::Warning(misfit));
+        }
     }
 
     /// Tares: takes the zeros from the present readings of the open, untouched hand.
