@@ -416,6 +416,13 @@ impl<'a> DisplayedData<'a> {
         }
     }
 
+    /// Trial of the real gripper whose curves stay until the next one, while nothing is recorded.
+    pub(super) fn recorded(&self) -> Option<TrialId> {
+        let gripper = self.gripper.filter(|gripper| self.source == ViewSource::Gripper && gripper.trial.is_none())?;
+        self.traces.current().filter(|trace| !trace.rolling)?;
+        Some(gripper.ended.as_ref()?.id)
+    }
+
     /// Beginning and end of the hold (s), where known.
     pub(super) fn hold(&self) -> Option<[f64; 2]> {
         if self.source == ViewSource::Trial {

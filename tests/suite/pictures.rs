@@ -260,7 +260,8 @@ fn the_ghost_of_a_finished_grasp_has_both_captions() {
     bench.tell(|app| app.simulation.send(Command::Play));
     bench.until(|s| s.status.finished);
     let says = |bench: &Bench| {
-        let both = ["The same grasp by rapier: its fingers differ by up to ", "As it was held, at 3.0\u{a0}s"];
+        let both =
+            ["The same grasp by the engine rapier: its fingers differ by up to ", "As it was held, at 3.0\u{a0}s"];
         texts(bench).iter().any(|(.., text)| both.iter().all(|part| text.replace('\n', " ").contains(part)))
     };
     while !says(&bench) {

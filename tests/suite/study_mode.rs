@@ -158,7 +158,7 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     for word in ["✔ agrees", "✖ disagrees", "± partly", "– not measured"] {
         assert!(bench.harness.query_by_label(word).is_some(), "{word}");
     }
-    let strip = "svm over macro-layer: −15.0 (−19.0 to −11.0) points, line at 0.0";
+    let strip = "svm over macro-layer: −15.0 (−19.0 to −11.0) points, line at 0.0\u{a0}points";
     assert!(bench.harness.query_by_label(strip).is_some(), "{strip}");
     bench.harness.run_steps(3);
     assert!(bench.harness.query_by_label_contains("than today's: run the study again").is_some());

@@ -155,17 +155,22 @@ pub(super) fn show(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions,
     gaps.iter().for_each(|gap| layers::hatch(ui, &response.transform, *gap, shade));
     if labelled {
         let mut frame = *response.transform.frame();
-        if uncalibrated && !has_header {
-            let (font, corner) = (egui::FontId::proportional(11.0), frame.right_bottom() + egui::vec2(6.0, 0.0));
-            ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, "not calibrated", font, ui.visuals().warn_fg_color);
-            frame.max.y -= labels::LINE;
-        }
         let quiet = theme.colours().quiet_text;
-        if data.traces.earlier().next().is_some() && frame.height() >= ROOM_FOR_EARLIER {
+        // Below the names, from the bottom up.
+        let mut note = |text: &str, ink: Color32| {
             let (font, corner) = (egui::FontId::proportional(11.0), frame.right_bottom() + egui::vec2(6.0, 0.0));
-            let text = "faint: earlier grasps";
-            ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, text, font, veil(quiet, 0.8));
+            ui.painter().text(corner, egui::Align2::LEFT_BOTTOM, text, font, ink);
             frame.max.y -= labels::LINE;
+        };
+        if uncalibrated && !has_header {
+            note("not calibrated", ui.visuals().warn_fg_color);
+        }
+        let has_room = response.transform.frame().height() >= ROOM_FOR_EARLIER;
+        if data.traces.earlier().next().is_some() && has_room {
+            note("faint: earlier grasps", veil(quiet, 0.8));
+        }
+        if let Some(trial) = data.recorded().filter(|_| has_room) {
+            note(&format!("as recorded: trial {trial}"), veil(quiet, 0.8));
         }
         let labels = curve_labels(data, &plot, &response.transform);
         if data.comparison.traces.is_empty() {

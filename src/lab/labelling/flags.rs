@@ -114,8 +114,9 @@ impl Observed<'_> {
     fn late_start(&self) -> Option<String> {
         const ADVICE: &str = "when the recording began: begin with open fingers";
         let (rest, pressed) = self.split();
-        let before = rest.last().or(pressed.first())?;
-        if let Some(bar) = before.line_bar {
+        // It may have opened and begun to close once more.
+        let before = [self.readings.first()?, rest.last().or(pressed.first())?];
+        if let Some(bar) = before.iter().filter_map(|reading| reading.line_bar).reduce(f64::max) {
             let told = || format!("the line was at {bar:.2} bar {ADVICE}");
             return (bar >= PRESSURE_STEP_BAR).then(told);
         }
@@ -354,6 +355,9 @@ mod tests {
         // The line pressure says it where it is read.
         closed.iter_mut().for_each(|reading| reading.line_bar = Some(if reading.t_s < 2.5 { 0.8 } else { 0.0 }));
         assert!(of(&closed)[0].remark.starts_with("the line was at 0.80 bar"), "{:?}", of(&closed));
+        // Opened, and closed once more.
+        closed.iter_mut().for_each(|reading| reading.line_bar = Some(if reading.t_s < 0.4 { 0.7 } else { 0.0 }));
+        assert!(of(&closed)[0].remark.starts_with("the line was at 0.70 bar"), "{:?}", of(&closed));
         // A grasp from rest is none, with or without line pressure.
         let mut open = readings(1500.0);
         assert_eq!(of(&open), []);
