@@ -435,8 +435,7 @@ impl<'a> DisplayedData<'a> {
             let ended = || gripper.ended.as_ref().map(|ended| ended.request.control);
             let control = gripper.trial.as_ref().map(|trial| trial.request.control).or_else(ended);
             let rolling = self.traces.current().is_none_or(|trace| trace.rolling);
-            let emulated = gripper.link.as_ref().is_some_and(|link| link.board.emulated);
-            let follows = |control| control == Control::Driven || control == Control::ByHand && !emulated;
+            let follows = |control| control == Control::Driven || control == Control::ByHand && !gripper.is_emulated();
             if rolling || !control.is_some_and(follows) {
                 return None;
             }

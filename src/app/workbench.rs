@@ -31,8 +31,8 @@ use palpate_geometry::palette::Theme;
 use palpate_lab::datasets::models_folder;
 use palpate_lab::gripper::{Listen, listen_to_port};
 use palpate_lab::workers::{
-    Explainer, GripperSetup, GripperWorker, LabelWorker, LibraryWorker, MeasuredAccuracy, SimWorker, SimWorkerSetup,
-    Snapshot, Wake, examine_port, open_trial_job,
+    Explainer, GripperSetup, GripperView, GripperWorker, LabelWorker, LibraryWorker, MeasuredAccuracy, SimWorker,
+    SimWorkerSetup, Snapshot, Wake, examine_port, open_trial_job,
 };
 use palpate_learn::{ModelError, Models, Shipped};
 use palpate_render::{describe_adapter, draws_in_software};
@@ -304,8 +304,7 @@ impl Workbench {
         let subject = match shown.source {
             ViewSource::Trial => shown.inspected.map(|own| format!("{}, trial {}", own.trial.title, own.trial.id)),
             ViewSource::Gripper => {
-                let emulated =
-                    shown.gripper.and_then(|gripper| gripper.link.as_ref()).is_some_and(|l| l.board.emulated);
+                let emulated = shown.gripper.is_some_and(GripperView::is_emulated);
                 Some(if emulated { "Emulated gripper" } else { "Real gripper" }.to_owned())
             }
             ViewSource::Simulation if !shown.view.truth_shown => None,

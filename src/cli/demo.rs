@@ -245,9 +245,9 @@ struct Touched {
     width_mm: [f64; 3],
     /// Extent along the gripper's axis (mm).
     height_mm: [f64; 3],
-    /// True where width, and height, are only known to be over the first end of their ranges.
+    /// Width and height in words.
     #[serde(skip)]
-    is_vague: [bool; 2],
+    words: [String; 2],
     /// Likeliest shape.
     shape: &'static str,
     shape_probability: f64,
@@ -264,19 +264,14 @@ impl Touched {
         };
         let (shape, shape_probability) = measured.shape.top();
         let shape = SHAPES.get(shape)?.name();
-        let is_vague = [width, height].map(MeasureEstimate::is_vague);
-        Some(Self { width_mm: of(width), height_mm: of(height), is_vague, shape, shape_probability })
+        let words = [width, height].map(|estimate| estimate.words(" to "));
+        Some(Self { width_mm: of(width), height_mm: of(height), words, shape, shape_probability })
     }
 }
 
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let of = |[value, low, high]: [f64; 3], is_vague: bool| match is_vague {
-            true => format!("over {low:.0} mm"),
-            false => format!("{value:.0} mm ({low:.0} to {high:.0})"),
-        };
-        let [width, height] = [of(self.width_mm, self.is_vague[0]), of(self.height_mm, self.is_vague[1])];
-        let shape = self.shape;
+        let ([width, height], shape) = (&self.words, self.shape);
         write!(f, "{width} wide, {height} high, {shape} ({})", percent(self.shape_probability))
     }
 }

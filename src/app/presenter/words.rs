@@ -1,11 +1,11 @@
 //! Sentences of presenter mode, for people who have never heard of the project.
 
-use crate::app::panels::recognition::words::{Headline, left, newest, percent, ranked, title};
+use crate::app::panels::recognition::words::{Headline, leads, left, newest, percent, ranked, title};
 use crate::app::widgets::capital;
 use palpate_geometry::units::mm;
 use palpate_lab::grasping::IdentificationView;
 use palpate_lab::workers::Snapshot;
-use palpate_learn::{Measure, StopReason};
+use palpate_learn::{Measure, OTHER, StopReason};
 use palpate_sim::gripper::{Mount, Phase};
 use palpate_sim::objects::EMPTY;
 
@@ -61,13 +61,14 @@ pub(super) fn reason(view: &IdentificationView, is_lost: bool) -> String {
 
 /// The width that it has measured; none of an empty hand, nor of what is like nothing that it knows.
 fn felt(view: &IdentificationView) -> String {
-    let leader = newest(view).map(|pmf| pmf.top().0);
-    if leader.is_some_and(|class| [view.labels.class(EMPTY), view.labels.other()].contains(&Some(class))) {
+    if leads(view, EMPTY) || leads(view, OTHER) {
         return String::new();
     }
     let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));
-    let range = width.map(|width| width.range.map(mm));
-    range.map_or_else(String::new, |[from, to]| format!("It feels {from:.0} to {to:.0} mm wide."))
+    width.map_or_else(String::new, |width| match width.range.map(mm) {
+        [from, _] if width.is_vague() => format!("It feels over {from:.0} mm wide."),
+        [from, to] => format!("It feels {from:.0} to {to:.0} mm wide."),
+    })
 }
 
 /// What else it may be beside the class that is named, where that is worth a word.

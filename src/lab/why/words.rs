@@ -199,6 +199,12 @@ mod tests {
                 "Against Lemon: right curvature, distal, mostly in contact (−9 percentage points)."
             ]
         );
+        // A phase is no reason where its channels speak the other way, one by one.
+        let against = |cell: f64| {
+            let found = found([0.0, 0.0], [[0.0, cell], [0.0, 0.0]]);
+            Attribution { by_phase: [0.0, -2.0].map(evidence).to_vec(), ..found }.reasons()[1].len()
+        };
+        assert_eq!([against(0.0), against(16.0)], [1, 0]);
         // A pad without load speaks by its silence.
         let silent = |unloaded: [bool; 2]| {
             let cells = vec![unloaded.to_vec(), vec![false; 2]];

@@ -99,6 +99,15 @@ impl MeasureEstimate {
     pub fn is_vague(&self) -> bool {
         self.measure == Measure::Height || self.range[1] > VAGUE * self.range[0]
     }
+
+    /// A length in words: `34 mm (30 to 38)`, with `between` between the ends; `over 16 mm` where little is known.
+    pub fn words(&self, between: &str) -> String {
+        let [value, from, to] = [self.value, self.range[0], self.range[1]].map(|x| x * 1e3);
+        match self.is_vague() {
+            true => format!("over {from:.0} mm"),
+            false => format!("{value:.0} mm ({from:.0}{between}{to:.0})"),
+        }
+    }
 }
 
 /// What one grasp tells about the geometry of the object.
@@ -137,4 +146,19 @@ pub struct GeometryScores {
     pub shape: f64,
     /// Number of grasps.
     pub grasps: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_of_which_little_is_known_has_no_number_in_its_middle() {
+        let of =
+            |measure: Measure, value: f64, range: [f64; 2]| MeasureEstimate { measure, value, range }.words(" to ");
+        assert_eq!(of(Measure::Width, 0.034, [0.030, 0.038]), "34 mm (30 to 38)");
+        assert_eq!(of(Measure::Width, 0.036, [0.016, 0.082]), "over 16 mm");
+        assert_eq!(of(Measure::Width, 0.0, [0.0, 0.0]), "0 mm (0 to 0)");
+        assert_eq!(of(Measure::Height, 0.010, [0.007, 0.013]), "over 7 mm", "an egg cup stands out of the hand");
+    }
 }

@@ -1,7 +1,7 @@
 //! The measured touch: width and height of the object with their spread, as the fingers feel them, before any
 //! class is named.
 
-use super::words::newest;
+use super::words::leads;
 use super::{Measures, Part, fitted, put};
 use crate::app::theme::colour;
 use egui::{Align2, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
@@ -39,7 +39,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
         return false;
     }
     // Fingers that touch each other measure nothing.
-    let is_empty = newest(part.view).is_some_and(|pmf| part.view.labels.class(EMPTY) == Some(pmf.top().0));
+    let is_empty = leads(part.view, EMPTY);
     let measured = part.view.measured.as_deref().filter(|_| !is_empty);
     let unknown = if is_empty { "–" } else { UNKNOWN };
     let of = |measure: Measure| measured.and_then(|measured| measured.of(measure));
@@ -50,7 +50,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
         for (k, (measure, name, about)) in SHOWN.into_iter().enumerate() {
             let corner = pos2(line.left() + share * k as f32, line.top());
             let place = Rect::from_min_size(corner, vec2(share - 4.0, line.height()));
-            let text = of(measure).map_or_else(|| "–".to_owned(), |estimate| words(estimate, "–"));
+            let text = of(measure).map_or_else(|| "–".to_owned(), |estimate| estimate.words("–"));
             explain(ui, place, (name, about), of(measure).ok_or(unknown));
             let ink = colour(if of(measure).is_some() { part.colours().text } else { part.colours().quiet_text });
             put(
@@ -70,7 +70,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 
 /// Text of an estimate for people who point at it, and for screen readers.
 fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Result<&MeasureEstimate, &str>) {
-    let text = estimate.map_or_else(str::to_owned, |estimate| words(estimate, " to "));
+    let text = estimate.map_or_else(str::to_owned, |estimate| estimate.words(" to "));
     let spoken = format!("{name} {text}");
     let meaning = match estimate {
         Ok(estimate) if estimate.is_vague() => "it is longer with 95 % probability; how much is not felt",
@@ -81,20 +81,10 @@ fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Result<&
         .widget_info(|| WidgetInfo::labeled(Role::Label, true, &spoken));
 }
 
-/// An estimate in words: `34 mm (30 to 38)`; `over 16 mm` where little is known.
-fn words(estimate: &MeasureEstimate, between: &str) -> String {
-    let [value, from, to] = [estimate.value, estimate.range[0], estimate.range[1]].map(|x| x * 1e3);
-    if estimate.is_vague() {
-        format!("over {from:.0} mm")
-    } else {
-        format!("{value:.0} mm ({from:.0}{between}{to:.0})")
-    }
-}
-
 fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estimate: Result<&MeasureEstimate, &str>) {
     let (colours, height) = (part.colours(), part.measures.class);
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
-    let text = estimate.map_or_else(str::to_owned, |estimate| words(estimate, " to "));
+    let text = estimate.map_or_else(str::to_owned, |estimate| estimate.words(" to "));
     explain(ui, rect, (name, about), estimate);
     let quiet = colour(colours.quiet_text);
     let (left, right) = (rect.left() + NAME, rect.right() - VALUE);
@@ -119,20 +109,4 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
     }
     let ink = if estimate.is_ok() { colour(colours.text) } else { quiet };
     put(ui, fitted(ui, &text, LETTERS, VALUE, ink), rect, Align2::RIGHT_CENTER);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_length_of_which_little_is_known_has_no_number_in_its_middle() {
-        let of =
-            |value: f64, range: [f64; 2]| words(&MeasureEstimate { measure: Measure::Width, value, range }, " to ");
-        assert_eq!(of(0.034, [0.030, 0.038]), "34 mm (30 to 38)");
-        assert_eq!(of(0.036, [0.016, 0.082]), "over 16 mm");
-        assert_eq!(of(0.0, [0.0, 0.0]), "0 mm (0 to 0)");
-        let height = MeasureEstimate { measure: Measure::Height, value: 0.010, range: [0.007, 0.013] };
-        assert_eq!(words(&height, " to "), "over 7 mm", "an egg cup stands out of the hand");
-    }
 }

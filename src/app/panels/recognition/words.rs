@@ -96,6 +96,11 @@ impl Headline {
     }
 }
 
+/// True where this class is the likeliest.
+pub(in crate::app) fn leads(view: &IdentificationView, class: &str) -> bool {
+    newest(view).is_some_and(|pmf| view.labels.class(class) == Some(pmf.top().0))
+}
+
 fn is_other(view: &IdentificationView, class: usize) -> bool {
     view.labels.other() == Some(class)
 }

@@ -208,6 +208,11 @@ impl GripperView {
         self.link.is_some()
     }
 
+    /// True while the board that is connected is an emulated one.
+    pub fn is_emulated(&self) -> bool {
+        self.link.as_ref().is_some_and(|link| link.board.emulated)
+    }
+
     /// True while a connected board sends no readings.
     pub fn is_silent(&self) -> bool {
         self.link.as_ref().is_some_and(|link| link.state != LinkState::Listening)
