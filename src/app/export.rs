@@ -97,6 +97,9 @@ fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError
     written.retain(|id| !missing.contains(id));
     let what = match export.taxels {
         _ if folder => "as CSV",
+        _ if FileKind::of(&path, &[FileKind::Csv]).is_some() => {
+            "as CSV, loaded taxels of a simulated one in .contacts.csv"
+        }
         true => "with taxels",
         false => "without taxels (the box \"With taxels\" in the library's Export adds them)",
     };
@@ -145,13 +148,17 @@ mod tests {
         std::fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/data/store.sqlite"), &store).expect("copies");
         std::fs::create_dir(&out).expect("a folder of this name");
         let options = OpenOptions::default();
-        let request = ExportRequest::Trials { store, ids: vec![1, 2, 4], options, taxels: false };
+        let request = ExportRequest::Trials { store: store.clone(), ids: vec![1, 2, 4], options, taxels: false };
         let said = request.write(&out, &AtomicBool::new(false)).expect("writes");
         assert!(said.starts_with("Exported trials 1, 2, 4 as CSV: ") && said.ends_with("export-2"), "{said}");
         assert_eq!(request.name(), "3_trials");
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export-2").join(name).is_file(), "{name}");
         }
+        // A file says where the taxels are.
+        let request = ExportRequest::Trials { ids: vec![1], store, options: OpenOptions::default(), taxels: false };
+        let said = request.write(&out.with_extension("csv"), &AtomicBool::new(false)).expect("writes");
+        assert!(said.contains(".contacts.csv: ") && folder.path().join("export.contacts.csv").is_file(), "{said}");
     }
 
     #[test]

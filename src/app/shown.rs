@@ -8,7 +8,7 @@ use palpate_lab::grasping::{IdentificationView, LEAD_S};
 use palpate_lab::inspection::{Alignment, OpenTrial, PhaseSpan, TouchPhase, phases_of_frames};
 use palpate_lab::picture::Stage;
 use palpate_lab::why::{Band, bands_for};
-use palpate_lab::workers::{ExplainRequest, GripperView, Snapshot};
+use palpate_lab::workers::{ExplainRequest, GripperView, ObjectCard, Snapshot};
 use palpate_sim::frame::Frame;
 use palpate_sim::objects::{capital_title, object_title};
 use palpate_sim::scene::Scene;
@@ -141,8 +141,7 @@ const STORED: u64 = 1 << 63;
 pub(super) struct HeldMoment {
     pub(super) stage: Arc<Stage>,
     pub(super) frame: Arc<Frame>,
-    /// Class of the object.
-    pub(super) object: String,
+    pub(super) object: Option<Arc<ObjectCard>>,
 }
 
 /// Length of a live stream in the plots (s).

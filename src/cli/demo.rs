@@ -247,7 +247,7 @@ struct Touched {
     height_mm: [f64; 3],
     /// Width and height in words.
     #[serde(skip)]
-    words: [String; 2],
+    words: String,
     /// Likeliest shape.
     shape: &'static str,
     shape_probability: f64,
@@ -264,15 +264,16 @@ impl Touched {
         };
         let (shape, shape_probability) = measured.shape.top();
         let shape = SHAPES.get(shape)?.name();
-        let words = [width, height].map(|estimate| estimate.words(" to "));
+        let high = measured.felt(Measure::Height).map(|height| format!(", {} high", height.words(" to ")));
+        let words = format!("{} wide{}", width.words(" to "), high.unwrap_or_default());
         Some(Self { width_mm: of(width), height_mm: of(height), words, shape, shape_probability })
     }
 }
 
 impl std::fmt::Display for Touched {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let ([width, height], shape) = (&self.words, self.shape);
-        write!(f, "{width} wide, {height} high, {shape} ({})", percent(self.shape_probability))
+        let (words, shape) = (&self.words, self.shape);
+        write!(f, "{words}, {shape} ({})", percent(self.shape_probability))
     }
 }
 

@@ -5,6 +5,7 @@ use super::snapshot::sides_from;
 use crate::app::ExportRequest;
 use palpate_geometry::palette::Theme;
 use palpate_lab::inspection::{Alignment, FigureOptions, HeatKind, Keep, OpenOptions, OpenTrial, comparison_figure};
+use palpate_lab::picture::{BendUnit, LoadUnit};
 
 /// Arguments of `palpate plot`.
 #[derive(Debug, clap::Args)]
@@ -33,7 +34,7 @@ pub(super) struct PlotArguments {
     #[arg(long, conflicts_with = "heat")]
     raw: bool,
     /// Heat maps over time: joints (angle of each) or pads (pressure on each row of taxels).
-    #[arg(long, value_name = "NAME", value_parser = one_of([("joints", HeatKind::Joints), ("pads", HeatKind::Pads)]))]
+    #[arg(long, value_name = "NAME", value_parser = one_of([("joints", HeatKind::Joints(BendUnit::Angle)), ("pads", HeatKind::Pads(LoadUnit::Pressure))]))]
     heat: Option<HeatKind>,
     #[command(flatten)]
     signals: SignalArguments,

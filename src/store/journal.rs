@@ -64,7 +64,7 @@ pub enum Change {
         /// The prediction.
         guess: Guess,
     },
-    /// The label was reviewed and kept.
+    /// The label was reviewed.
     Reviewed,
     Plan {
         /// Before.
@@ -124,7 +124,7 @@ impl Change {
                 Some((class, p)) => format!("{} predicted {}, {}", guess.model, shown_title(class), percent(*p)),
                 None => format!("{} predicted nothing", guess.model),
             },
-            Self::Reviewed => "label reviewed and kept".to_owned(),
+            Self::Reviewed => "label reviewed".to_owned(),
             Self::Plan { to, .. } => {
                 let wanted: u32 = to.objects.iter().map(|object| object.wanted).sum();
                 format!("plan changed to {wanted} trials of {} objects", to.objects.len())

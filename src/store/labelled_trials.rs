@@ -37,6 +37,10 @@ fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         (Some(model), Some(pmf)) => serde_json::from_str(&pmf).ok().map(|pmf| Guess { model, pmf }),
         _ => None,
     };
+    let flags = flaws(shown.flags.clone(), object.as_deref());
+    // A hand that felt nothing is empty, whatever a model makes of that.
+    let is_surely_empty = shown.flags.len() > flags.len();
+    let guess = guess.filter(|_| !is_surely_empty);
     let samples = row.get::<_, i64>(10)?.max(0).cast_unsigned();
     // Trials of early versions have no length: it follows from their rate.
     let by_rate = if shown.cadence.rate_hz > 0.0 { samples as f64 / shown.cadence.rate_hz } else { 0.0 };
@@ -48,7 +52,7 @@ fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         note: row.get(5)?,
         tags: serde_json::from_str(&text(6)?).unwrap_or_default(),
         unsure: row.get(7)?,
-        flags: flaws(shown.flags, object.as_deref()),
+        flags,
         cadence: cadence_line(&shown.cadence),
         guess: guess.and_then(|guess| GuessTop::of(&guess, object.as_deref())),
         reviewed: row.get(8)?,

@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json as object};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -226,12 +226,15 @@ fn the_python_example_of_the_manual_runs_to_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let client = folder.path().join("palpate.py");
     std::fs::write(&client, include_str!("../../assets/clients/palpate.py")).unwrap();
-    let python = |script: &Path| std::process::Command::new("python3").arg(script).current_dir(folder.path()).output();
-    let Ok(alone) = python(&client) else { return };
-    // Without a server it says so in a line.
+    let python = |script: &Path, arguments: &[&str]| {
+        std::process::Command::new("python3").arg(script).args(arguments).current_dir(folder.path()).output()
+    };
+    // Without a server it says so in a line. Nobody listens at a port that was free a moment ago.
+    let free = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).unwrap().port().to_string();
+    let Ok(alone) = python(&client, &["--port", &free]) else { return };
     let text = String::from_utf8_lossy(&alone.stderr).into_owned();
-    let refused = text.starts_with("error: no `palpate serve` on 127.0.0.1:4747") && text.lines().count() == 1;
-    assert!(refused || TcpStream::connect("127.0.0.1:4747").is_ok(), "{text}");
+    assert!(text.starts_with(&format!("error: no `palpate serve` on 127.0.0.1:{free}")), "{text}");
+    assert_eq!(text.lines().count(), 1, "{text}");
     // Advice for the box leads where the fingers have no room.
     let server = Server::start(folder.path(), &["--object", "box", "--speed", "20"]);
     let manual = include_str!("../../assets/help/control.md");
@@ -240,7 +243,7 @@ fn the_python_example_of_the_manual_runs_to_its_end() {
     let example = example.replace("Palpate(token_file", &format!("Palpate({port}, token_file"));
     let script = folder.path().join("example.py");
     std::fs::write(&script, &example).unwrap();
-    let ended = python(&script).unwrap();
+    let ended = python(&script, &[]).unwrap();
     assert!(ended.status.success(), "{}\n{example}", String::from_utf8_lossy(&ended.stderr));
     let labelled = Store::open_to_read(&server.store).unwrap().labels().trials().unwrap();
     assert!(labelled.iter().any(|trial| trial.unsure && trial.object.is_some()), "the last trial is labelled");

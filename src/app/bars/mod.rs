@@ -241,8 +241,15 @@ fn sources_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
 
 /// State of the real gripper, in every mode: who actuates it, and whether trials begin automatically.
 fn gripper_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
-    let Some(gripper) = app.gripper_view().filter(|gripper| gripper.is_connected()) else { return };
+    let Some(gripper) = app.gripper_view() else { return };
     let colours = app.view.theme.colours();
+    if let Some(refused) = &gripper.refused {
+        let text = RichText::new("gripper not connected").small().color(colour(colours.warning));
+        actions.on(&ui.button(text).on_hover_text(&refused.text), |app| app.show_panel("gripper"));
+    }
+    if !gripper.is_connected() {
+        return;
+    }
     let watching = gripper.watching.is_some();
     let narrow = ui.available_width() < 640.0;
     let trials = match (watching, narrow) {

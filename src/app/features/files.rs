@@ -81,7 +81,9 @@ impl FileFeature {
         let (title, extensions) = match request {
             ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
-            ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => ("Export trials", &["mcap", "npz"][..]),
+            ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => {
+                ("Export trials", &["mcap", "npz", "parquet", "csv"][..])
+            }
         };
         let name = Some(format!("{name}.{}", extensions[0]));
         self.ask(title, extensions, name, |app, path| _ = app.files.exports.start((path, request)));

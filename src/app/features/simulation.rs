@@ -90,7 +90,7 @@ impl SimulationFeature {
         let snapshot = self.snapshot.as_ref()?;
         let frame = &snapshot.frame;
         let over = frame.phase == Phase::Release || frame.taxels.is_empty();
-        self.held.as_ref().filter(|held| over && held.object == snapshot.truth())
+        self.held.as_ref().filter(|held| over && held.object == snapshot.object)
     }
 
     /// Sends a command to the simulation.
@@ -130,13 +130,14 @@ impl SimulationFeature {
         self.effects.start(self.scene.clone());
     }
 
-    /// Keeps the newest moment of the grasp at which an object is held.
+    /// Keeps the newest moment of the grasp at which an object is held; none after a grasp that held nothing.
     fn note_hold(&mut self, snapshot: &Snapshot) {
+        self.held.take_if(|_| snapshot.status.nothing_held);
         let Some(trace) = self.traces.current().filter(|trace| trace.grasp == snapshot.grasp) else { return };
         let holds = |frame: &&Arc<Frame>| frame.phase == Phase::Hold && snapshot.stage.force_on_object(frame).is_some();
         let newest = trace.frames.iter().rev().flatten().take_while(|frame| frame.phase != Phase::Close).find(holds);
         if let Some(frame) = newest {
-            let (stage, object) = (Arc::clone(&snapshot.stage), snapshot.truth().to_owned());
+            let (stage, object) = (Arc::clone(&snapshot.stage), snapshot.object.clone());
             self.held = Some(HeldMoment { stage, frame: Arc::clone(frame), object });
         }
     }

@@ -9,8 +9,9 @@ use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
-use palpate_geometry::units::{difference, number, symbol};
-use palpate_lab::inspection::Alignment;
+use palpate_geometry::units::{difference, number, symbol, true_minus};
+use palpate_lab::inspection::{Alignment, OpenTrial, TouchPhase};
+use palpate_sim::gripper::Side;
 use palpate_tactile::trial::TrialId;
 
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
@@ -128,6 +129,21 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                     1 => ui.label(format!("{mean} ({off})")),
                     _ => ui.label(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
                 };
+            }
+            ui.end_row();
+        }
+        for side in Side::BOTH {
+            let touched = |trial: &OpenTrial| {
+                let closing = trial.phase_from(TouchPhase::PreShaping).or(trial.phase_from(TouchPhase::Contact));
+                Some(trial.touched_s[side.index()]? - closing?)
+            };
+            let Some(own) = touched(shown) else { continue };
+            ui.weak(format!("first contact {}, s", side.name())).on_hover_text("After the closing began");
+            ui.label(format!("{own:.2}"));
+            for other in &pinned {
+                let text = touched(&other.trial)
+                    .map_or("–".to_owned(), |other| true_minus(&format!("{other:.2} ({:+.2})", other - own)));
+                ui.label(text);
             }
             ui.end_row();
         }

@@ -15,11 +15,12 @@ use palpate_lab::workers::{GripperCommand, GripperView, LatestReading};
 use palpate_tactile::board::{Sensor, SensorKind};
 use palpate_tactile::calibration::{Drift, DriftLevel};
 use palpate_tactile::trial::Control;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(super) fn ui(
     ui: &mut Ui,
     (gripper, silent_s): (Option<&GripperView>, Option<u64>),
+    port: Option<&Path>,
     control: Control,
     actions: &mut Actions,
 ) {
@@ -27,13 +28,13 @@ pub(super) fn ui(
         let connected = gripper.and_then(|gripper| Some((gripper, gripper.link.as_ref()?)));
         match connected {
             Some((gripper, link)) => connected_ui(ui, (gripper, silent_s), link, control, actions),
-            None => ports_ui(ui, gripper, actions),
+            None => ports_ui(ui, gripper, port, actions),
         }
     });
 }
 
-/// Ports to connect to.
-fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
+/// Ports to connect to, first the last one.
+fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, port: Option<&Path>, actions: &mut Actions) {
     if let Some(refused) = gripper.and_then(|gripper| gripper.refused.as_ref()) {
         failure_ui(ui, &refused.text);
         if let Some(command) = &refused.command {
@@ -43,7 +44,8 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         remark_ui(ui, "No gripper connected. Demo and Inspect work with the simulated one.");
     }
     let id = egui::Id::unique("port path");
-    let mut path = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
+    let typed = ui.data_mut(|data| data.get_temp::<String>(id));
+    let mut path = typed.unwrap_or_else(|| port.map(|port| port.display().to_string()).unwrap_or_default());
     let typed = Some(path.trim()).filter(|path| !path.is_empty()).map(PathBuf::from);
     ui.horizontal_wrapped(|ui| {
         let connect = Button::new("Connect").fill(accented(theme::of(ui)));

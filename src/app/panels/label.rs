@@ -158,15 +158,15 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
             let agrees = if guess.p < 0.5 { "Also the model's first guess" } else { "The model agrees" };
-            (format!("trial {}: {title}. {agrees} ({})", trial.id, percent(guess.p)), colours.accent)
+            (format!("Last label, trial {}: {title}. {agrees} ({})", trial.id, percent(guess.p)), colours.accent)
         }
         Some(guess) => {
             let (class, p) = (object_title(&guess.class), percent(guess.p));
             let (state, ink) =
                 if trial.reviewed { ("reviewed", colours.quiet_text) } else { ("please review", colours.warning) };
-            (format!("trial {}: {title}. The model predicts {class} ({p}): {state}", trial.id), ink)
+            (format!("Last label, trial {}: {title}. The model predicts {class} ({p}): {state}", trial.id), ink)
         }
-        None => (format!("trial {}: {title}", trial.id), colours.quiet_text),
+        None => (format!("Last label, trial {}: {title}", trial.id), colours.quiet_text),
     };
     let frame = egui::Frame::new().fill(veil(ink, 0.14)).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 3));
     frame.show(ui, |ui| {

@@ -91,7 +91,7 @@ pub const ALL: [PanelKind; 35] = [
     }),
     panel("journal", "Journal", |ui, app, actions| journal::ui(ui, app.labels(), actions)),
     panel("gripper", "Gripper", |ui, app, actions| {
-        gripper::ui(ui, (app.gripper_view(), app.gripper.silent_s()), app.control(), actions);
+        gripper::ui(ui, (app.gripper_view(), app.gripper.silent_s()), app.view.port.as_deref(), app.control(), actions);
     }),
     panel("counts", "Counts", |ui, app, actions| curves::counts_ui(ui, &app.shown(), actions)),
     panel("console", "Console", |ui, app, _| console::ui(ui, app.gripper_view())),

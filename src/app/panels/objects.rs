@@ -6,6 +6,7 @@ use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
+use palpate_lab::grasping::lesson_warning;
 use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, catalogue};
 use std::ffi::OsStr;
@@ -42,8 +43,9 @@ pub(super) fn ui<'a>(
             let class = learned_as(path);
             let title = title_of(path);
             let learned = match class {
-                Some((_, Some(Lesson { recognised, tested, .. }))) => {
-                    format!("learned: right in {recognised} of {tested}, ")
+                Some((_, Some(lesson))) => {
+                    let poorly = if lesson_warning(lesson).is_some() { " poorly" } else { "" };
+                    format!("learned{poorly}: right in {} of {}, ", lesson.recognised, lesson.tested)
                 }
                 Some((_, None)) => "learned, ".to_owned(),
                 None => String::new(),

@@ -29,7 +29,9 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         }
         if data.source == ViewSource::Trial {
             ui.separator();
-            for (heat, name) in [(HeatKind::Joints, "Export joints"), (HeatKind::Pads, "Export pads")] {
+            for (heat, name) in
+                [(HeatKind::Joints(bend_unit), "Export joints"), (HeatKind::Pads(load_unit), "Export pads")]
+            {
                 if ui.small_button(name).on_hover_text("Export this heat map as SVG or PNG").clicked() {
                     let options = FigureOptions { heat: Some(heat), ..FigureOptions::default() };
                     actions.push(|app| app.export_figure(options));

@@ -55,6 +55,9 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, library: Option<&Library
                 ui.end_row();
             }
         });
+        if let Some(text) = touches_text(trial.touched_s) {
+            wrapped(ui, RichText::new(text).weak());
+        }
         ui.add_space(6.0);
         facts_ui(ui, trial);
         ui.add_space(6.0);
@@ -65,6 +68,13 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, library: Option<&Library
             actions.push(|app| app.set_scene(scene));
         }
     });
+}
+
+/// When each finger touched first.
+fn touches_text(touched_s: [Option<f64>; 2]) -> Option<String> {
+    let text = |t: Option<f64>| t.map_or_else(|| "never".to_owned(), |t| format!("at {t:.2}{SPACE}s"));
+    let [left, right] = touched_s.map(text);
+    touched_s.iter().any(Option::is_some).then(|| format!("First contact: left {left}, right {right}"))
 }
 
 /// Number and source, and what the library says: local time, tags and note.

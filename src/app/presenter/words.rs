@@ -65,9 +65,9 @@ fn felt(view: &IdentificationView) -> String {
         return String::new();
     }
     let width = view.measured.as_ref().and_then(|measured| measured.of(Measure::Width));
-    width.map_or_else(String::new, |width| match width.range.map(mm) {
-        [from, _] if width.is_vague() => format!("It feels over {from:.0} mm wide."),
-        [from, to] => format!("It feels {from:.0} to {to:.0} mm wide."),
+    width.map_or_else(String::new, |width| match width.felt().map(|end| end.map(mm)) {
+        [Some(from), Some(to)] => format!("It feels {from:.0} to {to:.0} mm wide."),
+        _ => format!("It feels {} wide.", width.words("")),
     })
 }
 

@@ -18,8 +18,8 @@ use palpate_tactile::trial::TrialSource;
 use palpate_tactile::{Channel, LayoutError};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Simulated grasps of a new object by which a model usually learns it.
 pub const LESSON_GRASPS: usize = 160;
@@ -117,11 +117,21 @@ pub fn lesson_result(lesson: &Lesson) -> String {
 pub fn lesson_warning(lesson: &Lesson) -> Option<String> {
     let Lesson { grasps, lost, tested, recognised, taken_for, .. } = lesson;
     if 4 * lost >= *grasps && *lost > 0 {
-        let words = "was not held: it slid away or was never touched. Fix it in place to learn its shape";
-        return Some(format!("in {lost} of {grasps} grasps the object {words}"));
+        let words = "it slid away or was never touched. Fix it in place to learn its shape";
+        return Some(format!("not held in {lost} of {grasps} grasps: {words}"));
     }
     let is_doubtful = 2 * recognised < *tested && !taken_for.is_empty();
-    is_doubtful.then(|| format!("its grasps are hard to tell from those of {}", rivals(lesson)))
+    is_doubtful.then(|| format!("hard to tell from {}", rivals(lesson)))
+}
+
+/// Simulated grasps of one object.
+struct Simulated {
+    /// Those that are sound.
+    examples: Vec<Example>,
+    /// Number of those in which the object left the hand or was never touched.
+    lost: usize,
+    /// Why another one is not sound.
+    unsound: Option<GraspFailure>,
 }
 
 /// Reason why a model learned nothing.
@@ -190,8 +200,8 @@ impl Lessons<'_> {
             let mut scene = usual.clone();
             name.clone_into(&mut scene.object.source);
             let Some(object) = scene.load_object()? else { continue };
-            let (examples, _) = self.simulated(&scene, &object, 0..REHEARSED, &view, &tick)?;
-            add(data_of(&object.name, examples, &scene, &view)?)?;
+            let own = self.simulated(&scene, &object, 0..REHEARSED, &view, &tick)?;
+            add(data_of(&object.name, own.examples, &scene, &view)?)?;
         }
         for (number, setup) in self.objects.iter().enumerate() {
             let ObjectSetup { fixed, shift, .. } = scene.object;
@@ -216,17 +226,18 @@ impl Lessons<'_> {
             let (few, half) = (self.grasps / STRAIGHT, self.grasps / 2);
             let (mut examples, mut lost) = (Vec::new(), 0);
             for (scene, grasps) in [(&scene, self.grasps - half), (&usual, half - few), (&straight, few)] {
-                let (own, lost_here) = self.simulated(scene, &object, 0..grasps, &view, &tick)?;
-                examples.extend(own);
-                lost += lost_here;
+                let own = self.simulated(scene, &object, 0..grasps, &view, &tick)?;
+                examples.extend(own.examples);
+                lost += own.lost;
             }
-            if examples.is_empty() {
-                let name = &object.name;
-                return Err(refused(format!("no simulated grasp of \"{name}\" is sound; `palpate grasp` shows why")));
+            let test = self.simulated(&usual, &object, half..half + TESTED, &view, &tick)?;
+            if examples.is_empty() || test.examples.is_empty() {
+                let why = test.unsound.map_or("their numbers are unsound".to_owned(), |failure| failure.to_string());
+                return Err(refused(format!("\"{}\" is not learned: in its grasps, {why}", object.name)));
             }
             let (name, grasps) = (object.name.clone(), examples.len());
             learned.push(Lesson { name, grasps, lost, ..Lesson::default() });
-            tests.push(self.simulated(&usual, &object, half..half + TESTED, &view, &tick)?.0);
+            tests.push(test.examples);
             add(data_of(&object.name, examples, &scene, &view)?)?;
         }
         for name in self.recorded {
@@ -249,7 +260,7 @@ impl Lessons<'_> {
         Ok(Taught { model: taught, lessons: learned })
     }
 
-    /// Simulated grasps of one object in the poses of a scene, and the number of those in which it left the hand.
+    /// Simulated grasps of one object in the poses of a scene.
     fn simulated(
         &self,
         scene: &Scene,
@@ -257,10 +268,10 @@ impl Lessons<'_> {
         grasps: Range<usize>,
         view: &SensorView,
         tick: &(dyn Fn() + Sync),
-    ) -> Result<(Vec<Example>, usize), LessonError> {
+    ) -> Result<Simulated, LessonError> {
         let sampler = PoseSampler::new(scene, Some(object));
         let seeds: Vec<u64> = seeds_of(object, self.seed).skip(grasps.start).take(grasps.len()).collect();
-        let lost = AtomicUsize::new(0);
+        let (lost, unsound) = (AtomicUsize::new(0), OnceLock::new());
         let read = |seed: &u64| -> Result<Option<Example>, LessonError> {
             if self.stop.load(Ordering::Relaxed) {
                 return Err(LearnError::Stopped.into());
@@ -269,6 +280,7 @@ impl Lessons<'_> {
             let trial = grasp_soundly(&drawn, Some(object), *seed, Recompute::Unsettled);
             tick();
             if !trial.data.quality.is_sound() {
+                trial.data.quality.failure.into_iter().for_each(|failure| _ = unsound.set(failure));
                 return Ok(None);
             }
             let mut readings = view.readings(&trial)?.into_iter().map(|signals| Arc::new(sequence_of(&signals)));
@@ -280,7 +292,8 @@ impl Lessons<'_> {
             Ok(Some(Example { grasp, content, further: readings.collect(), ..Example::default() }))
         };
         let examples: Vec<Option<Example>> = seeds.par_iter().map(read).collect::<Result<_, _>>()?;
-        Ok((examples.into_iter().flatten().collect(), lost.into_inner()))
+        let examples = examples.into_iter().flatten().collect();
+        Ok(Simulated { examples, lost: lost.into_inner(), unsound: unsound.into_inner() })
     }
 }
 
@@ -354,11 +367,11 @@ mod tests {
             lesson_result(&lesson),
             format!("the most likely answer in 3 of 12 new grasps, others taken for {rivals}")
         );
-        assert_eq!(lesson_warning(&lesson), Some(format!("its grasps are hard to tell from those of {rivals}")));
+        assert_eq!(lesson_warning(&lesson), Some(format!("hard to tell from {rivals}")));
         let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };
         let result = "the most likely answer in 12 of 12 new grasps";
         assert_eq!((lesson_result(&known).as_str(), lesson_warning(&known)), (result, None));
         let lost = Lesson { lost: 40, ..lesson };
-        assert!(lesson_warning(&lost).is_some_and(|words| words.starts_with("in 40 of 160 grasps")));
+        assert!(lesson_warning(&lost).is_some_and(|words| words.starts_with("not held in 40 of 160 grasps")));
     }
 }

@@ -17,18 +17,18 @@ use palpate_tactile::trial::{TrialId, TrialSource};
 /// What a heat map shows over time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeatKind {
-    /// Angle of each joint.
-    Joints,
-    /// Pressure on each row of taxels.
-    Pads,
+    /// Bending of each joint.
+    Joints(BendUnit),
+    /// Load on each row of taxels.
+    Pads(LoadUnit),
 }
 
 impl HeatKind {
     /// What a trial must have for it.
     fn name(self) -> &'static str {
         match self {
-            Self::Joints => "joint angles",
-            Self::Pads => "taxels",
+            Self::Joints(_) => "joint angles",
+            Self::Pads(_) => "taxels",
         }
     }
 }
@@ -402,10 +402,10 @@ fn heat_plots(trials: &[&OpenTrial], kind: HeatKind) -> Result<Vec<Plot>, Figure
         }
         let gripper = &trial.header.scene.gripper;
         let maps: [HeatMap; 2] = match kind {
-            HeatKind::Joints => joints_over_time(gripper, &trial.frames, BendUnit::Angle),
-            HeatKind::Pads => {
+            HeatKind::Joints(unit) => joints_over_time(gripper, &trial.frames, unit),
+            HeatKind::Pads(unit) => {
                 let shown = first..gripper.taxels().rows;
-                pad_rows_over_time(gripper, &trial.frames, LoadUnit::Pressure, &shown)
+                pad_rows_over_time(gripper, &trial.frames, unit, &shown)
             }
         };
         for map in maps {
@@ -538,7 +538,8 @@ mod tests {
     #[test]
     fn heat_maps_stand_side_by_side() -> Result<(), FigureDataError> {
         let trials = opened(&["ball"]);
-        for kind in [HeatKind::Joints, HeatKind::Pads] {
+        let kinds = [BendUnit::Angle, BendUnit::Curvature].map(HeatKind::Joints);
+        for kind in kinds.into_iter().chain([HeatKind::Pads(LoadUnit::Pressure)]) {
             let options = FigureOptions { heat: Some(kind), ..FigureOptions::default() };
             let figure = comparison_figure(&[&trials[0]], &options)?;
             assert_eq!((figure.plots.len(), figure.columns), (2, 2));

@@ -1,6 +1,6 @@
 //! A stored trial, opened: everything that plots, pictures and bars show of it, sample by sample.
 
-use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, phases_of_frames};
+use super::phases::{PhaseSpan, PhaseTimes, TouchPhase, phases_of_frames, touches_of_frames};
 use crate::datasets::{SensorView, knows_fingers, noise_seed};
 use crate::grasping::{Identification, IdentificationView, Row};
 use crate::labelling::measured_phases;
@@ -100,6 +100,8 @@ pub struct OpenTrial {
     pub board: Option<Board>,
     /// Phases of the grasp.
     pub phases: Vec<PhaseSpan>,
+    /// First contact of each finger (s), left and right, where its pad shows one.
+    pub touched_s: [Option<f64>; 2],
     /// Facts that only simulated trials have.
     pub simulated: Option<SimulatedFacts>,
     /// Meshes of the 3-D view.
@@ -186,6 +188,7 @@ impl OpenTrial {
             columns: Vec::new(),
             board: None,
             phases: Vec::new(),
+            touched_s: [None; 2],
             simulated: None,
             stage: None,
             frames: Vec::new(),
@@ -280,6 +283,7 @@ impl OpenTrial {
             self.push(row, row.t_s);
         }
         self.phases = phases_of_frames(data.frames.iter(), gripper);
+        self.touched_s = touches_of_frames(data.frames.iter(), gripper);
         let SimulatedData { world_from_gripper, plan, quality, frames } = data;
         self.remarks.extend(self.header.origin.as_ref().and_then(GraspOrigin::other_physics));
         if options.keep >= Keep::Scenery {

@@ -107,11 +107,19 @@ impl PhaseTimes {
 
 /// Phases of a simulated grasp: contact is the first sample in which a pad carries load.
 pub fn phases_of_frames<'a>(frames: impl Iterator<Item = &'a Frame> + Clone, gripper: &GripperModel) -> Vec<PhaseSpan> {
-    let taxels = gripper.taxels().count();
-    let touches = |frame: &&Frame| Side::BOTH.iter().any(|side| frame.normal_force(*side, taxels) > CONTACT_FORCE);
     let mut times = PhaseTimes::of_samples(frames.clone().map(|frame| (frame.t, frame.phase)));
-    times.contact = frames.clone().find(touches).map(|frame| frame.t);
+    times.contact = touches_of_frames(frames.clone(), gripper).into_iter().flatten().reduce(f64::min);
     times.spans(0.0, frames.last().map_or(0.0, |frame| frame.t))
+}
+
+/// First contact of each finger of a simulated grasp (s), left and right: the first sample in which its pad carries load.
+pub(super) fn touches_of_frames<'a>(
+    frames: impl Iterator<Item = &'a Frame> + Clone,
+    gripper: &GripperModel,
+) -> [Option<f64>; 2] {
+    let taxels = gripper.taxels().count();
+    let touches = |frame: &&Frame, side: Side| frame.normal_force(side, taxels) > CONTACT_FORCE;
+    Side::BOTH.map(|side| frames.clone().find(|frame| touches(frame, side)).map(|frame| frame.t))
 }
 
 /// Line pressure that counts as none (bar): half a step of the control box.

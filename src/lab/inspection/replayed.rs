@@ -110,6 +110,11 @@ impl OpenTrial {
             let loads = self.columns.iter().filter(|column| is_load(column));
             loads.filter_map(|column| onset(&self.t_s, &column.values, begin, 0.0)).reduce(f64::min)
         };
+        let is_calibrated = |column: &Column| {
+            column.channel.as_ref().is_some_and(|own| {
+                matches!(own.quantity, Quantity::Pressure | Quantity::ContactPressure | Quantity::Force)
+            })
+        };
         // The pads as calibrated, or else as the board counted them, or another program named them.
         let pads: Vec<&String> = self
             .board
@@ -119,13 +124,13 @@ impl OpenTrial {
                 pads.filter_map(|pad| board.channels.get(board.channel_of(pad)?))
             })
             .collect();
-        let contact = onsets(&|column| {
-            column.channel.as_ref().is_some_and(|own| {
-                matches!(own.quantity, Quantity::Pressure | Quantity::ContactPressure | Quantity::Force)
-            })
-        })
-        .or_else(|| onsets(&|column| pads.contains(&&column.name)))
-        .or_else(|| onsets(&|column| column.name.contains("pressure") || column.name.contains("force")));
+        let touched_s = Side::BOTH.map(|side| {
+            let is_own = |own: &Channel| own.side() == Some(side);
+            onsets(&|column| is_calibrated(column) && column.channel.as_ref().is_some_and(is_own))
+        });
+        let contact = onsets(&is_calibrated)
+            .or_else(|| onsets(&|column| pads.contains(&&column.name)))
+            .or_else(|| onsets(&|column| column.name.contains("pressure") || column.name.contains("force")));
         let corrected = self.header.phases.unwrap_or_default();
         let times = PhaseTimes {
             closing: corrected.closing.or(Some(begin)),
@@ -135,6 +140,8 @@ impl OpenTrial {
         };
         let [first_s, last_s] = self.span_s();
         self.phases = times.spans(first_s, last_s);
+        // What a person has seen is not measured again.
+        self.touched_s = if corrected.contact.is_some() { [None; 2] } else { touched_s };
     }
 
     /// Fingers as arcs of the curvature that was read, where it was.

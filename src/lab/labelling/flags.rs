@@ -17,7 +17,7 @@ use palpate_tactile::board::{Board, Gap, Reading, Sensor, SensorKind};
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::calibration::{Calibration, Input, RangeEnd, Readout};
 use palpate_tactile::electronics::PadPart;
-use palpate_tactile::trial::PhaseMark;
+use palpate_tactile::trial::{Control, PhaseMark};
 
 /// Consecutive readings that count as contact: a single one may be a knock.
 const IN_A_ROW: usize = 3;
@@ -53,6 +53,8 @@ pub struct Observed<'a> {
     pub cadence: &'a Cadence,
     /// Phases of the grasp, if known.
     pub phases: &'a [PhaseMark],
+    /// Who actuated: a driven hand was told to open first.
+    pub control: Control,
     /// Calibrations of its parts, if any.
     pub calibrations: &'a [(Sensor, Calibration)],
 }
@@ -114,9 +116,10 @@ impl Observed<'_> {
     fn late_start(&self) -> Option<String> {
         const ADVICE: &str = "when the recording began: begin with open fingers";
         let (rest, pressed) = self.split();
-        // It may have opened and begun to close once more.
-        let before = [self.readings.first()?, rest.last().or(pressed.first())?];
-        if let Some(bar) = before.iter().filter_map(|reading| reading.line_bar).reduce(f64::max) {
+        // A hand that was not told to open may have opened and begun to close once more.
+        let first = if self.control == Control::Driven { None } else { self.readings.first() };
+        let before = [first, Some(rest.last().or(pressed.first())?)];
+        if let Some(bar) = before.iter().flatten().filter_map(|reading| reading.line_bar).reduce(f64::max) {
             let told = || format!("the line was at {bar:.2} bar {ADVICE}");
             return (bar >= PRESSURE_STEP_BAR).then(told);
         }
@@ -314,11 +317,20 @@ mod tests {
     }
 
     fn flags(readings: &[Reading], gaps: &[Gap], interruptions: &[String], cadence: &Cadence) -> Vec<FlagRemark> {
+        flags_under(Control::Free, readings, gaps, interruptions, cadence)
+    }
+
+    fn flags_under(
+        control: Control,
+        readings: &[Reading],
+        gaps: &[Gap],
+        interruptions: &[String],
+        cadence: &Cadence,
+    ) -> Vec<FlagRemark> {
         let board = Board { rate_hz: Some(50.0), ..Board::default() };
-        let phases = marks();
-        let observed =
-            Observed { board: &board, readings, gaps, interruptions, cadence, phases: &phases, calibrations: &[] };
-        flags_of(&observed)
+        let (phases, calibrations) = (marks(), &[]);
+        let phases = &phases;
+        flags_of(&Observed { board: &board, readings, gaps, interruptions, cadence, phases, control, calibrations })
     }
 
     #[test]
@@ -358,6 +370,8 @@ mod tests {
         // Opened, and closed once more.
         closed.iter_mut().for_each(|reading| reading.line_bar = Some(if reading.t_s < 0.4 { 0.7 } else { 0.0 }));
         assert!(of(&closed)[0].remark.starts_with("the line was at 0.70 bar"), "{:?}", of(&closed));
+        // A driven hand opens first.
+        assert_eq!(flags_under(Control::Driven, &closed, &[], &[], &good())[0].flag, Flag::NoContact);
         // A grasp from rest is none, with or without line pressure.
         let mut open = readings(1500.0);
         assert_eq!(of(&open), []);
@@ -391,6 +405,7 @@ mod tests {
             interruptions: &[],
             cadence: &cadence,
             phases: &[],
+            control: Control::Free,
             calibrations: &[],
         };
         let (rest, pressed) = observed.split();

@@ -5,7 +5,7 @@ use super::annotations::{Annotator, MARGIN, Plate, SCALE_BAR, shows_legends};
 use glam::{DVec3, Vec2, Vec3};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::{Align, Arrow};
-use palpate_geometry::palette::{Rgb, Theme, pressure_colour};
+use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
 use palpate_sim::frame::{Frame, TaxelLoad};
 use palpate_sim::gripper::{GripperModel, Side};
@@ -19,8 +19,6 @@ const SHORTEST: f64 = 0.03;
 const RADIUS: f64 = 0.0042;
 /// Forces below this are not drawn (N).
 const FAINTEST: f64 = 0.01;
-/// Force that has the brightest colour (N).
-const FULL_SCALE: f64 = 0.5;
 /// Height of the numbers (points), of a line of them, and their distance from the tips.
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
@@ -30,7 +28,7 @@ const LEAST_HEIGHT: f32 = 150.0;
 const APART: f32 = 250.0;
 const HIGH: f32 = 320.0;
 
-/// Colour of friction; that of a force across the pad comes from the map of pressures.
+/// Colour of friction, of its arrow and its number; that of a force across the pad is the colour of text.
 fn friction_colour(theme: Theme) -> Rgb {
     match theme {
         Theme::Dark => Rgb(255, 126, 182),
@@ -46,13 +44,6 @@ struct Forces {
     normal: DVec3,
     /// Along the pad; none where it is too small to be drawn.
     friction: Option<DVec3>,
-}
-
-impl Forces {
-    /// The colour of the normal force: the lower third of the map is too dark for a thin line.
-    fn normal_colour(&self) -> Rgb {
-        pressure_colour(0.35 + 0.65 * (self.normal.length() / FULL_SCALE) as f32)
-    }
 }
 
 /// The friction that a picture shows: a low one has no room for its number.
@@ -75,7 +66,7 @@ pub(super) fn arrows(
             let (from, to) = (forces.from.as_vec3(), tip(forces.from, vector, scale));
             arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
         };
-        arrow(forces.normal, forces.normal_colour());
+        arrow(forces.normal, view.theme.colours().text);
         if let Some(friction) = shown_friction(&forces, view) {
             arrow(friction, friction_colour(view.theme));
         }
@@ -122,7 +113,7 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, fra
     let tip = view.size - Vec2::new(MARGIN, SCALE_BAR + KEY_TIP);
     let force = KEY * longest_force(&on_fingers(gripper, &Pose::IDENTITY, frame));
     let length = view.size.y * (LONGEST * KEY) as f32;
-    let (tail, ink) = (tip - Vec2::new(length, 0.0), pressure_colour(0.35 + 0.65 * (force / FULL_SCALE) as f32));
+    let (tail, ink) = (tip - Vec2::new(length, 0.0), view.theme.colours().text);
     let half = Vec2::new((0.5 * length).max(1.5 * TEXT) + 5.0, LINE);
     let middle_x = (tip.x - 0.5 * length).min(view.size.x - half.x - 8.0);
     let middle = Vec2::new(middle_x, view.size.y - SCALE_BAR - KEY_MIDDLE);
@@ -136,13 +127,7 @@ pub(super) fn add_key(annotator: &mut Annotator<'_>, gripper: &GripperModel, fra
     for side in [-4.0, 4.0] {
         overlay.line(tip, tip + Vec2::new(-6.0, side), 2.0, ink);
     }
-    overlay.text(
-        Vec2::new(middle.x, tip.y - 14.0),
-        Align::Centre,
-        TEXT,
-        view.theme.colours().text,
-        units::shown(force, "N"),
-    );
+    overlay.text(Vec2::new(middle.x, tip.y - 14.0), Align::Centre, TEXT, ink, units::shown(force, "N"));
 }
 
 /// Their numbers, beyond the tips or near by: a plate for each finger, or one for both in a low picture.

@@ -70,7 +70,7 @@ impl BoardTrialRecording {
             seconds: plan.total_s(),
             status: gripper.stream().status(),
             began_s,
-            prompted: request.control == Control::ByHand,
+            control: request.control,
         });
         let mut recording = Self {
             request,

@@ -9,7 +9,7 @@ use palpate_store::{BoardChunk, BoardInfo, Serving, Store, StoreError, check_spa
 use palpate_tactile::board::Gap;
 use palpate_tactile::cadence::Cadence;
 use palpate_tactile::capture::Captured;
-use palpate_tactile::trial::{BoardCourse, PhaseMark, TrialHeader, TrialId};
+use palpate_tactile::trial::{BoardCourse, Control, PhaseMark, TrialHeader, TrialId};
 
 /// Bytes a second that a trial may need: readings and bytes of 1 kHz with 8 channels, twice over.
 const BYTES_PER_S: f64 = 400e3;
@@ -31,8 +31,8 @@ pub struct BoardTrialPlan {
     pub status: LinkStatus,
     /// First reading (s, on the clock of the readings).
     pub began_s: f64,
-    /// Its phases are what a person was told to do: those measured replace them, where there are any.
-    pub prompted: bool,
+    /// Who actuates. By hand, phases are what a person was told to do: those measured replace them, where there are any.
+    pub control: Control,
 }
 
 /// A recorded trial of the real gripper.
@@ -51,7 +51,7 @@ pub struct RecordedTrial {
 pub(super) struct BoardWriter {
     id: TrialId,
     about: BoardInfo,
-    prompted: bool,
+    control: Control,
     chunk: BoardChunk,
     samples: u64,
     /// Number of these that are written.
@@ -84,7 +84,7 @@ impl BoardWriter {
         Ok(Self {
             id: store.begin_board(&TrialHeader::new(&plan.object, plan.scene.clone()), &about)?,
             about,
-            prompted: plan.prompted,
+            control: plan.control,
             chunk: BoardChunk::default(),
             samples: 0,
             written: 0,
@@ -197,7 +197,7 @@ impl BoardWriter {
             tracing::warn!("trial {} is flagged without calibrations: {error}", self.id);
             Serving::default()
         });
-        if self.prompted {
+        if self.control == Control::ByHand {
             let measured = measured_phases(&self.about.course.board, &trial.readings);
             // Phases that were asked for stay where nothing measures them.
             if !measured.is_empty() || shows_grasps(&self.about.course.board, &trial.readings) {
@@ -212,6 +212,7 @@ impl BoardWriter {
             interruptions: &self.interruptions,
             cadence: &self.about.course.cadence,
             phases: &self.about.course.phases,
+            control: self.control,
             calibrations: &serving.calibrations,
         });
         self.about.sparkline = sparkline(&self.about.course.board, &readings);

@@ -7,7 +7,7 @@ use palpate_device::serial::{LinkOptions, PortError, SerialLink};
 use palpate_sim::scene::Scene;
 use palpate_store::Store;
 use palpate_tactile::capture::{CAPTURE_MAGIC, Captured};
-use palpate_tactile::trial::TrialSource;
+use palpate_tactile::trial::{Control, TrialSource};
 use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::Duration;
@@ -48,7 +48,7 @@ fn plan(link: &SerialLink, object: &str) -> BoardTrialPlan {
         seconds: Some(8.0),
         status: link.status(),
         began_s: 0.0,
-        prompted: false,
+        control: Control::Free,
     }
 }
 

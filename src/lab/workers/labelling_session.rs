@@ -476,9 +476,10 @@ impl LabellingSession {
             let [new, old] = [&label, old].map(|name| object_title(name));
             LabellingEffect::Inform(format!("Trial {}: {new}, no longer {old}; Ctrl+Z brings it back", trial.id))
         });
+        let disagrees = labels.disagreements.iter().any(|found| found.id == trial.id && found.guess != label);
         let mut effects = vec![LabellingEffect::Edit(LabelCommand::Edit(trial.id, TrialEdit::Label(label)))];
         effects.extend(corrected);
-        if labels.disagreements.iter().any(|found| found.id == trial.id) {
+        if disagrees {
             effects.push(LabellingEffect::Edit(LabelCommand::Reviewed(trial.id)));
         }
         self.draft.reset();

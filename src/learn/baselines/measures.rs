@@ -90,22 +90,34 @@ pub struct MeasureEstimate {
     pub range: [f64; 2],
 }
 
-/// A range this many times as long as where it begins has no number in its middle that says anything.
+/// The lower end of a range that is so many times as long is not felt: fingers that meet feel alike on all that is thinner.
 const VAGUE: f64 = 3.0;
+/// Opening of the gripper whose grasps the encoder has learned (m): nothing wider stood between its fingers.
+const OPENING: f64 = 0.084;
 
 impl MeasureEstimate {
-    /// True where only the lower end of the range is felt: heights, for nothing touches what stands out above and below the
-    /// pads, and long ranges. The other end is that of the objects that were learned; a bottle is longer.
-    pub fn is_vague(&self) -> bool {
-        self.measure == Measure::Height || self.range[1] > VAGUE * self.range[0]
+    /// The ends of its range that are felt (m). The upper end of a height is that of the objects that were learned, for nothing
+    /// touches what stands out above and below the pads; a bottle is longer. So is that of a width above the opening of the
+    /// gripper.
+    pub fn felt(&self) -> [Option<f64>; 2] {
+        let [from, to] = self.range;
+        match self.measure {
+            Measure::Height => [Some(from), None],
+            Measure::Width if to > OPENING => [Some(from), None],
+            _ if to > VAGUE * from => [None, Some(to)],
+            _ => [Some(from), Some(to)],
+        }
     }
 
-    /// A length in words: `34 mm (30 to 38)`, with `between` between the ends; `over 16 mm` where little is known.
+    /// A length in words: `34 mm (30 to 38)`, with `between` between the ends; `over 16 mm` or `under 30 mm` where one end is
+    /// felt.
     pub fn words(&self, between: &str) -> String {
-        let [value, from, to] = [self.value, self.range[0], self.range[1]].map(|x| x * 1e3);
-        match self.is_vague() {
-            true => format!("over {from:.0} mm"),
-            false => format!("{value:.0} mm ({from:.0}{between}{to:.0})"),
+        let (value, ends) = (self.value * 1e3, self.felt().map(|end| end.map(|x| x * 1e3)));
+        match ends {
+            [Some(from), Some(to)] => format!("{value:.0} mm ({from:.0}{between}{to:.0})"),
+            [Some(from), None] => format!("over {from:.0} mm"),
+            [None, Some(to)] => format!("under {to:.0} mm"),
+            [None, None] => String::new(),
         }
     }
 }
@@ -123,6 +135,12 @@ impl Measured {
     /// The estimate of a quantity.
     pub fn of(&self, measure: Measure) -> Option<&MeasureEstimate> {
         self.estimates.iter().find(|estimate| estimate.measure == measure)
+    }
+
+    /// The same, but no height between fingers that may touch each other.
+    pub fn felt(&self, measure: Measure) -> Option<&MeasureEstimate> {
+        let may_meet = self.of(Measure::Width).is_some_and(|width| width.felt()[0].is_none());
+        self.of(measure).filter(|_| measure != Measure::Height || !may_meet)
     }
 }
 
@@ -157,8 +175,16 @@ mod tests {
         let of =
             |measure: Measure, value: f64, range: [f64; 2]| MeasureEstimate { measure, value, range }.words(" to ");
         assert_eq!(of(Measure::Width, 0.034, [0.030, 0.038]), "34 mm (30 to 38)");
-        assert_eq!(of(Measure::Width, 0.036, [0.016, 0.082]), "over 16 mm");
+        assert_eq!(of(Measure::Width, 0.016, [0.008, 0.030]), "under 30 mm", "the fingers may touch each other");
+        assert_eq!(of(Measure::Width, 0.085, [0.082, 0.088]), "over 82 mm", "as wide as the hand opens, or wider");
         assert_eq!(of(Measure::Width, 0.0, [0.0, 0.0]), "0 mm (0 to 0)");
         assert_eq!(of(Measure::Height, 0.010, [0.007, 0.013]), "over 7 mm", "an egg cup stands out of the hand");
+        let estimate = |measure, range| MeasureEstimate { measure, value: 0.010, range };
+        let tells_height = |width: [f64; 2]| {
+            let estimates = vec![estimate(Measure::Width, width), estimate(Measure::Height, [0.007, 0.013])];
+            let measured = Measured { estimates, shape: Pmf::uniform(2) };
+            measured.felt(Measure::Height).is_some()
+        };
+        assert_eq!([[0.008, 0.030], [0.030, 0.038]].map(tells_height), [false, true]);
     }
 }

@@ -81,8 +81,8 @@ fn edits_ui(
             ui.close();
         }
         if ui
-            .button("MCAP or NPZ file …")
-            .on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy (Ctrl+Shift+E)")
+            .button("A file: MCAP, NPZ, Parquet, CSV …")
+            .on_hover_text("For ROS 2, Foxglove, PlotJuggler; for numpy, pandas; CSV for one trial (Ctrl+Shift+E)")
             .clicked()
         {
             actions.push(move |app| app.export_trials(taxels));

@@ -220,7 +220,7 @@ fn lesson_ui(
             // Classes need the height: in a small window the warning stands for all that is said.
             let warned_above = measures.is_tight() && warning.is_some();
             if let Some(warning) = warning.as_ref().filter(|_| warned_above) {
-                let text = format!("{}: {warning}.", capital_title(&learned.name));
+                let text = format!("{}, {warning}.", capital_title(&learned.name));
                 ui.add(Label::new(RichText::new(text).color(amber)).truncate());
             }
             ui.horizontal_wrapped(|ui| {

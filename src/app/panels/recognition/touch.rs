@@ -40,9 +40,9 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     }
     // Fingers that touch each other measure nothing.
     let is_empty = leads(part.view, EMPTY);
-    let measured = part.view.measured.as_deref().filter(|_| !is_empty);
-    let unknown = if is_empty { "–" } else { UNKNOWN };
-    let of = |measure: Measure| measured.and_then(|measured| measured.of(measure));
+    let touched = part.view.measured.as_deref().filter(|_| !part.recognised.nothing_held);
+    let unknown = if is_empty || touched.is_some() { "–" } else { UNKNOWN };
+    let of = |measure: Measure| touched.filter(|_| !is_empty).and_then(|measured| measured.felt(measure));
     if part.measures.is_tight() {
         let height = part.measures.class - part.measures.gap;
         let (line, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
@@ -72,8 +72,9 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
 fn explain(ui: &Ui, place: Rect, (name, about): (&str, &str), estimate: Result<&MeasureEstimate, &str>) {
     let text = estimate.map_or_else(str::to_owned, |estimate| estimate.words(" to "));
     let spoken = format!("{name} {text}");
-    let meaning = match estimate {
-        Ok(estimate) if estimate.is_vague() => "it is longer with 95 % probability; how much is not felt",
+    let meaning = match estimate.map(MeasureEstimate::felt) {
+        Ok([Some(_), None]) => "it is longer with 95 % probability; how much is not felt",
+        Ok([None, _]) => "it is shorter with 95 % probability; fingers that may touch each other do not feel how much",
         _ => "median, and the range that holds the true value with 90 % probability",
     };
     ui.interact(place, ui.scope_id().with(("touch", name)), Sense::hover())
@@ -97,12 +98,13 @@ fn line_ui(ui: &mut Ui, part: &Part<'_, '_>, (name, about): (&str, &str), estima
         ui.painter().rect_filled(bar, 2.0, colour(colours.raised));
         if let Ok(estimate) = estimate {
             let at = |x: f64| bar.left() + bar.width() * (x * 1e3 / LONGEST).clamp(0.0, 1.0) as f32;
-            let [from, to] = estimate.range.map(at);
-            let to = if estimate.is_vague() { bar.right() } else { to };
+            let [from, to] = estimate.felt().map(|end| end.map(at));
+            let is_vague = from.is_none() || to.is_none();
+            let (from, to) = (from.unwrap_or(bar.left()), to.unwrap_or(bar.right()));
             let range = Rect::from_min_max(pos2(from, bar.top()), pos2(to.max(from + 2.0), bar.bottom()));
             ui.painter().rect_filled(range, 2.0, colour(colours.background.mix(colours.accent, 0.45)));
             let middle = Rect::from_center_size(pos2(at(estimate.value), bar.center().y), vec2(2.5, height * 0.7));
-            if !estimate.is_vague() {
+            if !is_vague {
                 ui.painter().rect_filled(middle, 1.0, colour(colours.accent));
             }
         }

@@ -174,6 +174,8 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
             format!("{}, but unlike any known object: {again}", percent(p))
         }
         None if certain => format!("{}, but the grasps disagree: {again}", percent(p)),
+        // Fingers feel each other, too.
+        None if recognised.nothing_held => format!("Object not held ({}): {again}", leaders(&view.labels, now)),
         None => format!("Not sure yet ({}): {again}", leaders(&view.labels, now)),
     }
 }
