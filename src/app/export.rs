@@ -18,6 +18,8 @@ pub enum ExportRequest {
     Figure(Figure, Theme, [u32; 2]),
     /// The 3-D view, width and height in points: .png with two pixels per point.
     View3d(Box<DrawList>, [u32; 2]),
+    /// A table of a study: .csv.
+    Table(String),
     /// Sound trials of a store: the formats of [`palpate_exchange::FORMATS`]; as CSV into a new folder.
     Trials {
         store: PathBuf,
@@ -40,7 +42,7 @@ impl ExportRequest {
             Self::Figure(figure, ..) => figure,
             Self::Trials { ids, .. } if ids.len() == 1 => return format!("trial_{}", ids[0]),
             Self::Trials { ids, .. } => return format!("{}_trials", ids.len()),
-            Self::View3d(..) | Self::Labelled(_) => return "palpate".to_owned(),
+            Self::View3d(..) | Self::Table(_) | Self::Labelled(_) => return "palpate".to_owned(),
         };
         let plot = match figure.plots.as_slice() {
             [one] => one.y.title.split(" (").next().unwrap_or_default(),
@@ -56,7 +58,7 @@ impl ExportRequest {
 
     /// Writes it and says so; the file appears whole or not at all. `stop` ends an export of trials.
     pub fn write(&self, path: &Path, stop: &AtomicBool) -> Result<String, JobError> {
-        let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png]);
+        let kind = FileKind::of(path, &[FileKind::Svg, FileKind::Png, FileKind::Csv]);
         let is = |wanted: FileKind| kind == Some(wanted);
         let unknown = |known: &str| Err(format!("cannot write \"{}\": choose {known}", path.display()).into());
         let bytes = match self {
@@ -75,6 +77,8 @@ impl ExportRequest {
                 Picture::draw(&gpu, &mut renderer, list, size.map(|side| 2 * side), 2.0)?.to_png()?
             }
             Self::View3d(..) => return unknown("a .png file"),
+            Self::Table(text) if is(FileKind::Csv) => text.clone().into_bytes(),
+            Self::Table(_) => return unknown("a .csv file"),
             Self::Trials { store, ids, options, taxels } => {
                 let (store, is_stopped) = (&Store::open(store)?, &|| stop.load(Ordering::Relaxed));
                 return write_sound(&TrialExport { store, ids, options, taxels: *taxels, is_stopped }, path);
@@ -192,10 +196,14 @@ mod tests {
             assert!(exports.take().iter().all(|ended| ended.command.0 == path && ended.outcome.is_ok()));
             assert!(std::fs::read(&path).expect("written").starts_with(begin));
         }
-        let stop = AtomicBool::new(false);
+        let (stop, table) = (AtomicBool::new(false), ExportRequest::Table("a,b\n".to_owned()));
+        table.write(&folder.path().join("a.csv"), &stop).expect("written");
+        assert!(
+            table.write(&folder.path().join("a.svg"), &stop).is_err_and(|error| error.to_string().contains(".csv"))
+        );
         let wrong = ExportRequest::Figure(Figure::default(), Theme::Light, [200, 100]);
         let error = wrong.write(&folder.path().join("a.pdf"), &stop).expect_err("refused").to_string();
         assert!(error.contains("choose an .svg or a .png file; numbers are exported in the library"), "{error}");
-        assert_eq!(std::fs::read_dir(folder.path()).expect("reads").count(), 2);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("reads").count(), 3);
     }
 }

@@ -9,11 +9,13 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use palpate::app::Mode;
 use palpate_geometry::palette::Theme;
+use palpate_lab::gripper::{Listen, NotOpened};
 use palpate_lab::workers::{Command, LabelCommand};
 use palpate_sim::objects::catalogue;
 use palpate_sim::scene::Scene;
 use palpate_store::{BoardInfo, Store};
 use palpate_tactile::trial::{TrialHeader, TrialSource};
+use std::sync::Arc;
 
 fn window(size: [f32; 2]) -> Bench {
     Bench::new(BenchSetup { size, ..BenchSetup::default() }, CpuRenderer::default())
@@ -35,6 +37,19 @@ fn run(bench: &mut Bench, text: &str) {
     type_text(bench, text);
     press(bench, Modifiers::NONE, Key::Enter);
     assert!(bench.harness.query_by_role_and_label(Role::SearchInput, "Find an action").is_none());
+}
+
+#[test]
+fn a_port_that_cannot_be_opened_is_named_and_leads_to_its_panel() {
+    let listen: Listen = Arc::new(|_, _| Err(NotOpened::from("there is no such port".to_owned())));
+    let setup = BenchSetup { size: [1280.0, 820.0], listen, ..BenchSetup::default() };
+    let mut bench = Bench::new(setup, CpuRenderer::default());
+    bench.tell(|app| app.connect(Some("/dev/ttyACM7".into())));
+    bench.until_shown(true, "gripper not connected");
+    bench.harness.get_by_label("gripper not connected").click();
+    bench.until_shown(true, "List ports");
+    let field = bench.harness.get_by_role_and_label(Role::TextInput, "Port or file").value();
+    assert_eq!(field.as_deref(), Some("/dev/ttyACM7"));
 }
 
 #[test]

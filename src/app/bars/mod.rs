@@ -117,6 +117,10 @@ fn drawn_by(app: &App, driver: &str) -> String {
     format!("{rate:.0}{SPACE}{frames}/s{coarse} \u{b7} {driver}")
 }
 
+/// Width of the list of messages (points), and how many it shows: the newest.
+const MESSAGES: f32 = 380.0;
+const MOST_MESSAGES: usize = 12;
+
 /// Settings of the window.
 fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
     let (icon, other) = match app.view.theme {
@@ -164,6 +168,15 @@ fn menu_ui(ui: &mut Ui, app: &App, actions: &mut Actions) {
         let hint = "Full screen: object after object, with large letters and a score";
         let presenter = egui::Button::new("Presenter mode").shortcut_text("F11");
         actions.on(&ui.add(presenter).on_hover_text(hint), |app| app.present(true));
+        ui.menu_button("Messages", |ui| {
+            ui.set_width(MESSAGES);
+            if app.notices.messages().is_empty() {
+                ui.weak("There was none yet.");
+            }
+            for text in app.notices.messages().iter().rev().take(MOST_MESSAGES) {
+                ui.add(egui::Label::new(RichText::new(text).small()).wrap());
+            }
+        });
         ui.separator();
         actions.on(&ui.add(egui::Button::new("Keys").shortcut_text("F1")), |app| app.view.keys_shown = true);
         actions.on(&ui.button("Manual"), |app| app.view.manual_shown = true);

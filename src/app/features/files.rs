@@ -81,6 +81,7 @@ impl FileFeature {
         let (title, extensions) = match request {
             ExportRequest::Figure(..) => ("Export figure", &["svg", "png"][..]),
             ExportRequest::View3d(..) => ("Save picture", &["png"][..]),
+            ExportRequest::Table(_) => ("Export table", &["csv"][..]),
             ExportRequest::Trials { .. } | ExportRequest::Labelled(_) => {
                 ("Export trials", &["mcap", "npz", "parquet", "csv"][..])
             }
@@ -217,6 +218,11 @@ impl App {
             }
             None => self.notices.warning("There is no figure: run the study first."),
         }
+    }
+
+    /// Exports a table of a study.
+    pub(in crate::app) fn export_table(&mut self, name: &str, text: String) {
+        self.files.export_as(name, ExportRequest::Table(text));
     }
 
     /// Exports the trials selected in the library, or else the one shown, into one file, with the force on every taxel where

@@ -6,7 +6,7 @@ use crate::app::theme::{self, colour};
 use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{selectable_row, text_field};
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui};
-use palpate_lab::grasping::lesson_warning;
+use palpate_lab::grasping::{is_doubtful, lesson_warning};
 use palpate_learn::Lesson;
 use palpate_sim::objects::{EMPTY, catalogue};
 use std::ffi::OsStr;
@@ -44,8 +44,12 @@ pub(super) fn ui<'a>(
             let title = title_of(path);
             let learned = match class {
                 Some((_, Some(lesson))) => {
-                    let poorly = if lesson_warning(lesson).is_some() { " poorly" } else { "" };
-                    format!("learned{poorly}: right in {} of {}, ", lesson.recognised, lesson.tested)
+                    let doubt = match is_doubtful(lesson) {
+                        true => " poorly",
+                        false if lesson_warning(lesson).is_some() => ", often not held",
+                        false => "",
+                    };
+                    format!("learned{doubt}: right in {} of {}, ", lesson.recognised, lesson.tested)
                 }
                 Some((_, None)) => "learned, ".to_owned(),
                 None => String::new(),

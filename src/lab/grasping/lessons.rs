@@ -113,15 +113,19 @@ pub fn lesson_result(lesson: &Lesson) -> String {
     format!("the most likely answer in {recognised} of {tested} new grasps{others}")
 }
 
+/// Most new grasps of the object were taken for others.
+pub fn is_doubtful(lesson: &Lesson) -> bool {
+    2 * lesson.recognised < lesson.tested && !lesson.taken_for.is_empty()
+}
+
 /// A warning where the hand was empty in many of the grasps, or they are like those of other objects.
 pub fn lesson_warning(lesson: &Lesson) -> Option<String> {
-    let Lesson { grasps, lost, tested, recognised, taken_for, .. } = lesson;
+    let Lesson { grasps, lost, .. } = lesson;
     if 4 * lost >= *grasps && *lost > 0 {
         let words = "it slid away or was never touched. Fix it in place to learn its shape";
         return Some(format!("not held in {lost} of {grasps} grasps: {words}"));
     }
-    let is_doubtful = 2 * recognised < *tested && !taken_for.is_empty();
-    is_doubtful.then(|| format!("hard to tell from {}", rivals(lesson)))
+    is_doubtful(lesson).then(|| format!("hard to tell from {}", rivals(lesson)))
 }
 
 /// Simulated grasps of one object.

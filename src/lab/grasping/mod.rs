@@ -41,7 +41,9 @@ pub(crate) use felt_rows::FeltRows;
 pub use guidance::{Advisor, GripperMove, Guide, KnownTouches, ObjectMove, Stance, TouchLibrary, TouchesError};
 pub use identify::{Identification, IdentificationView, IdentifyError, RecognisedGrasp};
 pub use known_geometry::{KnownGeometryError, KnownGrasps, SHAPES, geometry_of, random_shapes};
-pub use lessons::{LESSON_GRASPS, LessonError, LessonStage, Lessons, Taught, lesson_result, lesson_warning};
+pub use lessons::{
+    LESSON_GRASPS, LessonError, LessonStage, Lessons, Taught, is_doubtful, lesson_result, lesson_warning,
+};
 pub use presentation::Presentation;
 pub(crate) use pressure_watch::PressureFault;
 pub use promise::{GraspRounds, GraspedRound, PromiseError};

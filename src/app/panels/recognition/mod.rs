@@ -23,7 +23,9 @@ use egui::{
 };
 use palpate_geometry::palette::ThemeColours;
 use palpate_geometry::units::SPACE;
-use palpate_lab::grasping::{IdentificationView, ObjectMove, RecognisedGrasp, lesson_result, lesson_warning};
+use palpate_lab::grasping::{
+    IdentificationView, ObjectMove, RecognisedGrasp, is_doubtful, lesson_result, lesson_warning,
+};
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::capital_title;
@@ -143,6 +145,9 @@ pub(super) fn ui(
         let labels = recognised.view.map(|view| view.labels.as_ref());
         // What was learned of fixed objects says nothing about free ones.
         let learned = learned.filter(|learned| learned.fixed == data.scene.holds_object());
+        // Nor has it to do with another object in the hand.
+        let is_in_hand = |name: &str| recognised.truth.as_ref().is_none_or(|(truth, _)| *truth == name);
+        let learned = learned.filter(|learned| is_in_hand(&learned.name));
         lesson_ui(ui, tools, learned, labels, measures, actions);
         match recognised.view {
             Some(view) => {
@@ -226,8 +231,8 @@ fn lesson_ui(
             ui.horizontal_wrapped(|ui| {
                 let title = capital_title(&learned.name);
                 let ink = if warning.is_some() { amber } else { colour(good) };
-                let learned_badly = if warning.is_some() { " poorly" } else { "" };
-                let told = RichText::new(format!("Learned {title}{learned_badly}")).strong().color(ink);
+                let poorly = if learned.lesson.as_ref().is_some_and(is_doubtful) { " poorly" } else { "" };
+                let told = RichText::new(format!("Learned {title}{poorly}")).strong().color(ink);
                 if !warned_above {
                     ui.label(if measures.is_tight() { told } else { told.heading() });
                 }

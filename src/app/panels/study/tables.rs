@@ -2,7 +2,7 @@
 
 use super::{about_row_ui, cell_text, hint, opening, part_title, result_ui};
 use crate::app::actions::Actions;
-use crate::app::features::studies::Studies;
+use crate::app::features::studies::{Studies, is_quick};
 use crate::app::theme::{self, colour};
 use crate::app::widgets::put_line;
 use egui::{Align, Align2, Color32, FontId, Layout, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
@@ -47,6 +47,11 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     let first = table.rows.iter().position(|row| opening(&result, row).is_some());
     let mut goes = false;
     ui.allocate_ui_with_layout(vec2(ui.available_width(), ROW), Layout::right_to_left(Align::Center), |ui| {
+        if ui.small_button("Export").on_hover_text("Write this table as CSV").clicked() {
+            let quick = if is_quick(result.origin) { "_quick" } else { "" };
+            let (name, text) = (format!("{}{quick}", table.name), table.csv());
+            actions.push(move |app| app.export_table(&name, text));
+        }
         if let Some(first) = first.filter(|first| *first >= IN_SIGHT) {
             goes = ui.small_button(format!("To row {}, which opens trials", first + 1)).clicked();
         }
@@ -128,7 +133,12 @@ fn row_ui(
     texts(ui, rect, &places[..1.min(places.len())], cells.iter().take(1).cloned(), ink);
     texts(ui, rect, &places[1.min(places.len())..], cells.into_iter().skip(1), colour(colours.text));
     let clicked = response.clicked();
-    response.on_hover_ui(|ui| about_row_ui(ui, result, table, row));
+    // Cells in sight are not said again, over the rows above.
+    let in_sight = whole <= ui.clip_rect().width() + 1.0;
+    response.on_hover_ui(|ui| match in_sight {
+        true => _ = ui.label(RichText::new(hint(result, row)).small().weak()),
+        false => about_row_ui(ui, result, table, row),
+    });
     match trials {
         Some(trials) if clicked => actions.push(move |app| app.open_trials(&trials)),
         None if clicked => {

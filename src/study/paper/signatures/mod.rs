@@ -82,6 +82,8 @@ pub(super) struct Found {
     signatures: Vec<Signature>,
     /// Grasps without contact, or in which nothing was held to the end.
     lost: usize,
+    /// Grasps left out as unsound.
+    unsound: usize,
     curves: Vec<Curve>,
     /// Sentences at each value of a setting.
     varied: Vec<(f64, Summary)>,
@@ -171,7 +173,7 @@ fn of_data(bench: &StudyData<'_>, wanted: &DataWanted) -> Result<Found, StudyErr
             Some((known.name.as_str(), scene.load_object().ok()??))
         })
         .collect();
-    let mut found = Found { data: data.about.described(), ..Found::default() };
+    let mut found = Found { data: data.about.described(), unsound: data.about.left_out, ..Found::default() };
     for example in &data.examples {
         bench.check_stop()?;
         let class = &data.labels.classes[example.class];
@@ -313,11 +315,12 @@ fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
         let cell = move |own: &Measured| interval(&own.found.signatures.iter().collect::<Vec<_>>(), statistic);
         (name, unit, cell)
     });
-    let own: [Column<'_, Measured>; 4] = [
+    let own: [Column<'_, Measured>; 5] = [
         Column("gripper", "", &|own| own.gripper.into()),
         Column("grasps", "", &|own| own.kind.as_str().into()),
         Column("held", "grasps", &|own| own.summary.grasps.into()),
         Column("lost", "grasps", &|own| own.found.lost.into()),
+        Column("unsound", "grasps", &|own| own.found.unsound.into()),
     ];
     let statistics = statistics.iter().map(|(name, unit, cell)| Column(name, unit, cell));
     let columns: Vec<Column<'_, Measured>> = own.into_iter().chain(statistics).collect();
