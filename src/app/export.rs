@@ -92,18 +92,17 @@ impl ExportRequest {
 }
 
 fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError> {
-    // A name without ending is that of a folder.
-    let folder = path.extension().is_none();
-    let path = if folder { unused(path) } else { path.to_owned() };
+    // A name without ending is that of a folder, which several trials need as CSV.
+    let is_csv = FileKind::of(path, &[FileKind::Csv]).is_some();
+    let folder = path.extension().is_none() || (is_csv && export.ids.len() > 1);
+    let path = if folder { unused(&path.with_extension("")) } else { path.to_owned() };
     let (mut written, mut missing) = sound_ones(export.store, export.ids)?;
     let left_out = write_trials(&TrialExport { ids: &written, ..*export }, &path)?.left_out;
     missing.extend(left_out.into_iter().map(|(id, _)| id));
     written.retain(|id| !missing.contains(id));
     let what = match export.taxels {
         _ if folder => "as CSV",
-        _ if FileKind::of(&path, &[FileKind::Csv]).is_some() => {
-            "as CSV, loaded taxels of a simulated one in .contacts.csv"
-        }
+        _ if is_csv => "as CSV, loaded taxels of a simulated one in .contacts.csv",
         true => "with taxels",
         false => "without taxels (the box \"With taxels\" in the library's Export adds them)",
     };
@@ -159,6 +158,9 @@ mod tests {
         for name in ["trial_1_lemon.csv", "trial_1_lemon.contacts.csv", "trial_2_mug.csv", "trial_4_lemon.bytes"] {
             assert!(folder.path().join("export-2").join(name).is_file(), "{name}");
         }
+        // Several trials as CSV are a folder of that name.
+        let said = request.write(&folder.path().join("two.csv"), &AtomicBool::new(false)).expect("writes");
+        assert!(said.ends_with("two") && folder.path().join("two").join("trial_2_mug.csv").is_file(), "{said}");
         // A file says where the taxels are.
         let request = ExportRequest::Trials { ids: vec![1], store, options: OpenOptions::default(), taxels: false };
         let said = request.write(&out.with_extension("csv"), &AtomicBool::new(false)).expect("writes");

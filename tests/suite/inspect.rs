@@ -229,8 +229,8 @@ fn compared_trials_have_a_line_each_or_a_mean() {
     bench.until_shown(true, "Lemon, trial 3, simulated");
     // The one that is shown stands in the list once, and can be taken out of it.
     bench.until_shown(true, "Trial 1, shown: Lemon");
-    bench.until_shown(true, "first contact left, s");
-    bench.until_shown(true, "first contact right, s");
+    bench.until_shown(true, "closing to contact, left, s");
+    bench.until_shown(true, "closing to contact, right, s");
     assert!(bench.harness.query_by_label_contains("Lemon, trial 1, simulated").is_none());
     bench.harness.get_by_label("Remove trial 1 from the comparison").click();
     bench.look();

@@ -9,7 +9,7 @@ use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
-use palpate_geometry::units::{difference, number, symbol, true_minus};
+use palpate_geometry::units::{SPACE, difference, number, shown as with_unit, symbol};
 use palpate_lab::inspection::{Alignment, OpenTrial, TouchPhase};
 use palpate_sim::gripper::Side;
 use palpate_tactile::trial::TrialId;
@@ -88,6 +88,8 @@ fn options_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     }
 }
 
+/// Width below which the table of the hold has short names (points).
+const NARROW: f32 = 260.0;
 /// Most trials of the table of the hold.
 const MOST_IN_TABLE: usize = 4;
 
@@ -99,6 +101,7 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     ui.separator();
     ui.strong("Mean in the hold, and difference to the trial shown");
     let table = Grid::new("hold").num_columns(2 + pinned.len()).spacing([8.0, 2.0]);
+    let narrow = ui.available_width() < NARROW;
     let table_ui = |ui: &mut Ui| {
         // Small letters, so that several trials have room.
         ui.style_mut().override_text_style = Some(TextStyle::Small);
@@ -115,8 +118,12 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 unit => (unit, 1.0),
             };
             let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
-            ui.weak(format!("{}, {}", column.name.replace('_', " "), symbol(unit)));
-            ui.label(number(own, unit));
+            let name = column.name.replace('_', " ");
+            match narrow {
+                true => ui.weak(name.replace(" left", " L").replace(" right", " R")).on_hover_text(name),
+                false => ui.weak(format!("{name}, {}", symbol(unit))),
+            };
+            ui.label(if narrow { with_unit(own, unit) } else { number(own, unit) });
             for other in &pinned {
                 let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
                 let Some(mean) = mean else {
@@ -126,7 +133,7 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 let (mean, off) = (number(mean, unit), difference(mean - own, unit));
                 // A panel has room for both of one trial.
                 match pinned.len() {
-                    1 => ui.label(format!("{mean} ({off})")),
+                    1 if !narrow => ui.label(format!("{mean} ({off})")),
                     _ => ui.label(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
                 };
             }
@@ -138,12 +145,22 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 Some(trial.touched_s[side.index()]? - closing?)
             };
             let Some(own) = touched(shown) else { continue };
-            ui.weak(format!("first contact {}, s", side.name())).on_hover_text("After the closing began");
-            ui.label(format!("{own:.2}"));
+            let name = format!("closing to contact, {}", side.name());
+            match narrow {
+                true => ui.weak(format!("contact {}", &side.name()[..1].to_uppercase())).on_hover_text(name),
+                false => ui.weak(format!("{name}, s")).on_hover_text("First contact after the closing began"),
+            };
+            ui.label(if narrow { with_unit(own, "s") } else { number(own, "s") });
             for other in &pinned {
-                let text = touched(&other.trial)
-                    .map_or("–".to_owned(), |other| true_minus(&format!("{other:.2} ({:+.2})", other - own)));
-                ui.label(text);
+                let Some(other) = touched(&other.trial) else {
+                    ui.label("–");
+                    continue;
+                };
+                let (other, off) = (number(other, "s"), difference(other - own, "s"));
+                match pinned.len() {
+                    1 if !narrow => ui.label(format!("{other} ({off})")),
+                    _ => ui.label(off).on_hover_text(format!("{other}{SPACE}s")),
+                };
             }
             ui.end_row();
         }

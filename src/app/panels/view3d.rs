@@ -53,8 +53,8 @@ const PRESENTED: f32 = 0.38;
 /// The same where it is enlarged.
 const LARGE: f32 = 0.62;
 
-/// Smallest visible change of curvature (1/m): 0.25 mm at the tip of a 100 mm finger.
-const SEEN_PER_M: f64 = 0.05;
+/// Smallest visible change of curvature (1/m): half a millimetre at the tip of a 100 mm finger.
+const SEEN_PER_M: f64 = 0.1;
 
 pub(super) fn ui(ui: &mut Ui, own: &View3d<'_>, actions: &mut Actions) {
     let rect = ui.available_rect_before_wrap();

@@ -40,7 +40,7 @@ impl TrialFormat for Csv {
             return Err(ExchangeError::Refused(text.to_owned()));
         }
         if is_file && export.ids.len() > 1 {
-            return Err(ExchangeError::Refused("several trials need a folder: a path without .csv".to_owned()));
+            return Err(ExchangeError::Refused("several trials need a folder: --out FOLDER".to_owned()));
         }
         let mut written = Written { files: Vec::new(), left_out: Vec::new() };
         for id in export.numbers() {

@@ -108,6 +108,8 @@ impl PhaseTimes {
 /// Phases of a simulated grasp: contact is the first sample in which a pad carries load.
 pub fn phases_of_frames<'a>(frames: impl Iterator<Item = &'a Frame> + Clone, gripper: &GripperModel) -> Vec<PhaseSpan> {
     let mut times = PhaseTimes::of_samples(frames.clone().map(|frame| (frame.t, frame.phase)));
+    // The first sample comes after the first step.
+    times.closing = times.closing.map(|_| 0.0);
     times.contact = touches_of_frames(frames.clone(), gripper).into_iter().flatten().reduce(f64::min);
     times.spans(0.0, frames.last().map_or(0.0, |frame| frame.t))
 }

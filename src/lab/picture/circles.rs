@@ -104,7 +104,10 @@ const FARTHEST: f32 = 110.0;
 
 /// Writes a curvature outside of the finger's back, or near by where it covers nothing.
 pub(super) fn number(annotator: &mut Annotator<'_>, own: &CircleNumber) {
-    let text = units::shown(own.curvature, "1/m");
+    let text = match annotator.view.tenths {
+        true => units::true_minus(&format!("{:.1}{}{}", own.curvature, units::SPACE, units::symbol("1/m"))),
+        false => units::shown(own.curvature, "1/m"),
+    };
     let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
     let wanted = own.back + own.outward * (GAP + half.dot(own.outward.abs()));
     if annotator.view.size.y >= LEAST_HEIGHT

@@ -62,6 +62,8 @@ pub struct PictureView {
     pub layout: Option<SensorLayout>,
     /// Draw the circle that each flex strip reads.
     pub circles: bool,
+    /// Curvatures are known to a tenth (1/m): those of real fingers, which are drawn anew only where it is seen.
+    pub tenths: bool,
     /// Height of the inset with the touch, as a share of the picture's; 0 for none.
     pub inset: f32,
 }
@@ -80,6 +82,7 @@ impl Default for PictureView {
             path: None,
             layout: Some(CATALOGUE[0].clone()),
             circles: true,
+            tenths: false,
             inset: INSET,
         }
     }
@@ -244,7 +247,7 @@ impl Stage {
     /// left out, and so is whatever it holds: nothing is known of that.
     pub fn draw_real(&self, curvature: [Option<f64>; 2], view: &PictureView) -> DrawList {
         let frame = reconstructed::evenly_bent(&self.gripper, curvature);
-        let mut list = self.draw(&frame, &PictureView { forces: false, inset: 0.0, ..view.clone() });
+        let mut list = self.draw(&frame, &PictureView { forces: false, tenths: true, inset: 0.0, ..view.clone() });
         let fingers = std::mem::take(&mut list.fingers);
         list.fingers = fingers.into_iter().zip(curvature).filter_map(|(finger, kappa)| kappa.map(|_| finger)).collect();
         list
