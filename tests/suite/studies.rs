@@ -136,7 +136,7 @@ fn without_times(report: &StudyReport) -> Vec<(String, Vec<StudyRow>)> {
     let tables = report.tables.iter().map(|table| {
         let is_time = |at: usize| ["CPU s", "µs", "ms"].contains(&table.columns[at].unit.as_str());
         let cells = |cells: &[Cell]| (0..cells.len()).filter(|at| !is_time(*at)).map(|at| cells[at].clone()).collect();
-        let row = |row: &StudyRow| StudyRow { cells: cells(&row.cells), trials: row.trials.clone() };
+        let row = |row: &StudyRow| StudyRow { cells: cells(&row.cells), ..row.clone() };
         (table.name.clone(), table.rows.iter().map(row).collect())
     });
     tables.collect()

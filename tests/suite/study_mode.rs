@@ -7,6 +7,7 @@ use egui_kittest::kittest::Queryable as _;
 use image::RgbaImage;
 use palpate::app::Mode;
 use palpate_geometry::palette::Theme;
+use palpate_lab::datasets::SensorView;
 use palpate_learn::metrics::Interval;
 use palpate_store::Store;
 use palpate_study::jobs::StudyRequest;
@@ -14,6 +15,7 @@ use palpate_study::paper::{StudyPlan, paper_study, study_fingerprint};
 use palpate_study::{
     Agreement, Cell, ClaimNumber, Finding, PERCENT, POINTS, StoredStudy, StudyReport, StudySize, StudyTable,
 };
+use palpate_tactile::model::SensorModel;
 
 const SAMPLE: StudySize = StudySize::Sample { objects: 4, trials: 6 };
 
@@ -34,6 +36,9 @@ pub(crate) fn scripted_result(store: &mut Store) {
             let cells = [kind, model, group].map(Cell::text).to_vec();
             let cells = [cells, vec![Cell::Interval(interval), Cell::Number(3.0 / (k + 1) as f64)]].concat();
             table.push(cells, vec![k as i64 + 1, 1]);
+            let sensors = SensorModel::ALL.into_iter().find(|own| own.name() == kind).expect("a sensor model");
+            let view = SensorView { sensors, ..SensorView::default() };
+            table.rows.iter_mut().last().expect("pushed").sensors = Some(view);
         }
     }
     let gain = |low: f64, high: f64| Some(Interval { estimate: 0.5 * (low + high), low, high });
@@ -172,6 +177,16 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     bench.harness.run_steps(2);
     assert_eq!(until_open(&mut bench), 2);
     bench.until_shown(true, "Lemon, trial 1, simulated");
+    // A row is opened through the sensors by which it was measured.
+    let through = |bench: &Bench| bench.workbench().inspected().unwrap().trial.sensors.sensors.name();
+    assert_eq!(through(&bench), "virtual");
+    bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    bench.harness.run_steps(3);
+    bench.harness.get_by_label("Row physical-like, macro-layer, network, 49.0 (45.0 to 52.0), 1.50").click();
+    bench.until_told("through physical-like sensors as in the study");
+    while through(&bench) != "physical-like" {
+        bench.wait();
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::App;
 use palpate_geometry::palette::{SERIES_COLOURS, Theme};
+use palpate_lab::datasets::SensorView;
 use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
 use palpate_render::figure_svg;
 use palpate_store::TrialQuery;
@@ -9,8 +10,7 @@ use palpate_study::jobs::{
     StudyFiles, StudyFilesByKey, StudyOrigin, StudyRequest, StudyResult, StudyRunner, study_files_job, study_runner,
 };
 use palpate_study::paper::PAPER_STUDIES;
-use palpate_study::{LinkedFigure, ListedStudy, StudySize, all_studies, listed_study};
-use palpate_tactile::trial::TrialId;
+use palpate_study::{LinkedFigure, ListedStudy, StudyRow, StudySize, all_studies, listed_study};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -101,9 +101,13 @@ impl Studies {
     /// The figure that is shown with its origin in the note, and its size (points).
     pub(in crate::app) fn exported(&self) -> Option<LinkedFigure> {
         let result = self.result()?;
-        let linked = result.figures.get(self.figure_of(&result))?.clone();
-        let note = result.stored.plain_origin();
-        Some(linked.with_note(&if is_quick(result.origin) { format!("{QUICK} {note}") } else { note }))
+        let mut linked = result.figures.get(self.figure_of(&result))?.clone();
+        let mut note = result.stored.plain_origin();
+        if is_quick(result.origin) {
+            note = format!("{QUICK} {note}");
+            linked.name.push_str("-quick");
+        }
+        Some(linked.with_note(&note))
     }
 
     /// Reads the results again.
@@ -193,15 +197,23 @@ impl App {
     }
 
     /// Opens the first of these trials, and compares the next with it, each in a colour of its own.
-    pub(in crate::app) fn open_trials(&mut self, trials: &[TrialId]) {
-        let Some((first, others)) = trials.split_first() else { return };
+    pub(in crate::app) fn open_trials(&mut self, row: &StudyRow) {
+        let Some((first, others)) = row.trials.split_first() else { return };
         self.inspect.unpin_all();
         // They are of the study's data set: the list shows them, too.
         let query = TrialQuery { without_collected: false, ..self.library.selection.query.clone() };
         self.library.find(query);
+        // What the row was measured by, not what curves were shown through before.
+        let mut through = String::new();
+        if let Some(own) = &row.sensors {
+            let (sensors, signals) = (own.sensors, own.signals);
+            through = format!(", through {} sensors as in the study", sensors.name());
+            self.set_sensors(SensorView { sensors, signals, ..self.view.sensors.clone() });
+        }
         self.open_trial(*first);
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));
         let beside = others.len().min(SERIES_COLOURS);
-        self.notices.info(format!("Trial {first} of the row is open, {beside} of its others are compared with it."));
+        self.notices
+            .info(format!("Trial {first} of the row is open, {beside} of its others are compared with it{through}."));
     }
 }

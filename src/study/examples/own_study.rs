@@ -66,6 +66,7 @@ impl Experiment for HoldForce {
         let row = |(cell, force): &(OneGrasp, f64)| StudyRow {
             cells: vec![Cell::Text(cell.object.to_owned()), Cell::Number(cell.friction), Cell::Number(*force)],
             trials: Vec::new(),
+            sensors: None,
         };
         let table = StudyTable {
             name: "hold".to_owned(),

@@ -4,6 +4,7 @@ use super::groups::unique;
 use super::stored_study::markdown_table;
 use palpate_geometry::drawing::Figure;
 use palpate_geometry::units::{fixed, three_digits, true_minus};
+use palpate_lab::datasets::SensorView;
 use palpate_learn::metrics::Interval;
 use palpate_tactile::trial::TrialId;
 use serde::{Deserialize, Serialize};
@@ -48,6 +49,9 @@ pub struct StudyRow {
     /// Some trials behind the row, to look at.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trials: Vec<TrialId>,
+    /// Sensors through which the row was measured, where trials stand behind it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensors: Option<SensorView>,
 }
 
 /// A cell of a table. In JSON: a text, a number, an interval as an object, or null.
@@ -345,12 +349,13 @@ pub(crate) struct TableRows<'a, R> {
     title: String,
     rows: &'a [R],
     trials: &'a dyn Fn(&R) -> Vec<TrialId>,
+    sensors: &'a dyn Fn(&R) -> Option<SensorView>,
 }
 
 impl<'a, R> TableRows<'a, R> {
     /// Rows without trials behind them.
     pub(crate) fn new(name: &'a str, title: impl Into<String>, rows: &'a [R]) -> Self {
-        Self { name, title: title.into(), rows, trials: &|_| Vec::new() }
+        Self { name, title: title.into(), rows, trials: &|_| Vec::new(), sensors: &|_| None }
     }
 
     /// The same with trials behind each row.
@@ -358,12 +363,19 @@ impl<'a, R> TableRows<'a, R> {
         Self { trials, ..self }
     }
 
+    /// The same with the sensors through which each row was measured.
+    pub(crate) fn read_through(self, sensors: &'a dyn Fn(&R) -> Option<SensorView>) -> Self {
+        Self { sensors, ..self }
+    }
+
     /// The table with these columns.
     pub(crate) fn columns(self, columns: &[Column<'_, R>]) -> StudyTable {
         let headings: Vec<(&str, &str)> = columns.iter().map(|Column(name, unit, _)| (*name, *unit)).collect();
         let mut table = StudyTable::new(self.name, self.title, &headings);
         for row in self.rows {
-            table.push(columns.iter().map(|Column(.., cell)| cell(row)).collect(), (self.trials)(row));
+            let (cells, trials) = (columns.iter().map(|Column(.., cell)| cell(row)).collect(), (self.trials)(row));
+            let sensors = (self.sensors)(row).filter(|_| !trials.is_empty());
+            table.rows.push(StudyRow { cells, trials, sensors });
         }
         table
     }
@@ -411,7 +423,7 @@ impl StudyTable {
 
     /// Adds a row.
     pub fn push(&mut self, cells: Vec<Cell>, trials: Vec<TrialId>) {
-        self.rows.push(StudyRow { cells, trials });
+        self.rows.push(StudyRow { cells, trials, sensors: None });
     }
 
     /// Cell of a row in the column with a heading.

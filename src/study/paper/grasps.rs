@@ -4,6 +4,7 @@
 //! experts multiplies the probabilities of each grasp alone.
 
 use super::prelude::*;
+use palpate_lab::datasets::SensorView;
 use palpate_lab::grasping::SUCCESSION;
 use palpate_learn::{StopReason, StopRule};
 use palpate_sim::scene::Between;
@@ -275,7 +276,8 @@ impl Merged {
 fn stops_table(all: &[Merged]) -> StudyTable {
     let sure = 100.0 * StopRule::default().threshold;
     let title = format!("Grasping until one object has a probability of {sure:.0} %, at most {MOST} times");
-    TableRows::new("grasps-stops", title, all).with_trials(&Merged::misjudged).columns(&[
+    let sensors = |own: &Merged| Some(SensorView { sensors: own.kind.sensors, ..SensorView::default() });
+    TableRows::new("grasps-stops", title, all).with_trials(&Merged::misjudged).read_through(&sensors).columns(&[
         Column("sensors", "", &|own| own.kind.sensors.name().into()),
         Column("model", "", &|own| own.kind.method.key.into()),
         Column("object", "", &|own| own.kind.factor.placed.into()),

@@ -199,7 +199,9 @@ impl<F: 'static> Row<F> {
 
     /// Table of rows with some misjudged trials behind each.
     pub(super) fn table<'a>(name: &'a str, title: impl Into<String>, rows: &'a [Self]) -> TableRows<'a, Self> {
-        TableRows::new(name, title, rows).with_trials(&|row| row.pool.misjudged())
+        TableRows::new(name, title, rows)
+            .with_trials(&|row| row.pool.misjudged())
+            .read_through(&|row| Some(SensorView { sensors: row.kind.sensors, ..SensorView::default() }))
     }
 
     /// The same with columns of the study's own between the model and its scores; `gain` names the difference to the

@@ -16,7 +16,6 @@ use palpate_geometry::units::symbol;
 use palpate_sim::objects::object_title;
 use palpate_study::jobs::{StudyOrigin, StudyResult};
 use palpate_study::{Cell, StudyColumn, StudyRow, StudyTable};
-use palpate_tactile::trial::TrialId;
 use std::sync::Arc;
 
 /// Result of the chosen study. Without one the panel says what to do.
@@ -66,9 +65,9 @@ fn part_title(study: &str, name: &str) -> String {
 }
 
 /// The trials behind a row; none where they are not in the store of the window.
-fn opening(result: &StudyResult, row: &StudyRow) -> Option<Vec<TrialId>> {
+fn opening(result: &StudyResult, row: &StudyRow) -> Option<StudyRow> {
     let own = !row.trials.is_empty() && result.origin != StudyOrigin::Shipped;
-    own.then(|| row.trials.clone())
+    own.then(|| row.clone())
 }
 
 /// What a click on a row does, or why it does nothing.

@@ -48,7 +48,7 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
     let mut goes = false;
     ui.allocate_ui_with_layout(vec2(ui.available_width(), ROW), Layout::right_to_left(Align::Center), |ui| {
         if ui.small_button("Export").on_hover_text("Write this table as CSV").clicked() {
-            let quick = if is_quick(result.origin) { "_quick" } else { "" };
+            let quick = if is_quick(result.origin) { "-quick" } else { "" };
             let (name, text) = (format!("{}{quick}", table.name), table.csv());
             actions.push(move |app| app.export_table(&name, text));
         }

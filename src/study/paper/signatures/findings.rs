@@ -3,6 +3,7 @@
 use super::super::prelude::*;
 use super::bodies::Summary;
 use super::{DEFAULT, Found, PAPER};
+use palpate_lab::datasets::SensorView;
 
 /// Sentences in numbers for one kind of grasps with one gripper.
 pub(super) struct Measured {
@@ -10,6 +11,8 @@ pub(super) struct Measured {
     pub(super) kind: String,
     pub(super) summary: Summary,
     pub(super) found: Found,
+    /// Sensors that read the grasps; none of grasps that no data set holds.
+    pub(super) view: Option<SensorView>,
 }
 
 /// A sentence of the paper in numbers.

@@ -275,7 +275,11 @@ impl Study for TactileSignatures {
             if let Grasps::Varied(varied) = grasps {
                 settings.extend(found.varied.into_iter().map(|(value, summary)| (varied, value, summary)));
             } else {
-                measured.push(Measured { gripper, kind, summary: Summary::of(&found.signatures), found });
+                let view = match grasps {
+                    Grasps::Posed(view) | Grasps::Stored(view) => Some(view),
+                    Grasps::Bodies | Grasps::Objects | Grasps::Varied(_) => None,
+                };
+                measured.push(Measured { gripper, kind, summary: Summary::of(&found.signatures), found, view });
             }
         }
         let described = measured.iter().filter(|own| !own.found.data.is_empty());
@@ -331,7 +335,7 @@ fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
         let every = 1 + trials.clone().count() / SHOWN;
         trials.step_by(every).collect()
     };
-    TableRows::new("signatures", title, all).with_trials(&shown).columns(&columns)
+    TableRows::new("signatures", title, all).with_trials(&shown).read_through(&|own| own.view.clone()).columns(&columns)
 }
 
 /// Grasps of one object.
@@ -362,7 +366,8 @@ fn object_table(all: &[Measured]) -> StudyTable {
     let rows: Vec<ObjectGrasps<'_>> = rows.collect();
     let shown =
         |row: &ObjectGrasps<'_>| row.own.iter().filter_map(|signature| signature.of.trial).take(SHOWN).collect();
-    TableRows::new("objects", "Each object; medians over its grasps", &rows).with_trials(&shown).columns(&[
+    let table = TableRows::new("objects", "Each object; medians over its grasps", &rows).with_trials(&shown);
+    table.read_through(&|row| row.of.view.clone()).columns(&[
         Column("gripper", "", &|row| row.of.gripper.into()),
         Column("grasps", "", &|row| row.of.kind.as_str().into()),
         Column("object", "", &|row| row.object.into()),
