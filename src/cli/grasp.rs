@@ -216,7 +216,7 @@ pub(super) fn summary_facts(summary: &GraspSummary, page: &mut Page) {
     pair("hold force", hold.map(|hold| hold.force_n), "N");
     pair("curvature", hold.map(|hold| hold.curvature_per_m), "1/m");
     pair("pad pressure", hold.map(|hold| hold.pressure_pa.map(|p| p * 1e-3)), "kPa");
-    pair("at contact", hold.map(|hold| hold.contact_pressure_pa.map(|p| p * 1e-3)), "kPa");
+    pair("contact pressure", hold.map(|hold| hold.contact_pressure_pa.map(|p| p * 1e-3)), "kPa");
     let shape = hold.and_then(|hold| hold.out_of_plane.as_ref());
     pair("tips sideways", shape.map(|shape| shape.tip_m.map(mm)), "mm");
     pair("tips twisted", shape.map(|shape| shape.twist_rad.map(f64::to_degrees)), "degrees");

@@ -86,6 +86,9 @@ pub struct Lesson {
     pub tested: usize,
     /// Those of them that are recognised, each on its own.
     pub recognised: usize,
+    /// As many rounds of three of these grasps: those whose last answer is right. None where that was not tried.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after_three: Option<usize>,
     /// Classes that the others are taken for, each with the number of them.
     pub taken_for: BTreeMap<String, usize>,
 }

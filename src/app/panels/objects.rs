@@ -49,7 +49,11 @@ pub(super) fn ui<'a>(
                         false if lesson_warning(lesson).is_some() => ", often not held",
                         false => "",
                     };
-                    format!("learned{doubt}: right in {} of {}, ", lesson.recognised, lesson.tested)
+                    let Lesson { recognised, tested, after_three, .. } = lesson;
+                    match after_three {
+                        Some(right) => format!("learned{doubt}: right in {right} of {tested} after three grasps, "),
+                        None => format!("learned{doubt}: right in {recognised} of {tested}, "),
+                    }
                 }
                 Some((_, None)) => "learned, ".to_owned(),
                 None => String::new(),

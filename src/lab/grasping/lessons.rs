@@ -5,7 +5,7 @@ use super::agreement::{Recompute, grasp_soundly};
 use super::known_geometry::seeds_of;
 use crate::datasets::{DatasetError, DatasetQuery, SensorView, sequence_of};
 use palpate_learn::{
-    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Lesson, Model, ModelCard, OTHER, Sequence,
+    Class, DataCard, Dataset, Example, Fitting, Labels, LearnError, Lesson, Model, ModelCard, OTHER, Pmf, Sequence,
 };
 use palpate_sim::frame::GraspFailure;
 use palpate_sim::objects::{ObjectError, ObjectModel, capital_title, catalogue};
@@ -86,6 +86,15 @@ fn test(lesson: &mut Lesson, model: &Model, grasps: &[Example]) {
             other => *lesson.taken_for.entry(other.clone()).or_default() += 1,
         }
     }
+    let ends_right = |first: &usize| {
+        let add = |before: Option<Pmf>, k: usize| {
+            let own = &grasps[(first + k) % grasps.len()];
+            Some(model.recogniser.recognise(&own.grasp, before.as_ref()).pmf)
+        };
+        let last = (0..3).fold(prior.clone(), add);
+        last.is_some_and(|last| labels.classes[last.top().0].name == lesson.name)
+    };
+    lesson.after_three = Some((0..grasps.len()).filter(ends_right).count());
 }
 
 /// Most classes that are named as mistaken for a new one.
@@ -108,14 +117,15 @@ fn rivals(lesson: &Lesson) -> String {
 
 /// How well a new object is recognised, in words.
 pub fn lesson_result(lesson: &Lesson) -> String {
-    let Lesson { tested, recognised, taken_for, .. } = lesson;
+    let Lesson { tested, recognised, after_three, taken_for, .. } = lesson;
+    let after = after_three.map_or_else(String::new, |right| format!(", after three grasps in {right} of {tested}"));
     let others = if taken_for.is_empty() { String::new() } else { format!(", others taken for {}", rivals(lesson)) };
-    format!("the most likely answer in {recognised} of {tested} new grasps{others}")
+    format!("the most likely answer in {recognised} of {tested} new grasps{others}{after}")
 }
 
-/// Most new grasps of the object were taken for others.
+/// Most new grasps of the object were taken for others, also three together.
 pub fn is_doubtful(lesson: &Lesson) -> bool {
-    2 * lesson.recognised < lesson.tested && !lesson.taken_for.is_empty()
+    2 * lesson.after_three.unwrap_or(lesson.recognised) < lesson.tested && !lesson.taken_for.is_empty()
 }
 
 /// A warning where the hand was empty in many of the grasps, or they are like those of other objects.
@@ -372,6 +382,9 @@ mod tests {
             format!("the most likely answer in 3 of 12 new grasps, others taken for {rivals}")
         );
         assert_eq!(lesson_warning(&lesson), Some(format!("hard to tell from {rivals}")));
+        let slow = Lesson { after_three: Some(11), ..lesson.clone() };
+        assert!(lesson_result(&slow).ends_with("further ones (1), after three grasps in 11 of 12"));
+        assert_eq!(lesson_warning(&slow), None, "three grasps tell it");
         let known = Lesson { recognised: 12, taken_for: BTreeMap::new(), ..lesson.clone() };
         let result = "the most likely answer in 12 of 12 new grasps";
         assert_eq!((lesson_result(&known).as_str(), lesson_warning(&known)), (result, None));

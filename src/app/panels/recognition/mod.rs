@@ -240,7 +240,8 @@ fn lesson_ui(
                     let time = learned.seconds.map_or_else(String::new, |seconds| format!(" in {seconds:.0}\u{a0}s"));
                     let text = format!("from {} simulated grasps{time}: {}.", lesson.grasps, lesson_result(lesson));
                     if measures.is_tight() {
-                        let right = format!("{} of {} right", lesson.recognised, lesson.tested);
+                        let right = lesson.after_three.unwrap_or(lesson.recognised);
+                        let right = format!("{right} of {} right", lesson.tested);
                         ui.label(right).on_hover_text(text);
                     } else {
                         ui.label(text);
@@ -454,6 +455,8 @@ impl Part<'_, '_> {
     fn advice(&self, advice: &Job<Arc<RecognisedGrasp>, ObjectMove>) -> Option<String> {
         match self.data.source {
             ViewSource::Trial => None,
+            // There the plan says how the object is to lie.
+            ViewSource::Gripper if self.data.view.mode == Mode::Label => None,
             ViewSource::Simulation => Some(format!("Guided: gripper {}", self.data.snapshot?.status.guided?)),
             ViewSource::Gripper => {
                 let undecided = self.view.decision.is_none() && !self.view.listening;

@@ -101,9 +101,11 @@ impl GripperSession {
 
     /// Tells the fingers to vent after a fault; says whether that could be sent. Our firmware vents within a second without it.
     pub(super) fn tell_to_vent(&mut self) -> &'static str {
-        match self.connection.as_mut().map(|connection| connection.gripper.vent()) {
-            Some(Ok(())) => "fingers told to vent",
-            Some(Err(_)) | None => "the fingers could not be told to vent: vent at the control box",
+        let sent = self.connection.as_mut().map(|own| (own.gripper.vent(), own.board.firmware.is_some()));
+        match sent {
+            Some((Ok(()), _)) => "fingers told to vent",
+            Some((Err(_), true)) => "the fingers could not be told to vent; the board vents within a second",
+            Some((Err(_), false)) | None => "the fingers could not be told to vent: vent at the control box",
         }
     }
 
