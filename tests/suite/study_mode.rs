@@ -178,13 +178,17 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     assert_eq!(until_open(&mut bench), 2);
     bench.until_shown(true, "Lemon, trial 1, simulated");
     // A row is opened through the sensors by which it was measured.
-    let through = |bench: &Bench| bench.workbench().inspected().unwrap().trial.sensors.sensors.name();
-    assert_eq!(through(&bench), "virtual");
+    let through = |bench: &Bench| -> Vec<&str> {
+        let shown = bench.workbench().inspected().unwrap();
+        let all = std::iter::once(shown.trial).chain(shown.pinned.iter().map(|pinned| &pinned.trial));
+        all.map(|trial| trial.sensors.sensors.name()).collect()
+    };
+    assert_eq!(through(&bench), ["virtual"; 2]);
     bench.harness.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     bench.harness.run_steps(3);
     bench.harness.get_by_label("Row physical-like, macro-layer, network, 49.0 (45.0 to 52.0), 1.50").click();
     bench.until_told("through physical-like sensors as in the study");
-    while through(&bench) != "physical-like" {
+    while through(&bench) != ["physical-like"; 2] {
         bench.wait();
     }
 }

@@ -178,11 +178,11 @@ impl InspectFeature {
         if let Some(id) = self.wanted {
             self.ask(id, Keep::Scenery);
         }
-        let pinned: Vec<TrialId> = self.pinned.iter().map(|pinned| pinned.trial.id).collect();
-        for id in pinned {
-            self.awaited.push(id);
-            self.ask(id, Keep::Channels);
-        }
+        let Self { pinned, awaited, .. } = self;
+        let pinned = pinned.iter().map(|pinned| pinned.trial.id).filter(|id| !awaited.contains(id));
+        let pinned: Vec<TrialId> = pinned.collect();
+        self.awaited.extend(pinned);
+        self.awaited.iter().for_each(|id| self.ask(*id, Keep::Channels));
     }
 
     fn ask(&self, id: TrialId, keep: Keep) {
@@ -297,6 +297,10 @@ impl App {
         }
         for ended in inspect.opener.take() {
             let (id, scenery) = (ended.command.id, ended.command.options.keep == Keep::Scenery);
+            // Asked for through other sensors before, and asked for again since.
+            if ended.command.options.sensors != inspect.options.sensors {
+                continue;
+            }
             match ended.outcome {
                 Ok(trial) if scenery => {
                     self.notices.done("trial");

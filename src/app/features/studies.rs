@@ -149,6 +149,11 @@ impl Studies {
     pub(in crate::app) fn stop(&self) {
         self.runner.stop();
     }
+
+    /// Takes a study back that waits.
+    pub(in crate::app) fn withdraw(&self, key: &str) {
+        self.runner.withdraw(|request| request.key == key);
+    }
 }
 
 impl App {

@@ -26,9 +26,11 @@ pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Action
         ui.spacing_mut().item_spacing.x = 4.0;
         for shown in TrialFilter::ALL {
             let text = format!("{} {}", shown.title(), shown.of(view).len());
-            actions.on(&ui.selectable_label(draft.filter == shown, RichText::new(text).small()), move |app| {
-                app.label(LabellingAction::Filter(shown));
-            });
+            let mut chip = ui.selectable_label(draft.filter == shown, RichText::new(text).small());
+            if shown == TrialFilter::Disagreeing {
+                chip = chip.on_hover_text("Label and model differ, and nobody has reviewed it");
+            }
+            actions.on(&chip, move |app| app.label(LabellingAction::Filter(shown)));
         }
     });
     let listed = draft.filter.of(view);
@@ -89,6 +91,8 @@ fn row_ui(
     let title = format!("{}  {name}{mark}{tags}", trial.id);
     put_line(ui, words, Align2::LEFT_TOP, &title, 13.0, colour(ink));
     let blind = labelling.blind && trial.object.is_none();
+    let kept = trial.guess.as_ref().filter(|guess| trial.reviewed && trial.object.as_ref() != Some(&guess.class));
+    let kept = kept.map(|guess| format!("model: {} {}, reviewed", object_title(&guess.class), percent(guess.p)));
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
         (_, Some(_), _) => {
@@ -99,7 +103,10 @@ fn row_ui(
             (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
         }
         (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
-        (_, None, None) => (format!("{:.1} s, {} readings", trial.seconds, trial.samples), colours.quiet_text),
+        (_, None, None) => {
+            let length = || format!("{:.1} s, {} readings", trial.seconds, trial.samples);
+            (kept.unwrap_or_else(length), colours.quiet_text)
+        }
     };
     put_line(ui, words, Align2::LEFT_BOTTOM, &below, 11.0, colour(ink));
     let clicked = response.clicked();

@@ -21,7 +21,7 @@ use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_tactile::Quantity;
+use palpate_tactile::{Quantity, SignalDefinition};
 use std::sync::Arc;
 
 /// What the 3-D view reads.
@@ -153,6 +153,8 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         ViewSource::Trial | ViewSource::Simulation if own.data.view.inset_large => LARGE,
         ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
     };
+    // Plots of other signals have another curvature than the strips.
+    let reads_strips = own.data.view.sensors.signals == SignalDefinition::Parts;
     let view = PictureView {
         camera: own.data.view.camera,
         theme: own.data.view.theme,
@@ -160,7 +162,7 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         forces: own.data.view.forces,
         plain: own.data.view.presents,
         layout: own.data.view.sensors.sensor_layout().ok(),
-        circles: own.data.view.circles && !own.data.view.presents,
+        circles: own.data.view.circles && !own.data.view.presents && reads_strips,
         inset,
         ..PictureView::default()
     };

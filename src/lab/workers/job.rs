@@ -191,6 +191,11 @@ impl<C, O> Job<C, O> {
         state.waiting.iter().skip(next).map(|next| Arc::clone(&next.command)).collect()
     }
 
+    /// Takes back those of the commands that wait.
+    pub fn withdraw(&self, is_meant: impl Fn(&C) -> bool) {
+        locked(&self.shared.state).waiting.retain(|waiting| !is_meant(&waiting.command));
+    }
+
     /// Replaces those of the commands that run and wait for which there is another, each in its place.
     pub fn renew(&self, renewed: impl Fn(&C) -> Option<C>) {
         let mut state = locked(&self.shared.state);

@@ -153,7 +153,7 @@ impl Finding {
     /// A line on numbers that are not shown; none where all are.
     pub fn left_out(&self) -> Option<String> {
         let more = self.measured.len().checked_sub(Self::SHOWN).filter(|more| *more > 0)?;
-        Some(format!("and {more} more, less against the claim"))
+        Some(format!("and {more} more"))
     }
 }
 
@@ -548,10 +548,7 @@ mod tests {
         assert_eq!(strips, ["········│──────●────────", "────────●───────········"]);
         assert_eq!((two.measured[0].shown(), two.left_out()), ("+10.0 (0.0 to +20.0) points".to_owned(), None));
         let many = finding(vec![of(0.0, 0.2); 13]);
-        assert_eq!(
-            (many.strips().count(), many.left_out().as_deref()),
-            (10, Some("and 3 more, less against the claim"))
-        );
+        assert_eq!((many.strips().count(), many.left_out().as_deref()), (10, Some("and 3 more")));
     }
 
     #[test]

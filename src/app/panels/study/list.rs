@@ -142,12 +142,16 @@ fn chosen_ui(ui: &mut Ui, studies: &Studies, card: &StudyCard, actions: &mut Act
     }
     // Below the others: a second click on it must start nothing.
     if busy {
-        let stop =
-            ui.button("Stop study").on_hover_text("Stop this study and those that wait (Delete). Finished parts stay.");
+        let (title, hint) = match running.is_some() {
+            true => ("Stop study", "Stop this study and those that wait (Delete). Finished parts stay."),
+            false => ("Do not run it", "Take it out of the queue; the others go on."),
+        };
+        let stop = ui.button(title).on_hover_text(hint);
         if just_begun(ui, key) {
             stop.scroll_to_me(None);
         }
-        actions.on(&stop, |app| app.studies.stop());
+        let runs = running.is_some();
+        actions.on(&stop, move |app| if runs { app.studies.stop() } else { app.studies.withdraw(key) });
     } else {
         ui.data_mut(|data| data.remove::<bool>(Id::unique(("begun", key))));
     }
