@@ -102,7 +102,10 @@ pub(super) fn show(
         .y_axis_formatter(texts(&known[1]))
         .set_margin_fraction(egui::Vec2::ZERO);
     if height > ROOM_FOR_TITLES {
-        widget = widget.x_axis_label(symbol(&plot.x.title)).y_axis_label(symbol(&plot.y.title));
+        let names = known[1].iter().map(|(_, text)| text.lines().map(|line| line.chars().count()).max().unwrap_or(0));
+        let axis = ((ui.available_width() / LETTER) as usize).saturating_sub(names.max().unwrap_or(0).min(most));
+        let x_title = wrapped_name(&symbol(&plot.x.title), axis.max(8), 1);
+        widget = widget.x_axis_label(x_title).y_axis_label(symbol(&plot.y.title));
     }
     if height <= ROOM_FOR_TITLES || plot.heat.is_some() {
         let titles = [plot.y.title.as_str(), plot.x.title.as_str()].map(symbol);
@@ -149,9 +152,16 @@ pub(super) fn show(
             let (place, anchor) = if line.horizontal {
                 (PlotPoint::new(*x_bounds.start(), at), Align2::LEFT_BOTTOM)
             } else {
-                // On the side with more room.
-                let beyond = at > 0.5 * (x_bounds.start() + x_bounds.end());
-                (PlotPoint::new(at, *y_bounds.end()), if beyond { Align2::RIGHT_TOP } else { Align2::LEFT_TOP })
+                // On the side that has room, or else in the middle.
+                let (frame, width) = (*plot_ui.transform().frame(), LETTER * line.text.chars().count() as f32);
+                let x = plot_ui.transform().position_from_point(&PlotPoint::new(at, *y_bounds.end())).x;
+                let middle = 0.5 * (x_bounds.start() + x_bounds.end());
+                let (at, anchor) = match (frame.right() - x > width, x - frame.left() > width) {
+                    (true, _) => (at, Align2::LEFT_TOP),
+                    (_, true) => (at, Align2::RIGHT_TOP),
+                    _ => (middle, Align2::CENTER_TOP),
+                };
+                (PlotPoint::new(at, *y_bounds.end()), anchor)
             };
             let word = RichText::new(&line.text).small().background_color(veil(theme.colours().background, 0.8));
             plot_ui.text(Text::new("", place, word).color(colour(quiet)).anchor(anchor));
@@ -215,7 +225,7 @@ const LINE: f32 = 15.0;
 /// Room for the half of a number at the right end of the axis (points).
 const LAST: f32 = 16.0;
 
-/// A name in at most so many lines of so many letters, cut off with dots.
+/// A name in at most so many lines of so many letters, cut in the middle.
 fn wrapped_name(text: &str, most: usize, lines: usize) -> String {
     let mut wrapped = vec![String::new()];
     for word in text.split(' ') {
@@ -231,7 +241,11 @@ fn wrapped_name(text: &str, most: usize, lines: usize) -> String {
         }
     }
     for line in wrapped.iter_mut().filter(|line| line.chars().count() > most) {
-        *line = line.chars().take(most.saturating_sub(1)).chain(['…']).collect();
+        // Names that begin alike differ at their ends.
+        let letters: Vec<char> = line.chars().collect();
+        let head = 3 * most.saturating_sub(1) / 5;
+        let tail = most.saturating_sub(1) - head;
+        *line = letters[..head].iter().chain(['…'].iter()).chain(&letters[letters.len() - tail..]).collect();
     }
     wrapped.join("\n")
 }
@@ -395,7 +409,7 @@ mod tests {
         let name = "two pads on each finger, chamber pressure";
         assert_eq!(wrapped_name(name, 60, 1), name);
         assert_eq!(wrapped_name(name, 24, 2), "two pads on each finger,\nchamber pressure");
-        assert_eq!(wrapped_name(name, 10, 1), "two pads …");
+        assert_eq!(wrapped_name(name, 10, 1), "two p…sure");
         assert_eq!(wrapped_name("", 10, 2), "");
     }
 }

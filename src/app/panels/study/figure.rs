@@ -99,9 +99,14 @@ fn about_origin(origin: StudyOrigin) -> &'static str {
     }
 }
 
+/// Room of the scroll bar (points).
+const SCROLL_BAR: f32 = 10.0;
+
 /// All plots in rows, as many beside each other as there is room for.
 fn plots_ui(ui: &mut Ui, result: &StudyResult, linked: &LinkedFigure, actions: &mut Actions) {
     let plots = &linked.figure.plots;
+    // The scroll bar covers no number.
+    ui.set_max_width(ui.available_width() - SCROLL_BAR);
     let most = if linked.figure.columns == 0 { plots.len() } else { linked.figure.columns };
     let fitting = (ui.available_width() / LEAST_WIDTH) as usize;
     let columns = most.min(plots.len()).min(fitting).max(1);
