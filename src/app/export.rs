@@ -104,7 +104,7 @@ fn write_sound(export: &TrialExport<'_>, path: &Path) -> Result<String, JobError
         _ if folder => "as CSV",
         _ if is_csv => "as CSV, loaded taxels of a simulated one in .contacts.csv",
         true => "with taxels",
-        false => "without taxels (the box \"With taxels\" in the library's Export adds them)",
+        false => "without taxels (the box \"With taxels\" in Edit > Export of the library adds them)",
     };
     let written = if written.is_empty() { "no trial".to_owned() } else { trial_numbers(written) };
     let missing = match missing.is_empty() {

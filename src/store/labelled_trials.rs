@@ -38,9 +38,8 @@ fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         _ => None,
     };
     let flags = flaws(shown.flags.clone(), object.as_deref());
-    // A hand that felt nothing is empty, whatever a model makes of that.
+    // A hand that felt nothing is empty, whatever a model makes of that: nobody has to review it.
     let is_surely_empty = shown.flags.len() > flags.len();
-    let guess = guess.filter(|_| !is_surely_empty);
     let samples = row.get::<_, i64>(10)?.max(0).cast_unsigned();
     // Trials of early versions have no length: it follows from their rate.
     let by_rate = if shown.cadence.rate_hz > 0.0 { samples as f64 / shown.cadence.rate_hz } else { 0.0 };
@@ -55,7 +54,7 @@ fn read_intact(row: &Row<'_>) -> rusqlite::Result<LabelledTrial> {
         flags,
         cadence: cadence_line(&shown.cadence),
         guess: guess.and_then(|guess| GuessTop::of(&guess, object.as_deref())),
-        reviewed: row.get(8)?,
+        reviewed: row.get(8)? || is_surely_empty,
         samples,
         emulated: shown.board.emulated,
         seconds: if shown.seconds > 0.0 { shown.seconds } else { by_rate },

@@ -60,7 +60,7 @@ const KEYS: &[Act] = &[
 fn layout(tiles: &mut Tiles<String>) -> TileId {
     let library = tabs(tiles, &["library"]);
     let compared = tabs(tiles, &["compared", "sensors"]);
-    let left = split(tiles, LinearDir::Vertical, [(library, 0.62), (compared, 0.38)]);
+    let left = split(tiles, LinearDir::Vertical, [(library, 0.52), (compared, 0.48)]);
     let [view, curvature] = [&["view"][..], &["curvature", "signature"]].map(|names| tabs(tiles, names));
     let loads = tabs(tiles, &["pressure", "force", "line", "other", "counts", "hysteresis", "pads"]);
     let right = tabs(tiles, &["recognition", "why", "trial"]);

@@ -163,7 +163,7 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
         Some(guess) => {
             let (class, p) = (object_title(&guess.class), percent(guess.p));
             let (state, ink) =
-                if trial.reviewed { ("reviewed", colours.quiet_text) } else { ("please review", colours.warning) };
+                if trial.reviewed { ("label kept", colours.quiet_text) } else { ("please review", colours.warning) };
             (format!("Last label, trial {}: {title}. The model predicts {class} ({p}): {state}", trial.id), ink)
         }
         None => (format!("Last label, trial {}: {title}", trial.id), colours.quiet_text),

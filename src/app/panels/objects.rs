@@ -45,14 +45,14 @@ pub(super) fn ui<'a>(
             let learned = match class {
                 Some((_, Some(lesson))) => {
                     let doubt = match is_doubtful(lesson) {
-                        true => " poorly",
+                        true => ", poorly",
                         false if lesson_warning(lesson).is_some() => ", often not held",
                         false => "",
                     };
                     let Lesson { recognised, tested, after_three, .. } = lesson;
                     match after_three {
-                        Some(right) => format!("learned{doubt}: right in {right} of {tested} after three grasps, "),
-                        None => format!("learned{doubt}: right in {recognised} of {tested}, "),
+                        Some(right) => format!("learned: {right} of {tested} right after three grasps{doubt}, "),
+                        None => format!("learned: {recognised} of {tested} right{doubt}, "),
                     }
                 }
                 Some((_, None)) => "learned, ".to_owned(),

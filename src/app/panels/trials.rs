@@ -37,7 +37,7 @@ pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Action
     if listed.is_empty() {
         let text = match draft.filter {
             TrialFilter::Kept => "No trials of the real gripper yet: with it connected, R records one.",
-            TrialFilter::Disagreeing => "The model agrees with all labels.",
+            TrialFilter::Disagreeing => "No label is to be reviewed.",
             TrialFilter::Unlabelled | TrialFilter::Flagged | TrialFilter::Discarded => "None.",
         };
         ui.weak(text);
@@ -92,7 +92,7 @@ fn row_ui(
     put_line(ui, words, Align2::LEFT_TOP, &title, 13.0, colour(ink));
     let blind = labelling.blind && trial.object.is_none();
     let kept = trial.guess.as_ref().filter(|guess| trial.reviewed && trial.object.as_ref() != Some(&guess.class));
-    let kept = kept.map(|guess| format!("model: {} {}, reviewed", object_title(&guess.class), percent(guess.p)));
+    let kept = kept.map(|guess| format!("model: {} {}, label kept", object_title(&guess.class), percent(guess.p)));
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
         (_, Some(_), _) => {

@@ -121,7 +121,7 @@ impl TrialFilter {
             Self::Kept => "all",
             Self::Unlabelled => "unlabelled",
             Self::Flagged => "flagged",
-            Self::Disagreeing => "disagreeing",
+            Self::Disagreeing => "to review",
             Self::Discarded => "discarded",
         }
     }
