@@ -47,32 +47,6 @@ impl Rule {
         }
     }
 
-    /// Sentences of a verdict: agrees, partly, disagrees.
-    fn sentences(self) -> [&'static str; 3] {
-        match self {
-            Self::AllAbove(_) => [
-                "Every interval lies above the line.",
-                "Some intervals lie above the line, others do not.",
-                "At least one interval lies below the line.",
-            ],
-            Self::AllBelow(_) => [
-                "Every interval lies below the line.",
-                "Some intervals lie below the line, others do not.",
-                "At least one interval lies above the line.",
-            ],
-            Self::NoneBelow(_) => [
-                "No interval lies below the line.",
-                "In some cases an interval lies below the line.",
-                "At least one interval lies below the line.",
-            ],
-            Self::Within(..) => [
-                "Every interval reaches the paper's number.",
-                "Some intervals reach the paper's number, others do not.",
-                "No interval reaches the paper's number.",
-            ],
-        }
-    }
-
     /// Orders intervals from those that are most against the claim.
     fn most_against(self, own: &Interval, other: &Interval) -> Ordering {
         match self {
@@ -105,11 +79,10 @@ impl Claim<'_> {
 
     /// Finding on groups of intervals, each judged by a rule.
     pub(crate) fn on_groups(self, unit: &str, groups: impl IntoIterator<Item = (Rule, Gains)>) -> Finding {
-        let (mut measured, mut verdicts, mut sentences) = (Vec::new(), Vec::new(), [""; 3]);
+        let (mut measured, mut verdicts) = (Vec::new(), Vec::new());
         for (rule, group) in groups {
             verdicts.push(rule.judge(&group.iter().map(|(_, interval)| *interval).collect::<Vec<_>>()));
             measured.extend(group.into_iter().map(|(what, interval)| (rule, what, interval)));
-            sentences = rule.sentences();
         }
         if measured.len() > Finding::SHOWN {
             measured.sort_by(|(rule, _, own), (_, _, other)| rule.most_against(own, other));
@@ -117,12 +90,17 @@ impl Claim<'_> {
         let evidence = |(rule, what, interval): (Rule, String, Interval)| {
             ClaimNumber::new(what, Some(interval), unit, rule.line())
         };
-        self.finding(measured.into_iter().map(evidence).collect(), Agreement::of_all(verdicts), sentences)
+        let reaches = matches!(measured.first(), Some((Rule::Within(..), ..)));
+        let measured: Vec<ClaimNumber> = measured.into_iter().map(evidence).collect();
+        let (sides, verdict) = (sides(&measured), Agreement::of_all(verdicts));
+        self.finding(measured, verdict, if reaches { REACHES } else { [&sides; 3] })
     }
 
     /// Finding on intervals, each judged by a rule.
     pub(crate) fn on_each(self, unit: &str, rule: Rule, all: impl IntoIterator<Item = (String, Interval)>) -> Finding {
-        self.on_groups(unit, all.into_iter().map(|one| (rule, vec![one])))
+        let all: Vec<(String, Interval)> = all.into_iter().collect();
+        let apart = if all.len() > 1 { "Each interval is judged by itself: partly where they differ" } else { "" };
+        self.apart(apart, |claim| claim.on_groups(unit, all.into_iter().map(|one| (rule, vec![one]))))
     }
 
     /// Finding on gains of macro F1, all judged together by a rule.
@@ -132,7 +110,47 @@ impl Claim<'_> {
 
     /// Finding on gains of macro F1, each group judged by a rule.
     pub(crate) fn on_gains(self, rule: Rule, groups: Vec<(String, Gains)>) -> Finding {
-        self.on_groups(POINTS, groups.into_iter().map(|group| (rule, named_gains(group))))
+        let each = "Each kind of grasps and model is judged by itself: partly where they differ";
+        let apart = if groups.len() > 1 { each } else { "" };
+        self.apart(apart, |claim| claim.on_groups(POINTS, groups.into_iter().map(|group| (rule, named_gains(group)))))
+    }
+
+    /// A finding with this beside the rule.
+    fn apart(self, how: &str, found: impl FnOnce(Claim<'_>) -> Finding) -> Finding {
+        let rule = if how.is_empty() { self.2.to_owned() } else { format!("{}. {how}", self.2) };
+        found(Claim(self.0, self.1, &rule))
+    }
+}
+
+/// Sentences of claims on a number of the paper: agrees, partly, disagrees.
+const REACHES: [&str; 3] = [
+    "Every interval reaches the paper's number.",
+    "Some intervals reach the paper's number, others do not.",
+    "No interval reaches the paper's number.",
+];
+
+/// On which sides of their lines intervals lie: `3 of 4 intervals lie above the line, 1 on both sides.`
+fn sides(measured: &[ClaimNumber]) -> String {
+    let side = |own: &ClaimNumber| match own.places() {
+        [low, _, _, line] if low > line => 0,
+        [.., high, line] if high < line => 1,
+        _ => 2,
+    };
+    let mut counts = [0; 3];
+    measured.iter().for_each(|own| counts[side(own)] += 1);
+    let places = ["above the line", "below the line", "on both sides of the line"];
+    let found: Vec<(usize, &str)> = counts.into_iter().zip(places).filter(|(count, _)| *count > 0).collect();
+    match found.as_slice() {
+        [(1, place)] => format!("The interval lies {place}."),
+        [(all, place)] => format!("All {all} intervals lie {place}."),
+        [(count, place), others @ ..] => {
+            let lie = if *count == 1 { "lies" } else { "lie" };
+            let others =
+                others.iter().map(|(count, place)| format!(", {count} {}", place.trim_end_matches(" of the line")));
+            let others: String = others.map(|other| other.trim_end_matches(" the line").to_owned()).collect();
+            format!("{count} of {} intervals {lie} {place}{others}.", measured.len())
+        }
+        [] => String::new(),
     }
 }
 
@@ -168,9 +186,37 @@ mod tests {
         let found = Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), gains(vec![up]));
         assert_eq!((found.measured[0].what.as_str(), found.verdict), ("virtual: a", Agrees));
         assert_eq!(Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), Vec::new()).verdict, NotMeasured);
+        // What is said is what is shown, whatever the verdict.
+        let said = |gains: &[Interval]| {
+            let gains: Gains = gains.iter().map(|own| ("a".to_owned(), *own)).collect();
+            let found = Claim("V-B", "enough", "rule").on_each(POINTS, Rule::AllBelow(0.0), gains);
+            (found.verdict, found.found, found.why)
+        };
+        let each = "rule. Each interval is judged by itself: partly where they differ".to_owned();
+        let two = "1 of 2 intervals lies above the line, 1 on both sides.".to_owned();
+        assert_eq!(said(&[up, open]), (Partly, two, each.clone()));
+        let three = "2 of 3 intervals lie above the line, 1 below.".to_owned();
+        assert_eq!(said(&[up, down, up]), (Partly, three, each));
+        let one = "The interval lies on both sides of the line.".to_owned();
+        assert_eq!(said(&[open]), (Partly, one, "rule".to_owned()));
         // Of many the worst come first.
         let many =
             Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), gains([vec![up; 10], vec![down]].concat()));
         assert_eq!((many.measured[0].value.value(), many.verdict), (Some(down.estimate), Disagrees));
+    }
+
+    #[test]
+    fn shipped_findings_say_what_their_intervals_show() {
+        let mut checked = 0;
+        for study in crate::all_studies() {
+            let Some(shipped) = study.shipped().expect("it is readable") else { continue };
+            for finding in &shipped.stored.result.findings {
+                if finding.found.contains("the line") {
+                    assert_eq!(finding.found, sides(&finding.measured), "{}", finding.claim);
+                    checked += 1;
+                }
+            }
+        }
+        assert!(checked > 20, "{checked} checked");
     }
 }

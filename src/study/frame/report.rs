@@ -109,7 +109,7 @@ impl ClaimNumber {
     }
 
     /// Low end, estimate, high end and line.
-    fn places(&self) -> [f64; 4] {
+    pub(super) fn places(&self) -> [f64; 4] {
         let value = self.value.value().unwrap_or(f64::NAN);
         let [low, high] = self.value.spread().unwrap_or([value; 2]);
         [low, value, high, self.line]

@@ -130,7 +130,7 @@ fn simplest_is_enough(rows: &[Row<SensorView>]) -> Finding {
     let claim = Claim(
         "V-B",
         "The simplest layout, C1, is enough: more sensors add little or nothing",
-        "Agrees where no layout gains more than 2 points over C1, with its paired 95 % interval; disagrees where one gains more. The \
+        "Agrees where no layout gains more than 2 points over C1, with its paired 95 % interval, disagrees where it gains more. The \
          paper numbers its layouts without saying which is which, but for C1",
     );
     claim.on_each(POINTS, Rule::AllBelow(MINIMAL), most)

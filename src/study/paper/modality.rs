@@ -140,8 +140,8 @@ fn are_confused([a, b]: [&str; 2], whole: &[(&str, &Pool)]) -> Finding {
         Some((Rule::AllAbove(average), vec![(format!("{sensors}: taken for each other"), share)]))
     });
     let claim = format!("{} and {} are confused, since shape and size are similar", titled(a), titled(b));
-    let rule =
-        "Agrees where the 95 % interval of the share is above the average of all pairs, disagrees where it is below";
+    let rule = "Agrees where the 95 % interval of the share is above the average of all pairs, disagrees where it is below; partly \
+         where sensors differ";
     Claim("V-B", &claim, rule).on_groups(PERCENT, of_sensors)
 }
 
