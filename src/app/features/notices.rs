@@ -177,17 +177,14 @@ impl Notices {
         &self.messages
     }
 
-    /// The message to show now: the newest error or one that can be decided, else the newest warning, else the newest.
+    /// The message to show now: the newest error, else the newest that can be decided, else the newest warning, else the newest.
     fn first(&mut self, ctx: &egui::Context) -> Option<usize> {
         let now = Instant::now();
         self.shown.retain(|shown| shown.until > now);
         if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
             ctx.request_repaint_after(next - now);
         }
-        let urgency = |shown: &Shown| match shown.level {
-            Level::Warning if remedies(&shown.text).next().is_some() => Level::Error,
-            level => level,
-        };
+        let urgency = |shown: &Shown| (shown.level, remedies(&shown.text).next().is_some());
         (0..self.shown.len()).max_by_key(|k| (urgency(&self.shown[*k]), *k))
     }
 

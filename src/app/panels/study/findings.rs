@@ -2,7 +2,7 @@
 
 use super::result_ui;
 use crate::app::actions::Actions;
-use crate::app::features::studies::Studies;
+use crate::app::features::studies::{QUICK, Studies, is_quick};
 use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::wrapped;
 use egui::{Color32, Frame, Label, Margin, RichText, Role, ScrollArea, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
@@ -26,6 +26,9 @@ pub(in crate::app::panels) fn ui(ui: &mut Ui, studies: &Studies, actions: &mut A
             RichText::new(if findings.is_empty() { "The paper has no claim about this.".to_owned() } else { text })
                 .weak(),
         );
+        if is_quick(result.origin) && !findings.is_empty() {
+            ui.label(RichText::new(QUICK).small().color(ui.visuals().warn_fg_color));
+        }
         for finding in findings {
             finding_ui(ui, theme::of(ui), finding);
         }
@@ -75,9 +78,10 @@ fn numbers_ui(ui: &mut Ui, theme: Theme, finding: &Finding, ink: Color32) {
         wrapped(ui, RichText::new(&own.what).small().weak());
         ui.horizontal(|ui| {
             let (rect, response) = ui.allocate_exact_size(STRIP.into(), Sense::hover());
-            let line_at = format!("line at {}{SPACE}{}", Cell::Number(own.line).shown(&own.unit), symbol(&own.unit));
-            let line_at = line_at.trim_end().to_owned();
-            let text = format!("{}: {}, {line_at}", own.what, own.shown());
+            // In the unit of the number before it.
+            let line_at = format!("line at {}", Cell::Number(own.line).shown(&own.unit));
+            let text = format!("{}: {}, {line_at}{SPACE}{}", own.what, own.shown(), symbol(&own.unit));
+            let text = text.trim_end().to_owned();
             response.widget_info(|| WidgetInfo::labeled(Role::Figure, true, &text));
             let inner = rect.shrink2(vec2(4.0, 1.0));
             let at = |place: f64| inner.left() + inner.width() * place as f32;
