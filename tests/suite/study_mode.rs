@@ -191,6 +191,11 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     while through(&bench) != ["physical-like"; 2] {
         bench.wait();
     }
+    // Another trial is shown as before.
+    bench.tell(|app| app.open_trial(3));
+    while through(&bench) != ["virtual"; 2] {
+        bench.wait();
+    }
 }
 
 #[test]

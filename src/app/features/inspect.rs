@@ -32,7 +32,7 @@ struct ComparisonKey {
 pub struct InspectFeature {
     opener: Job<OpenRequest, OpenTrial>,
     /// Trial that was asked for last.
-    wanted: Option<TrialId>,
+    pub(super) wanted: Option<TrialId>,
     open: Option<Arc<OpenTrial>>,
     pub(super) history: TraceHistory,
     pub(in crate::app) pinned: Vec<Pinned>,

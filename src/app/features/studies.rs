@@ -1,6 +1,7 @@
 //! Studies in the window: which is chosen, what of its results is shown, and which run.
 
 use super::App;
+use super::view::ViewSource;
 use palpate_geometry::palette::{SERIES_COLOURS, Theme};
 use palpate_lab::datasets::SensorView;
 use palpate_lab::workers::{Job, JobFailure, RunningJob, Wake};
@@ -28,6 +29,8 @@ pub struct Studies {
     /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
+    /// The row whose trials are looked at, and the sensors that were set before.
+    row: Option<(StudyRow, SensorView)>,
 }
 
 /// What is said of the result of a quick run.
@@ -53,6 +56,7 @@ impl Studies {
             chosen: PAPER_STUDIES[0],
             origin: None,
             figure: 0,
+            row: None,
         }
     }
 
@@ -159,6 +163,7 @@ impl Studies {
 impl App {
     /// Takes in files that were read, and reports runs that have ended.
     pub(super) fn poll_studies(&mut self) {
+        self.leave_row();
         let Self { studies, notices, .. } = self;
         for files in studies.looks.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
             studies.files = files;
@@ -201,6 +206,19 @@ impl App {
         }
     }
 
+    /// The sensors of a row go with its trials, unless others were chosen since.
+    fn leave_row(&mut self) {
+        let shows = |row: &StudyRow| {
+            let wanted = self.inspect.wanted.filter(|_| self.view.source == ViewSource::Trial);
+            wanted.is_some_and(|id| row.trials.contains(&id))
+        };
+        let Some((row, before)) = self.studies.row.take_if(|(row, _)| !shows(row)) else { return };
+        let (own, now) = (row.sensors.unwrap_or_default(), &mut self.view.sensors);
+        if (own.sensors, own.signals) == (now.sensors, now.signals) {
+            *now = before;
+        }
+    }
+
     /// Opens the first of these trials, and compares the next with it, each in a colour of its own.
     pub(in crate::app) fn open_trials(&mut self, row: &StudyRow) {
         let Some((first, others)) = row.trials.split_first() else { return };
@@ -213,7 +231,10 @@ impl App {
         if let Some(own) = &row.sensors {
             let (sensors, signals) = (own.sensors, own.signals);
             through = format!(", through {} sensors as in the study", sensors.name());
-            self.set_sensors(SensorView { sensors, signals, ..self.view.sensors.clone() });
+            let before = std::mem::take(&mut self.view.sensors);
+            self.view.sensors = SensorView { sensors, signals, ..before.clone() };
+            let before = self.studies.row.take().map_or(before, |(_, before)| before);
+            self.studies.row = Some((row.clone(), before));
         }
         self.open_trial(*first);
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));

@@ -88,11 +88,11 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
     let put = |cell: Rect, text: &str, ink| put_line(ui, cell, Align2::LEFT_CENTER, text, LETTERS, ink);
     let quiet = colour(quiet);
     if wide {
-        put(cell(0, 0.0, names), HEAD, quiet);
-        // A word that all names begin with has no room: of `contact left` and `contact right`, the sides stay.
+        // A word that all names begin with stands once: of `contact left` and `contact right`, the sides stay.
         let parts = |label: &CurveLabel<'_>| label.name.split_once(' ').map(|(a, b)| (a.to_owned(), b.to_owned()));
         let both: Vec<(String, String)> = labels.iter().take(in_row).filter_map(parts).collect();
         let is_shared = in_row > 1 && both.len() == in_row && both.iter().all(|(word, _)| *word == both[0].0);
+        put(cell(0, 0.0, names), if is_shared { &both[0].0 } else { HEAD }, quiet);
         for (k, label) in labels.iter().take(in_row).enumerate() {
             let place = cell(0, names + column * k as f32, column);
             let end = draw_line(ui.painter(), place.left_center(), quiet, label.dashed);

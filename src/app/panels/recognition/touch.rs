@@ -41,7 +41,11 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     // Fingers that touch each other measure nothing.
     let is_empty = leads(part.view, EMPTY);
     let touched = part.view.measured.as_deref().filter(|_| !part.recognised.nothing_held);
-    let unknown = if part.view.measured.is_some() { "–" } else { UNKNOWN };
+    let unknown = match part.view.measured.is_some() {
+        true if part.recognised.nothing_held => "not held",
+        true => "–",
+        false => UNKNOWN,
+    };
     let of = |measure: Measure| touched.filter(|_| !is_empty).and_then(|measured| measured.felt(measure));
     if part.measures.is_tight() {
         let height = part.measures.class - part.measures.gap;

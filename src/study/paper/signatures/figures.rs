@@ -23,8 +23,8 @@ fn plot(title: String, x: &str, y: String) -> Plot {
 /// Bending and pressure over time, the default gripper above that of the paper's scene.
 fn curves(mut figure: LinkedPlots<'_>) -> LinkedFigure {
     for gripper in [DEFAULT, PAPER] {
-        for (column, unit) in [("bending", "1/m"), ("pressure", "kPa")] {
-            figure.plots.push(plot(format!("Scene {gripper}: {column}"), "time (s)", format!("{column} ({unit})")));
+        for (column, name, unit) in [("bending", "bending", "1/m"), ("pressure", "contact pressure", "kPa")] {
+            figure.plots.push(plot(format!("Scene {gripper}: {name}"), "time (s)", format!("{name} ({unit})")));
             for (colour, class) in unique(figure.lines().map(|line| line.text("class"))).into_iter().enumerate() {
                 let lines = figure.lines_with(&[("gripper", gripper), ("class", class)]).into_iter();
                 let points = lines.map(|line| (line, DataPoint::new(line.value("time"), line.value(column))));
