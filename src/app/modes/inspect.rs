@@ -42,7 +42,7 @@ const KEYS: &[Act] = &[
     key(SHIFT, Key::A, "mark A at the cursor", |app| app.put_mark(0)),
     key(SHIFT, Key::B, "mark B at the cursor", |app| app.put_mark(1)),
     key(SHIFT.plus(COMMAND), Key::E, "export the selected trials, or the one shown: MCAP, NPZ, Parquet, CSV", |app| {
-        app.export_trials(false)
+        app.export_trials(false);
     }),
     key(COMMAND, Key::E, "export a figure of the trial and those compared with it", |app| {
         app.export_figure(FigureOptions::default());

@@ -283,7 +283,7 @@ impl OpenTrial {
             self.push(row, row.t_s);
         }
         self.phases = phases_of_frames(data.frames.iter(), gripper);
-        self.touched_s = touches_of_frames(data.frames.iter(), gripper);
+        self.touched_s = touches_of_frames(&data.frames.iter(), gripper);
         let SimulatedData { world_from_gripper, plan, quality, frames } = data;
         self.remarks.extend(self.header.origin.as_ref().and_then(GraspOrigin::other_physics));
         if options.keep >= Keep::Scenery {

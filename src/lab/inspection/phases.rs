@@ -110,13 +110,13 @@ pub fn phases_of_frames<'a>(frames: impl Iterator<Item = &'a Frame> + Clone, gri
     let mut times = PhaseTimes::of_samples(frames.clone().map(|frame| (frame.t, frame.phase)));
     // The first sample comes after the first step.
     times.closing = times.closing.map(|_| 0.0);
-    times.contact = touches_of_frames(frames.clone(), gripper).into_iter().flatten().reduce(f64::min);
+    times.contact = touches_of_frames(&frames, gripper).into_iter().flatten().reduce(f64::min);
     times.spans(0.0, frames.last().map_or(0.0, |frame| frame.t))
 }
 
 /// First contact of each finger of a simulated grasp (s), left and right: the first sample in which its pad carries load.
 pub(super) fn touches_of_frames<'a>(
-    frames: impl Iterator<Item = &'a Frame> + Clone,
+    frames: &(impl Iterator<Item = &'a Frame> + Clone),
     gripper: &GripperModel,
 ) -> [Option<f64>; 2] {
     let taxels = gripper.taxels().count();
