@@ -219,7 +219,7 @@ impl eframe::App for Window {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         if let Some(workbench) = &self.workbench {
-            eframe::set_value(storage, VIEW_KEY, workbench.view());
+            eframe::set_value(storage, VIEW_KEY, &workbench.kept_view());
         }
     }
 

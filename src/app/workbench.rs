@@ -210,9 +210,16 @@ impl Workbench {
         Ok(Self { app, path_dialog: None, import_dialog: None, cleared: setup.cleared, title: String::new() })
     }
 
-    /// View state, to be remembered.
+    /// View state.
     pub fn view(&self) -> &ViewState {
         &self.app.view
+    }
+
+    /// The same, to be remembered: the sensors of a study's row are not.
+    pub(in crate::app) fn kept_view(&self) -> ViewState {
+        let view = self.app.view.clone();
+        let sensors = self.app.studies.sensors_before().unwrap_or(&view.sensors).clone();
+        ViewState { sensors, ..view }
     }
 
     /// Newest state of the simulation.

@@ -154,6 +154,11 @@ impl Studies {
         self.runner.stop();
     }
 
+    /// The sensors that were set before those of a row.
+    pub(in crate::app) fn sensors_before(&self) -> Option<&SensorView> {
+        self.row.as_ref().map(|(_, before)| before)
+    }
+
     /// Takes a study back that waits.
     pub(in crate::app) fn withdraw(&self, key: &str) {
         self.runner.withdraw(|request| request.key == key);

@@ -78,7 +78,12 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
     let width_of = |name: &str| {
         ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(LETTERS), Color32::WHITE).size().x
     };
-    let first = if wide { width_of(HEAD) } else { 0.0 };
+    // A word that all names begin with stands once: of `contact, left` and `contact, right`, the sides stay.
+    let beginning = |label: &CurveLabel<'_>| label.name.split_once(' ').map(|(word, _)| format!("{word} "));
+    let word = labels.first().filter(|_| in_row > 1).and_then(beginning);
+    let shared = word.as_deref().filter(|word| labels.iter().take(in_row).all(|label| label.name.starts_with(word)));
+    let head_word = shared.map_or(HEAD, |word| word.trim_end().trim_end_matches(','));
+    let first = if wide { width_of(head_word) } else { 0.0 };
     let names = trials.iter().map(|name| width_of(name)).fold(first, f32::max).min(TRIALS) + GAP;
     let left = frame.right() + 6.0 + SAMPLE + 5.0;
     let column = (frame.right() + WIDTH - left - names) / in_row as f32;
@@ -88,15 +93,11 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
     let put = |cell: Rect, text: &str, ink| put_line(ui, cell, Align2::LEFT_CENTER, text, LETTERS, ink);
     let quiet = colour(quiet);
     if wide {
-        // A word that all names begin with stands once: of `contact left` and `contact right`, the sides stay.
-        let parts = |label: &CurveLabel<'_>| label.name.split_once(' ').map(|(a, b)| (a.to_owned(), b.to_owned()));
-        let both: Vec<(String, String)> = labels.iter().take(in_row).filter_map(parts).collect();
-        let is_shared = in_row > 1 && both.len() == in_row && both.iter().all(|(word, _)| *word == both[0].0);
-        put(cell(0, 0.0, names), if is_shared { &both[0].0 } else { HEAD }, quiet);
+        put(cell(0, 0.0, names), head_word, quiet);
         for (k, label) in labels.iter().take(in_row).enumerate() {
             let place = cell(0, names + column * k as f32, column);
             let end = draw_line(ui.painter(), place.left_center(), quiet, label.dashed);
-            let name = if is_shared { &both[k].1 } else { &label.name };
+            let name = label.name.strip_prefix(shared.unwrap_or_default()).unwrap_or(&label.name);
             put(place.with_min_x(end.x + 4.0), name, quiet);
         }
     }
