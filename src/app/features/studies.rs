@@ -12,6 +12,7 @@ use palpate_study::jobs::{
 };
 use palpate_study::paper::PAPER_STUDIES;
 use palpate_study::{LinkedFigure, ListedStudy, StudyRow, StudySize, all_studies, listed_study};
+use palpate_tactile::trial::TrialId;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,8 +30,8 @@ pub struct Studies {
     /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
-    /// The row whose trials are looked at, and the sensors that were set before.
-    row: Option<(StudyRow, SensorView)>,
+    /// Trials of the row that is looked at, and the sensors: those of the row, and those set before.
+    row: Option<(Vec<TrialId>, [SensorView; 2])>,
 }
 
 /// What is said of the result of a quick run.
@@ -156,7 +157,7 @@ impl Studies {
 
     /// The sensors that were set before those of a row.
     pub(in crate::app) fn sensors_before(&self) -> Option<&SensorView> {
-        self.row.as_ref().map(|(_, before)| before)
+        self.row.as_ref().map(|(_, [_, before])| before)
     }
 
     /// Takes a study back that waits.
@@ -168,7 +169,8 @@ impl Studies {
 impl App {
     /// Takes in files that were read, and reports runs that have ended.
     pub(super) fn poll_studies(&mut self) {
-        self.leave_row();
+        let shown = self.inspect.wanted.filter(|_| self.view.source == ViewSource::Trial);
+        self.leave_row(|trials| shown.is_none_or(|id| !trials.contains(&id)));
         let Self { studies, notices, .. } = self;
         for files in studies.looks.take().into_iter().filter_map(|ended| ended.outcome.ok()) {
             studies.files = files;
@@ -212,15 +214,10 @@ impl App {
     }
 
     /// The sensors of a row go with its trials, unless others were chosen since.
-    fn leave_row(&mut self) {
-        let shows = |row: &StudyRow| {
-            let wanted = self.inspect.wanted.filter(|_| self.view.source == ViewSource::Trial);
-            wanted.is_some_and(|id| row.trials.contains(&id))
-        };
-        let Some((row, before)) = self.studies.row.take_if(|(row, _)| !shows(row)) else { return };
-        let (own, now) = (row.sensors.unwrap_or_default(), &mut self.view.sensors);
-        if (own.sensors, own.signals) == (now.sensors, now.signals) {
-            *now = before;
+    fn leave_row(&mut self, is_left: impl Fn(&[TrialId]) -> bool) {
+        let Some((_, [own, before])) = self.studies.row.take_if(|(trials, _)| is_left(trials)) else { return };
+        if self.view.sensors == own {
+            self.view.sensors = before;
         }
     }
 
@@ -233,13 +230,13 @@ impl App {
         self.library.find(query);
         // What the row was measured by, not what curves were shown through before.
         let mut through = String::new();
-        if let Some(own) = &row.sensors {
-            let (sensors, signals) = (own.sensors, own.signals);
+        self.leave_row(|_| true);
+        if let Some(SensorView { layout, gripper, sensors, signals, .. }) = row.sensors.clone() {
             through = format!(", through {} sensors as in the study", sensors.name());
-            let before = std::mem::take(&mut self.view.sensors);
-            self.view.sensors = SensorView { sensors, signals, ..before.clone() };
-            let before = self.studies.row.take().map_or(before, |(_, before)| before);
-            self.studies.row = Some((row.clone(), before));
+            let before = self.view.sensors.clone();
+            let own = SensorView { layout, gripper, sensors, signals, ..before.clone() };
+            self.view.sensors = own.clone();
+            self.studies.row = Some((row.trials.clone(), [own, before]));
         }
         self.open_trial(*first);
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));

@@ -9,7 +9,7 @@ use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
-use palpate_geometry::units::{SPACE, difference, number, shown as with_unit, symbol};
+use palpate_geometry::units::{difference, number, shown as with_unit, symbol};
 use palpate_lab::inspection::{Alignment, OpenTrial, TouchPhase};
 use palpate_sim::gripper::Side;
 use palpate_tactile::trial::TrialId;
@@ -117,55 +117,53 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 "Pa" => ("kPa", 1e-3),
                 unit => (unit, 1.0),
             };
-            let Some(own) = shown.hold_mean(&column.name).map(|mean| mean * factor) else { continue };
+            let mean = |trial: &OpenTrial| Some(trial.hold_mean(&column.name)? * factor);
             let name = column.name.replace('_', " ");
-            match narrow {
-                true => ui.weak(name.replace(" left", " L").replace(" right", " R")).on_hover_text(name),
-                false => ui.weak(format!("{name}, {}", symbol(unit))),
-            };
-            ui.label(if narrow { with_unit(own, unit) } else { number(own, unit) });
-            for other in &pinned {
-                let mean = other.trial.hold_mean(&column.name).map(|mean| mean * factor);
-                let Some(mean) = mean else {
-                    ui.label("–");
-                    continue;
-                };
-                let (mean, off) = (number(mean, unit), difference(mean - own, unit));
-                // A panel has room for both of one trial.
-                match pinned.len() {
-                    1 if !narrow => ui.label(format!("{mean} ({off})")),
-                    _ => ui.label(off).on_hover_text(format!("Mean {mean} {}", symbol(unit))),
-                };
-            }
-            ui.end_row();
+            let short = name.replace(" left", " L").replace(" right", " R");
+            values_ui(ui, narrow, [&name, &short], unit, mean(shown), pinned.iter().map(|own| mean(&own.trial)));
         }
         for side in Side::BOTH {
             let touched = |trial: &OpenTrial| {
                 let closing = trial.phase_from(TouchPhase::PreShaping).or(trial.phase_from(TouchPhase::Contact));
                 Some(trial.touched_s[side.index()]? - closing?)
             };
-            let Some(own) = touched(shown) else { continue };
             let name = format!("closing to contact, {}", side.name());
-            match narrow {
-                true => ui.weak(format!("contact {}", &side.name()[..1].to_uppercase())).on_hover_text(name),
-                false => ui.weak(format!("{name}, s")).on_hover_text("First contact after the closing began"),
-            };
-            ui.label(if narrow { with_unit(own, "s") } else { number(own, "s") });
-            for other in &pinned {
-                let Some(other) = touched(&other.trial) else {
-                    ui.label("–");
-                    continue;
-                };
-                let (other, off) = (number(other, "s"), difference(other - own, "s"));
-                match pinned.len() {
-                    1 if !narrow => ui.label(format!("{other} ({off})")),
-                    _ => ui.label(off).on_hover_text(format!("{other}{SPACE}s")),
-                };
-            }
-            ui.end_row();
+            let short = format!("contact {}", &side.name()[..1].to_uppercase());
+            values_ui(ui, narrow, [&name, &short], "s", touched(shown), pinned.iter().map(|own| touched(&own.trial)));
         }
     };
     ScrollArea::horizontal().show(ui, |ui| table.show(ui, table_ui));
+}
+
+/// A row of the table, where the trial shown has a value: its own, and those of the others with the differences to it.
+fn values_ui(
+    ui: &mut Ui,
+    narrow: bool,
+    [name, short]: [&str; 2],
+    unit: &str,
+    own: Option<f64>,
+    others: impl ExactSizeIterator<Item = Option<f64>>,
+) {
+    let Some(own) = own else { return };
+    match narrow {
+        true => ui.weak(short).on_hover_text(name),
+        false => ui.weak(format!("{name}, {}", symbol(unit))),
+    };
+    ui.label(if narrow { with_unit(own, unit) } else { number(own, unit) });
+    // A panel has room for both of one trial.
+    let both = others.len() == 1 && !narrow;
+    for other in others {
+        let Some(other) = other else {
+            ui.label("–");
+            continue;
+        };
+        let off = difference(other - own, unit);
+        match both {
+            true => ui.label(format!("{} ({off})", number(other, unit))),
+            false => ui.label(off).on_hover_text(with_unit(other, unit)),
+        };
+    }
+    ui.end_row();
 }
 
 /// Name of the trial or gripper shown.

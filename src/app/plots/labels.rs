@@ -78,7 +78,7 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
     let width_of = |name: &str| {
         ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(LETTERS), Color32::WHITE).size().x
     };
-    // A word that all names begin with stands once: of `contact, left` and `contact, right`, the sides stay.
+    // A word that all names share is the heading: `contact` above `left` and `right`.
     let beginning = |label: &CurveLabel<'_>| label.name.split_once(' ').map(|(word, _)| format!("{word} "));
     let word = labels.first().filter(|_| in_row > 1).and_then(beginning);
     let shared = word.as_deref().filter(|word| labels.iter().take(in_row).all(|label| label.name.starts_with(word)));

@@ -17,6 +17,7 @@ pub use query::{
     DatasetError, DatasetQuery, NoPhysicsVersion, PhysicsVersion, SensorView, TrialSignals, labels_of_catalogue,
     noise_seed, sequence_of, trial_signals,
 };
+pub use reading::NOT_SOUND;
 pub use sampling::{Cut, NoCut};
 pub use saved_models::{
     SavedModel, check_model_path, make_models_folder, models_folder, new_model_path, save_model, saved_models,

@@ -230,7 +230,7 @@ impl DatasetQuery {
 /// What to do with two objects in one class.
 const SEPARATE: &str = "choose one of them with --collection, or collect one of them anew under another --class";
 /// Reason: diverged, did not converge, or did not come to rest.
-const NOT_SOUND: &str = "not sound";
+pub const NOT_SOUND: &str = "not sound";
 /// Reason: not what was stored.
 const DAMAGED: &str = "damaged";
 /// Reason: another trial holds the same grasp.

@@ -78,23 +78,20 @@ pub struct Taught {
 /// Tests a class that a model has learned by grasps that it has not learned from.
 fn test(lesson: &mut Lesson, model: &Model, grasps: &[Example]) {
     let (labels, prior) = (&model.card.labels, model.card.prior());
-    lesson.tested = grasps.len();
-    for own in grasps {
-        let class = model.recogniser.recognise(&own.grasp, prior.as_ref()).pmf.top().0;
-        match &labels.classes[class].name {
-            name if *name == lesson.name => lesson.recognised += 1,
+    let felt = |own: &Example, before: Option<&Pmf>| model.recogniser.recognise(&own.grasp, before).pmf;
+    let (mut right, mut after_three) = (0, 0);
+    for (k, own) in grasps.iter().enumerate() {
+        let mut answer = felt(own, prior.as_ref());
+        match &labels.classes[answer.top().0].name {
+            name if *name == lesson.name => right += 1,
             other => *lesson.taken_for.entry(other.clone()).or_default() += 1,
         }
+        for next in grasps.iter().cycle().skip(k + 1).take(2) {
+            answer = felt(next, Some(&answer));
+        }
+        after_three += usize::from(labels.classes[answer.top().0].name == lesson.name);
     }
-    let ends_right = |first: &usize| {
-        let add = |before: Option<Pmf>, k: usize| {
-            let own = &grasps[(first + k) % grasps.len()];
-            Some(model.recogniser.recognise(&own.grasp, before.as_ref()).pmf)
-        };
-        let last = (0..3).fold(prior.clone(), add);
-        last.is_some_and(|last| labels.classes[last.top().0].name == lesson.name)
-    };
-    lesson.after_three = Some((0..grasps.len()).filter(ends_right).count());
+    (lesson.tested, lesson.recognised, lesson.after_three) = (grasps.len(), right, Some(after_three));
 }
 
 /// Most classes that are named as mistaken for a new one.

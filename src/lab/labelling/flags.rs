@@ -53,7 +53,7 @@ pub struct Observed<'a> {
     pub cadence: &'a Cadence,
     /// Phases of the grasp, if known.
     pub phases: &'a [PhaseMark],
-    /// Who actuated: a driven hand was told to open first.
+    /// Who actuated: a driven hand opens first.
     pub control: Control,
     /// Calibrations of its parts, if any.
     pub calibrations: &'a [(Sensor, Calibration)],
@@ -116,7 +116,7 @@ impl Observed<'_> {
     fn late_start(&self) -> Option<String> {
         const ADVICE: &str = "when the recording began: begin with open fingers";
         let (rest, pressed) = self.split();
-        // A hand that was not told to open may have opened and begun to close once more.
+        // A hand that the board does not drive may have opened and begun to close once more.
         let first = if self.control == Control::Driven { None } else { self.readings.first() };
         let before = [first, Some(rest.last().or(pressed.first())?)];
         if let Some(bar) = before.iter().flatten().filter_map(|reading| reading.line_bar).reduce(f64::max) {

@@ -186,7 +186,7 @@ mod tests {
         let found = Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), gains(vec![up]));
         assert_eq!((found.measured[0].what.as_str(), found.verdict), ("virtual: a", Agrees));
         assert_eq!(Claim("V-D", "better", "rule").on_gains(Rule::AllAbove(0.0), Vec::new()).verdict, NotMeasured);
-        // What is said is what is shown, whatever the verdict.
+        // The sentence counts the intervals, whatever the verdict.
         let said = |gains: &[Interval]| {
             let gains: Gains = gains.iter().map(|own| ("a".to_owned(), *own)).collect();
             let found = Claim("V-B", "enough", "rule").on_each(POINTS, Rule::AllBelow(0.0), gains);

@@ -89,8 +89,12 @@ impl Crossing for Layouts {
             Column("layout", "", &|row: &Row<SensorView>| row.kind.factor.name().into()),
             Column("channels", "", &|row| channels(row).into()),
         ];
-        let tables = vec![Row::scores("layouts", title, rows, &own, Some("F1 against C1")), recommended(rows)];
-        (tables, vec![simplest_is_enough(rows), better_than_zuo(rows)])
+        let mut scores = Row::scores("layouts", title, rows, &own, Some("F1 against C1"));
+        for (line, row) in scores.rows.iter_mut().zip(rows) {
+            let view = SensorView { sensors: row.kind.sensors, ..row.kind.factor.clone() };
+            line.sensors = line.sensors.take().map(|_| view);
+        }
+        (vec![scores, recommended(rows)], vec![simplest_is_enough(rows), better_than_zuo(rows)])
     }
 
     fn figures(report: &StudyReport) -> Vec<Option<LinkedFigure>> {

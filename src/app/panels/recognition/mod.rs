@@ -143,11 +143,9 @@ pub(super) fn ui(
         ui.spacing_mut().item_spacing.y = measures.gap;
         let top = ui.cursor().top();
         let labels = recognised.view.map(|view| view.labels.as_ref());
-        // What was learned of fixed objects says nothing about free ones.
-        let learned = learned.filter(|learned| learned.fixed == data.scene.holds_object());
-        // Nor has it to do with another object in the hand.
+        // What was learned of fixed objects says nothing about free ones, nor about another object.
         let is_in_hand = |name: &str| recognised.truth.as_ref().is_none_or(|(truth, _)| *truth == name);
-        let learned = learned.filter(|learned| is_in_hand(&learned.name));
+        let learned = learned.filter(|own| own.fixed == data.scene.holds_object() && is_in_hand(&own.name));
         lesson_ui(ui, tools, learned, labels, measures, actions);
         match recognised.view {
             Some(view) => {

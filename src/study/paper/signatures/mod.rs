@@ -10,7 +10,7 @@ use super::prelude::*;
 use bodies::{FLAT, ROUND, STATISTICS, Statistic, Summary, VARIED, Varied, WIDTHS, papers_scene, papers_view};
 use course::{GraspCurves, Grasped, Signature, median};
 use findings::{Measured, findings, sentences};
-use palpate_lab::datasets::{SensorView, sequence_of};
+use palpate_lab::datasets::{NOT_SOUND, SensorView, sequence_of};
 use palpate_lab::grasping::grasp;
 use palpate_learn::metrics::Bootstrap;
 use palpate_sim::objects::{ObjectModel, catalogue};
@@ -173,7 +173,8 @@ fn of_data(bench: &StudyData<'_>, wanted: &DataWanted) -> Result<Found, StudyErr
             Some((known.name.as_str(), scene.load_object().ok()??))
         })
         .collect();
-    let mut found = Found { data: data.about.described(), unsound: data.about.left_out, ..Found::default() };
+    let unsound = data.about.left_out_for.get(NOT_SOUND).copied().unwrap_or(0);
+    let mut found = Found { data: data.about.described(), unsound, ..Found::default() };
     for example in &data.examples {
         bench.check_stop()?;
         let class = &data.labels.classes[example.class];
