@@ -4,6 +4,7 @@
 use crate::app::actions::Actions;
 use crate::app::theme::{colour, veil};
 use crate::app::widgets::{capital, choice_ui};
+use egui::emath::GuiRounding as _;
 use egui::{
     Align2, Color32, ColorImage, FontId, Pos2, Rect, Response, Sense, Stroke, TextureFilter, TextureHandle,
     TextureOptions, Ui, WidgetInfo, pos2, vec2,
@@ -92,8 +93,13 @@ pub(super) fn colour_bar(ui: &Ui, theme: Theme, right: Pos2, width: f32, scale: 
     for k in 0..steps {
         let value = from + (to - from) * (k as f32 + 0.5) / steps as f32;
         let x = |k: usize| bar.left() + width * k as f32 / steps as f32;
+        // Whole pixels leave no seam between two.
         let cell = Rect::from_x_y_ranges(x(k)..=x(k + 1), bar.y_range());
-        painter.rect_filled(cell, 0.0, scale.colour(value).map_or(Color32::TRANSPARENT, colour));
+        painter.rect_filled(
+            cell.round_to_pixels(painter.pixels_per_point()),
+            0.0,
+            scale.colour(value).map_or(Color32::TRANSPARENT, colour),
+        );
     }
     painter.text(pos2(bar.left() - 4.0, right.y), Align2::RIGHT_CENTER, low, font, ink).left()
 }

@@ -107,25 +107,28 @@ impl PathDialog {
         let fits = |row: &&Row| !narrows || row.name.to_lowercase().starts_with(&begun);
         let listed: Vec<Row> = all.iter().filter(fits).cloned().collect();
         let (mut chosen, mut done) = (None, false);
-        ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-            if let Some(above) = folder.parent()
-                && ui.selectable_label(false, "..  (folder above)").clicked()
-            {
-                chosen = Some(above.join(""));
-            }
-            for row in &listed {
-                let text = if row.folder { format!("{}/", row.name) } else { row.name.clone() };
-                let response = ui.selectable_label(false, text);
-                if response.clicked() || response.double_clicked() {
-                    done |= response.double_clicked() && !row.folder;
-                    let path = folder.join(&row.name);
-                    chosen = Some(if row.folder { path.join("") } else { path });
+        ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink([false, true]).show(
+            ui,
+            |ui| {
+                if let Some(above) = folder.parent()
+                    && ui.selectable_label(false, "..  (folder above)").clicked()
+                {
+                    chosen = Some(above.join(""));
                 }
-            }
-            if listed.is_empty() {
-                ui.weak("No such files here.");
-            }
-        });
+                for row in &listed {
+                    let text = if row.folder { format!("{}/", row.name) } else { row.name.clone() };
+                    let response = ui.selectable_label(false, text);
+                    if response.clicked() || response.double_clicked() {
+                        done |= response.double_clicked() && !row.folder;
+                        let path = folder.join(&row.name);
+                        chosen = Some(if row.folder { path.join("") } else { path });
+                    }
+                }
+                if listed.is_empty() {
+                    ui.weak("No such files here.");
+                }
+            },
+        );
         if let Some(path) = chosen {
             let name =
                 self.question.name.as_deref().filter(|_| path.as_os_str().to_string_lossy().ends_with(is_separator));

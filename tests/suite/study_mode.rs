@@ -191,8 +191,11 @@ fn findings_are_told_by_words_and_rows_open_trials() {
     while through(&bench) != ["physical-like"; 2] {
         bench.wait();
     }
-    // Another trial is shown as before.
+    // All trials of the row are listed, and no others.
+    bench.until_shown(true, "trials of the row: 2  \u{d7}");
+    // Another trial is shown as before, in the whole list.
     bench.tell(|app| app.open_trial(3));
+    bench.until_shown(false, "trials of the row");
     while through(&bench) != ["virtual"; 2] {
         bench.wait();
     }

@@ -6,6 +6,7 @@ use crate::app::features::view::ViewSource;
 use crate::app::playback::Seek;
 use crate::app::shown::{DisplayedData, Inspected};
 use crate::app::theme::{colour, veil};
+use egui::emath::GuiRounding as _;
 use egui::{Align2, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 use palpate_geometry::palette::Trace;
 use palpate_lab::inspection::PhaseSpan;
@@ -135,15 +136,19 @@ fn line_pressure(painter: &egui::Painter, rect: Rect, data: &DisplayedData<'_>, 
     let fill = veil(Trace::Line.colour(data.view.theme), 0.40);
     let height = |bar: f64| rect.height() * 0.92 * (bar / top).clamp(0.0, 1.0) as f32;
     // At most one column per point: a long trial has more samples than that.
-    let mut drawn = f32::NEG_INFINITY;
+    let mut drawn = None;
     for (pair, bars) in trace.t.windows(2).zip(trace.line_bar.windows(2)) {
-        let [left, right] = [x_of(pair[0]), x_of(pair[1])];
-        if right <= drawn + 0.5 || !bars[1].is_finite() {
+        let [left, right] = [*drawn.get_or_insert_with(|| x_of(pair[0])), x_of(pair[1])];
+        if !bars[1].is_finite() {
+            drawn = None;
             continue;
         }
-        let column =
-            Rect::from_min_max(pos2(left.max(drawn), rect.bottom() - height(bars[1])), pos2(right, rect.bottom()));
-        painter.rect_filled(column, 0.0, fill);
-        drawn = right;
+        if right <= left + 0.5 {
+            continue;
+        }
+        let column = Rect::from_min_max(pos2(left, rect.bottom() - height(bars[1])), pos2(right, rect.bottom()));
+        // Whole pixels leave no seam between two.
+        painter.rect_filled(column.round_to_pixels(painter.pixels_per_point()), 0.0, fill);
+        drawn = Some(right);
     }
 }

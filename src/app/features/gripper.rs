@@ -31,6 +31,8 @@ pub struct GripperFeature {
     pub(in crate::app) view: Option<Arc<GripperView>>,
     pub(in crate::app) traces: TraceHistory,
     connected: bool,
+    /// It is, and sends no readings.
+    silent: bool,
     /// The simulation waits for the gripper: it is connected, and not the simulation is looked at.
     followed: bool,
     /// When the last reading came.
@@ -68,6 +70,7 @@ impl GripperFeature {
             view: None,
             traces: TraceHistory::default(),
             connected: false,
+            silent: false,
             followed: false,
             heard: Instant::now(),
             part: None,
@@ -128,6 +131,13 @@ impl App {
         let Some(now) = gripper.view.clone() else { return };
         // Grasps read through other calibrations are not comparable.
         gripper.traces.forget_before(now.calibrated);
+        if gripper.silent != now.is_silent() {
+            gripper.silent = now.is_silent();
+            // What was said without its readings is no longer so.
+            if !now.is_silent() {
+                self.notices.done("gripper");
+            }
+        }
         if gripper.connected != now.is_connected() {
             gripper.connected = now.is_connected();
             if now.is_connected() {

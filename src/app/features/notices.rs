@@ -61,6 +61,8 @@ struct Shown {
     /// Action that has failed or was stopped: when it succeeds or begins again, the message is no longer true.
     failed: Option<&'static str>,
     text: String,
+    /// It can have been read once.
+    read: Instant,
     until: Instant,
 }
 
@@ -97,12 +99,13 @@ impl Notices {
         }
         let reading = Duration::from_secs_f32(2.5 + 0.06 * text.len() as f32);
         let time = if level == Level::Error { 2 * reading } else { reading };
-        let time = if text.contains(STORE_LOST) { LASTING } else { time };
+        let [reading, time] = if text.contains(STORE_LOST) { [LASTING; 2] } else { [reading, time] };
         let time = if remedies(&text).next().is_some() { time.max(WITH_BUTTON) } else { time };
         self.shown.retain(|shown| shown.text != text);
-        self.shown.push(Shown { level, failed: None, text: text.clone(), until: Instant::now() + time });
+        let now = Instant::now();
+        self.shown.push(Shown { level, failed: None, text: text.clone(), read: now + reading, until: now + time });
         self.messages.push_back(text);
-        self.told = Some(Instant::now());
+        self.told = Some(now);
         if self.messages.len() > MOST_MESSAGES {
             self.messages.pop_front();
         }
@@ -177,14 +180,16 @@ impl Notices {
         &self.messages
     }
 
-    /// The message to show now: the newest error, else the newest that can be decided, else the newest warning, else the newest.
+    /// The message to show now: the newest error that is still to be read, else the newest that can be decided, else the newest
+    /// warning, else the newest. What can have been read makes room for the answer to a later action.
     fn first(&mut self, ctx: &egui::Context) -> Option<usize> {
         let now = Instant::now();
         self.shown.retain(|shown| shown.until > now);
         if let Some(next) = self.shown.iter().map(|shown| shown.until).min() {
             ctx.request_repaint_after(next - now);
         }
-        let urgency = |shown: &Shown| (shown.level, remedies(&shown.text).next().is_some());
+        let level = |shown: &Shown| if now < shown.read { shown.level } else { Level::Info };
+        let urgency = |shown: &Shown| (level(shown), remedies(&shown.text).next().is_some());
         (0..self.shown.len()).max_by_key(|k| (urgency(&self.shown[*k]), *k))
     }
 

@@ -172,11 +172,14 @@ impl App {
         }
     }
 
-    /// Asks whether an object that was learned is to be forgotten or renamed.
+    /// Takes an object that was learned in hand, and asks whether it is to be forgotten or renamed.
     pub fn change_learned(&mut self, source: &str) {
         let Some(name) = self.learned_as(source).map(str::to_owned) else {
             return self.notices.info("No learned object is in the hand.");
         };
+        if self.simulation.scene.object.source != source {
+            self.open(source);
+        }
         let (lesson, fixed) = (self.lesson(&name).cloned(), self.simulation.scene.holds_object());
         self.recognition.learned = Some(Learned { name, fixed, lesson, seconds: None });
         self.show_panel("recognition");

@@ -278,6 +278,13 @@ impl App {
         self.simulation.send(Command::SetGhost(ghost));
     }
 
+    /// Enlarges the picture of the touch, or makes it as large as usual.
+    pub(in crate::app) fn enlarge_touch(&mut self) {
+        self.view.inset_large ^= true;
+        let size = if self.view.inset_large { "enlarged, where the 3-D view has room" } else { "as large as usual" };
+        self.notices.info(format!("Picture of the touch: {size}."));
+    }
+
     /// Grasps the scene refused last, or the present one, with the convex hull of its object.
     pub(in crate::app) fn use_hull(&mut self) {
         let mut scene = self.simulation.refused.take().unwrap_or_else(|| self.simulation.scene.clone());

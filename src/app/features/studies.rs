@@ -13,7 +13,7 @@ use palpate_study::jobs::{
 use palpate_study::paper::PAPER_STUDIES;
 use palpate_study::{LinkedFigure, ListedStudy, StudyRow, StudySize, all_studies, listed_study};
 use palpate_tactile::trial::TrialId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -30,8 +30,16 @@ pub struct Studies {
     /// Origin of the result that is shown; the first one where it is missing.
     origin: Option<StudyOrigin>,
     figure: usize,
-    /// Trials of the row that is looked at, and the sensors: those of the row, and those set before.
-    row: Option<(Vec<TrialId>, [SensorView; 2])>,
+    row: Option<OpenRow>,
+}
+
+/// A row whose trials are looked at.
+struct OpenRow {
+    trials: BTreeSet<TrialId>,
+    /// The list before it.
+    before: TrialQuery,
+    /// Its sensors, and those that were set before.
+    sensors: Option<[SensorView; 2]>,
 }
 
 /// What is said of the result of a quick run.
@@ -157,7 +165,8 @@ impl Studies {
 
     /// The sensors that were set before those of a row.
     pub(in crate::app) fn sensors_before(&self) -> Option<&SensorView> {
-        self.row.as_ref().map(|(_, [_, before])| before)
+        let [_, before] = self.row.as_ref()?.sensors.as_ref()?;
+        Some(before)
     }
 
     /// Takes a study back that waits.
@@ -213,10 +222,13 @@ impl App {
         }
     }
 
-    /// The sensors of a row go with its trials, unless others were chosen since.
-    fn leave_row(&mut self, is_left: impl Fn(&[TrialId]) -> bool) {
-        let Some((_, [own, before])) = self.studies.row.take_if(|(trials, _)| is_left(trials)) else { return };
-        if self.view.sensors == own {
+    /// The sensors of a row go with its trials, and so does the list of these, unless others were chosen since.
+    fn leave_row(&mut self, is_left: impl Fn(&BTreeSet<TrialId>) -> bool) {
+        let Some(row) = self.studies.row.take_if(|row| is_left(&row.trials)) else { return };
+        if self.library.selection.query.only == Some(row.trials) {
+            self.library.find(row.before);
+        }
+        if let Some([_, before]) = row.sensors.filter(|[own, _]| self.view.sensors == *own) {
             self.view.sensors = before;
         }
     }
@@ -225,23 +237,26 @@ impl App {
     pub(in crate::app) fn open_trials(&mut self, row: &StudyRow) {
         let Some((first, others)) = row.trials.split_first() else { return };
         self.inspect.unpin_all();
-        // They are of the study's data set: the list shows them, too.
-        let query = TrialQuery { without_collected: false, ..self.library.selection.query.clone() };
-        self.library.find(query);
-        // What the row was measured by, not what curves were shown through before.
-        let mut through = String::new();
         self.leave_row(|_| true);
-        if let Some(SensorView { layout, gripper, sensors, signals, .. }) = row.sensors.clone() {
-            through = format!(", through {} sensors as in the study", sensors.name());
+        let trials: BTreeSet<TrialId> = row.trials.iter().copied().collect();
+        let before = self.library.selection.query.clone();
+        self.library.find(TrialQuery { only: Some(trials.clone()), ..before.cleared() });
+        // What the row was measured by, not what curves were shown through before.
+        let sensors = row.sensors.clone().map(|SensorView { layout, gripper, sensors, signals, .. }| {
             let before = self.view.sensors.clone();
-            let own = SensorView { layout, gripper, sensors, signals, ..before.clone() };
+            [SensorView { layout, gripper, sensors, signals, ..before.clone() }, before]
+        });
+        let mut through = String::new();
+        if let Some([own, _]) = &sensors {
+            through = format!(", through {} sensors as in the study", own.sensors.name());
             self.view.sensors = own.clone();
-            self.studies.row = Some((row.trials.clone(), [own, before]));
         }
+        self.studies.row = Some(OpenRow { trials, before, sensors });
         self.open_trial(*first);
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));
-        let beside = others.len().min(SERIES_COLOURS);
-        self.notices
-            .info(format!("Trial {first} of the row is open, {beside} of its others are compared with it{through}."));
+        let (all, beside) = (others.len(), others.len().min(SERIES_COLOURS));
+        self.notices.info(format!(
+            "Trial {first} of the row is open, {beside} of its {all} others are compared with it{through}; all are listed."
+        ));
     }
 }

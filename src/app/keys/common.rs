@@ -57,7 +57,7 @@ const VIEW: &[Act] = &[
     key(NONE, Key::C, "contact path on the object: by time, by pressure, off", |app| {
         app.view.path = app.view.path.next();
     }),
-    key(NONE, Key::I, "enlarge the picture of the touch", |app| app.view.inset_large = !app.view.inset_large),
+    key(NONE, Key::I, "enlarge the picture of the touch", App::enlarge_touch),
     key(NONE, Key::G, "ghost: result of the other engine", |app| app.set_ghost(!app.view.ghost)),
     key(Modifiers::ALT, Key::Num1, "front view", |app| turn(app, StandardView::Front)),
     key(Modifiers::ALT, Key::Num3, "right view", |app| turn(app, StandardView::Right)),

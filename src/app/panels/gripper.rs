@@ -73,7 +73,7 @@ fn ports_ui(ui: &mut Ui, gripper: Option<&GripperView>, port: Option<&Path>, act
         }
     }
     if gripper.is_some_and(|gripper| gripper.refused.is_some()) {
-        remark_ui(ui, "The Doctor panel in Label mode examines port and board.");
+        remark_ui(ui, "The panel Doctor of Label mode examines port and board.");
     }
     let sensors = gripper.map(|gripper| gripper.sensors).unwrap_or_default();
     let expected = format!("Expected columns of the board: {}", sensors.names());

@@ -40,14 +40,15 @@ pub(super) fn ui(
             (Some(trial), _) if trial.automatic && draft.selected.is_some() && open.is_some() => {
                 let text = format!("{} is being recorded automatically: {}", trial.title(), instruction(trial));
                 wrapped(ui, RichText::new(text).small().color(colour(theme::of(ui).colours().accent)));
-                open.into_iter().for_each(|asked| question_ui(ui, labelling, pictures, (view, asked), actions));
+                open.into_iter()
+                    .for_each(|asked| question_ui(ui, labelling, pictures, (gripper, view, asked), actions));
             }
             (Some(trial), _) if trial.adapting => adapting_ui(ui, (trial, silent_s)),
             (Some(trial), _) => {
                 running_ui(ui, pictures, view, (trial, silent_s));
                 answer_ahead_ui(ui, labelling, actions);
             }
-            (None, Some(trial)) => question_ui(ui, labelling, pictures, (view, trial), actions),
+            (None, Some(trial)) => question_ui(ui, labelling, pictures, (gripper, view, trial), actions),
             (None, None) => {
                 next_ui(ui, gripper, pictures, view, actions);
                 answer_ahead_ui(ui, labelling, actions);
@@ -97,14 +98,23 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
         }
     }
     ui.add_space(4.0);
-    if let Some(gripper) = gripper.filter(|gripper| gripper.is_connected()) {
+    if gripper.is_some_and(GripperView::is_connected) {
         let button = Button::new("Record  R").fill(accented(theme::of(ui))).min_size(vec2(ui.available_width(), 36.0));
-        let shown = ui.add_enabled(!gripper.is_silent(), button).on_hover_text("Record a grasp (R)");
-        let shown = shown.on_disabled_hover_text("The board sends no readings: is it plugged in?");
-        actions.on(&shown, |app| app.label(LabellingAction::Record));
+        record_ui(ui, gripper, button, "Record a grasp (R)", actions);
     } else {
         warning_ui(ui, "Connect the gripper: Ctrl+G, or the panel Gripper below.");
     }
+}
+
+/// Button that records a grasp, while readings come.
+fn record_ui(ui: &mut Ui, gripper: Option<&GripperView>, button: Button<'_>, about: &str, actions: &mut Actions) {
+    let why = match gripper.filter(|gripper| gripper.is_connected()) {
+        Some(gripper) if gripper.is_silent() => Some("The board sends no readings: is it plugged in?"),
+        Some(_) => None,
+        None => Some("No gripper is connected (Ctrl+G)"),
+    };
+    let shown = ui.add_enabled(why.is_none(), button).on_hover_text(about).on_disabled_hover_text(why.unwrap_or(about));
+    actions.on(&shown, |app| app.label(LabellingAction::Record));
 }
 
 /// Pose of the object, in words.
@@ -186,7 +196,7 @@ fn question_ui(
     ui: &mut Ui,
     labelling: &LabellingFeature,
     pictures: &Thumbnails,
-    (view, trial): (&LabelView, &LabelledTrial),
+    (gripper, view, trial): (Option<&GripperView>, &LabelView, &LabelledTrial),
     actions: &mut Actions,
 ) {
     let draft = labelling.session.draft();
@@ -205,8 +215,13 @@ fn question_ui(
         let button = Button::new("Label  N, Enter").fill(accented(theme::of(ui)));
         let shown = ui.add_enabled(draft.label(view).is_some(), button).on_disabled_hover_text("No object is chosen");
         actions.on(&shown, |app| app.label(LabellingAction::GiveLabel));
-        let record = ui.button("Record  R").on_hover_text("Record a grasp; a trial without a label is kept (R)");
-        actions.on(&record, |app| app.label(LabellingAction::Record));
+        record_ui(
+            ui,
+            gripper,
+            Button::new("Record  R"),
+            "Record a grasp; a trial without a label is kept (R)",
+            actions,
+        );
         actions.on(&ui.button("Discard  D"), |app| app.label(LabellingAction::Discard));
         let mut unsure = trial.unsure;
         if ui.checkbox(&mut unsure, "unsure  U").changed() {

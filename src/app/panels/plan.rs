@@ -20,7 +20,8 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(format!("{done} of {wanted} trials")).strong());
         if let Some(next) = &view.next {
-            ui.weak(format!("next: {}", object_title(&next.object)));
+            let order = "One of the objects with the smallest share done, and not the same twice in a row";
+            ui.weak(format!("next: {}", object_title(&next.object))).on_hover_text(order);
         }
     });
     add_ui(ui, actions);

@@ -453,7 +453,7 @@ fn buttons(ui: &mut Ui, rect: Rect, own: &View3d<'_>, actions: &mut Actions) {
             }
             let large = ui.selectable_label(own.data.view.inset_large, "Large inset");
             let large = large.on_hover_text("Enlarge the picture of the touch (I)");
-            actions.on(&large, |app| app.view.inset_large = !app.view.inset_large);
+            actions.on(&large, App::enlarge_touch);
         });
         menu.response.on_hover_text("Standard views, parallel projection, forces, ghost");
     } else {

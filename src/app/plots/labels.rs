@@ -98,7 +98,9 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
             let place = cell(0, names + column * k as f32, column);
             let end = draw_line(ui.painter(), place.left_center(), quiet, label.dashed);
             let name = label.name.strip_prefix(shared.unwrap_or_default()).unwrap_or(&label.name);
-            put(place.with_min_x(end.x + 4.0), name, quiet);
+            let place = place.with_min_x(end.x + 4.0);
+            let fits = width_of(name) <= place.width();
+            put(place, if fits { name.to_owned() } else { name[..1].to_uppercase() }.as_str(), quiet);
         }
     }
     for (k, own) in labels.chunks(in_row).take(shown).enumerate() {

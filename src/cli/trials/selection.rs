@@ -42,6 +42,7 @@ impl Filters {
         let Self { search, object, unlabelled, origin, flag, place, quality, sensors } = self.clone();
         let OriginFilters { source, preset, collection, tag, since, until } = origin;
         TrialQuery {
+            only: None,
             search: search.unwrap_or_default(),
             object,
             unlabelled,

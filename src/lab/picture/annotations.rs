@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 use palpate_geometry::drawing::{Align, Camera, Overlay, Shape2};
 use palpate_geometry::palette::{PRESSURE_MAP, Rgb, Theme};
 use palpate_geometry::units::{SPACE, mark};
+use palpate_sim::gripper::Side;
 
 /// Distance of annotations from the edges (points).
 pub(super) const MARGIN: f32 = 18.0;
@@ -178,6 +179,12 @@ fn add_gizmo(overlay: &mut Overlay, camera: &Camera, centre: Vec2, theme: Theme)
 /// True where a view has scale bar and legends.
 pub(super) fn shows_legends(view: &PictureView) -> bool {
     view.annotations && view.size.cmpge(LEAST_SIZE).all()
+}
+
+/// Title of an inset with that pad: a letter where words would cover it.
+pub(super) fn pad_title(side: Side, view: &PictureView) -> String {
+    let name = side.name();
+    if view.size.y < INSET_WITH_SCALE { name[..1].to_uppercase() } else { format!("{name} pad") }
 }
 
 /// Border, title and scale bar of an inset.

@@ -151,25 +151,27 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
     }
     let tips: Vec<f32> = all.iter().filter_map(|forces| Some(ends(forces, forces.normal)?.0.x)).collect();
     let middle = if tips.len() == 2 { 0.5 * (tips[0] + tips[1]) } else { 0.5 * view.size.x };
-    let lines = |forces: &Forces| -> Vec<(String, Rgb)> {
+    let lines = |forces: &Forces, short: bool| -> Vec<(String, Rgb)> {
         let letter = match forces.side {
             Side::Left => "L",
             Side::Right => "R",
         };
         let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
-        let name = if view.plain || view.size.y < APART { "" } else { "normal " };
+        let name = if short || view.plain || view.size.y < APART { "" } else { "normal " };
         let friction =
             shown_friction(forces, view).map(|force| (text("friction ", force), friction_colour(view.theme)));
         std::iter::once((text(name, forces.normal), view.theme.colours().text)).chain(friction).collect()
     };
-    for group in all.chunks(if view.size.y < APART { 2 } else { 1 }) {
-        let forces = &group[0];
-        let Some((from, to)) = ends(forces, forces.normal) else { continue };
-        let texts: Vec<(String, Rgb)> = group.iter().flat_map(lines).collect();
+    // Where a group of forces is written, and whether that is on its side of the hand.
+    let place = |annotator: &Annotator<'_>, group: &[Forces], short: bool| {
+        let forces = group.first()?;
+        let (from, to) = ends(forces, forces.normal)?;
+        let along = (to - from).normalize_or(Vec2::Y);
+        let outward = (from.x - middle).signum();
+        let texts: Vec<(String, Rgb)> = group.iter().flat_map(|forces| lines(forces, short)).collect();
         // The letters of this font are half as wide as high.
         let width = texts.iter().map(|(text, _)| 0.5 * TEXT * text.chars().count() as f32).fold(0.0, f32::max);
         let half = Vec2::new(0.5 * width + 7.0, 0.5 * LINE * texts.len() as f32 + 2.0);
-        let along = (to - from).normalize_or(Vec2::Y);
         // Beyond the tip, or else on a side of the arrow.
         let beyond = to + along * (GAP + half.x * along.x.abs() + half.y * along.y.abs());
         let aside = |sign: f32| {
@@ -178,14 +180,25 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         };
         let over = Vec2::new(0.0, -2.5 * half.y);
         // Sooner further up or down than beside the other finger.
-        let outward = (from.x - middle).signum();
         let outside = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0].map(|rows| aside(outward) + rows * over);
         let places = [&[beyond], &outside[..], &[aside(-outward), aside(-outward) + over]].concat();
         // Over the hand sooner than nowhere, unless that is most of the picture.
         let farthest = if shows_legends(view) { f32::INFINITY } else { view.size.length() };
-        let Some(plate) = annotator.place(&places, half, farthest) else { continue };
+        let plate = annotator.place(&places, half, farthest)?;
+        Some((plate, texts, group.len() > 1 || (plate.middle.x - middle) * outward > 0.0))
+    };
+    // With fewer words sooner than beside the other finger, and sooner both on one plate than that.
+    let tries = |annotator: &Annotator<'_>, group: &[Forces]| {
+        [false, true].into_iter().filter_map(|short| place(annotator, group, short)).collect::<Vec<_>>()
+    };
+    let has_own = |group: &[Forces]| tries(annotator, group).iter().any(|(.., is_own)| *is_own);
+    let apart = view.size.y >= APART && all.chunks(1).all(has_own);
+    for group in all.chunks(if apart { 1 } else { 2 }) {
+        let tried = tries(annotator, group);
+        let own = tried.iter().position(|(.., is_own)| *is_own).unwrap_or(0);
+        let Some((plate, texts, _)) = tried.into_iter().nth(own) else { continue };
         annotator.add_plate(plate);
-        let mut at = plate.middle - half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
+        let mut at = plate.middle - plate.half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
         for (text, ink) in texts {
             annotator.overlay.text(at, Align::Left, TEXT, ink, text);
             at.y += LINE;

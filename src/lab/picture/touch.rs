@@ -116,7 +116,7 @@ impl Stage {
             list.arrows = super::forces::shear(&self.gripper, &world_from_gripper, frame, view.theme);
         }
         let near = self.near_side(&inner.camera);
-        let title = title.map_or_else(|| format!("{} pad", near.name()), str::to_owned);
+        let title = title.map_or_else(|| super::annotations::pad_title(near, &inner), str::to_owned);
         super::annotations::frame_inset(&mut list.overlay, &inner, &title);
         Inset { list, corner, size, past: None }
     }

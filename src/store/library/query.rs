@@ -4,7 +4,8 @@ use super::order::TrialOrder;
 use super::quality::TrialQuality;
 use super::{LibraryTrial, Store, StoreError, TrialPlace};
 use crate::labels::{Flag, UnknownWord};
-use palpate_tactile::trial::TrialSource;
+use palpate_tactile::trial::{TrialId, TrialSource};
+use std::collections::BTreeSet;
 use std::str::FromStr;
 
 /// A local day.
@@ -78,6 +79,8 @@ pub enum Shown {
 /// Search, filters and order of trials. A trial matches when it passes all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TrialQuery {
+    /// These trials only, those of data sets too.
+    pub only: Option<BTreeSet<TrialId>>,
     /// Words that must all occur in title, object, number, note, tags, collection or sensors.
     pub search: String,
     /// Name or title of the object or label.
@@ -118,7 +121,7 @@ impl TrialQuery {
 
     /// True where it leaves out trials that were simulated for data sets.
     pub fn hides_collected(&self) -> bool {
-        self.without_collected && self.collection.is_none()
+        self.without_collected && self.collection.is_none() && self.only.is_none()
     }
 
     /// True where it leaves anything out but deleted trials.
@@ -161,6 +164,7 @@ impl Matcher<'_> {
         };
         let day = row.local.get(..10).unwrap_or_default();
         shown
+            && query.only.as_ref().is_none_or(|only| only.contains(&row.id))
             && (!query.unlabelled || row.object.is_empty())
             && query.source.is_none_or(|source| row.source == source)
             && query.place.is_none_or(|place| row.place == place)

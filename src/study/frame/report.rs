@@ -457,7 +457,8 @@ impl StudyTable {
             |column: usize| self.rows.iter().any(|row| matches!(row.cells.get(column), Some(Cell::Interval(_))));
         let intervals: Vec<bool> = (0..self.columns.len()).map(is_interval).collect();
         let mut lines = Vec::new();
-        let unit = |column: &StudyColumn| if column.unit == PERCENT { String::new() } else { column.unit.clone() };
+        let is_share = |column: &StudyColumn| [PERCENT, POINTS].contains(&column.unit.as_str());
+        let unit = |column: &StudyColumn| if is_share(column) { String::new() } else { column.unit.clone() };
         let headings = self.columns.iter().zip(&intervals).flat_map(|(column, interval)| {
             let plain = StudyColumn { name: column.name.clone(), unit: unit(column) }.titled();
             let ends = interval.then(|| [format!("{} low", column.name), format!("{} high", column.name)]);

@@ -223,7 +223,7 @@ impl Study for Drift {
                 Row::F1,
                 Row::ACCURACY,
                 Row::gain("F1 against none"),
-                Column("F1 against as read", PERCENT, &|row| Cell::from(against_as_read(&rows, row))),
+                Column("F1 against as read", POINTS, &|row| Cell::from(against_as_read(&rows, row))),
                 Row::TESTED,
             ])],
             findings(&rows),

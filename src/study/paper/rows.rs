@@ -5,7 +5,7 @@ use super::bench::StudyData;
 use super::plan::StudyPlan;
 use super::study::Study;
 use crate::frame::{
-    Column, Finding, Gains, LinkedFigure, PERCENT, StudyCard, StudyCell, StudyError, StudyReport, StudyTable,
+    Column, Finding, Gains, LinkedFigure, PERCENT, POINTS, StudyCard, StudyCell, StudyError, StudyReport, StudyTable,
     TableRows, grouped, unique,
 };
 use palpate_lab::datasets::SensorView;
@@ -194,7 +194,7 @@ impl<F: 'static> Row<F> {
 
     /// Column of differences to the reference.
     pub(super) const fn gain(name: &'static str) -> Column<'static, Self> {
-        Column(name, PERCENT, &|row| row.gain.into())
+        Column(name, POINTS, &|row| row.gain.into())
     }
 
     /// Table of rows with some misjudged trials behind each.

@@ -165,7 +165,7 @@ fn why(view: &IdentificationView, recognised: &Recognised<'_>) -> String {
         },
         Some(StopReason::Unknown) => "The grasps agree on no known object".to_owned(),
         None if view.listening => match view.beliefs.last() {
-            Some(before) => format!("{grasp}. So far: {}", leaders(&view.labels, before)),
+            Some(before) => format!("{grasp}. Before it: {}", leaders(&view.labels, before)),
             None if view.rule.threshold >= 1.0 => format!("{grasp}, without automatic stop"),
             None => format!("{grasp}, needed {threshold}"),
         },
@@ -267,7 +267,7 @@ mod tests {
             (view(None, &[], None), "No contact yet", "Fingers closing"),
             (listening(0.35, &[]), "Tomato", "Grasp 1 of up to 4, needed 90 %"),
             (listening(0.61, &[]), "Lemon", "Grasp 1 of up to 4, needed 90 %"),
-            (listening(0.7, &[0.61]), "Lemon", "Grasp 2 of up to 4. So far: lemon 61 %, tomato 35 %"),
+            (listening(0.7, &[0.61]), "Lemon", "Grasp 2 of up to 4. Before it: lemon 61 %, tomato 35 %"),
             (view(Some(0.61), &[0.61], None), "Lemon", "Not sure yet (lemon 61 %, tomato 35 %): grasping again"),
             (view(Some(0.92), &[0.92], None), "Lemon", "92 %, but unlike any known object: grasping again"),
             (view(Some(0.92), &[0.5, 0.92], None), "Lemon", "92 %, but the grasps disagree: grasping again"),

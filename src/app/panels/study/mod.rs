@@ -85,8 +85,8 @@ fn hint(result: &StudyResult, row: &StudyRow) -> String {
 fn about_row_ui(ui: &mut Ui, result: &StudyResult, table: &StudyTable, row: &StudyRow) {
     ui.spacing_mut().item_spacing.y = 2.0;
     for (cell, column) in row.cells.iter().zip(&table.columns) {
-        if *cell != Cell::Missing {
-            let text = cell_text(cell, column);
+        let text = cell_text(cell, column);
+        if *cell != Cell::Missing && !text.is_empty() {
             let unit = symbol(&column.unit);
             let one = unit.strip_suffix('s').filter(|one| text == "1" && one.len() > 1);
             let unit = one.unwrap_or(&unit);
