@@ -23,7 +23,7 @@ const LINE: f32 = 15.0;
 /// Distance between the maps of both fingers (points).
 const BETWEEN: f32 = 3.0;
 /// Least height of a map over time (points).
-const LOWEST: f32 = 14.0;
+const LOWEST: f32 = 10.0;
 /// Distance between the strokes of a hatching (points).
 const STROKES: f32 = 7.0;
 
@@ -296,10 +296,12 @@ fn phase_names(
     (y, ink, font): (f32, Color32, &FontId),
 ) {
     let mut free = *room.start();
-    for span in phases {
+    for (k, span) in phases.iter().enumerate() {
         let galley = ui.painter().layout_no_wrap(span.phase.name().to_owned(), font.clone(), ink);
         let from = x(span.from_s).max(*room.start());
-        if from < free || from + galley.size().x > *room.end() {
+        // A name never reaches into the next phase.
+        let end = phases.get(k + 1).map_or(*room.end(), |next| x(next.from_s).min(*room.end()));
+        if from < free || from + galley.size().x > end {
             continue;
         }
         free = from + galley.size().x + 6.0;

@@ -25,6 +25,17 @@ struct Row {
     folder: bool,
 }
 
+/// The path that begins anew in a text: `/b/c` in `/a//b/c`.
+fn restarted(text: &str) -> &str {
+    let is_drive = |at: usize| {
+        let letter = text[..at].chars().next_back().filter(char::is_ascii_alphabetic);
+        letter.is_some() && text[at..].starts_with(":\\")
+    };
+    let drive = (2..text.len()).rev().find(|at| text.is_char_boundary(*at) && is_drive(*at)).map(|at| at - 1);
+    let root = text.rfind("//").filter(|at| *at > 0).map(|at| at + 1);
+    &text[drive.or(root).unwrap_or(0)..]
+}
+
 /// End of a dialog.
 pub(super) enum Closed {
     Cancelled,
@@ -64,6 +75,8 @@ impl PathDialog {
                 focus_field(ui, id);
             }
             if response.changed() {
+                // A whole path, pasted behind the folder, stands for itself.
+                self.path = restarted(&self.path).to_owned();
                 (self.refused, self.replaced) = (None, None);
             }
             let mut done = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
@@ -207,6 +220,21 @@ fn rows(folder: &Path, extensions: &[&str]) -> Vec<Row> {
 mod tests {
     use super::*;
     use crate::app::features::files::tests::question;
+    #[test]
+    fn a_path_pasted_behind_the_folder_stands_for_itself() {
+        for (text, path) in [
+            ("/home/me//data/mug.obj", "/data/mug.obj"),
+            ("/home/me/mug.obj", "/home/me/mug.obj"),
+            ("//server/share/mug.obj", "//server/share/mug.obj"),
+            ("C:\\me\\D:\\mug.obj", "D:\\mug.obj"),
+            ("C:\\me\\mug.obj", "C:\\me\\mug.obj"),
+            ("/tmp/a:\u{e9}", "/tmp/a:\u{e9}"),
+            ("", ""),
+        ] {
+            assert_eq!(restarted(text), path, "{text}");
+        }
+    }
+
     #[test]
     fn a_path_is_checked_before_it_is_used() {
         let folder = tempfile::tempdir().expect("a folder");

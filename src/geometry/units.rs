@@ -100,6 +100,11 @@ pub fn number(value: f64, unit: &str) -> String {
     decimals(unit).map_or_else(|| true_minus(&three_digits(value)), |decimals| fixed(value, decimals))
 }
 
+/// The unit in which people read values of this unit, and the factor to it.
+pub fn read_in(unit: &str) -> (&str, f64) {
+    if unit == "Pa" { ("kPa", 1e-3) } else { (unit, 1.0) }
+}
+
 /// The same with its unit: `0.57 N`, `31.0 kPa`, `7.29 m⁻¹`.
 pub fn shown(value: f64, unit: &str) -> String {
     format!("{}{SPACE}{}", number(value, unit), symbol(unit))

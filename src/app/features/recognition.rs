@@ -238,12 +238,16 @@ impl App {
         if self.snapshot().is_some_and(|snapshot| snapshot.status.finished) {
             self.simulation.send(Command::Play);
         }
-        let ClassChange::Renamed(new) = change else { return self.notices.info(format!("Forgot \"{title}\".")) };
-        self.notices.info(format!("\"{title}\" is \"{}\" now.", capital_title(new)));
-        if self.simulation.scene.object.source == source {
-            let mut scene = self.simulation.scene.clone();
-            scene.object.name = Some(new.clone());
-            self.set_scene(scene);
+        match change {
+            ClassChange::Renamed(new) => {
+                self.notices.info(format!("\"{title}\" is \"{}\" now.", capital_title(new)));
+                self.simulation.name_object(&source, Some(new));
+            }
+            // Its name goes with it.
+            _ => {
+                self.notices.info(format!("Forgot \"{title}\"."));
+                self.simulation.name_object(&source, None);
+            }
         }
     }
 

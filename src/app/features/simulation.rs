@@ -8,7 +8,7 @@ use palpate_lab::grasping::ShuffledObjects;
 use palpate_lab::workers::{Command, GhostGrasp, Job, MeasuredAccuracy, Notice, Refusal, SimWorker, Snapshot};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::{Auto, Phase};
-use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, object_title};
+use palpate_sim::objects::{CollisionShape, EMPTY, anchored, catalogue, is_file, object_title};
 use palpate_sim::scene::Scene;
 use palpate_store::TrialPlace;
 use palpate_study::Explanation;
@@ -123,6 +123,19 @@ impl SimulationFeature {
         self.scene = scene;
         self.effects.stop();
         self.worker.send(Command::SetScene(Box::new(self.scene.clone())));
+    }
+
+    /// Gives the object in a file another name, or its own: here, and wherever the scene goes back to.
+    pub(super) fn name_object(&mut self, source: &str, name: Option<&str>) {
+        let SceneChanges { before, after, .. } = &mut self.changes;
+        for scene in before.iter_mut().chain(after).filter(|scene| scene.object.source == source) {
+            scene.object.name = name.map(str::to_owned);
+        }
+        if self.scene.object.source == source && self.scene.object.name.as_deref() != name {
+            let mut scene = self.scene.clone();
+            scene.object.name = name.map(str::to_owned);
+            self.use_scene(scene);
+        }
     }
 
     /// Measures cost and influence of the scene's effects.
@@ -316,14 +329,14 @@ impl App {
     }
 
     fn take_back(&mut self, scene: Scene, done: &str) {
-        let changed = changes(&self.simulation.scene, &scene);
+        let changed = changes(&self.simulation.scene, &scene, |path| self.view.title_of(path));
         self.simulation.use_scene(scene);
         self.notices.info(format!("{done}: {changed}."));
     }
 }
 
 /// What differs between two scenes: `object lemon → tomato`, `yaw deg 30 → 0`.
-fn changes(from: &Scene, to: &Scene) -> String {
+fn changes(from: &Scene, to: &Scene, title_of_file: impl Fn(&str) -> String) -> String {
     /// Most settings that are named.
     const NAMED: usize = 2;
     let settings = |scene: &Scene| -> BTreeMap<String, String> {
@@ -334,7 +347,11 @@ fn changes(from: &Scene, to: &Scene) -> String {
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let value = |of: &BTreeMap<String, String>, key: &str| of.get(key).cloned().unwrap_or_else(|| "default".to_owned());
     let named = |key: &str| key.rsplit('.').next().unwrap_or(key).replace('_', " ");
-    let title = |scene: &Scene| scene.object.name.clone().unwrap_or_else(|| object_title(&scene.object.source));
+    let title = |scene: &Scene| match &scene.object.source {
+        _ if scene.object.name.is_some() => object_title(scene.object.name.as_deref().unwrap_or_default()),
+        file if is_file(file) => title_of_file(file),
+        built_in => object_title(built_in),
+    };
     let titles = [from, to].map(title);
     let mut texts: Vec<String> = Vec::new();
     if titles[0] != titles[1] {

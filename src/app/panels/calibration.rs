@@ -43,7 +43,10 @@ fn begin_ui(ui: &mut Ui, gripper: Option<&GripperView>, actions: &mut Actions) {
         Some(Err(cause)) => failure_ui(ui, cause),
         None => {}
     }
-    remark_ui(ui, "Turns the counts of a sensor into angles or forces, by known ones.");
+    remark_ui(
+        ui,
+        "Turns the counts of a sensor into angles or forces: you bend it to known angles, or press it with known forces.",
+    );
     ui.add_space(4.0);
     Grid::new("calibration form").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         ui.label("Sensor");

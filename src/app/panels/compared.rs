@@ -9,7 +9,7 @@ use crate::app::theme::colour;
 use crate::app::widgets::{choice_ui, remark_ui};
 use egui::{Color32, Grid, Label, RichText, ScrollArea, Sense, TextStyle, Ui, vec2};
 use palpate_geometry::palette::series_colour;
-use palpate_geometry::units::{difference, number, shown as with_unit, symbol};
+use palpate_geometry::units::{difference, number, read_in, shown as with_unit, symbol};
 use palpate_lab::inspection::{Alignment, OpenTrial, TouchPhase};
 use palpate_sim::gripper::Side;
 use palpate_tactile::trial::TrialId;
@@ -113,10 +113,7 @@ fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
         ui.end_row();
         let counts = shown.has_counts_alone();
         for column in shown.columns.iter().filter(|column| column.channel.is_none() == counts) {
-            let (unit, factor) = match column.unit {
-                "Pa" => ("kPa", 1e-3),
-                unit => (unit, 1.0),
-            };
+            let (unit, factor) = read_in(column.unit);
             let mean = |trial: &OpenTrial| Some(trial.hold_mean(&column.name)? * factor);
             let name = column.name.replace('_', " ");
             let short = name.replace(" left", " L").replace(" right", " R");

@@ -63,7 +63,7 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>) {
                 add_loop(plot_ui, trace, finger, ink, 1.8);
                 let Some(place) = now.and_then(|k| point(trace, finger, k)) else { continue };
                 let filled = finger.side == Side::Left;
-                let dot = Points::new("", vec![place]).radius(4.5).filled(filled).color(finger.ink);
+                let dot = Points::new("", vec![place]).radius(4.5).filled(filled).color(ink);
                 plot_ui.points(dot.allow_hover(false));
             }
             plot_ui.hline(egui_plot::HLine::new("", 0.0).color(veil(theme.colours().quiet_text, 0.4)).width(1.0));

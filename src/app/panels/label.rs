@@ -10,7 +10,8 @@ use egui::text_edit::TextEditState;
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_geometry::units::{self, percent};
 use palpate_lab::workers::{
-    GripperView, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView, parse_tags,
+    GripperView, LISTED_OBJECTS, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView,
+    parse_tags,
 };
 use palpate_sim::objects::{catalogue, object_title};
 use palpate_store::Change;
@@ -91,6 +92,10 @@ fn next_ui(ui: &mut Ui, gripper: Option<&GripperView>, pictures: &Thumbnails, vi
         Some(next) => {
             ui.weak("next");
             object_ui(ui, pictures, &next.object, &cue(next));
+        }
+        None if view.progress.wanted() == 0 => {
+            ui.heading("Nothing planned");
+            remark_ui(ui, "Add objects in the panel Plan, or record: each trial asks what it was of.");
         }
         None => {
             ui.heading("Plan complete");
@@ -233,22 +238,28 @@ fn question_ui(
     if chosen.is_none() {
         ui.weak("Which one? Choose with the arrow keys or the mouse.");
     }
-    let shown = names.len().min(NUMBERED_OBJECTS);
+    let shown = names.len().min(LISTED_OBJECTS);
     // In a low panel, tags and note stay in sight below.
-    let columns = if ui.clip_rect().bottom() - ui.cursor().top() < LOW { 2 } else { 1 };
+    let low = ui.clip_rect().bottom() - ui.cursor().top() < LOW;
+    let columns = if low || shown > NUMBERED_OBJECTS { 2 } else { 1 };
     ui.columns(columns, |columns| {
         let rows = shown.div_ceil(columns.len()).max(1);
         for (place, name) in names.iter().take(shown).enumerate() {
             let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
-            let row = object_row(&mut columns[place / rows], pictures, place, name, Some(place) == chosen, !known);
+            let remark = match known {
+                _ if draft.predicted(view) == Some(name.as_str()) => " (predicted)",
+                true => "",
+                false => " (new)",
+            };
+            let row = object_row(&mut columns[place / rows], pictures, (place, name), Some(place) == chosen, remark);
             if row.clicked() {
                 actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
                 actions.push(|app| app.label(LabellingAction::GiveLabel));
             }
         }
     });
-    if names.len() > NUMBERED_OBJECTS {
-        ui.weak(format!("and {} more: type to find them (/)", names.len() - NUMBERED_OBJECTS));
+    if names.len() > shown {
+        ui.weak(format!("and {} more: type to find them (/)", names.len() - shown));
     }
     remarks_ui(ui, draft, trial, actions);
 }
@@ -288,7 +299,7 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
     let step = ui.input(|i| i32::from(i.key_pressed(Key::ArrowDown)) - i32::from(i.key_pressed(Key::ArrowUp)));
     if response.has_focus() && step != 0 {
         let chosen = draft.chosen.or_else(|| labelling.labels.as_ref().and_then(|view| draft.place(view)));
-        let next = |chosen: usize| chosen.saturating_add_signed(step as isize).min(NUMBERED_OBJECTS - 1);
+        let next = |chosen: usize| chosen.saturating_add_signed(step as isize).min(LISTED_OBJECTS - 1);
         let place = chosen.map_or(0, next);
         actions.push(move |app| app.label(LabellingAction::ChooseObject(place)));
     }
@@ -302,14 +313,21 @@ fn search_ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Actions) {
 }
 
 /// Object to choose: key, picture, name.
-fn object_row(ui: &mut Ui, pictures: &Thumbnails, place: usize, name: &str, chosen: bool, new: bool) -> egui::Response {
+fn object_row(
+    ui: &mut Ui,
+    pictures: &Thumbnails,
+    (place, name): (usize, &str),
+    chosen: bool,
+    remark: &str,
+) -> egui::Response {
     let colours = theme::of(ui).colours();
-    let title = if new { format!("{name} (new)") } else { object_title(name) };
+    let title = format!("{}{remark}", object_title(name));
     let (rect, response) = selectable_row(ui, 23.0, chosen, &format!("Label {title}"));
     let builder =
         egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));
     let mut inside = ui.new_child(builder);
-    inside.label(RichText::new((place + 1).to_string()).monospace().color(colour(colours.quiet_text)));
+    let key = if place < NUMBERED_OBJECTS { (place + 1).to_string() } else { " ".to_owned() };
+    inside.label(RichText::new(key).monospace().color(colour(colours.quiet_text)));
     let (thumbnail, _) = inside.allocate_exact_size(vec2(21.0, 21.0), Sense::hover());
     picture(&inside, pictures, name, thumbnail);
     inside.add(egui::Label::new(title).truncate().selectable(false));

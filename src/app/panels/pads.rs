@@ -13,6 +13,8 @@ const ABREAST: f32 = 1.8;
 const LEAST: egui::Vec2 = vec2(40.0, 24.0);
 const BETWEEN: f32 = 12.0;
 const TEXTS: f32 = 34.0;
+/// Width from which on a pad says from where its place is counted (points).
+const WORDY: f32 = 160.0;
 
 pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
     let Some(grasp) = ShownGrasp::of(data) else {
@@ -46,7 +48,11 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         let texts = std::iter::once(pad.force_text()).chain(pad.peak_text()).collect::<Vec<_>>().join(", ");
         say(place.right_top() - vec2(0.0, 2.0), Align2::RIGHT_BOTTOM, texts, ink);
         pad_ui(ui, theme, place, &shown, side, &pad.about(title));
-        say(place.left_bottom() + vec2(0.0, 3.0), Align2::LEFT_TOP, begin_of(&map.x), quiet);
+        let begin = match map.x.is_cut() && size.x > WORDY {
+            true => format!("{} from the palm", begin_of(&map.x)),
+            false => begin_of(&map.x),
+        };
+        say(place.left_bottom() + vec2(0.0, 3.0), Align2::LEFT_TOP, begin, quiet);
         say(place.right_bottom() + vec2(0.0, 3.0), Align2::RIGHT_TOP, "tip".to_owned(), quiet);
     }
 }

@@ -3,7 +3,7 @@
 use crate::app::actions::Actions;
 use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::{number_field, put_line, text_field};
-use egui::{DragValue, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
+use egui::{Align, DragValue, Layout, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView};
 use palpate_sim::objects::{class_of, object_title};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
@@ -24,7 +24,20 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
             ui.weak(format!("next: {}", object_title(&next.object))).on_hover_text(order);
         }
     });
-    add_ui(ui, actions);
+    ui.horizontal(|ui| {
+        let planned: Vec<String> =
+            view.progress.objects.iter().filter(|own| own.wanted > 0).map(|own| own.name.clone()).collect();
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let clear = |ui: &mut Ui| {
+                let text = format!("Remove all {} objects; their trials stay", planned.len());
+                actions.on(&ui.button(text), move |app| {
+                    planned.into_iter().for_each(|name| app.edit_labels(LabelCommand::Unplan(name)));
+                });
+            };
+            ui.menu_button("Clear", clear).response.on_hover_text("Begin a plan of your own");
+            add_ui(ui, actions);
+        });
+    });
     let next = view.next.as_ref().map(|next| next.object.as_str());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;

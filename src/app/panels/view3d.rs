@@ -17,11 +17,12 @@ use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Align, Camera, Detail, DrawList, Overlay, Shape2, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
+use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_tactile::{Quantity, SignalDefinition};
+use palpate_tactile::{Quantity, SensorModel, SignalDefinition};
 use std::sync::Arc;
 
 /// What the 3-D view reads.
@@ -153,8 +154,9 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         ViewSource::Trial | ViewSource::Simulation if own.data.view.inset_large => LARGE,
         ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
     };
-    // Plots of other signals have another curvature than the strips.
-    let reads_strips = own.data.view.sensors.signals == SignalDefinition::Parts;
+    // Plots of other signals, or by other sensors, have another curvature than the fingers.
+    let SensorView { signals, sensors, .. } = &own.data.view.sensors;
+    let reads_strips = *signals == SignalDefinition::Parts && *sensors == SensorModel::Virtual;
     let view = PictureView {
         camera: own.data.view.camera,
         theme: own.data.view.theme,
@@ -327,7 +329,11 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
     if let Some(inspected) = own.data.shown_trial() {
         let lost = held.filter(|_| inspected.trial.nothing_held()).map(|held| held + ".");
         // Otherwise the time bar tells the time.
-        let said: Vec<String> = lost.into_iter().chain(inspected.trial.remarks.iter().cloned()).collect();
+        let sensors = own.data.view.sensors.sensors;
+        let through = (inspected.trial.simulated.is_some() && sensors != SensorModel::Virtual)
+            .then(|| format!("As simulated; the curves are what {} sensors read.", sensors.name()));
+        let remarks = inspected.trial.remarks.iter().cloned();
+        let said: Vec<String> = lost.into_iter().chain(remarks).chain(through).collect();
         return (said.join(" "), None);
     }
     if own.data.source == ViewSource::Gripper {

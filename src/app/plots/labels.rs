@@ -94,13 +94,16 @@ pub(super) fn draw_table(ui: &Ui, frame: Rect, quiet: Rgb, (trials, labels): (&[
     let quiet = colour(quiet);
     if wide {
         put(cell(0, 0.0, names), head_word, quiet);
+        let name_of = |label: &CurveLabel<'_>| -> String {
+            label.name.strip_prefix(shared.unwrap_or_default()).unwrap_or(&label.name).to_owned()
+        };
+        let fits = labels.iter().take(in_row).all(|label| width_of(&name_of(label)) <= column - SAMPLE - 4.0);
         for (k, label) in labels.iter().take(in_row).enumerate() {
             let place = cell(0, names + column * k as f32, column);
             let end = draw_line(ui.painter(), place.left_center(), quiet, label.dashed);
-            let name = label.name.strip_prefix(shared.unwrap_or_default()).unwrap_or(&label.name);
-            let place = place.with_min_x(end.x + 4.0);
-            let fits = width_of(name) <= place.width();
-            put(place, if fits { name.to_owned() } else { name[..1].to_uppercase() }.as_str(), quiet);
+            let name = name_of(label);
+            let letter = || name.chars().next().map_or_else(String::new, |first| first.to_uppercase().collect());
+            put(place.with_min_x(end.x + 4.0), &if fits { name.clone() } else { letter() }, quiet);
         }
     }
     for (k, own) in labels.chunks(in_row).take(shown).enumerate() {

@@ -2,7 +2,7 @@
 //! port.
 //!
 //! Columns: `t_s` and `arrived_s` since the trial began, `seq`, `missing_before`, the channels (counts), `line_pressure
-//! (bar)`, `phase`. A missing number is an empty field; `missing_before` is the number of readings missing before the
+//! (bar)`, `command`. A missing number is an empty field; `missing_before` is the number of readings missing before the
 //! row, `?` where unknown.
 
 use super::writing::{number, write_file};
@@ -17,7 +17,7 @@ pub(super) fn write_board_csv(path: &Path, trial: &BoardLog) -> Result<(), Excha
     let channels = &trial.course.board.channels;
     write_file(path, FileKind::Csv, |out| {
         let before = ["t_s", "arrived_s", "seq", "missing_before"].map(str::to_owned).into_iter();
-        let after = ["line_pressure [bar]", "phase"].map(str::to_owned);
+        let after = ["line_pressure [bar]", "command"].map(str::to_owned);
         out.write_record(before.chain(channels.iter().map(|name| format!("{name} [counts]"))).chain(after))?;
         let mut gaps = trial.gaps.iter().peekable();
         for reading in &trial.readings {
@@ -71,7 +71,7 @@ mod tests {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("trial.csv");
         write_board_csv(&path, &log)?;
-        let wanted = "t_s,arrived_s,seq,missing_before,flexL [counts],fsrL [counts],line_pressure [bar],phase
+        let wanted = "t_s,arrived_s,seq,missing_before,flexL [counts],fsrL [counts],line_pressure [bar],command
 0,0.25,0,,,12.5,0.55,
 1.5,1.75,3,2,2003,12.5,0.05,close
 4.5,4.75,9,?,2009,12.5,0.05,close

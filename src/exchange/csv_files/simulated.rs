@@ -1,9 +1,9 @@
 //! CSV for spreadsheets, pandas and plotting tools: one row per sample, units in the header, time first, no byte-order
 //! mark. A second file lists every loaded taxel with its place in the world.
 //!
-//! Columns: `t_s`, `line_pressure (bar)`, `phase`, the channels of a sensor layout, joint angles, joint positions in the
-//! world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave their planes the
-//! sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
+//! Columns: `t_s`, `line_pressure (bar)`, `command` (close, hold or release), the channels of a sensor layout, joint angles,
+//! joint positions in the world frame (as the paper stores them, section IV-A), the object's pose, and where fingers leave
+//! their planes the sideways curvature at the palm and the twist of each. Joints are numbered from 1 at the palm.
 
 use super::writing::{number, write_file};
 use crate::format::ExchangeError;
@@ -73,7 +73,7 @@ pub fn write_contacts_csv(path: &Path, trial: &SimulatedTrial, scene: &Scene) ->
 
 /// `sway` adds the shapes of fingers that leave their planes.
 fn header(scene: &Scene, sensors: &Sensors, trial: &SimulatedTrial, sway: bool) -> Vec<String> {
-    let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "phase".to_owned()];
+    let mut names = vec!["t_s".to_owned(), "line_pressure [bar]".to_owned(), "command".to_owned()];
     names.extend(sensors.channels().iter().map(|c| format!("{} [{}]", c.name(), c.quantity.unit())));
     let joints = || Side::BOTH.into_iter().flat_map(|side| (1..=scene.gripper.finger.joints).map(move |j| (side, j)));
     names.extend(joints().map(|(side, j)| format!("q_{}_{j} [rad]", side.name())));

@@ -4,6 +4,8 @@
 use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use crate::datasets::SensorView;
+use crate::why::channel_words;
+use palpate_geometry::units::{read_in, shown};
 use palpate_learn::{
     Belief, GeometryEncoder, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped,
     Signatures, StopReason, StopRule, Verdict,
@@ -12,7 +14,7 @@ use palpate_sim::gripper::{GripperModel, Phase};
 use palpate_sim::objects::EMPTY;
 use palpate_sim::scene::Between;
 use palpate_tactile::trial::EarlierGrasps;
-use palpate_tactile::{Channel, LayoutError};
+use palpate_tactile::{Channel, LayoutError, Quantity};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -93,6 +95,8 @@ pub struct Identification {
     /// The newest verdict on the running grasp.
     verdict: Option<Verdict>,
     geometry: FeltGeometry,
+    /// How the running grasp began far from those that the model learned, where it did.
+    unlike: Option<String>,
     /// The hold has ended; later rows are ignored.
     closed: bool,
     decision: Option<StopReason>,
@@ -119,6 +123,8 @@ pub struct IdentificationView {
     pub verdict: Option<Verdict>,
     /// Whether the readings serve to estimate the object's geometry.
     pub measures_geometry: bool,
+    /// The grasp began far from those that the model learned: its answers mean little, and nothing is measured.
+    pub unlike: bool,
     /// The newest estimate of it; none before the first contact.
     pub measured: Option<Arc<Measured>>,
     /// True while the fingers close and hold, and the answer still changes.
@@ -183,6 +189,7 @@ impl Identification {
             belief: Belief::default(),
             verdict: None,
             geometry: FeltGeometry::default(),
+            unlike: None,
             closed: true,
             decision: None,
             decided_at: 0.0,
@@ -201,6 +208,7 @@ impl Identification {
         self.last = None;
         self.verdict = None;
         self.geometry.forget();
+        self.unlike = None;
         self.decision = None;
         self.closed = true;
     }
@@ -274,6 +282,7 @@ impl Identification {
             IdentifyError::Channels { cause, fits }
         })?;
         self.readings = Sequence::default();
+        self.unlike = None;
         self.hold_s = None;
         self.verdict = None;
         self.geometry.begin(shipped, &named);
@@ -304,6 +313,9 @@ impl Identification {
         }
         self.readings.t_s.push(t as f32);
         self.readings.values.extend_from_slice(&self.columned);
+        if self.readings.t_s.len() == 1 {
+            self.unlike = self.far_at_start();
+        }
         let answer = self.live.as_mut().and_then(|live| live.push(t as f32, &self.columned));
         let new = answer.is_some();
         self.verdict = answer.or_else(|| self.verdict.take());
@@ -311,16 +323,31 @@ impl Identification {
         new || measured
     }
 
-    /// Says so where channels begin far from what the model learned.
+    /// Says so where channels began far from what the model learned.
     pub fn unlike_at_start(&self) -> Option<String> {
+        self.unlike.clone()
+    }
+
+    fn far_at_start(&self) -> Option<String> {
         let signatures = self.model.signatures.as_ref()?;
         let far = signatures.far_at_start(&self.readings.values);
-        let (channel, value, mean) = far.first()?;
+        let (name, value, mean) = far.first()?;
+        let (unit, factor) = read_in(Quantity::of_name(name).map_or("", |(quantity, _)| quantity.unit()));
+        let [value, mean] = [value, mean].map(|value| match unit {
+            "" => format!("{value:.0}"),
+            unit => shown(factor * f64::from(*value), unit),
+        });
+        // A table may have been imported without the zero of its sensors.
+        let remedy = match self.model.card.data.is_recorded() {
+            true => ". Where it learned an imported table, import that anew with --rezero",
+            false => "",
+        };
         Some(format!(
-            "{} of {} channels begin far from the grasps that the model learned ({channel}: {value:.0}, there {mean:.0}), so its \
-             answers mean little. Where it learned an imported table, import that anew with --rezero",
+            "{} of {} channels begin far from the grasps that the model learned ({}: {value}, there {mean}), so its answers mean \
+             little{remedy}",
             far.len(),
-            signatures.channels().len()
+            signatures.channels().len(),
+            channel_words(name)
         ))
     }
 
@@ -376,7 +403,8 @@ impl Identification {
             rule: self.rule,
             verdict: self.verdict.clone(),
             measures_geometry: self.geometry.serves(),
-            measured: self.geometry.newest(),
+            unlike: self.unlike.is_some(),
+            measured: self.geometry.newest().filter(|_| self.unlike.is_none()),
             listening: !self.closed,
             beliefs: self.belief.steps().to_vec(),
             decision: self.decision,

@@ -244,7 +244,7 @@ impl Lessons<'_> {
             let test = self.simulated(&usual, &object, half..half + TESTED, &view, &tick)?;
             if examples.is_empty() || test.examples.is_empty() {
                 let why = test.unsound.map_or("their numbers are unsound".to_owned(), |failure| failure.to_string());
-                return Err(refused(format!("\"{}\" is not learned: in its grasps, {why}", object.name)));
+                return Err(refused(format!("no usable grasp of \"{}\": {why}", object.name)));
             }
             let (name, grasps) = (object.name.clone(), examples.len());
             learned.push(Lesson { name, grasps, lost, ..Lesson::default() });

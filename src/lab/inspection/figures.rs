@@ -10,6 +10,7 @@ use palpate_geometry::drawing::{
     DataPoint, DataSeries, Figure, HeatMap, LineStyle, Plot, PlotAxis, ReferenceLine, SpreadBand,
 };
 use palpate_geometry::palette::{NO_SERIES, SHOWN_SERIES};
+use palpate_geometry::units::read_in;
 use palpate_sim::gripper::Side;
 use palpate_tactile::SignalDefinition;
 use palpate_tactile::trial::{TrialId, TrialSource};
@@ -239,14 +240,6 @@ struct Curve<'a> {
     values: Box<dyn Fn(usize) -> f64 + 'a>,
 }
 
-/// Unit in which a value is shown, and the factor to it.
-fn shown_unit(unit: &str) -> (&str, f64) {
-    match unit {
-        "Pa" => ("kPa", 1e-3),
-        other => (other, 1.0),
-    }
-}
-
 fn side_of(name: &str) -> Option<Side> {
     Side::BOTH.into_iter().find(|side| name.contains(side.name()))
 }
@@ -264,7 +257,7 @@ fn found<'a>(trial: &'a OpenTrial, term: &str, raw: bool) -> Result<(Vec<Curve<'
     let mut curves = Vec::new();
     let mut unit = "";
     for column in shown(trial, raw).filter(begins) {
-        let (own, factor) = shown_unit(column.unit);
+        let (own, factor) = read_in(column.unit);
         unit = own;
         let values = Box::new(|k: usize| f64::from(column.values[k]));
         curves.push(Curve { name: &column.name, side: side_of(&column.name), factor, values });

@@ -168,33 +168,34 @@ impl LabelDraft {
         }
     }
 
-    /// Objects that match the search, in the order of their number keys: best matches first, among equals the trial's label,
-    /// the empty hand where nothing was touched, what the model took a labelled one for, the next of the plan, the plan, the
-    /// empty hand. A name that matches no object exactly is offered as a new one, last of
-    /// those with a number.
+    /// Objects that match the search, best matches first, among equals in the order of the plan: their number keys stay theirs
+    /// from trial to trial. After the plan come the empty hand and what else the trial may be of. A name that matches no object
+    /// exactly is offered as a new one, last of those with a number.
     pub fn objects(&self, view: &LabelView) -> Vec<String> {
         self.found(view).names
     }
 
     fn found(&self, view: &LabelView) -> ObjectSearch {
-        let next = view.next.iter().map(|next| next.object.clone());
         let trial = self.trial(view);
-        let label = trial.and_then(|trial| trial.object.clone());
+        let label = trial.and_then(|trial| trial.object.as_deref());
         // A trial that was cut may have ended before the touch.
         let has = |flag: Flag| trial.is_some_and(|trial| trial.flags.iter().any(|found| found.flag == flag));
-        let untouched = has(Flag::NoContact) && !has(Flag::Interrupted);
-        let untouched = untouched.then(|| EMPTY.to_owned());
-        let guess = trial.filter(|trial| trial.object.is_some()).and_then(|trial| trial.guess.as_ref());
-        let guess = guess.map(|guess| guess.class.clone()).filter(|class| class != OTHER);
-        let planned = view.progress.objects.iter().map(|object| object.name.clone());
+        let untouched = (has(Flag::NoContact) && !has(Flag::Interrupted)).then_some(EMPTY);
+        let next = view.next.as_ref().map(|next| next.object.as_str());
+        let planned = view.progress.objects.iter().map(|object| object.name.as_str());
         let mut names: Vec<String> = Vec::new();
-        for name in label.into_iter().chain(untouched).chain(guess).chain(next).chain(planned).chain([EMPTY.to_owned()])
-        {
-            if !names.contains(&name) {
-                names.push(name);
+        for name in planned.chain([EMPTY]).chain(label).chain(self.predicted(view)) {
+            if !names.iter().any(|own| own == name) {
+                names.push(name.to_owned());
             }
         }
-        search_objects(names, &self.search)
+        search_objects(names, &self.search, label.or(untouched).or(next))
+    }
+
+    /// What the model took a labelled trial for; none of one that is still to be labelled.
+    pub fn predicted<'a>(&self, view: &'a LabelView) -> Option<&'a str> {
+        let trial = self.trial(view).filter(|trial| trial.object.is_some())?;
+        trial.guess.as_ref().map(|guess| guess.class.as_str()).filter(|class| *class != OTHER)
     }
 
     /// Place in the list of objects that a label is given from; none while the search may mean several.

@@ -5,6 +5,8 @@ use palpate_sim::objects::object_title;
 
 /// Objects that have a number key.
 pub const NUMBERED_OBJECTS: usize = 9;
+/// Most objects that are listed.
+pub const LISTED_OBJECTS: usize = 2 * NUMBERED_OBJECTS;
 
 /// Objects that fit a text, best first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,11 +42,16 @@ fn fit(name: &str, wanted: &str) -> Option<Fit> {
     }
 }
 
-/// Searches `known` names; without a text all fit, and the first is meant.
-pub(super) fn search_objects(known: Vec<String>, text: &str) -> ObjectSearch {
+/// Searches `known` names; without a text all fit, and the likely one is meant, which is listed in any case.
+pub(super) fn search_objects(mut known: Vec<String>, text: &str, likely: Option<&str>) -> ObjectSearch {
     let text = text.trim();
     if text.is_empty() {
-        let sure = (!known.is_empty()).then_some(0);
+        let mut sure = known.iter().position(|name| Some(name.as_str()) == likely);
+        if let Some(place) = sure.take_if(|place| *place >= LISTED_OBJECTS) {
+            let name = known.remove(place);
+            known.insert(LISTED_OBJECTS - 1, name);
+            sure = Some(LISTED_OBJECTS - 1);
+        }
         return ObjectSearch { names: known, sure };
     }
     let wanted = text.to_lowercase();
@@ -73,7 +80,7 @@ mod tests {
 
     fn found(text: &str) -> (Vec<String>, Option<usize>) {
         let known = catalogue().iter().map(|built_in| built_in.name.clone()).chain([EMPTY.to_owned()]).collect();
-        let ObjectSearch { names, sure } = search_objects(known, text);
+        let ObjectSearch { names, sure } = search_objects(known, text, Some("lemon"));
         (names, sure)
     }
 
@@ -96,6 +103,12 @@ mod tests {
         assert_eq!(found("stop").1, Some(0));
         // Without a title that fits, names count.
         assert_eq!(found("cylinder").0[found("cylinder").1.expect("sure")], "cylinder");
-        assert_eq!(found(" ").1, Some(0));
+        let (all, likely) = found(" ");
+        assert_eq!(all[likely.expect("the likely one")], "lemon");
+        // One that is far down is listed last.
+        let many = (0..40).map(|k| format!("part {k}")).collect();
+        let ObjectSearch { names, sure } = search_objects(many, "", Some("part 30"));
+        assert_eq!((names[LISTED_OBJECTS - 1].as_str(), sure), ("part 30", Some(LISTED_OBJECTS - 1)));
+        assert_eq!((names[0].as_str(), names.len()), ("part 0", 40));
     }
 }

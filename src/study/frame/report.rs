@@ -470,19 +470,21 @@ impl StudyTable {
                 let plain = match cell {
                     Cell::Text(text) => quoted(text),
                     Cell::Missing => String::new(),
-                    Cell::Number(_) | Cell::Interval(_) => {
-                        cell.value().map_or(String::new(), |value| value.to_string())
-                    }
+                    Cell::Number(_) | Cell::Interval(_) => cell.value().map_or(String::new(), in_full),
                 };
-                let ends = interval.then(|| {
-                    cell.spread().map_or([const { String::new() }; 2], |ends| ends.map(|end| end.to_string()))
-                });
+                let ends =
+                    interval.then(|| cell.spread().map_or([const { String::new() }; 2], |ends| ends.map(in_full)));
                 std::iter::once(plain).chain(ends.into_iter().flatten())
             });
             lines.push(cells.collect::<Vec<_>>().join(","));
         }
         lines.join("\n") + "\n"
     }
+}
+
+/// A number with all its digits; a tiny one as `1.5e-113`.
+fn in_full(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-6 { format!("{value:e}") } else { value.to_string() }
 }
 
 fn quoted(text: &str) -> String {

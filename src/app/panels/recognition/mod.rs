@@ -28,11 +28,12 @@ use palpate_lab::grasping::{
 };
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
-use palpate_sim::objects::capital_title;
+use palpate_sim::objects::{capital_title, is_file};
+use palpate_tactile::SensorModel;
 use std::sync::Arc;
 use words::{
-    ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, percent, reason,
-    title,
+    ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, UNLIKE, percent,
+    reason, title,
 };
 
 /// Time in which bars follow a new answer (s).
@@ -138,6 +139,7 @@ pub(super) fn ui(
     // The buttons stay in sight below what scrolls.
     let has_buttons = data.source != ViewSource::Trial && data.view.mode != Mode::Label;
     let below = if has_buttons { measures.button + measures.gap } else { 0.0 };
+    let mut can_learn = false;
     let scrolled = ScrollArea::vertical().auto_shrink(false).max_height(room.y - below);
     scrolled.show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = measures.gap;
@@ -169,6 +171,9 @@ pub(super) fn ui(
                     actions,
                 };
                 part.headline_ui(ui);
+                can_learn = data.source == ViewSource::Simulation
+                    && part.distrust() == Some(NOT_LEARNED)
+                    && is_file(&data.scene.object.source);
                 let advised = part.advice_ui(ui, &tools.advice) + told;
                 if let Some((_, title)) = &recognised.truth {
                     part.truth_ui(ui, title);
@@ -186,6 +191,12 @@ pub(super) fn ui(
     if has_buttons {
         ui.horizontal(|ui| {
             more_ui(ui, data, measures, actions);
+            if can_learn {
+                let width = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
+                let learn = ui.add_sized([width, measures.button], egui::Button::new("Learn it"));
+                actions
+                    .on(&learn.on_hover_text("Simulate grasps of this object, and learn from them"), App::teach_object);
+            }
             next_ui(ui, data, measures, actions);
         });
     }
@@ -239,7 +250,7 @@ fn lesson_ui(
                     let text = format!("from {} simulated grasps{time}: {}.", lesson.grasps, lesson_result(lesson));
                     if measures.is_tight() {
                         let right = lesson.after_three.unwrap_or(lesson.recognised);
-                        let right = format!("{right} of {} right", lesson.tested);
+                        let right = format!("{right}\u{a0}of\u{a0}{}\u{a0}right", lesson.tested);
                         ui.label(right).on_hover_text(text);
                     } else {
                         ui.label(text);
@@ -361,6 +372,7 @@ impl Part<'_, '_> {
         match self.is_being_learned {
             _ if self.is_foreign() => Some(FOREIGN),
             _ if self.data.other_fingers => Some(OTHER_FINGERS),
+            _ if self.view.unlike => Some(UNLIKE),
             _ if self.data.learned_otherwise && is_new => {
                 Some(if self.data.scene.holds_object() { LEARNED_FREE } else { LEARNED_FIXED })
             }
@@ -370,9 +382,10 @@ impl Part<'_, '_> {
         }
     }
 
-    /// A model from perfect sensors reads real ones.
+    /// A model from perfect sensors reads real ones, or such as are like them.
     fn is_foreign(&self) -> bool {
-        self.view.from_perfect_sensors && self.data.board().is_some()
+        let is_perfect = self.data.board().is_none() && self.data.view.sensors.sensors == SensorModel::Virtual;
+        self.view.from_perfect_sensors && !is_perfect
     }
 
     /// Picture of a class, or a frame with a question mark.

@@ -17,6 +17,9 @@ pub(super) const FOREIGN: &str = "Not to be trusted: this model knows perfect se
 /// Warning about a model of other fingers.
 pub(super) const OTHER_FINGERS: &str = "Not to be trusted: the model has not learned these fingers.";
 
+/// Warning about a grasp that began far from all that the model learned.
+pub(super) const UNLIKE: &str = "Not to be trusted: the grasp began unlike any that the model learned.";
+
 /// Warnings about an object that was learned only as it is not held now.
 pub(super) const LEARNED_FREE: &str = "Learned as a free object, not yet fixed in place.";
 pub(super) const LEARNED_FIXED: &str = "Learned fixed in place, not yet as a free object.";
@@ -227,6 +230,7 @@ mod tests {
             rule: StopRule { threshold: 0.9, most_grasps: 4 },
             verdict: now.map(|p| Verdict { pmf: pmf(p), properties: None }),
             measures_geometry: false,
+            unlike: false,
             measured: None,
             listening: false,
             beliefs: beliefs.iter().map(|p| pmf(*p)).collect(),

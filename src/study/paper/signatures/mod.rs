@@ -329,8 +329,10 @@ fn sentence_table(plan: &StudyPlan, all: &[Measured]) -> StudyTable {
     ];
     let statistics = statistics.iter().map(|(name, unit, cell)| Column(name, unit, cell));
     let columns: Vec<Column<'_, Measured>> = own.into_iter().chain(statistics).collect();
-    let title =
-        format!("Sentences of section V-A in numbers, preset {}; rates as shares of that before contact", plan.preset);
+    let title = format!(
+        "Sentences of section V-A in numbers, preset {} and centred; rates as shares of that before contact",
+        plan.preset
+    );
     let shown = |own: &Measured| {
         let trials = own.found.signatures.iter().filter_map(|own| own.of.trial);
         let every = 1 + trials.clone().count() / SHOWN;
