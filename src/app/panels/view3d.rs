@@ -22,7 +22,8 @@ use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_tactile::{Quantity, SensorModel, SignalDefinition};
+use palpate_tactile::model::SensorModel;
+use palpate_tactile::{Quantity, SignalDefinition};
 use std::sync::Arc;
 
 /// What the 3-D view reads.

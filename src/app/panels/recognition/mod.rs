@@ -29,7 +29,7 @@ use palpate_lab::grasping::{
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::{capital_title, is_file};
-use palpate_tactile::SensorModel;
+use palpate_tactile::model::SensorModel;
 use std::sync::Arc;
 use words::{
     ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, UNLIKE, percent,
