@@ -14,6 +14,7 @@ use palpate_sim::objects::{capital_title, object_title};
 use palpate_sim::scene::Scene;
 use palpate_tactile::Channel;
 use palpate_tactile::board::Board;
+use palpate_tactile::model::SensorModel;
 use palpate_tactile::trial::{Control, TrialId, TrialSource};
 use std::sync::Arc;
 
@@ -322,6 +323,12 @@ impl<'a> DisplayedData<'a> {
             ViewSource::Gripper => self.gripper?.link.as_ref().map(|link| &link.board),
             ViewSource::Trial => self.inspected?.trial.board.as_ref(),
         }
+    }
+
+    /// True for a simulated trial that is read by sensors like the parts of a real gripper, and not by perfect ones.
+    pub(super) fn reads_like_parts(&self) -> bool {
+        let trial = self.inspected.filter(|_| self.source == ViewSource::Trial);
+        self.view.sensors.sensors != SensorModel::Virtual && trial.is_some_and(|own| own.trial.simulated.is_some())
     }
 
     /// Names of the columns of the traces, as in files.

@@ -17,12 +17,10 @@ use glam::{DVec3, Vec2};
 use palpate_geometry::drawing::{Align, Camera, Detail, DrawList, Overlay, Shape2, StandardView};
 use palpate_geometry::palette::{Rgb, Theme};
 use palpate_geometry::units;
-use palpate_lab::datasets::SensorView;
 use palpate_lab::picture::{PAD_FULL_SCALE, PictureView, Stage, ghost_colour};
 use palpate_lab::workers::{Command, GhostGrasp};
 use palpate_sim::frame::Frame;
 use palpate_sim::gripper::Side;
-use palpate_tactile::model::SensorModel;
 use palpate_tactile::{Quantity, SignalDefinition};
 use std::sync::Arc;
 
@@ -156,8 +154,7 @@ fn picture_view(own: &View3d<'_>, moment: Moment<'_>, size: Vec2) -> PictureView
         ViewSource::Trial | ViewSource::Simulation => PictureView::default().inset,
     };
     // Plots of other signals, or by other sensors, have another curvature than the fingers.
-    let SensorView { signals, sensors, .. } = &own.data.view.sensors;
-    let reads_strips = *signals == SignalDefinition::Parts && *sensors == SensorModel::Virtual;
+    let reads_strips = own.data.view.sensors.signals == SignalDefinition::Parts && !own.data.reads_like_parts();
     let view = PictureView {
         camera: own.data.view.camera,
         theme: own.data.view.theme,
@@ -330,9 +327,9 @@ fn caption(own: &View3d<'_>, key: &PictureKey, off: Option<[f64; 2]>) -> (String
     if let Some(inspected) = own.data.shown_trial() {
         let lost = held.filter(|_| inspected.trial.nothing_held()).map(|held| held + ".");
         // Otherwise the time bar tells the time.
-        let sensors = own.data.view.sensors.sensors;
-        let through = (inspected.trial.simulated.is_some() && sensors != SensorModel::Virtual)
-            .then(|| format!("As simulated; the curves are what {} sensors read.", sensors.name()));
+        let sensors = own.data.view.sensors.sensors.name();
+        let through = own.data.reads_like_parts();
+        let through = through.then(|| format!("As simulated; the curves are what {sensors} sensors read."));
         let remarks = inspected.trial.remarks.iter().cloned();
         let said: Vec<String> = lost.into_iter().chain(remarks).chain(through).collect();
         return (said.join(" "), None);

@@ -29,7 +29,6 @@ use palpate_lab::grasping::{
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
 use palpate_learn::Labels;
 use palpate_sim::objects::{capital_title, is_file};
-use palpate_tactile::model::SensorModel;
 use std::sync::Arc;
 use words::{
     ALONE, BEING_LEARNED, FOREIGN, Headline, LEARNED_FIXED, LEARNED_FREE, NOT_LEARNED, OTHER_FINGERS, UNLIKE, percent,
@@ -384,8 +383,7 @@ impl Part<'_, '_> {
 
     /// A model from perfect sensors reads real ones, or such as are like them.
     fn is_foreign(&self) -> bool {
-        let is_perfect = self.data.board().is_none() && self.data.view.sensors.sensors == SensorModel::Virtual;
-        self.view.from_perfect_sensors && !is_perfect
+        self.view.from_perfect_sensors && (self.data.board().is_some() || self.data.reads_like_parts())
     }
 
     /// Picture of a class, or a frame with a question mark.

@@ -44,6 +44,7 @@ pub(super) fn ui(ui: &mut Ui, part: &Part<'_, '_>) -> bool {
     let unknown = match part.view.measured.is_some() {
         true if part.recognised.nothing_held => "not held",
         true => "–",
+        false if part.view.unlike => "–",
         false => UNKNOWN,
     };
     let of = |measure: Measure| touched.filter(|_| !is_empty).and_then(|measured| measured.felt(measure));
