@@ -196,7 +196,8 @@ pub(super) fn words(name: &str) -> String {
 
 /// Progress as a bar, its words cut with dots where they have no room.
 pub(super) fn progress_ui(ui: &mut Ui, share: f64, words: &str) {
-    let bar = ui.add(ProgressBar::new(share as f32));
+    // Narrow panels cut it off.
+    let bar = ui.add(ProgressBar::new(share as f32)).on_hover_text(words);
     bar.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, true, words));
     let inside = bar.rect.shrink2(vec2(8.0, 0.0));
     put_line(ui, inside, Align2::LEFT_CENTER, words, 12.0, ui.visuals().strong_text_color());

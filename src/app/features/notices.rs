@@ -154,13 +154,11 @@ impl Notices {
         }
     }
 
-    /// Takes errors of an action away: it has succeeded.
+    /// Takes errors of an action away: it has succeeded. The list of messages keeps them.
     pub(in crate::app) fn done(&mut self, attempt: &'static str) {
-        let mut gone =
-            self.shown.extract_if(.., |shown| shown.failed == Some(attempt)).map(|shown| shown.text).peekable();
-        if gone.peek().is_some() {
-            let gone: Vec<String> = gone.collect();
-            self.messages.retain(|text| !gone.contains(text));
+        if self.shown.extract_if(.., |shown| shown.failed == Some(attempt)).count() > 0 {
+            // The last message is no longer so.
+            self.told = None;
         }
     }
 
@@ -284,7 +282,8 @@ mod tests {
         let ctx = egui::Context::default();
         assert_eq!(notices.current(&ctx), Some("The study failed"));
         notices.done("study");
-        assert!(notices.current(&ctx).is_none() && notices.messages().is_empty());
+        assert!(notices.current(&ctx).is_none() && notices.told.is_none());
+        assert_eq!(notices.messages().len(), 2, "what was said can be looked up");
     }
 
     #[test]

@@ -109,6 +109,11 @@ impl RecognitionFeature {
     }
 }
 
+/// Text of the field for another name, while it is open.
+pub(in crate::app) fn name_id() -> egui::Id {
+    egui::Id::unique("name of what was learned")
+}
+
 impl App {
     /// Sets the probability from which a class counts as certain.
     pub fn set_threshold(&mut self, threshold: f64) {
@@ -174,15 +179,40 @@ impl App {
 
     /// Takes an object that was learned in hand, and asks whether it is to be forgotten or renamed.
     pub fn change_learned(&mut self, source: &str) {
-        let Some(name) = self.learned_as(source).map(str::to_owned) else {
+        if !self.choose_learned(source) {
             return self.notices.info("No learned object is in the hand.");
-        };
+        }
         if self.simulation.scene.object.source != source {
             self.open(source);
         }
-        let (lesson, fixed) = (self.lesson(&name).cloned(), self.simulation.scene.holds_object());
-        self.recognition.learned = Some(Learned { name, fixed, lesson, seconds: None });
         self.show_panel("recognition");
+    }
+
+    /// The same, with the field for its name.
+    pub(in crate::app) fn ask_for_name(&mut self, source: &str) {
+        self.change_learned(source);
+        if let Some(Learned { name, .. }) = &self.recognition.learned {
+            let title = capital_title(name);
+            self.ctx.data_mut(|data| data.insert_temp(name_id(), title));
+            self.ctx.memory_mut(|memory| memory.request_focus(name_id().with("field")));
+        }
+    }
+
+    /// Uses the model without the object in this file.
+    pub(in crate::app) fn forget_object(&mut self, source: &str) {
+        if self.choose_learned(source) {
+            self.forget_learned();
+        }
+    }
+
+    /// What is said of a lesson is about the object in this file; false where that was not learned.
+    fn choose_learned(&mut self, source: &str) -> bool {
+        let Some(name) = self.learned_as(source).map(str::to_owned) else { return false };
+        let (lesson, fixed) = (self.lesson(&name).cloned(), self.simulation.scene.holds_object());
+        let told = self.recognition.learned.as_ref().filter(|own| (&own.name, own.fixed) == (&name, fixed));
+        let seconds = told.and_then(|own| own.seconds);
+        self.recognition.learned = Some(Learned { name, fixed, lesson, seconds });
+        true
     }
 
     /// Changes the model of the simulation in the object of the last lesson.

@@ -63,8 +63,9 @@ pub(super) fn ui<'a>(
             let source = path.clone();
             if class.is_some() {
                 clicked.context_menu(|ui| {
-                    let source = source.clone();
-                    actions.on(&ui.button("Forget or rename …"), move |app| app.change_learned(&source));
+                    let [named, forgotten] = [source.clone(), source.clone()];
+                    actions.on(&ui.button("Rename …"), move |app| app.ask_for_name(&named));
+                    actions.on(&ui.button("Forget"), move |app| app.forget_object(&forgotten));
                 });
             }
             actions.on(&clicked, move |app| app.open(&source));

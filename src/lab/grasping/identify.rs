@@ -4,7 +4,6 @@
 use super::felt_geometry::FeltGeometry;
 use super::row::Row;
 use crate::datasets::SensorView;
-use crate::why::channel_words;
 use palpate_geometry::units::{read_in, shown};
 use palpate_learn::{
     Belief, GeometryEncoder, Labels, LiveRecogniser, Measured, Model, ModelError, OTHER, Pmf, Sequence, Shipped,
@@ -347,7 +346,7 @@ impl Identification {
              little{remedy}",
             far.len(),
             signatures.channels().len(),
-            channel_words(name)
+            name.replace('_', " ")
         ))
     }
 

@@ -9,7 +9,7 @@ pub(in crate::app) mod words;
 
 use crate::app::actions::Actions;
 use crate::app::features::App;
-use crate::app::features::recognition::Learned;
+use crate::app::features::recognition::{Learned, name_id};
 use crate::app::features::tools::GripperTools;
 use crate::app::features::view::{Mode, ViewSource};
 use crate::app::icons::{self, Icon};
@@ -27,7 +27,7 @@ use palpate_lab::grasping::{
     IdentificationView, ObjectMove, RecognisedGrasp, is_doubtful, lesson_result, lesson_warning,
 };
 use palpate_lab::workers::{Command, Explainer, Job, THRESHOLDS};
-use palpate_learn::Labels;
+use palpate_learn::{Labels, OTHER};
 use palpate_sim::objects::{capital_title, is_file};
 use std::sync::Arc;
 use words::{
@@ -258,7 +258,7 @@ fn lesson_ui(
                 if labels.is_some_and(|labels| labels.classes.iter().all(|class| class.name != learned.name)) {
                     ui.label("The model that answers here has not learned it.");
                 }
-                let id = egui::Id::unique("name of what was learned");
+                let id = name_id();
                 if let Some(name) = ui.data(|data| data.get_temp::<String>(id)) {
                     return rename_ui(ui, id, name, actions);
                 }
@@ -409,7 +409,11 @@ impl Part<'_, '_> {
         // No answer can be right: the likest known object is no headline.
         let is_new = distrust == Some(BEING_LEARNED);
         if let Some((class, probability)) = headline.class().zip(p.take_if(|_| is_new)) {
-            why = format!("{why} So far like {} ({}).", title(&self.view.labels, class), percent(probability));
+            let like = match self.view.labels.classes[class].name.as_str() {
+                OTHER => "no known object".to_owned(),
+                _ => title(&self.view.labels, class),
+            };
+            why = format!("{why} So far like {like} ({}).", percent(probability));
             "New object".clone_into(&mut text);
         }
         // Without a grasp, what the pads touch is no contact of one.
