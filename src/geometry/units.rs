@@ -110,9 +110,12 @@ pub fn shown(value: f64, unit: &str) -> String {
     format!("{}{SPACE}{}", number(value, unit), symbol(unit))
 }
 
-/// A difference of two such values, with its sign and a decimal more: values that read alike may differ.
+/// A difference of two such values, with its sign; with a decimal more where it would read as none.
 pub fn difference(value: f64, unit: &str) -> String {
-    let text = decimals(unit).map_or_else(|| true_minus(&three_digits(value)), |decimals| fixed(value, decimals + 1));
+    let text = decimals(unit).map_or_else(
+        || true_minus(&three_digits(value)),
+        |decimals| fixed(value, decimals + usize::from(value.abs() < 0.5 * 0.1_f64.powi(decimals as i32))),
+    );
     if value > 0.0 { format!("+{text}") } else { text }
 }
 
@@ -133,7 +136,7 @@ mod tests {
         assert_eq!(texts, ["0.57 N", "0.00 N", "31.0 kPa", "−7.29 m⁻¹", "−1.50 m⁻¹/s", "0.00412 V"]);
         assert_eq!([mark(-0.5), mark(20.0), mark(0.25), mark(-1e-9)], ["−0.5", "20", "0.25", "0"]);
         assert_eq!(number(f64::NAN, "N"), "–");
-        assert_eq!([difference(0.0071, "N"), difference(-0.0719, "kPa")], ["+0.007", "−0.07"]);
+        assert_eq!([0.0071, -0.0719, 0.004].map(|n| difference(n, "N")), ["+0.01", "−0.07", "+0.004"]);
     }
 
     #[test]

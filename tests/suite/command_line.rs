@@ -105,7 +105,7 @@ fn exported_csv_names_its_units_and_is_complete() {
     let text = std::fs::read_to_string(at.join("ball.csv")).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    for column in ["t_s", "phase"] {
+    for column in ["t_s", "command"] {
         assert!(header.contains(&column), "{header:?}");
     }
     for unit in ["[bar]", "[1/m]", "[Pa]", "[N]", "[rad]", "[m]"] {

@@ -134,7 +134,7 @@ fn a_store_made_earlier_is_listed_and_exported() {
     std::fs::write(&path, include_bytes!("data/store.sqlite")).unwrap();
     let list = run(folder.path(), &["trials", "list"]);
     assert_eq!((list.code, list.err.as_str()), (Some(0), ""), "{list:?}");
-    for row in ["Lemon", "mug", "Rubber ball (ball)", "slipped a little", "[wet, late]", "unsure"] {
+    for row in ["Lemon", "Mug", "Rubber ball (ball)", "slipped a little", "[wet, late]", "unsure"] {
         assert!(list.out.contains(row), "no {row}: {list:?}");
     }
     let export = run(folder.path(), &["trials", "export", "1", "2", "4", "5", "--out", "out"]);

@@ -192,10 +192,10 @@ fn findings_are_told_by_words_and_rows_open_trials() {
         bench.wait();
     }
     // All trials of the row are listed, and no others.
-    bench.until_shown(true, "trials of the row: 2  \u{d7}");
+    bench.until_shown(true, "trials kept of the row: 2  \u{d7}");
     // Another trial is shown as before, in the whole list.
     bench.tell(|app| app.open_trial(3));
-    bench.until_shown(false, "trials of the row");
+    bench.until_shown(false, "trials kept of the row");
     while through(&bench) != ["virtual"; 2] {
         bench.wait();
     }

@@ -256,7 +256,7 @@ impl App {
         others.iter().take(SERIES_COLOURS).for_each(|id| self.pin(*id));
         let (all, beside) = (others.len(), others.len().min(SERIES_COLOURS));
         self.notices.info(format!(
-            "Trial {first} of the row is open, {beside} of its {all} others are compared with it{through}; all are listed."
+            "Trial {first} of the row is open, {beside} of the {all} others that are kept of it are compared{through}."
         ));
     }
 }

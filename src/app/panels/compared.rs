@@ -90,13 +90,11 @@ fn options_ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
 
 /// Width below which the table of the hold has short names (points).
 const NARROW: f32 = 260.0;
-/// Most trials of the table of the hold.
-const MOST_IN_TABLE: usize = 4;
 
 /// Means over the hold, channel by channel: of the trial shown, and of those compared with the difference to it.
 fn hold_ui(ui: &mut Ui, data: &DisplayedData<'_>) {
     let Some(shown) = data.inspected.filter(|_| data.source == ViewSource::Trial).map(|own| own.trial) else { return };
-    let pinned = data.comparison.pinned.iter().filter(|pinned| pinned.trial.id != shown.id).take(MOST_IN_TABLE);
+    let pinned = data.comparison.pinned.iter().filter(|pinned| pinned.trial.id != shown.id);
     let pinned: Vec<&Pinned> = pinned.collect();
     ui.separator();
     ui.strong("Mean in the hold, and difference to the trial shown");

@@ -244,6 +244,7 @@ fn question_ui(
     let columns = if low || shown > NUMBERED_OBJECTS { 2 } else { 1 };
     ui.columns(columns, |columns| {
         let rows = shown.div_ceil(columns.len()).max(1);
+        columns.iter_mut().for_each(|column| column.spacing_mut().item_spacing.y = 1.0);
         for (place, name) in names.iter().take(shown).enumerate() {
             let known = view.progress.objects.iter().any(|object| object.name == *name) || name == "empty";
             let remark = match known {

@@ -102,7 +102,7 @@ fn row_ui(
         (_, None, Some(found)) => {
             (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
         }
-        (_, None, None) if !trial.complete && trial.samples == 0 => ("recording …".to_owned(), colours.quiet_text),
+        (_, None, None) if !trial.complete => ("recording …".to_owned(), colours.quiet_text),
         (_, None, None) => {
             let length = || format!("{:.1} s, {} readings", trial.seconds, trial.samples);
             (kept.unwrap_or_else(length), colours.quiet_text)

@@ -1,4 +1,4 @@
-//! Contact forces on each finger, as arrows with numbers: the force across the pad, and the friction along it.
+//! Contact forces on each finger, as arrows with numbers: the force across the pad, and the shear along it.
 
 use super::PictureView;
 use super::annotations::{Annotator, MARGIN, Plate, SCALE_BAR, shows_legends};
@@ -23,13 +23,13 @@ const FAINTEST: f64 = 0.01;
 const TEXT: f32 = 14.0;
 const LINE: f32 = 18.0;
 const GAP: f32 = 14.0;
-/// Least height of a picture with numbers, with a plate for each finger, and with friction and a key (points).
+/// Least height of a picture with numbers, with a plate for each finger, and with shear and a key (points).
 const LEAST_HEIGHT: f32 = 150.0;
 const APART: f32 = 250.0;
 const HIGH: f32 = 320.0;
 
-/// Colour of friction, of its arrow and its number; that of a force across the pad is the colour of text.
-fn friction_colour(theme: Theme) -> Rgb {
+/// Colour of shear, of its arrow and its number; that of a force across the pad is the colour of text.
+fn shear_colour(theme: Theme) -> Rgb {
     match theme {
         Theme::Dark => Rgb(255, 126, 182),
         Theme::Light => Rgb(190, 24, 110),
@@ -43,12 +43,12 @@ struct Forces {
     /// Across the pad.
     normal: DVec3,
     /// Along the pad; none where it is too small to be drawn.
-    friction: Option<DVec3>,
+    shear: Option<DVec3>,
 }
 
-/// The friction that a picture shows: a low one has no room for its number.
-fn shown_friction(forces: &Forces, view: &PictureView) -> Option<DVec3> {
-    forces.friction.filter(|_| view.size.y >= HIGH && !view.plain)
+/// The shear that a picture shows: a low one has no room for its number.
+fn shown_shear(forces: &Forces, view: &PictureView) -> Option<DVec3> {
+    forces.shear.filter(|_| view.size.y >= HIGH && !view.plain)
 }
 
 /// Arrows along the forces that the object exerts on the fingers.
@@ -67,8 +67,8 @@ pub(super) fn arrows(
             arrows.push(Arrow { from, to, radius: (RADIUS * height) as f32, colour });
         };
         arrow(forces.normal, view.theme.colours().text);
-        if let Some(friction) = shown_friction(&forces, view) {
-            arrow(friction, friction_colour(view.theme));
+        if let Some(shear) = shown_shear(&forces, view) {
+            arrow(shear, shear_colour(view.theme));
         }
     }
     arrows
@@ -93,7 +93,7 @@ pub(super) fn reach(gripper: &GripperModel, world_from_gripper: &Pose, frame: &F
 
 /// Force that has the longest arrow beside these (N).
 fn longest_force(all: &[Forces]) -> f64 {
-    let sizes = all.iter().flat_map(|own| [Some(own.normal), own.friction]).flatten().map(DVec3::length);
+    let sizes = all.iter().flat_map(|own| [Some(own.normal), own.shear]).flatten().map(DVec3::length);
     let largest = sizes.fold(0.0, f64::max);
     FORCES.into_iter().find(|force| *force >= largest).unwrap_or(largest)
 }
@@ -141,7 +141,7 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
     };
     for forces in &all {
         for (from, to) in
-            std::iter::once(forces.normal).chain(shown_friction(forces, view)).filter_map(|force| ends(forces, force))
+            std::iter::once(forces.normal).chain(shown_shear(forces, view)).filter_map(|force| ends(forces, force))
         {
             annotator.keep_clear(from, to);
         }
@@ -158,9 +158,8 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         };
         let text = |name: &str, force: DVec3| format!("{letter}  {name}{}", units::shown(force.length(), "N"));
         let name = if short || view.plain || view.size.y < APART { "" } else { "normal " };
-        let friction =
-            shown_friction(forces, view).map(|force| (text("friction ", force), friction_colour(view.theme)));
-        std::iter::once((text(name, forces.normal), view.theme.colours().text)).chain(friction).collect()
+        let shear = shown_shear(forces, view).map(|force| (text("shear ", force), shear_colour(view.theme)));
+        std::iter::once((text(name, forces.normal), view.theme.colours().text)).chain(shear).collect()
     };
     // Where a group of forces is written, and whether that is on its side of the hand.
     let place = |annotator: &Annotator<'_>, group: &[Forces], short: bool| {
@@ -213,7 +212,7 @@ const SHEAR_RADIUS: f32 = 0.0003;
 /// Shear on a taxel below this is not drawn (N).
 const FAINTEST_SHEAR: f32 = 2e-4;
 
-/// Friction on the taxels that bear most of it, as small arrows along the pads: each as long as its share of the largest.
+/// Shear on the taxels that bear most of it, as small arrows along the pads: each as long as its share of the largest.
 pub(super) fn shear(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame, theme: Theme) -> Vec<Arrow> {
     let grid = gripper.taxels();
     let mut loads = Vec::new();
@@ -233,7 +232,7 @@ pub(super) fn shear(gripper: &GripperModel, world_from_gripper: &Pose, frame: &F
         let force = placed.axes(segment) * DVec3::new(f64::from(load.along), f64::from(load.across), 0.0);
         let along = world_from_gripper.direction(force).as_vec3().normalize_or_zero();
         let to = from + along * (LONGEST_SHEAR * size / largest);
-        Arrow { from, to, radius: SHEAR_RADIUS, colour: friction_colour(theme) }
+        Arrow { from, to, radius: SHEAR_RADIUS, colour: shear_colour(theme) }
     };
     loads.iter().filter(|(_, size, ..)| *size >= FAINTEST_SHEAR).map(arrow).collect()
 }
@@ -252,7 +251,7 @@ fn tip(from: DVec3, force: DVec3, [span, longest]: [f64; 2]) -> Vec3 {
     (from + force / size * length).as_vec3()
 }
 
-/// The force across the pad and the friction along it, of each finger that is touched.
+/// The force across the pad and the shear along it, of each finger that is touched.
 fn on_fingers(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) -> Vec<Forces> {
     let grid = gripper.taxels();
     // Outside the finger, so that the loaded pad is seen.
@@ -260,14 +259,14 @@ fn on_fingers(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) 
     let mut all = Vec::new();
     for side in Side::BOTH {
         let placed = frame.placed(gripper, side);
-        let (mut across, mut friction, mut moment, mut weight) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0.0);
+        let (mut across, mut shear, mut moment, mut weight) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0.0);
         for (taxel, load) in frame.loads(side, grid.count()) {
             let (segment, along) = grid.place(taxel, &gripper.finger);
             let normal = f64::from(load.normal);
             let skin = grid.height(taxel) - grid.compression(taxel, normal);
             let axes = placed.axes(segment);
             across += axes * DVec3::new(0.0, 0.0, -normal);
-            friction += axes * DVec3::new(f64::from(load.along), f64::from(load.across), 0.0);
+            shear += axes * DVec3::new(f64::from(load.along), f64::from(load.across), 0.0);
             moment += placed.point(segment, along, grid.across(taxel), skin) * normal;
             weight += normal;
         }
@@ -275,9 +274,9 @@ fn on_fingers(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) 
             continue;
         }
         let from = world_from_gripper.point(moment / weight + across.normalize() * clear);
-        let friction = Some(friction).filter(|force| force.length() >= FAINTEST);
-        let friction = friction.map(|force| world_from_gripper.direction(force));
-        all.push(Forces { side, from, normal: world_from_gripper.direction(across), friction });
+        let shear = Some(shear).filter(|force| force.length() >= FAINTEST);
+        let shear = shear.map(|force| world_from_gripper.direction(force));
+        all.push(Forces { side, from, normal: world_from_gripper.direction(across), shear });
     }
     all
 }

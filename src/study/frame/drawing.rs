@@ -5,6 +5,7 @@ use super::report::{FigureLink, FigureMark, LinkedFigure, StudyReport, StudyTabl
 use palpate_geometry::drawing::{
     CellAxis, ColourScale, DataPoint, DataSeries, Figure, HeatMap, LineStyle, Marker, Plot, PlotAxis, ReferenceLine,
 };
+use palpate_geometry::palette::SERIES_COLOURS;
 use palpate_sim::objects::object_title;
 
 /// Heading of columns of shares in plots.
@@ -58,9 +59,13 @@ pub(crate) fn dots(colour: usize) -> DataSeries {
     DataSeries { colour, marker: Marker::Dot, ..DataSeries::default() }
 }
 
-/// Series of a colour with a line, bold or thin.
+/// Series of a colour with a line, bold or thin; dashed where the colours begin again.
 pub(crate) fn lines(colour: usize, bold: bool) -> DataSeries {
-    let line = if bold { LineStyle::Bold } else { LineStyle::Thin };
+    let line = match bold {
+        true => LineStyle::Bold,
+        false if colour < SERIES_COLOURS => LineStyle::Thin,
+        false => LineStyle::Dashed,
+    };
     DataSeries { colour, line, marker: Marker::of_series(colour), ..DataSeries::default() }
 }
 

@@ -87,7 +87,7 @@ fn set_ui(ui: &mut Ui, query: &mut TrialQuery) {
         let clicked = ui.selectable_label(true, small(&format!("{text}  \u{d7}"))).on_hover_text("Remove").clicked();
         (!clicked).then_some(())
     };
-    if query.only.as_ref().is_some_and(|only| chip(format!("trials of the row: {}", only.len())).is_none()) {
+    if query.only.as_ref().is_some_and(|only| chip(format!("trials kept of the row: {}", only.len())).is_none()) {
         query.only = None;
     }
     let keep = |value: &mut Option<String>, name: &str, chip: &mut dyn FnMut(String) -> Option<()>| {
