@@ -381,6 +381,7 @@ fn the_answer_to_a_discarded_trial_goes_with_it() {
     desk.tell(|app| app.set_mode(Mode::Demo));
     desk.until_shown(true, answered);
     desk.tell(|app| app.set_mode(Mode::Label));
+    desk.until_shown(true, "Trial 1: which object?");
     desk.press(Key::D);
     desk.until_labelled(&[(1, None, true)]);
     desk.tell(|app| app.set_mode(Mode::Demo));
