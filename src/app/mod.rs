@@ -100,7 +100,12 @@ pub struct WindowOptions {
     pub model: Option<PathBuf>,
     /// Other programs that may control the real gripper.
     pub serve: Option<(DeskSetup, Clients)>,
+    /// Takes what closes the window when the program is asked to stop.
+    pub on_stop: OnStop,
 }
+
+/// Arranges for the window to be closed by Ctrl+C or a termination request.
+pub type OnStop = Box<dyn FnOnce(Box<dyn Fn() + Send>)>;
 
 /// First and smallest size of the window (points).
 const FIRST_SIZE: [f32; 2] = [1280.0, 820.0];
@@ -136,7 +141,11 @@ pub fn open_window(options: WindowOptions) -> Result<(), WindowError> {
         let render_state = creation.wgpu_render_state.clone().ok_or("the window has no graphics device")?;
         let mut view: ViewState = creation.storage.and_then(|s| eframe::get_value(s, VIEW_KEY)).unwrap_or_default();
         view.gripper_model = options.model.or(view.gripper_model);
-        let wake_context = creation.egui_ctx.clone();
+        let [wake_context, closed_context] = [(); 2].map(|()| creation.egui_ctx.clone());
+        (options.on_stop)(Box::new(move || {
+            closed_context.send_viewport_cmd_to(egui::ViewportId::ROOT, egui::ViewportCommand::Close);
+            closed_context.request_repaint();
+        }));
         let wake = Arc::new(move || wake_context.request_repaint());
         let theme = view.theme;
         let start = move |ctx: &egui::Context| {
@@ -221,6 +230,11 @@ impl eframe::App for Window {
         if let Some(workbench) = &self.workbench {
             eframe::set_value(storage, VIEW_KEY, &workbench.kept_view());
         }
+    }
+
+    /// Little is lost where the program is killed.
+    fn auto_save_interval(&self) -> std::time::Duration {
+        std::time::Duration::from_secs(5)
     }
 
     /// The layout is stored in the view state, not in egui's memory.

@@ -13,6 +13,8 @@ pub(super) struct PathDialog {
     refused: Option<String>,
     /// File that is replaced if it is chosen once more.
     replaced: Option<PathBuf>,
+    /// What was typed behind the folder: it narrows the list.
+    typed: String,
     /// Contents of a folder, and when they were read.
     listing: Option<(PathBuf, Vec<Row>)>,
     fresh: bool,
@@ -49,7 +51,7 @@ impl PathDialog {
     /// A dialog that begins in `folder`.
     pub(super) fn new(question: Question, folder: &Path) -> Self {
         let path = folder.join(question.name.as_deref().unwrap_or_default()).to_string_lossy().into_owned();
-        Self { question, path, refused: None, replaced: None, listing: None, fresh: true }
+        Self { question, path, refused: None, replaced: None, typed: String::new(), listing: None, fresh: true }
     }
 
     /// Draws the dialog; returns its end.
@@ -77,6 +79,7 @@ impl PathDialog {
             if response.changed() {
                 // A whole path, pasted behind the folder, stands for itself.
                 self.path = restarted(&self.path).to_owned();
+                self.typed = split(&self.path).1;
                 (self.refused, self.replaced) = (None, None);
             }
             let mut done = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
@@ -109,14 +112,15 @@ impl PathDialog {
 
     /// Lists the folder of the path; true where a file was chosen twice.
     fn list_ui(&mut self, ui: &mut Ui, height: f32) -> bool {
-        let (folder, begun) = split(&self.path);
+        let (folder, _) = split(&self.path);
         if self.listing.as_ref().is_none_or(|(listed, _)| *listed != folder) {
             self.listing = Some((folder.clone(), rows(&folder, self.question.extensions)));
+            self.typed = split(&self.path).1;
         }
         let Some((_, all)) = &self.listing else { return false };
         // A name that is being typed narrows the list of files to read.
-        let narrows = self.question.name.is_none() && !begun.is_empty() && !all.iter().any(|row| row.name == begun);
-        let begun = begun.to_lowercase();
+        let narrows = self.question.name.is_none() && !self.typed.is_empty();
+        let begun = self.typed.to_lowercase();
         let fits = |row: &&Row| !narrows || row.name.to_lowercase().starts_with(&begun);
         let listed: Vec<Row> = all.iter().filter(fits).cloned().collect();
         let (mut chosen, mut done) = (None, false);

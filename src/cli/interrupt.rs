@@ -9,11 +9,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let set_by_handler = Arc::clone(&stop);
+    on_request(move || set_by_handler.store(true, Ordering::Relaxed))?;
+    Ok(stop)
+}
+
+/// Stops by `stop` at the first Ctrl+C. To be called once.
+pub(super) fn on_request(stop: impl Fn() + Send + 'static) -> Result<(), Failure> {
+    let asked = AtomicBool::new(false);
     ctrlc::set_handler(move || {
-        if set_by_handler.swap(true, Ordering::Relaxed) {
+        if asked.swap(true, Ordering::Relaxed) {
             #[expect(clippy::exit, reason = "the second request: the orderly way takes too long")]
             std::process::exit(130);
         }
+        stop();
     })?;
-    Ok(stop)
+    Ok(())
 }

@@ -39,12 +39,12 @@ mod train;
 mod trials;
 mod version;
 
-use crate::app::{WindowOptions, open_window};
+use crate::app::{OnStop, WindowOptions, open_window};
 use crate::manual::TOPICS;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use palpate_learn::Model;
-use palpate_sim::objects::{EMPTY, RandomShape, anchored, catalogue};
+use palpate_sim::objects::{EMPTY, RandomShape, anchored, catalogue, class_of};
 use palpate_sim::scene::Scene;
 use palpate_tactile::board::SensorList;
 use std::path::{Path, PathBuf};
@@ -181,14 +181,19 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
     let model = model.as_ref().map(std::path::absolute).transpose()?;
     let store = setup::store_path(store.as_deref())?;
     let serve = serve.map(|listen| serve::beside_window(listen, token.as_deref(), &store)).transpose()?;
-    Ok(open_window(WindowOptions { scene, store, port: port.clone(), model, serve })?)
+    // What was learned and set is stored as if the window had been closed.
+    let on_stop: OnStop = Box::new(|close| _ = interrupt::on_request(close));
+    Ok(open_window(WindowOptions { scene, store, port: port.clone(), model, serve, on_stop })?)
 }
 
 /// Refuses a misspelt command or object, with the nearest of those there are.
 fn refuse_unknown_word(object: &str) {
     let is_random = RandomShape::seed_of(object).is_some();
-    let known =
-        object == EMPTY || is_random || catalogue().iter().any(|b| b.name == object) || Path::new(object).exists();
+    let known = object == EMPTY
+        || is_random
+        || class_of(object) != object
+        || catalogue().iter().any(|b| b.name == object)
+        || Path::new(object).exists();
     if !known && Path::new(object).extension().is_none() {
         let program = Arguments::command();
         let commands = program.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);

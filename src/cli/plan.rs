@@ -91,10 +91,6 @@ impl Report for PlanReport {
             page.line(format!("{} trial(s) without a label: `palpate trials label ID NAME`", self.unlabelled));
         }
         let Some(NextTrial { object, number, cue, .. }) = &self.next else { return page.line("the plan is complete") };
-        let ([opening, across], turn, object) = (cue.shift_mm, cue.turn_deg, titled(object));
-        page.line(format!(
-            "next: {object} (trial {number}), turned by {turn:.0} degrees, shifted by {opening:.0} mm to the right and \
-             {across:.0} mm across"
-        ));
+        page.line(format!("next: {} (trial {number}): {}", titled(object), cue.words()));
     }
 }

@@ -10,6 +10,7 @@ use super::prelude::*;
 pub(super) use import::{MappingArguments, import_all};
 use labels::LabelCommand;
 use palpate_exchange::{CSV, TrialExport, format_of, write_lerobot};
+use palpate_geometry::units::capital;
 use palpate_lab::inspection::OpenOptions;
 use palpate_learn::{Model, Models};
 use palpate_store::labels::shown_title;
@@ -280,7 +281,15 @@ impl Report for ListReport {
         }
         let row = |row: &TrialRow| {
             let [id, samples, seed] = [row.id.to_string(), row.samples.to_string(), row.seed.to_string()];
-            [id, shown_title(&row.object), date(&row.created), row.gripper().to_owned(), samples, seed, remark(row)]
+            [
+                id,
+                capital(&shown_title(&row.object)),
+                date(&row.created),
+                row.gripper().to_owned(),
+                samples,
+                seed,
+                remark(row),
+            ]
         };
         let header = ["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""];
         page.table(&header, self.rows.iter().map(row));

@@ -125,6 +125,10 @@ fn closed(mut mesh: TriMesh, diagonal: f64, sides: Sides) -> Result<Repaired, Me
     if mesh.triangles.is_empty() {
         return Err(MeshError::Empty);
     }
+    // No hull closes a sheet.
+    if is_sheet(&mesh, diagonal) {
+        return Err(MeshError::NoVolume);
+    }
     let pieces = orient(&mut mesh, &mut notes)?;
     fill_holes(&mut mesh, diagonal * SMALL_HOLE, &mut notes)?;
     if mesh.signed_volume() < FLAT * diagonal.powi(3) {
@@ -402,6 +406,16 @@ fn spread_orientation(
     Ok(piece)
 }
 
+/// True where all points lie in the plane of the largest triangle.
+fn is_sheet(mesh: &TriMesh, diagonal: f64) -> bool {
+    let corners = |triangle: &[u32; 3]| triangle.map(|i| mesh.points[i as usize]);
+    let across = |[a, b, c]: [DVec3; 3]| (a, (b - a).cross(c - a));
+    let planes = mesh.triangles.iter().map(|triangle| across(corners(triangle)));
+    let Some((at, across)) = planes.max_by(|a, b| a.1.length().total_cmp(&b.1.length())) else { return true };
+    let is_in = |point: DVec3| (point - at).dot(across.normalize_or_zero()).abs() <= FLAT * diagonal;
+    mesh.triangles.iter().flat_map(corners).all(is_in)
+}
+
 /// Closes narrow holes with a fan about their middle; refuses wide ones.
 fn fill_holes(mesh: &mut TriMesh, widest_allowed: f64, notes: &mut Vec<String>) -> Result<(), MeshError> {
     let loops = boundary_loops(&mesh.triangles)?;
@@ -409,6 +423,7 @@ fn fill_holes(mesh: &mut TriMesh, widest_allowed: f64, notes: &mut Vec<String>) 
     let widest = loops.iter().map(|hole| width(hole)).fold(0.0, f64::max);
     let wide = loops.iter().filter(|hole| width(hole) > widest_allowed).count();
     if wide > 0 {
+        // No hull helps a sheet.
         let edges = edges_of(&mesh.triangles);
         let crowded = edges.chunk_by(same_corners).filter(|sides| sides.len() > 2).count();
         if crowded > 0 && edges.chunk_by(same_corners).all(|sides| sides.len() > 1) {
@@ -612,6 +627,9 @@ mod tests {
         let mut open_box = cube();
         open_box.triangles.truncate(10);
         assert!(matches!(repair(&open_box), Err(MeshError::Open { holes: 1, .. })));
+        // Two triangles of it are a sheet, which no hull helps.
+        open_box.triangles.truncate(2);
+        assert!(matches!(repair(&open_box), Err(MeshError::NoVolume)));
     }
 
     #[test]

@@ -127,7 +127,11 @@ impl Change {
             Self::Reviewed => "label reviewed".to_owned(),
             Self::Plan { to, .. } => {
                 let wanted: u32 = to.objects.iter().map(|object| object.wanted).sum();
-                format!("plan changed to {wanted} trials of {} objects", to.objects.len())
+                match to.objects.len() {
+                    0 => "plan cleared".to_owned(),
+                    1 => format!("plan changed to {wanted} trials of 1 object"),
+                    objects => format!("plan changed to {wanted} trials of {objects} objects"),
+                }
             }
         }
     }

@@ -139,7 +139,7 @@ fn anybodys_grasps_are_taken_in_and_learned() {
     let again = run(at, &["trials", "import", "mine.csv"]);
     assert!(again.out.contains("0 trial(s) added as collection mine, 24 already there"), "{again:?}");
     let shown = run(at, &["trials", "show", "1"]);
-    assert!(shown.code == Some(0) && shown.out.contains("Mug") && shown.out.contains("grip, bend"), "{shown:?}");
+    assert!(shown.code == Some(0) && shown.out.contains("mug") && shown.out.contains("grip, bend"), "{shown:?}");
     let exported = run(at, &["trials", "export", "1", "--out", "back.csv"]);
     assert_eq!(exported.code, Some(0), "{exported:?}");
     assert!(std::fs::read_to_string(at.join("back.csv")).unwrap().starts_with("t_s,grip,bend\n0,0,0\n"));

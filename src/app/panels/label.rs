@@ -8,7 +8,7 @@ use crate::app::thumbnails::Thumbnails;
 use crate::app::widgets::{focus_field, remark_ui, selectable_row, text_field, warning_ui, wrapped};
 use egui::text_edit::TextEditState;
 use egui::{Align, Button, Id, Key, Layout, Rect, RichText, ScrollArea, Sense, Ui, vec2};
-use palpate_geometry::units::{self, percent};
+use palpate_geometry::units::percent;
 use palpate_lab::workers::{
     GripperView, LISTED_OBJECTS, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView,
     parse_tags,
@@ -124,15 +124,7 @@ fn record_ui(ui: &mut Ui, gripper: Option<&GripperView>, button: Button<'_>, abo
 
 /// Pose of the object, in words.
 fn cue(next: &NextTrial) -> String {
-    let turn = format!("turn {}°", units::fixed(next.cue.turn_deg, 0));
-    let [along, across] = next.cue.shift_mm;
-    let part = |by: f64, positive: &str, negative: &str| match by.round() {
-        by if by > 0.0 => format!(", {by:.0} mm {positive}"),
-        by if by < 0.0 => format!(", {:.0} mm {negative}", -by),
-        _ => String::new(),
-    };
-    let shifts = part(along, "towards the right finger", "towards the left finger") + &part(across, "back", "forward");
-    format!("Placement {}: {turn}{shifts}", next.number)
+    format!("Placement {}: {}", next.number, next.cue.words())
 }
 
 fn running_ui(ui: &mut Ui, pictures: &Thumbnails, view: &LabelView, running: (&TrialView, Option<u64>)) {

@@ -24,20 +24,7 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
             ui.weak(format!("next: {}", object_title(&next.object))).on_hover_text(order);
         }
     });
-    ui.horizontal(|ui| {
-        let planned: Vec<String> =
-            view.progress.objects.iter().filter(|own| own.wanted > 0).map(|own| own.name.clone()).collect();
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let clear = |ui: &mut Ui| {
-                let text = format!("Remove all {} objects; their trials stay", planned.len());
-                actions.on(&ui.button(text), move |app| {
-                    planned.into_iter().for_each(|name| app.edit_labels(LabelCommand::Unplan(name)));
-                });
-            };
-            ui.menu_button("Clear", clear).response.on_hover_text("Begin a plan of your own");
-            add_ui(ui, actions);
-        });
-    });
+    clear_ui(ui, view, actions);
     let next = view.next.as_ref().map(|next| next.object.as_str());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
@@ -51,6 +38,34 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
                 ui.data_mut(|data| data.insert_temp(seen, object.name.clone()));
             }
         }
+    });
+}
+
+/// Field that adds an object, and a button that removes all, once that is confirmed.
+fn clear_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
+    let id = egui::Id::unique("plan to be cleared");
+    let planned = view.progress.objects.iter().filter(|object| object.wanted > 0).count();
+    if ui.data(|data| data.get_temp::<bool>(id)).is_some() {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(format!("Remove all {planned} objects? Their trials stay."));
+            let [remove, keep] = ["Remove all", "Keep"].map(|text| ui.button(text).clicked());
+            if remove {
+                actions.push(|app| app.edit_labels(LabelCommand::ClearPlan));
+            }
+            if remove || keep {
+                ui.data_mut(|data| data.remove::<bool>(id));
+            }
+        });
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let clear = ui.add_enabled(planned > 0, egui::Button::new("Clear"));
+            if clear.on_hover_text("Remove all objects, for a plan of your own").clicked() {
+                ui.data_mut(|data| data.insert_temp(id, true));
+            }
+            add_ui(ui, actions);
+        });
     });
 }
 

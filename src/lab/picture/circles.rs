@@ -3,7 +3,7 @@
 //! Curvature is 1 / radius (paper, section IV-A1). The finger follows the circle where it bends evenly; where it does not,
 //! the gap between them is what the strip cannot tell.
 
-use super::annotations::Annotator;
+use super::annotations::{Annotator, Plate};
 use glam::{DVec3, Vec2};
 use palpate_geometry::Pose;
 use palpate_geometry::drawing::Align;
@@ -102,17 +102,26 @@ fn arc(gripper: &GripperModel, frame: &Frame, side: Side, [from, to]: [f64; 2], 
 /// Farthest that a number stands from where it is wanted (points).
 const FARTHEST: f32 = 110.0;
 
-/// Writes a curvature outside of the finger's back, or near by where it covers nothing.
-pub(super) fn number(annotator: &mut Annotator<'_>, own: &CircleNumber) {
-    let text = match annotator.view.tenths {
-        true => units::true_minus(&format!("{:.1}{}{}", own.curvature, units::SPACE, units::symbol("1/m"))),
-        false => units::shown(own.curvature, "1/m"),
-    };
-    let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
-    let wanted = own.back + own.outward * (GAP + half.dot(own.outward.abs()));
-    if annotator.view.size.y >= LEAST_HEIGHT
-        && let Some(plate) = annotator.place(&[wanted], half, FARTHEST)
-    {
+/// Writes curvatures outside of the fingers' backs, or near by where they cover nothing: all of them, or none.
+pub(super) fn add_numbers(annotator: &mut Annotator<'_>, numbers: &[CircleNumber]) {
+    if annotator.view.size.y < LEAST_HEIGHT {
+        return;
+    }
+    let mut placed: Vec<(Plate, String)> = Vec::new();
+    for own in numbers {
+        let text = match annotator.view.tenths {
+            true => units::true_minus(&format!("{:.1}{}{}", own.curvature, units::SPACE, units::symbol("1/m"))),
+            false => units::shown(own.curvature, "1/m"),
+        };
+        let half = Vec2::new(0.25 * TEXT * text.chars().count() as f32 + 5.0, 0.5 * TEXT + 3.0);
+        let wanted = own.back + own.outward * (GAP + half.dot(own.outward.abs()));
+        let Some(plate) = annotator.place(&[wanted], half, FARTHEST) else { return };
+        if placed.iter().any(|(other, _)| other.meets(&plate)) {
+            return;
+        }
+        placed.push((plate, text));
+    }
+    for ((plate, text), own) in placed.into_iter().zip(numbers) {
         annotator.add_plate(plate);
         annotator.overlay.text(plate.middle, Align::Centre, TEXT, own.colour, text);
     }

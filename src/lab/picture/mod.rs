@@ -180,7 +180,9 @@ impl Stage {
         if view.forces && view.annotations {
             forces::label(&mut annotator, &self.gripper, &world_from_gripper, frame);
         }
-        numbers.iter().filter(|_| !view.plain).for_each(|own| circles::number(&mut annotator, own));
+        if !view.plain {
+            circles::add_numbers(&mut annotator, &numbers);
+        }
         let mut fingers = self.fingers(frame, view.full_scale);
         if let Some(layout) = &view.layout {
             let drawn = sensors::on_finger(layout, &self.gripper, view.theme);
@@ -287,7 +289,7 @@ impl Stage {
         self.showing_hand(Camera { yaw, ..camera }, frame, view)
     }
 
-    /// Force of both pads on the object (N); none where they do not touch it.
+    /// Force of both pads on the object (N); none where they do not touch it, or less than is shown.
     pub fn force_on_object(&self, frame: &Frame) -> Option<f32> {
         let (object, radius) = self.object_ball(frame)?;
         self.touch(frame)?.force_on(object, radius)

@@ -63,7 +63,7 @@ impl Touch {
     /// Force on an object (N) that a ball about this place holds; none where the fingers touch something else, such as each
     /// other.
     pub(super) fn force_on(&self, object: Vec3, radius: f32) -> Option<f32> {
-        (self.middle.distance(object) <= radius + NEAR_OBJECT).then_some(self.force)
+        (self.force >= FAINTEST && self.middle.distance(object) <= radius + NEAR_OBJECT).then_some(self.force)
     }
 }
 

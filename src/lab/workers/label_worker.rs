@@ -29,6 +29,8 @@ pub enum LabelCommand {
     Want(String, u32),
     /// Remove an object from the plan; its trials stay.
     Unplan(String),
+    /// Remove all objects from the plan.
+    ClearPlan,
     /// Record this trial of the plan next.
     Next(NextTrial),
 }
@@ -126,6 +128,7 @@ impl LabelService {
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "Nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
+            LabelCommand::ClearPlan => change_plan(store, |plan| Ok(plan.objects.clear())).map(|()| None),
             LabelCommand::Next(next) => {
                 self.chosen = Some(next.clone());
                 Ok(None)

@@ -47,11 +47,12 @@ pub fn is_file(source: &str) -> bool {
     source != EMPTY && RandomShape::seed_of(source).is_none() && !catalogue().iter().any(|b| b.name == source)
 }
 
-/// A source that names the same object from any folder: files that exist get their whole path, names stay names.
+/// A source that names the same object from any folder: files that exist get their whole path, titles of built-in objects
+/// become names, and names stay.
 pub fn anchored(source: &str) -> String {
     let named = source == EMPTY || catalogue().iter().any(|b| b.name == source);
     let whole = std::path::absolute(source).ok().filter(|path| !named && path.exists());
-    whole.and_then(|path| path.to_str().map(str::to_owned)).unwrap_or_else(|| source.to_owned())
+    whole.and_then(|path| path.to_str().map(str::to_owned)).unwrap_or_else(|| class_of(source).to_owned())
 }
 
 /// Hash of files, in the order in which they are read.

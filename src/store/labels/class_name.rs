@@ -1,7 +1,6 @@
 //! Names of classes, which are the labels in files, tables and on the axes of a confusion matrix.
 
 use palpate_geometry::is_invisible;
-use palpate_geometry::units::capital;
 use palpate_sim::objects::{EMPTY, catalogue, titled};
 use std::collections::BTreeMap;
 use unicode_normalization::UnicodeNormalization as _;
@@ -96,7 +95,7 @@ pub fn shown_name(object: &str) -> &str {
 
 /// Title of a trial's object for display, with the name of its class where it differs; `unlabelled` without one.
 pub fn shown_title(object: &str) -> String {
-    if object.is_empty() { "unlabelled".to_owned() } else { capital(&titled(object)) }
+    if object.is_empty() { "unlabelled".to_owned() } else { titled(object) }
 }
 
 #[cfg(test)]

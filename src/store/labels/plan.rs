@@ -6,6 +6,7 @@
 
 use super::class_name::{Classes, LabelError, class_name, compared};
 use super::labelled_trial::LabelledTrial;
+use palpate_geometry::units::fixed;
 use palpate_sim::objects::{EMPTY, catalogue};
 use palpate_sim::scene::PoseSpread;
 use palpate_tactile::model::Stream;
@@ -182,6 +183,19 @@ impl Progress {
 }
 
 impl PoseCue {
+    /// What to do with the object: `turn 10°, 3 mm towards the right finger, 2 mm back`.
+    pub fn words(&self) -> String {
+        let [along, across] = self.shift_mm;
+        let part = |by: f64, positive: &str, negative: &str| match by.round() {
+            by if by > 0.0 => format!(", {by:.0} mm {positive}"),
+            by if by < 0.0 => format!(", {:.0} mm {negative}", -by),
+            _ => String::new(),
+        };
+        let shifts =
+            part(along, "towards the right finger", "towards the left finger") + &part(across, "back", "forward");
+        format!("turn {}°{shifts}", fixed(self.turn_deg, 0))
+    }
+
     /// Pose for one trial of an object: within preset M of the simulated grasps, in steps that a person can follow. The
     /// same object and trial give the same pose.
     pub fn drawn(object: &str, number: u32) -> Self {

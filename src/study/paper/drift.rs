@@ -286,7 +286,7 @@ fn findings(rows: &[Row<Drifted>]) -> Vec<Finding> {
     let findings = [
         claim(
             "Drifts of the sensors lower recognition",
-            "Agrees where the paired 95 % interval of the loss to gains and zeros drawn within 20 % is above zero in each case",
+            "Agrees where the paired 95 % interval of the change by gains and zeros drawn within 20 % is below zero in each case",
             Rule::AllBelow(0.0),
             &|row| row.gain.filter(|_| row.kind.factor.0 == Reading::AsRead && row.kind.factor.1.ends_with(&most)),
         ),
@@ -303,7 +303,7 @@ fn findings(rows: &[Row<Drifted>]) -> Vec<Finding> {
         ),
         claim(
             "Hysteresis that the training has not seen lowers recognition",
-            "Agrees where the paired 95 % interval of the loss against hysteresis in training and test is above zero",
+            "Agrees where the paired 95 % interval of the change against hysteresis in training and test is below zero",
             Rule::AllBelow(0.0),
             &|row| row.gain.filter(|_| row.kind.factor.1 == HYSTERESIS[2].0),
         ),

@@ -121,11 +121,13 @@ fn what_the_readings_say_is_offered_after_the_label() {
         |class: &str| Some(GuessTop { model: "trees".to_owned(), class: class.to_owned(), p: 0.9, label_p: Some(0.1) });
     view.trials[0] = LabelledTrial { guess: guessed("cube"), ..trial(4, Some("lemon")) };
     let draft = LabelDraft { selected: Some(4), ..LabelDraft::default() };
-    assert_eq!(draft.objects(&view)[..2], ["lemon", "cube"]);
+    assert_eq!((draft.label(&view).as_deref(), draft.predicted(&view)), (Some("lemon"), Some("cube")));
+    // The number keys are those of the plan, whatever the trial.
+    assert_eq!(draft.objects(&view), LabelDraft::default().objects(&view));
     // "Other" is no object, and what touched nothing held none.
     let untouched = FlagRemark { flag: Flag::NoContact, remark: String::new() };
-    view.trials[0] = LabelledTrial { flags: vec![untouched], guess: guessed(OTHER), ..trial(4, Some("lemon")) };
-    assert_eq!(draft.objects(&view)[..2], ["lemon", EMPTY]);
+    view.trials[0] = LabelledTrial { flags: vec![untouched], guess: guessed(OTHER), ..trial(4, None) };
+    assert_eq!((draft.label(&view).as_deref(), draft.predicted(&view)), (Some(EMPTY), None));
     assert!(!draft.objects(&view).iter().any(|name| name == OTHER));
 }
 
