@@ -213,7 +213,7 @@ pub(super) fn summary_facts(summary: &GraspSummary, page: &mut Page) {
         page.fact(name, text.map(|[left, right]| format!("{left} left, {right} right [{unit}]")));
     };
     let hold = summary.hold.as_ref();
-    pair("hold force", hold.map(|hold| hold.force_n), "N");
+    pair("force on object", hold.map(|hold| hold.force_n), "N");
     pair("curvature", hold.map(|hold| hold.curvature_per_m), "1/m");
     pair("pad pressure", hold.map(|hold| hold.pressure_pa.map(|p| p * 1e-3)), "kPa");
     pair("contact pressure", hold.map(|hold| hold.contact_pressure_pa.map(|p| p * 1e-3)), "kPa");

@@ -161,7 +161,7 @@ fn last_ui(ui: &mut Ui, last: &FinishedGrasp) {
                 let [left, right] = values.map(|value| number(value, unit));
                 format!("{left} | {right} {}", symbol(unit))
             };
-            line("hold force", pair(hold.force_n, "N"));
+            line("force on object", pair(hold.force_n, "N"));
             line("hold curvature", pair(hold.curvature_per_m, "1/m"));
             line("hold pressure", pair(hold.pressure_pa.map(|p| p * 1e-3), "kPa"));
         }

@@ -13,7 +13,7 @@ use palpate_lab::workers::{
     GripperView, LISTED_OBJECTS, LabelCommand, LabelDraft, LabelView, LabellingAction, NUMBERED_OBJECTS, TrialView,
     parse_tags,
 };
-use palpate_sim::objects::{catalogue, object_title};
+use palpate_sim::objects::{capital_title, catalogue};
 use palpate_store::Change;
 use palpate_store::labels::{LabelledTrial, NextTrial, TrialEdit};
 
@@ -64,7 +64,7 @@ fn object_ui(ui: &mut Ui, pictures: &Thumbnails, name: &str, below: &str) {
         let (rect, _) = ui.allocate_exact_size(vec2(PICTURE, PICTURE), Sense::hover());
         picture(ui, pictures, name, rect);
         ui.vertical(|ui| {
-            ui.label(RichText::new(object_title(name)).size(24.0).strong());
+            ui.label(RichText::new(capital_title(name)).size(24.0).strong());
             if let Some(built_in) = catalogue().iter().find(|built_in| built_in.name == name) {
                 ui.weak(built_in.class().to_string());
             }
@@ -161,14 +161,14 @@ fn last_ui(ui: &mut Ui, view: &LabelView) {
     let given = changes.find_map(|entry| view.trial(entry.trial?)).filter(is_labelled);
     let last = given.or_else(|| view.trials.iter().find(is_labelled));
     let Some((trial, label)) = last.and_then(|trial| Some((trial, trial.object.as_ref()?))) else { return };
-    let (colours, title) = (theme::of(ui).colours(), object_title(label));
+    let (colours, title) = (theme::of(ui).colours(), capital_title(label));
     let (text, ink) = match &trial.guess {
         Some(guess) if guess.class == *label => {
             let agrees = if guess.p < 0.5 { "Also the model's first guess" } else { "The model agrees" };
             (format!("Last label, trial {}: {title}. {agrees} ({})", trial.id, percent(guess.p)), colours.accent)
         }
         Some(guess) => {
-            let (class, p) = (object_title(&guess.class), percent(guess.p));
+            let (class, p) = (capital_title(&guess.class), percent(guess.p));
             let (state, ink) =
                 if trial.reviewed { ("label kept", colours.quiet_text) } else { ("please review", colours.warning) };
             (format!("Last label, trial {}: {title}. The model predicts {class} ({p}): {state}", trial.id), ink)
@@ -198,7 +198,7 @@ fn question_ui(
 ) {
     let draft = labelling.session.draft();
     let question = match &trial.object {
-        Some(label) => format!("Trial {}: labelled {}. Change it?", trial.id, object_title(label)),
+        Some(label) => format!("Trial {}: labelled {}. Change it?", trial.id, capital_title(label)),
         None => format!("Trial {}: which object?", trial.id),
     };
     ui.label(RichText::new(question).heading().strong());
@@ -314,7 +314,7 @@ fn object_row(
     remark: &str,
 ) -> egui::Response {
     let colours = theme::of(ui).colours();
-    let title = format!("{}{remark}", object_title(name));
+    let title = format!("{}{remark}", capital_title(name));
     let (rect, response) = selectable_row(ui, 23.0, chosen, &format!("Label {title}"));
     let builder =
         egui::UiBuilder::new().max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(Layout::left_to_right(Align::Center));

@@ -4,8 +4,8 @@ use crate::app::actions::Actions;
 use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::{number_field, put_line, text_field};
 use egui::{Align, DragValue, Layout, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
-use palpate_lab::workers::{LabelCommand, LabelView};
-use palpate_sim::objects::{class_of, object_title};
+use palpate_lab::workers::{LabelCommand, LabelView, NUMBERED_OBJECTS, ObjectSearch, search_objects};
+use palpate_sim::objects::{EMPTY, capital_title, catalogue, class_of};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).
@@ -21,10 +21,11 @@ pub(super) fn ui(ui: &mut Ui, labels: Option<&LabelView>, actions: &mut Actions)
         ui.label(RichText::new(format!("{done} of {wanted} trials")).strong());
         if let Some(next) = &view.next {
             let order = "One of the objects with the smallest share done, and not the same twice in a row";
-            ui.weak(format!("next: {}", object_title(&next.object))).on_hover_text(order);
+            ui.weak(format!("next: {}", capital_title(&next.object))).on_hover_text(order);
         }
     });
     clear_ui(ui, view, actions);
+    matches_ui(ui, view, actions);
     let next = view.next.as_ref().map(|next| next.object.as_str());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
@@ -64,22 +65,65 @@ fn clear_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
             if clear.on_hover_text("Remove all objects, for a plan of your own").clicked() {
                 ui.data_mut(|data| data.insert_temp(id, true));
             }
-            add_ui(ui, actions);
+            add_ui(ui, view, actions);
         });
     });
 }
 
 /// Field that adds an object.
-fn add_ui(ui: &mut Ui, actions: &mut Actions) {
-    let id = egui::Id::unique("plan addition");
+fn add_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
+    let id = addition_id();
     let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object …").char_limit(80));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
+    // Part of a name is no new object: which one is meant is chosen below.
+    let found = matches(view, &name);
+    let meant = found.sure.and_then(|place| found.names.get(place).cloned());
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
-        let added = std::mem::take(&mut name);
-        actions.push(move |app| app.edit_labels(LabelCommand::Want(class_of(&added).to_owned(), WANTED)));
+        match meant {
+            Some(object) => {
+                name.clear();
+                actions.push(move |app| app.edit_labels(LabelCommand::Want(object, WANTED)));
+            }
+            None => response.request_focus(),
+        }
     }
     ui.data_mut(|data| data.insert_temp(id, name));
+}
+
+fn addition_id() -> egui::Id {
+    egui::Id::unique("plan addition")
+}
+
+/// Objects that a text may mean, and the text as a new one.
+fn matches(view: &LabelView, text: &str) -> ObjectSearch {
+    let planned = view.progress.objects.iter().map(|object| object.name.clone());
+    let mut known: Vec<String> = catalogue().iter().map(|built_in| built_in.name.clone()).collect();
+    known.push(EMPTY.to_owned());
+    known.extend(planned.filter(|name| class_of(name) == name));
+    known.sort();
+    known.dedup();
+    search_objects(known, text, None)
+}
+
+/// What the text in the field may mean, to choose from.
+fn matches_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
+    let name = ui.data(|data| data.get_temp::<String>(addition_id())).unwrap_or_default();
+    if name.trim().is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        let is_known = |name: &str| class_of(name) != name || catalogue().iter().any(|b| b.name == name);
+        let planned = |name: &str| view.progress.objects.iter().any(|object| object.name == name);
+        for object in matches(view, &name).names.into_iter().take(NUMBERED_OBJECTS) {
+            let new = !is_known(&object) && !planned(&object) && object != EMPTY;
+            let text = format!("{}{}", capital_title(&object), if new { " (new)" } else { "" });
+            if ui.small_button(text).clicked() {
+                ui.data_mut(|data| data.remove::<String>(addition_id()));
+                actions.push(move |app| app.edit_labels(LabelCommand::Want(object, WANTED)));
+            }
+        }
+    });
 }
 
 /// Name, progress, and trials wanted; returns its place.
@@ -90,7 +134,7 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
         let size = vec2((ui.available_width() - 84.0).max(60.0), 22.0);
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
         let flags = if *flagged > 0 { format!(", {flagged} flagged") } else { String::new() };
-        let spoken = format!("{}: {done} of {wanted}{flags}", object_title(name));
+        let spoken = format!("{}: {done} of {wanted}{flags}", capital_title(name));
         response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, next, &spoken));
         let painter = ui.painter_at(rect);
         let lit = if response.hovered() || response.has_focus() { 0.12 } else { 0.0 };
@@ -115,7 +159,7 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
         let count = rect.right_center() - vec2(6.0, 0.0);
         let count = painter.text(count, egui::Align2::RIGHT_CENTER, done.to_string(), font, ink);
         let room = rect.with_min_x(rect.left() + 6.0).with_max_x(count.left() - 6.0);
-        put_line(ui, room, egui::Align2::LEFT_CENTER, &object_title(name), 12.5, ink);
+        put_line(ui, room, egui::Align2::LEFT_CENTER, &capital_title(name), 12.5, ink);
         let mut new = *wanted;
         let drag = DragValue::new(&mut new).range(0..=MOST_WANTED).speed(0.2);
         let sized = |ui: &mut Ui| ui.add_sized([40.0, 22.0], drag);
@@ -127,7 +171,7 @@ fn row_ui(ui: &mut Ui, object: &ObjectProgress, next: bool, actions: &mut Action
         }
         let remove = ui.add_enabled(*wanted > 0, egui::Button::new("–").small());
         remove.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {} from the plan", object_title(name)))
+            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Remove {} from the plan", capital_title(name)))
         });
         if remove.on_hover_text("Remove it from the plan; its trials stay").clicked() {
             let name = name.clone();

@@ -7,7 +7,7 @@ use crate::app::widgets::{LEAST_COUNTS, put_line, selectable_row, sparkline};
 use egui::{Align2, Rect, RichText, ScrollArea, Ui, pos2, vec2};
 use palpate_geometry::units::percent;
 use palpate_lab::workers::{LabelCommand, LabelView, LabellingAction, TrialFilter};
-use palpate_sim::objects::object_title;
+use palpate_sim::objects::capital_title;
 use palpate_store::labels::{LabelledTrial, TrialEdit};
 use palpate_tactile::trial::TrialId;
 
@@ -78,7 +78,7 @@ fn row_ui(
     actions: &mut Actions,
 ) {
     let (id, colours) = (trial.id, theme::of(ui).colours());
-    let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), object_title);
+    let name = trial.object.as_deref().map_or_else(|| "unlabelled".to_owned(), capital_title);
     let height = ROW - ui.spacing().item_spacing.y;
     let (rect, response) = selectable_row(ui, height, current, &format!("Trial {}, {name}", trial.id));
     let picture = Rect::from_min_size(rect.min + vec2(4.0, 4.0), vec2(PICTURE, rect.height() - 8.0));
@@ -92,7 +92,7 @@ fn row_ui(
     put_line(ui, words, Align2::LEFT_TOP, &title, 13.0, colour(ink));
     let blind = labelling.blind && trial.object.is_none();
     let kept = trial.guess.as_ref().filter(|guess| trial.reviewed && trial.object.as_ref() != Some(&guess.class));
-    let kept = kept.map(|guess| format!("model: {} {}, label kept", object_title(&guess.class), percent(guess.p)));
+    let kept = kept.map(|guess| format!("model: {} {}, label kept", capital_title(&guess.class), percent(guess.p)));
     let (below, ink) = match (trial.discarded, trial.flags.first(), disagrees.filter(|_| !blind)) {
         (true, ..) => ("discarded".to_owned(), colours.error),
         (_, Some(_), _) => {
@@ -100,7 +100,7 @@ fn row_ui(
             (labels.join(", "), colours.warning)
         }
         (_, None, Some(found)) => {
-            (format!("model: {} {}", object_title(&found.guess), percent(found.p)), colours.warning)
+            (format!("model: {} {}", capital_title(&found.guess), percent(found.p)), colours.warning)
         }
         (_, None, None) if !trial.complete => ("recording …".to_owned(), colours.quiet_text),
         (_, None, None) => {

@@ -273,10 +273,12 @@ fn on_fingers(gripper: &GripperModel, world_from_gripper: &Pose, frame: &Frame) 
         if weight < FAINTEST || across.length() < FAINTEST {
             continue;
         }
-        let from = world_from_gripper.point(moment / weight + across.normalize() * clear);
+        let out = across.normalize();
+        let from = world_from_gripper.point(moment / weight + out * clear);
         let shear = Some(shear).filter(|force| force.length() >= FAINTEST);
         let shear = shear.map(|force| world_from_gripper.direction(force));
-        all.push(Forces { side, from, normal: world_from_gripper.direction(across), shear });
+        // As much as the sensors of the pad read together.
+        all.push(Forces { side, from, normal: world_from_gripper.direction(out * weight), shear });
     }
     all
 }

@@ -82,7 +82,7 @@ pub use messages::{
     Checking, Command, FinishedGrasp, GhostGrasp, MeasuredAccuracy, Notice, ObjectCard, Refusal, SimWorkerSetup,
     Snapshot, Status, TraceRow, Wake,
 };
-pub use object_search::{LISTED_OBJECTS, NUMBERED_OBJECTS};
+pub use object_search::{LISTED_OBJECTS, NUMBERED_OBJECTS, ObjectSearch, search_objects};
 pub use open_trial::{OpenRequest, open_trial_job};
 pub use portraits::{PORTRAIT_SIDE, portrait_job};
 pub use sim::SimWorker;

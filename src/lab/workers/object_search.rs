@@ -10,11 +10,11 @@ pub const LISTED_OBJECTS: usize = 2 * NUMBERED_OBJECTS;
 
 /// Objects that fit a text, best first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct ObjectSearch {
+pub struct ObjectSearch {
     /// Names. A text that is no object's name is the last of those with a number key, as a new name.
-    pub(super) names: Vec<String>,
+    pub names: Vec<String>,
     /// Place of the object that the text means; none if it fits several.
-    pub(super) sure: Option<usize>,
+    pub sure: Option<usize>,
 }
 
 /// How a text fits an object, best first.
@@ -43,7 +43,7 @@ fn fit(name: &str, wanted: &str) -> Option<Fit> {
 }
 
 /// Searches `known` names; without a text all fit, and the likely one is meant, which is listed in any case.
-pub(super) fn search_objects(mut known: Vec<String>, text: &str, likely: Option<&str>) -> ObjectSearch {
+pub fn search_objects(mut known: Vec<String>, text: &str, likely: Option<&str>) -> ObjectSearch {
     let text = text.trim();
     if text.is_empty() {
         let mut sure = known.iter().position(|name| Some(name.as_str()) == likely);
