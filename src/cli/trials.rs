@@ -281,15 +281,9 @@ impl Report for ListReport {
         }
         let row = |row: &TrialRow| {
             let [id, samples, seed] = [row.id.to_string(), row.samples.to_string(), row.seed.to_string()];
-            [
-                id,
-                capital(&shown_title(&row.object)),
-                date(&row.created),
-                row.gripper().to_owned(),
-                samples,
-                seed,
-                remark(row),
-            ]
+            let title = shown_title(&row.object);
+            let title = if row.object.is_empty() { title } else { capital(&title) };
+            [id, title, date(&row.created), row.gripper().to_owned(), samples, seed, remark(row)]
         };
         let header = ["id", "object", "recorded (UTC)", "gripper", "samples", "seed", ""];
         page.table(&header, self.rows.iter().map(row));
