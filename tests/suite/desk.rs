@@ -168,7 +168,7 @@ fn an_afternoon_by_keys_alone() {
     desk.press(Key::Enter);
     desk.until_labelled(&[(1, Some("garlic"), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);
     // The strip tells the label given last, of whichever trial.
-    desk.until_shown(true, "trial 1: garlic. The model predicts Lemon");
+    desk.until_shown(true, "trial 1: Garlic. The model predicts Lemon");
     // Taken back, and made again.
     desk.press_with(Modifiers::COMMAND, Key::Z);
     desk.until_labelled(&[(1, Some(&next), false), (2, None, true), (3, Some("button"), false), (4, None, true)]);

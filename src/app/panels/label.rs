@@ -209,8 +209,11 @@ fn question_ui(
     }
     search_ui(ui, labelling, actions);
     ui.horizontal_wrapped(|ui| {
-        let button = Button::new("Label  N, Enter").fill(accented(theme::of(ui)));
-        let shown = ui.add_enabled(draft.label(view).is_some(), button).on_disabled_hover_text("No object is chosen");
+        // The list may be lower than the chosen row.
+        let label = draft.label(view);
+        let text = label.as_deref().map_or("Label".to_owned(), |name| format!("Label {}", capital_title(name)));
+        let button = Button::new(format!("{text}  N, Enter")).fill(accented(theme::of(ui)));
+        let shown = ui.add_enabled(label.is_some(), button).on_disabled_hover_text("No object is chosen");
         actions.on(&shown, |app| app.label(LabellingAction::GiveLabel));
         record_ui(
             ui,

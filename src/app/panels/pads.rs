@@ -6,6 +6,8 @@ use crate::app::shown::DisplayedData;
 use crate::app::shown_grasp::{ShownGrasp, shown_pads};
 use crate::app::theme::colour;
 use egui::{Align2, Color32, FontId, Pos2, Rect, RichText, Sense, Ui, vec2};
+use palpate_geometry::units::shown as shown_in;
+use palpate_lab::picture::LoadUnit;
 
 /// Width of a panel over its height from which on the pads lie beside each other.
 const ABREAST: f32 = 1.8;
@@ -45,7 +47,12 @@ pub(super) fn ui(ui: &mut Ui, data: &DisplayedData<'_>, actions: &mut Actions) {
         let corner = rect.min + (size + vec2(BETWEEN, TEXTS)) * at + vec2(0.5 * BETWEEN, 15.0);
         let place = Rect::from_min_size(corner, size);
         say(place.left_top() - vec2(0.0, 2.0), Align2::LEFT_BOTTOM, title.clone(), ink);
-        let texts = std::iter::once(pad.force_text()).chain(pad.peak_text()).collect::<Vec<_>>().join(", ");
+        let most = shown.maps[side].values.iter().copied().filter(|load| load.is_finite()).reduce(f32::max);
+        let peak = match unit {
+            LoadUnit::Pressure => pad.peak_text(),
+            LoadUnit::Force => most.map(|most| format!("peak {}", shown_in(f64::from(most), "N"))),
+        };
+        let texts = std::iter::once(pad.force_text()).chain(peak).collect::<Vec<_>>().join(", ");
         say(place.right_top() - vec2(0.0, 2.0), Align2::RIGHT_BOTTOM, texts, ink);
         pad_ui(ui, theme, place, &shown, side, &pad.about(title));
         let begin = match map.x.is_cut() && size.x > WORDY {

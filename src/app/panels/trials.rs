@@ -36,6 +36,7 @@ pub(super) fn ui(ui: &mut Ui, labelling: &LabellingFeature, actions: &mut Action
     let listed = draft.filter.of(view);
     if listed.is_empty() {
         let text = match draft.filter {
+            TrialFilter::Kept if !view.trials.is_empty() => "All trials are discarded.",
             TrialFilter::Kept => "No trials of the real gripper yet: with it connected, R records one.",
             TrialFilter::Disagreeing => "No label is to be reviewed.",
             TrialFilter::Unlabelled | TrialFilter::Flagged | TrialFilter::Discarded => "None.",

@@ -135,21 +135,28 @@ const LEAST_REST: usize = 5;
 const DEVIATIONS: f64 = 6.0;
 const LEAST_SHARE: f64 = 0.02;
 
-/// First time at which a load rises above its rest before the closing (s): rest and noise are measured before `closing_s`.
-/// NaN where nothing was read. Loads are those of one pad, in any unit.
+/// Time before the closing in which a hand that has opened first is at rest (s), and how much quieter it is then.
+const LATE_REST_S: f64 = 0.5;
+const QUIETER: f64 = 3.0;
+
+/// First time at which a load rises above its rest before the closing (s): rest and noise are measured before `closing_s`, or
+/// just before it where the hand still opened at the beginning. NaN where nothing was read. Loads are those of one pad, in any
+/// unit.
 pub(crate) fn onset(t_s: &[f64], loads: &[f32], closing_s: f64, least: f64) -> Option<f64> {
-    let rest: Vec<f64> = t_s
-        .iter()
-        .zip(loads)
-        .filter(|(t, load)| **t < closing_s && load.is_finite())
-        .map(|(_, load)| f64::from(*load))
-        .collect();
-    let (middle, noise) = if rest.len() < LEAST_REST {
-        (loads.iter().copied().find(|load| load.is_finite()).map_or(0.0, f64::from), 0.0)
-    } else {
+    let rest_from = |from_s: f64| {
+        let is_rest = |(t, load): &(&f64, &f32)| (from_s..closing_s).contains(*t) && load.is_finite();
+        let rest: Vec<f64> = t_s.iter().zip(loads).filter(is_rest).map(|(_, load)| f64::from(*load)).collect();
+        if rest.len() < LEAST_REST {
+            return None;
+        }
         let mean = rest.iter().sum::<f64>() / rest.len() as f64;
         let square = rest.iter().map(|load| (load - mean).powi(2)).sum::<f64>() / (rest.len() - 1) as f64;
-        (mean, square.sqrt())
+        Some((mean, square.sqrt()))
+    };
+    let late = rest_from(closing_s - LATE_REST_S);
+    let (middle, noise) = match rest_from(f64::NEG_INFINITY) {
+        Some(whole) => late.filter(|late| whole.1 > QUIETER * late.1).unwrap_or(whole),
+        None => (loads.iter().copied().find(|load| load.is_finite()).map_or(0.0, f64::from), 0.0),
     };
     let top = loads.iter().copied().filter(|load| load.is_finite()).map(f64::from).fold(middle, f64::max);
     let threshold = middle + (DEVIATIONS * noise).max(LEAST_SHARE * (top - middle)).max(least);
@@ -204,6 +211,11 @@ mod tests {
         // Noise alone is no contact, and neither are readings that are missing.
         let still: Vec<f32> = (0..400).map(|k| (20.0 + noise(k)) as f32).collect();
         assert_eq!(onset(&t, &still, 0.5, 0.0), None);
+        // A hand that opens first, from what it held before.
+        let before: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
+        let opened = before.iter().map(|t| if *t < 0.3 || *t > 2.5 { 900.0 } else { 0.0 });
+        let found = onset(&before, &opened.collect::<Vec<f32>>(), 1.0, 0.0).unwrap();
+        assert!((found - 2.51).abs() < 0.011, "{found}");
         assert_eq!(onset(&t, &[f32::NAN; 400], 0.5, 0.0), None);
         assert_eq!(onset(&[], &[], 0.5, 0.0), None);
     }
