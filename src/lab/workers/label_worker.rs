@@ -128,7 +128,13 @@ impl LabelService {
             LabelCommand::Redo => store.journal().redo().map(|entry| outcome(entry.map(redone), "Nothing to redo")),
             LabelCommand::Want(name, wanted) => change_plan(store, |plan| plan.set(name, *wanted)).map(|()| None),
             LabelCommand::Unplan(name) => change_plan(store, |plan| plan.remove(name)).map(|()| None),
-            LabelCommand::ClearPlan => change_plan(store, |plan| Ok(plan.objects.clear())).map(|()| None),
+            LabelCommand::ClearPlan => {
+                let clear = |plan: &mut LabelPlan| {
+                    plan.objects.clear();
+                    Ok(())
+                };
+                change_plan(store, clear).map(|()| None)
+            }
             LabelCommand::Next(next) => {
                 self.chosen = Some(next.clone());
                 Ok(None)
