@@ -187,15 +187,16 @@ pub(super) fn label(annotator: &mut Annotator<'_>, gripper: &GripperModel, world
         Some((plate, texts, group.len() > 1 || (plate.middle.x - middle) * outward > 0.0))
     };
     // With fewer words sooner than beside the other finger, and sooner both on one plate than that.
-    let tries = |annotator: &Annotator<'_>, group: &[Forces]| {
-        [false, true].into_iter().filter_map(|short| place(annotator, group, short)).collect::<Vec<_>>()
+    let has_own = |group: &[Forces]| {
+        [false, true].into_iter().any(|short| place(annotator, group, short).is_some_and(|(.., is_own)| is_own))
     };
-    let has_own = |group: &[Forces]| tries(annotator, group).iter().any(|(.., is_own)| *is_own);
     let apart = view.size.y >= APART && all.chunks(1).all(has_own);
     for group in all.chunks(if apart { 1 } else { 2 }) {
-        let tried = tries(annotator, group);
-        let own = tried.iter().position(|(.., is_own)| *is_own).unwrap_or(0);
-        let Some((plate, texts, _)) = tried.into_iter().nth(own) else { continue };
+        let placed = match place(annotator, group, false) {
+            Some(placed @ (.., true)) => Some(placed),
+            other => place(annotator, group, true).filter(|(.., is_own)| *is_own).or(other),
+        };
+        let Some((plate, texts, _)) = placed else { continue };
         annotator.add_plate(plate);
         let mut at = plate.middle - plate.half + Vec2::new(7.0, 2.0 + 0.5 * LINE);
         for (text, ink) in texts {
