@@ -14,7 +14,7 @@
 //! | [`palpate-learn`](palpate_learn) | `src/learn` | arrays in, class probabilities (PMF: probability mass function) out: networks, baselines, training, metrics, model files, comparison of methods | | 9735 |
 //! | [`palpate-device`](palpate_device) | `src/device` | bytes in, readings out: serial protocol, ports, doctor, emulator | `geometry` `sim` `tactile` | 5625 |
 //! | [`palpate-store`](palpate_store) | `src/store` | trials, labels and calibrations in SQLite | `geometry` `sim` `tactile` | 4185 |
-//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14427 |
+//! | [`palpate-lab`](palpate_lab) | `src/lab` | grippers behind one interface, grasping, recording, labelling, background threads | `geometry` `sim` `tactile` `learn` `device` `store` | 14434 |
 //! | [`palpate-exchange`](palpate_exchange) | `src/exchange` | trials as files of other programs: CSV, MCAP, NPZ, Parquet, LeRobot, glTF | `geometry` `sim` `tactile` `learn` `store` `lab` | 5573 |
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 13200 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3123 |
