@@ -19,7 +19,7 @@
 //! | [`palpate-study`](palpate_study) | `src/study` | a grid of factors in, tables, figures and claims out: the frame of all studies, the studies, and their background tasks | `geometry` `sim` `tactile` `learn` `device` `store` `lab` | 13200 |
 //! | [`palpate-render`](palpate_render) | `src/render` | a draw list in, pixels out (wgpu; the same in window, test and file); figures with axes | `geometry` | 3123 |
 //! | [`palpate-serve`](palpate_serve) | `src/serve` | requests of other programs in, what the gripper says out: messages, clients, the emulated gripper in place of a port | `sim` `tactile` `device` `store` `lab` | 1083 |
-//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` `serve` | 24640 |
+//! | `palpate` | `src/app` `src/cli` | [`app`]: the window; [`cli`]: all commands | `geometry` `sim` `tactile` `learn` `device` `store` `lab` `exchange` `study` `render` `serve` | 24645 |
 //! | `palpate-workshop` | `src/workshop` | development only: makes shipped models, thumbnails and generated tables | `geometry` `sim` `tactile` `learn` `store` `lab` `study` `render` | 508 |
 //!
 //! # One path for every grasp

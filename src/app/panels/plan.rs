@@ -5,8 +5,9 @@ use crate::app::theme::{self, colour, veil};
 use crate::app::widgets::{number_field, put_line, text_field};
 use egui::{Align, DragValue, Layout, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use palpate_lab::workers::{LabelCommand, LabelView, NUMBERED_OBJECTS, ObjectSearch, search_objects};
-use palpate_sim::objects::{EMPTY, capital_title, catalogue, class_of};
+use palpate_sim::objects::{EMPTY, capital_title, catalogue};
 use palpate_store::labels::{MOST_WANTED, ObjectProgress};
+use std::collections::BTreeSet;
 
 /// Trials wanted of an added object (paper, section IV-B: 40 to 55).
 const WANTED: u32 = 50;
@@ -76,11 +77,10 @@ fn add_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
     let mut name = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
     let response = ui.add(text_field(&mut name, id.with("field")).hint_text("add an object …").char_limit(80));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Add an object to the plan"));
-    // Part of a name is no new object: which one is meant is chosen below.
-    let found = matches(view, &name);
-    let meant = found.sure.and_then(|place| found.names.get(place).cloned());
     if response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter)) && !name.trim().is_empty() {
-        match meant {
+        // Part of a name is no new object: which one is meant is chosen below.
+        let ObjectSearch { names, sure } = search_objects(known(view), &name, None);
+        match sure.and_then(|place| names.into_iter().nth(place)) {
             Some(object) => {
                 name.clear();
                 actions.push(move |app| app.edit_labels(LabelCommand::Want(object, WANTED)));
@@ -95,15 +95,11 @@ fn addition_id() -> egui::Id {
     egui::Id::unique("plan addition")
 }
 
-/// Objects that a text may mean, and the text as a new one.
-fn matches(view: &LabelView, text: &str) -> ObjectSearch {
+/// Objects that have a name already.
+fn known(view: &LabelView) -> Vec<String> {
+    let built_in = catalogue().iter().map(|built_in| built_in.name.clone()).chain([EMPTY.to_owned()]);
     let planned = view.progress.objects.iter().map(|object| object.name.clone());
-    let mut known: Vec<String> = catalogue().iter().map(|built_in| built_in.name.clone()).collect();
-    known.push(EMPTY.to_owned());
-    known.extend(planned.filter(|name| class_of(name) == name));
-    known.sort();
-    known.dedup();
-    search_objects(known, text, None)
+    built_in.chain(planned).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// What the text in the field may mean, to choose from.
@@ -112,11 +108,10 @@ fn matches_ui(ui: &mut Ui, view: &LabelView, actions: &mut Actions) {
     if name.trim().is_empty() {
         return;
     }
+    let known = known(view);
     ui.horizontal_wrapped(|ui| {
-        let is_known = |name: &str| class_of(name) != name || catalogue().iter().any(|b| b.name == name);
-        let planned = |name: &str| view.progress.objects.iter().any(|object| object.name == name);
-        for object in matches(view, &name).names.into_iter().take(NUMBERED_OBJECTS) {
-            let new = !is_known(&object) && !planned(&object) && object != EMPTY;
+        for object in search_objects(known.clone(), &name, None).names.into_iter().take(NUMBERED_OBJECTS) {
+            let new = !known.contains(&object);
             let text = format!("{}{}", capital_title(&object), if new { " (new)" } else { "" });
             if ui.small_button(text).clicked() {
                 ui.data_mut(|data| data.remove::<String>(addition_id()));
